@@ -1,0 +1,232 @@
+"""The message tables (DBC) that ship in `configs/links`: `python -m firmware_sim.wire.tables DIRECTORY` writes them.
+
+Identifiers, N = 1…8 the number of the joint (11-bit, chosen so that sensor nodes stay clear of ODrive nodes 0…47
+and of MIT drive numbers):
+
+| identifier            | message        | from  | what it carries                                                         |
+|-----------------------|----------------|-------|-------------------------------------------------------------------------|
+| 0x600 + 0x10 (N-1)    | JointN_State   | joint | joint position (int32, 1e-6 rad), joint torque (int24, 1e-5 Nm), sequence |
+| 0x601 + 0x10 (N-1)    | JointN_Status  | joint | device time (uint32, us), temperature (int16, 0.01 degC), errors, sequence |
+| 0x400 + 0x10 (N-1)    | DriveN_Command | host  | targets: motor position, velocity, torque                               |
+| 0x401 + 0x10 (N-1)    | DriveN_Control | host  | state request, control mode, kp, kd, torque limit                       |
+| 0x402 + 0x10 (N-1)    | DriveN_State   | drive | motor position, velocity, torque, sequence                              |
+| 0x403 + 0x10 (N-1)    | DriveN_Status  | drive | state, mode, errors, current, temperature, sequence                     |
+| 0x700                 | Sync           | host  | step number; in stepped time every joint on the bus takes one step       |
+
+Intel byte order throughout. JointN_Status goes out with every tenth sample and at once when the error flags change;
+its sequence is that of the JointN_State sent just before, so a sample's device time is known to the microsecond.
+ODrive and MIT tables describe those makers' messages in the same terms.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+JOINTS = 8
+SENSOR_BASE = 0x600
+DRIVE_BASE = 0x400
+STRIDE = 0x10
+SYNC_ID = 0x700
+
+
+class Signal(NamedTuple):
+    """One signal: first bit, length in bits, scale, offset, unit; Intel unless `motorola`, unsigned unless `signed`."""
+
+    name: str
+    start: int
+    length: int
+    scale: float = 1.0
+    unit: str = ""
+    signed: bool = False
+    comment: str = ""
+    values: tuple[tuple[int, str], ...] = ()
+    real: bool = False
+    motorola: bool = False
+    offset: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
+
+
+class Message(NamedTuple):
+    """One message of the table."""
+
+    identifier: int
+    name: str
+    length: int
+    sender: str
+    receiver: str
+    signals: tuple[Signal, ...]
+    comment: str = ""
+
+
+DRIVE_STATES = ((0, "disabled"), (1, "calibrating"), (2, "enabled"), (3, "fault"))
+REQUESTS = (
+    (0, "disable"),
+    (1, "calibrate"),
+    (2, "enable"),
+    (3, "clear_faults"),
+    (4, "set_zero"),
+    (5, "reset"),
+)
+MODES = ((0, "torque"), (1, "velocity"), (2, "position"), (3, "impedance"))
+SENSOR_FLAGS = (
+    "bit 0 joint encoder lost, 1 joint encoder jumped, 2 torque sensor saturated, 3 over temperature, "
+    "4 started afresh since the last status, 5 index not found yet, 6 bus errors seen, 7 internal"
+)
+DRIVE_FLAGS = (
+    "bit 0 command timeout, 1 over torque, 2 over velocity, 3 position limit, 4 motor encoder, 5 index not found, "
+    "6 over temperature, 7 emergency stop, 8 bad frame, 9 started afresh, 10 bus off, 11 not calibrated"
+)
+
+
+def sensor_messages(joint: int) -> tuple[Message, ...]:
+    """Messages of the joint-side sensor node of joint 1…8."""
+    base, node = SENSOR_BASE + STRIDE * (joint - 1), f"SensorNode{joint}"
+    state = (
+        Signal("joint_position_rad", 0, 32, 1e-6, "rad", True, "joint (output pulley) angle"),
+        Signal("joint_torque_Nm", 32, 24, 1e-5, "Nm", True, "external moment on the output pulley"),
+        Signal("sequence", 56, 8, comment="one more with every sample, wraps at 256"),
+    )
+    status = (
+        Signal(
+            "device_time_us",
+            0,
+            32,
+            1.0,
+            "us",
+            comment="node's clock at the sample named by sequence; wraps at 2^32",
+        ),
+        Signal("temperature_degC", 32, 16, 0.01, "degC", True, "at the joint"),
+        Signal("error_flags", 48, 8, comment=SENSOR_FLAGS),
+        Signal("sequence", 56, 8, comment="sequence of the JointN_State sent just before"),
+    )
+    return (
+        Message(base, f"Joint{joint}_State", 8, node, "Host", state, "every sample of the sensor node"),
+        Message(
+            base + 1,
+            f"Joint{joint}_Status",
+            8,
+            node,
+            "Host",
+            status,
+            "every tenth sample, and when error_flags change",
+        ),
+    )
+
+
+def drive_messages(joint: int) -> tuple[Message, ...]:
+    """Messages of a drive of joint 1…8 that is described by this table alone."""
+    base, node = DRIVE_BASE + STRIDE * (joint - 1), f"Drive{joint}"
+    command = (
+        Signal("motor_position_target_rad", 0, 32, 1e-6, "rad", True),
+        Signal("motor_velocity_target_rad_s", 32, 16, 2e-3, "rad/s", True),
+        Signal(
+            "motor_torque_target_Nm",
+            48,
+            16,
+            1e-3,
+            "Nm",
+            True,
+            "torque, or feed-forward torque in the other modes",
+        ),
+    )
+    control = (
+        Signal("request", 0, 8, values=REQUESTS),
+        Signal("control_mode", 8, 8, values=MODES),
+        Signal("kp_Nm_per_rad", 16, 16, 0.05, "Nm/rad"),
+        Signal("kd_Nms_per_rad", 32, 16, 1e-3, "Nms/rad"),
+        Signal("torque_limit_Nm", 48, 16, 1e-3, "Nm", comment="0 leaves the drive's own limit as it is"),
+    )
+    state = (
+        Signal("motor_position_rad", 0, 28, 1e-6, "rad", True, "motor (input pulley) angle"),
+        Signal("motor_velocity_rad_s", 28, 12, 0.025, "rad/s", True),
+        Signal(
+            "motor_torque_Nm", 40, 16, 1e-3, "Nm", True, "torque that the motor applies to the input pulley"
+        ),
+        Signal("sequence", 56, 8, comment="one more with every state, wraps at 256"),
+    )
+    status = (
+        Signal("drive_state", 0, 4, values=DRIVE_STATES),
+        Signal("control_mode", 4, 4, values=MODES),
+        Signal("error_flags", 8, 16, comment=DRIVE_FLAGS),
+        Signal("motor_current_A", 24, 16, 0.01, "A", True),
+        Signal("temperature_degC", 40, 16, 0.01, "degC", True, "of the drive"),
+        Signal("sequence", 56, 8, comment="sequence of the DriveN_State sent just before"),
+    )
+    return (
+        Message(base, f"Drive{joint}_Command", 8, "Host", node, command, "answered by a DriveN_State"),
+        Message(base + 1, f"Drive{joint}_Control", 8, "Host", node, control, "answered by a DriveN_Status"),
+        Message(base + 2, f"Drive{joint}_State", 8, node, "Host", state, "one for each command"),
+        Message(
+            base + 3, f"Drive{joint}_Status", 8, node, "Host", status, "every tenth state, and on change"
+        ),
+    )
+
+
+SYNC = Message(
+    SYNC_ID,
+    "Sync",
+    4,
+    "Host",
+    "Vector__XXX",
+    (Signal("step", 0, 32, comment="number of the step, wraps at 2^32"),),
+    "in stepped time every joint on the bus takes one step",
+)
+
+
+def joint_table() -> tuple[Message, ...]:
+    """Sensor nodes 1…8, drives 1…8 and Sync: `cablecomp_joint.dbc`."""
+    joints = range(1, JOINTS + 1)
+    return (*(m for j in joints for m in (*sensor_messages(j), *drive_messages(j))), SYNC)
+
+
+def render(messages: tuple[Message, ...], comment: str) -> str:
+    """DBC text of a table (Vector's format, as cantools reads it)."""
+    nodes = sorted({n for m in messages for n in (m.sender, m.receiver)} - {"Vector__XXX"})
+    blocks = [_message(m) for m in messages]
+    notes = [f'CM_ "{comment}";']
+    values: list[str] = []
+    reals: list[str] = []
+    for m in messages:
+        if m.comment:
+            notes.append(f'CM_ BO_ {m.identifier} "{m.comment}";')
+        for s in m.signals:
+            if s.comment:
+                notes.append(f'CM_ SG_ {m.identifier} {s.name} "{s.comment}";')
+            if s.values:
+                pairs = " ".join(f'{k} "{v}"' for k, v in s.values)
+                values.append(f"VAL_ {m.identifier} {s.name} {pairs} ;")
+            if s.real:
+                reals.append(f"SIG_VALTYPE_ {m.identifier} {s.name} : 1;")
+    head = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: ' + " ".join(nodes)
+    parts = ["\n\n".join([head, *blocks]), "\n".join(notes), "\n".join(values), "\n".join(reals)]
+    return "\n\n".join(p for p in parts if p) + "\n"
+
+
+def _message(message: Message) -> str:
+    lines = [f"BO_ {message.identifier} {message.name}: {message.length} {message.sender}"]
+    for s in message.signals:
+        order, sign = (0 if s.motorola else 1), ("-" if s.signed else "+")
+        lines.append(
+            f" SG_ {s.name} : {s.start}|{s.length}@{order}{sign} ({s.scale:.12g},{s.offset:.12g}) "
+            f'[{s.low:.12g}|{s.high:.12g}] "{s.unit}" {message.receiver}'
+        )
+    return "\n".join(lines)
+
+
+def tables() -> dict[str, str]:
+    """File name -> text of every table that ships."""
+    note = "Sensor node and drive of a cable-driven joint, joints 1 to 8; SI units, named in each signal."
+    return {"cablecomp_joint.dbc": render(joint_table(), note)}
+
+
+def write_tables(directory: Path) -> None:
+    """Write every table into `directory`."""
+    for name, text in tables().items():
+        (directory / name).write_text(text, encoding="ascii")
+
+
+if __name__ == "__main__":
+    write_tables(Path(sys.argv[1]))
