@@ -1,0 +1,85 @@
+"""One look for every figure and page: colours by meaning, fonts, axes that carry their unit."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import plotly.graph_objects as go
+
+FONT: Final = "Inter, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+MONO: Final = "'JetBrains Mono', 'SF Mono', Consolas, 'Liberation Mono', monospace"
+INK: Final = "#1f2a37"
+MUTED: Final = "#64748b"
+RULE: Final = "#e2e8f0"
+PAPER: Final = "#ffffff"
+
+MEASURED: Final = "#334155"
+PREDICTED: Final = "#0f6fc6"
+BOUNDS: Final = "rgba(15, 111, 198, 0.16)"
+RESIDUAL: Final = "#c2410c"
+BASELINE: Final = "#9aa5b1"
+LOAD: Final = "#6b4fbb"
+CABLE_H: Final = "#c8102e"
+CABLE_L: Final = "#0b8a6f"
+
+SERIES: Final = ("#0f6fc6", "#c2410c", "#0b8a6f", "#6b4fbb", "#b7791f", "#c8102e", "#0891b2", "#64748b")
+"""Colours for curves without a meaning of their own, told apart by colour-blind readers as well."""
+
+SEQUENCE: Final = "Viridis"
+"""Colour scale for an ordered quantity (time, load level)."""
+
+
+def translucent(colour: str, alpha: float) -> str:
+    """Return `#rrggbb` as `rgba(r, g, b, alpha)`; `alpha` between 0 and 1."""
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red}, {green}, {blue}, {alpha:g})"
+
+
+def label(quantity: str, unit: str) -> str:
+    """Return an axis title such as `deflection / mrad`; an empty unit gives the quantity alone."""
+    return f"{quantity} / {unit}" if unit else quantity
+
+
+def template() -> Any:
+    """Return the plotly template that every figure uses."""
+    axis = {
+        "showline": True,
+        "linecolor": MUTED,
+        "linewidth": 1,
+        "gridcolor": RULE,
+        "zeroline": True,
+        "zerolinecolor": "#cbd5e1",
+        "zerolinewidth": 1,
+        "ticks": "outside",
+        "tickcolor": MUTED,
+        "ticklen": 4,
+        "title": {"font": {"size": 14, "color": INK}, "standoff": 8},
+        "tickfont": {"size": 12, "color": MUTED},
+        "automargin": True,
+    }
+    return go.layout.Template(
+        layout={
+            "font": {"family": FONT, "size": 13, "color": INK},
+            "colorway": list(SERIES),
+            "paper_bgcolor": PAPER,
+            "plot_bgcolor": PAPER,
+            "xaxis": axis,
+            "yaxis": axis,
+            "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
+            "margin": {"l": 64, "r": 24, "t": 40, "b": 52},
+            "hovermode": "closest",
+            "hoverlabel": {"font": {"family": FONT, "size": 12}},
+        }
+    )
+
+
+def figure(height: int = 380, **layout: Any) -> Any:
+    """Return an empty plotly figure in the common look; `height` in pixels, `layout` as plotly takes it."""
+    return go.Figure(layout={"template": template(), "height": height, **layout})
+
+
+def axes(fig: Any, x: str, y: str, **where: Any) -> Any:
+    """Title the axes of `fig` (see `label`) and return it; `where` may be `row=`, `col=` of a subplot."""
+    fig.update_xaxes(title_text=x, **where)
+    fig.update_yaxes(title_text=y, **where)
+    return fig
