@@ -1,0 +1,125 @@
+"""One cable of a stage: output drum, free span (with a guide, if any), input drum; stretch as a function of its tension."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.guide import guide_commit, guide_split
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.profile import ROWS, B, Floats, wrap_commit, wrap_eval
+from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
+from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
+
+Ints: TypeAlias = NDArray[np.int64]
+OUT, IN = 0, 1
+
+
+@njit
+def stacks(I: Ints, S: Floats) -> Floats:
+    """The profiles of all wraps as an array [wrap, row, point]; wrap 2c is cable c's output drum, 2c + 1 its input drum."""
+    wraps = 2 * I[o.N_CABLES]
+    first = I[o.S_PROFILE]
+    size = wraps * ROWS * I[o.CAPACITY]
+    return S[first : first + size].reshape((wraps, ROWS, I[o.CAPACITY]))
+
+
+@njit
+def law_of(P: Floats, p: int, end: int) -> int:
+    """Which law table a wrap uses: 0, 1 = output drum of chain h, l; 2 = everything else."""
+    if end == 1:
+        return 2
+    return 0 if P[p + o.SIGN] > 0.0 else 1
+
+
+@njit
+def drum_eval(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, end: int, tau: float, v: float, w: float
+) -> tuple[float, float]:
+    """Integral of strain * EA/T0 over one drum's wrap at end value v, and its derivative by v; kept as pending."""
+    p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
+    wrap = 2 * c + end
+    mu = P[p + o.MU_OUT + end]
+    m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+    S[m + o.M_W], S[m + o.M_END] = w, v
+    if P[p + o.VISCOUS] > 0.0:
+        return viscous_eval(P, I, S, c, end, w, tau, mu)
+    total, slope, k, ym, vm, cm, bm = wrap_eval(G, L, law_of(P, p, end), wrap, J[wrap], w, v, mu)
+    S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = total, k, ym, vm
+    S[m + o.M_C], S[m + o.M_B] = cm, bm
+    return total, slope
+
+
+@njit
+def cable_eval(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, tension: float, x_in: float, x_out: float
+) -> tuple[float, float]:
+    """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and its derivative [m/N].
+
+    With a guide in the path the input-side tension follows from the guide's friction and the material passed over it.
+    """
+    p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
+    q = I[o.S_CABLE] + o.CABLE_STATE * c
+    t0 = P[p + o.T0] * S[q + o.Q_T0] * S[q + o.Q_EA]
+    tau = tension / t0
+    v = v_of_tau(L, 2, tau)
+    w_out = P[p + o.W_OUT] + P[p + o.SIGN] * x_out
+    w_in = P[p + o.W_IN] - P[p + o.SIGN] * x_in
+    e_out, a_out = drum_eval(P, I, S, J, L, G, c, 0, tau, v, w_out)
+    S[q + o.Q_TENSION] = tension
+    dv = dv_dtau(L, 2, tau, v)
+    e_in, a_in = drum_eval(P, I, S, J, L, G, c, 1, tau, v, w_in)
+    e_span, a_span = strain_of_tau(L, 2, tau)
+    length = P[p + o.LENGTH]
+    total = P[p + o.R_OUT] * e_out + P[p + o.R_IN] * e_in + length * e_span
+    slope = (P[p + o.R_OUT] * a_out + P[p + o.R_IN] * a_in) * dv + length * a_span
+    if P[p + o.PLAY_YIELD] > 0.0:
+        play, d_play = span_play(P[p + o.PLAY_YIELD], S[q + o.Q_PLAY], tension - t0)
+        S[q + o.Q_PLAY_TRY] = play
+        total += length * P[p + o.PLAY_SHARE] * play / t0
+        slope += length * P[p + o.PLAY_SHARE] * d_play
+    unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA]
+    S[q + o.Q_TENSION_IN] = tension
+    S[q + o.Q_STRETCH] = total * unit
+    S[q + o.Q_COMPLIANCE] = slope * unit / t0
+    return total * unit, slope * unit / t0
+
+
+@njit
+def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
+    """Play operator of the given radius: output follows the input x once it leaves the play; (output, derivative by x)."""
+    if radius <= 0.0:
+        return 0.0, 0.0
+    if x - radius > z:
+        return x - radius, 1.0
+    if x + radius < z:
+        return x + radius, 1.0
+    return z, 0.0
+
+
+@njit
+def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, end_error: float) -> None:
+    """Make the last evaluation of cable c its state; `end_error` bounds the relative error of its tension."""
+    p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
+    q = I[o.S_CABLE] + o.CABLE_STATE * c
+    S[q + o.Q_PLAY] = S[q + o.Q_PLAY_TRY]
+    if P[p + o.GUIDE] > 0.0:
+        guide_commit(P, I, S, J, c)
+    if P[p + o.VISCOUS] > 0.0:
+        viscous_commit(P, I, S, c)
+        return
+    error = 0.0
+    for end in range(2):
+        wrap = 2 * c + end
+        m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+        meet = (
+            S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B]
+        )  # fmt: skip
+        w, v = S[m + o.M_W], S[m + o.M_END]
+        J[wrap] = wrap_commit(G, L, law_of(P, p, end), wrap, J[wrap], meet, w, v, end_error, P[p + o.MERGE])
+        error += P[p + (o.R_OUT if end == 0 else o.R_IN)] * G[wrap, B, J[wrap] - 1]
+    S[q + o.Q_ERROR] = error * P[p + o.T0] / P[p + o.EA]
+

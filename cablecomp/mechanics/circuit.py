@@ -1,0 +1,149 @@
+"""One circuit: a chain of cables (open), or two antagonistic chains (closed), solved for its tensions and its deflection.
+
+Closed: the two chains' stretches cancel, theta_h(T_h) + theta_l(T_l) = 0 (4-1), and T_h - T_l = M/R (4-4); every stretch
+rises with its tension, so one safeguarded Newton iteration on T_l finds both. The wraps turn with the unknown joint
+angle; that coupling is weak (strain, about 1e-3), so the angle is updated in the same iteration.
+"""
+
+from __future__ import annotations
+
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.cable import Ints, cable_commit, cable_eval
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.profile import Floats
+
+
+@njit
+def chain_eval(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
+) -> tuple[float, float]:
+    """Rotation [rad] of the chain's output shaft out of its stretch, and its derivative by the output cable's tension.
+
+    The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their ratios (5-2).
+    """
+    theta = 0.0
+    compliance = 0.0
+    x = x_in
+    for j in range(count):
+        c = first + j
+        p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
+        q = I[o.S_CABLE] + o.CABLE_STATE * c
+        scale = P[p + o.SCALE]
+        shaft = x_out if j == count - 1 else S[q + o.Q_SHAFT]
+        stretch, slope = cable_eval(P, I, S, J, L, G, c, tension * scale, x, shaft)
+        stretch -= S[q + o.Q_OFFSET]
+        theta += P[p + o.WEIGHT] * stretch
+        compliance += P[p + o.WEIGHT] * slope * scale
+        x = P[p + o.RATIO] * x + P[p + o.SIGN] * stretch / P[p + o.R_OUT]
+        S[q + o.Q_SHAFT] = x
+    return theta, compliance
+
+
+@njit
+def circuit_solve(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, ic: int, moment: float, x_in: float, x_guess: float
+) -> tuple[float, float, int]:
+    """Output angle [rad] of circuit `ic` under `moment` [N m] at input angle x_in, its compliance [rad/(N m)], and a status."""
+    h = o.HEADER + o.CIRCUIT * ic
+    j = o.JOINT * ic
+    first_h, count, closed, first_l = I[h], I[h + o.C_COUNT], I[h + o.C_CLOSED], I[h + o.C_FIRST_L]
+    radius = P[j + o.J_RADIUS]
+    rigid = P[j + o.J_RATIO] * x_in
+    floor = P[j + o.J_SLACK]
+    pull = moment / radius
+    x = x_guess
+    if not unwound_ok(P, I, first_h, count, closed, first_l, x_in, x):
+        return x, 0.0, o.STATUS_UNWOUND
+    if closed == 0:
+        q = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
+        tension = S[q + o.Q_REFERENCE] + pull
+        if tension <= floor:
+            return x, 0.0, o.STATUS_SLACK
+        for _ in range(60):
+            theta, slope = chain_eval(P, I, S, J, L, G, first_h, count, tension, x_in, x)
+            new = rigid + theta
+            if abs(new - x) <= 1e-15 + 1e-13 * abs(theta):
+                return new, slope / radius, o.STATUS_OK
+            x = new
+        return x, slope / radius, o.STATUS_DIVERGED
+    ql = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
+    unit = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first_l + count - 1) + o.T0]
+    lowest = floor if pull >= 0.0 else floor - pull
+    low, high = lowest, 1e300
+    tension = max(S[ql + o.Q_KEPT] - S[ql + o.Q_REFERENCE] * pull, lowest)
+    slack = False
+    a_h = a_l = 1.0
+    for iteration in range(80):
+        theta_h, a_h = chain_eval(P, I, S, J, L, G, first_h, count, tension + pull, x_in, x)
+        theta_l, a_l = chain_eval(P, I, S, J, L, G, first_l, count, tension, x_in, x)
+        gap = theta_h + theta_l
+        slack = tension <= lowest and gap >= 0.0
+        new = rigid + theta_h
+        if slack and pull < 0.0:
+            new = rigid - theta_l
+        step = 0.0 if slack else -gap / (a_h + a_l)
+        if abs(step) <= 1e-13 * unit and abs(new - x) <= 1e-11:
+            share = a_h * a_l / (a_h + a_l)
+            if slack:
+                share = a_h if pull >= 0.0 else a_l
+            return new, share / radius, o.STATUS_OK
+        x = new
+        if gap > 0.0:
+            high = tension
+        else:
+            low = tension
+        tension += step
+        if tension < lowest:
+            tension = lowest
+        elif iteration > 12 and abs(step) > 1e-9 * unit and not low < tension < high:
+            tension = 0.5 * (low + high)
+    return x, a_h * a_l / (a_h + a_l) / radius, o.STATUS_DIVERGED
+
+
+@njit
+def unwound_ok(
+    P: Floats, I: Ints, first_h: int, count: int, closed: int, first_l: int, x_in: float, x_out: float
+) -> bool:
+    """True if every drum keeps some cable at these shaft angles (rigid intermediate shafts)."""
+    for chain in range(1 + closed):
+        first = first_h if chain == 0 else first_l
+        x = x_in
+        for j in range(count):
+            p = o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first + j)
+            after = x_out if j == count - 1 else P[p + o.RATIO] * x
+            if P[p + o.W_OUT] + P[p + o.SIGN] * after < 1e-3 or P[p + o.W_IN] - P[p + o.SIGN] * x < 1e-3:
+                return False
+            x = after
+    return True
+
+
+@njit
+def circuit_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, ic: int) -> None:
+    """Make the last solution of circuit `ic` its state, with the error of earlier merging carried into the new end values."""
+    h = o.HEADER + o.CIRCUIT * ic
+    first_h, count, closed, first_l = I[h], I[h + o.C_COUNT], I[h + o.C_CLOSED], I[h + o.C_FIRST_L]
+    last_h = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
+    error_h = error_l = 0.0
+    if closed == 1:
+        last_l = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
+        theta_error = 0.0
+        a_h = a_l = 0.0
+        for jj in range(count):
+            ph = o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first_h + jj)
+            qh = I[o.S_CABLE] + o.CABLE_STATE * (first_h + jj)
+            qc = I[o.S_CABLE] + o.CABLE_STATE * (first_l + jj)
+            theta_error += P[ph + o.WEIGHT] * (S[qh + o.Q_ERROR] + S[qc + o.Q_ERROR])
+            a_h += P[ph + o.WEIGHT] * P[ph + o.SCALE] * S[qh + o.Q_COMPLIANCE]
+            a_l += P[ph + o.WEIGHT] * P[ph + o.SCALE] * S[qc + o.Q_COMPLIANCE]
+        tension_error = theta_error / (a_h + a_l)
+        error_h = tension_error / S[last_h + o.Q_TENSION]
+        error_l = tension_error / S[last_l + o.Q_TENSION]
+        # warm start of the next solution: T_l moves against M by h's share of the compliance
+        share = a_h / (a_h + a_l)
+        pull = S[last_h + o.Q_TENSION] - S[last_l + o.Q_TENSION]
+        S[last_l + o.Q_KEPT] = S[last_l + o.Q_TENSION] + share * pull
+        S[last_l + o.Q_REFERENCE] = share
+        for jj in range(count):
+            cable_commit(P, I, S, J, L, G, first_l + jj, error_l)
+    for jj in range(count):
+        cable_commit(P, I, S, J, L, G, first_h + jj, error_h)

@@ -1,0 +1,166 @@
+"""The whole joint: circuits in series, terms of further physics, one step per sample."""
+
+from __future__ import annotations
+
+import math
+
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.cable import Ints, stacks
+from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.pointer import call_term
+from cablecomp.mechanics.profile import Floats
+
+
+@njit
+def run_terms(P: Floats, I: Ints, S: Floats) -> None:
+    """Let every term add its part to the context."""
+    x = I[o.S_CONTEXT]
+    S[x + o.X_MOMENT : x + o.X_LENGTH_L + 1] = 0.0
+    S[x + o.X_PRETENSION_H : x + o.X_STIFFNESS_L + 1] = 1.0
+    S[x + o.X_READING] = 0.0
+    context = S[x : x + o.CONTEXT]
+    for k in range(I[o.N_TERMS]):
+        t = o.HEADER + o.CIRCUIT * I[o.N_CIRCUITS] + o.TERM * k
+        call_term(I[t], context, P[I[t + o.T_PARAMETER] :], S[I[t + o.T_STATE] :])
+
+
+@njit
+def _distribute(I: Ints, S: Floats) -> None:
+    """Hand the terms' factors and lengths to the cables of the output circuit (lengths) and of all circuits (factors)."""
+    x = I[o.S_CONTEXT]
+    last = I[o.N_CIRCUITS] - 1
+    for ic in range(last + 1):
+        h = o.HEADER + o.CIRCUIT * ic
+        count = I[h + o.C_COUNT]
+        for chain in range(1 + I[h + o.C_CLOSED]):
+            first = I[h] if chain == 0 else I[h + o.C_FIRST_L]
+            for j in range(count):
+                q = I[o.S_CABLE] + o.CABLE_STATE * (first + j)
+                S[q + o.Q_T0] = S[x + o.X_PRETENSION_H + chain]
+                S[q + o.Q_EA] = S[x + o.X_STIFFNESS_H + chain]
+                if ic == last and j == count - 1:
+                    S[q + o.Q_OFFSET] = S[x + o.X_LENGTH_H + chain]
+
+
+@njit
+def _solve_all(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, moment: float
+) -> tuple[float, float, int]:
+    """Joint angle and compliance with `moment` on the output pulley, through all circuits from the motor outward."""
+    x_context = I[o.S_CONTEXT]
+    x = S[x_context + o.X_MOTOR]
+    total = 0.0
+    for ic in range(I[o.N_CIRCUITS]):
+        j = o.JOINT * ic
+        h = o.HEADER + o.CIRCUIT * ic
+        q = I[o.S_CABLE] + o.CABLE_STATE * (I[h] + I[h + o.C_COUNT] - 1)
+        guess = S[q + o.Q_SHAFT] if ic < I[o.N_CIRCUITS] - 1 else S[x_context + o.X_JOINT]
+        n = P[j + o.J_MOMENT]
+        x_out, compliance, status = circuit_solve(P, I, S, J, L, G, ic, moment * n, x, guess)
+        if status != o.STATUS_OK:
+            return x_out, total, status
+        total = total * P[j + o.J_RATIO] * P[j + o.J_RATIO] + compliance
+        x = x_out
+    return x, total, o.STATUS_OK
+
+
+@njit
+def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> int:
+    """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved together."""
+    x = I[o.S_CONTEXT]
+    load = S[x + o.X_LOAD]
+    h = o.HEADER + o.CIRCUIT * (I[o.N_CIRCUITS] - 1)
+    qh = I[o.S_CABLE] + o.CABLE_STATE * (I[h] + I[h + o.C_COUNT] - 1)
+    ql = I[o.S_CABLE] + o.CABLE_STATE * (I[h + o.C_FIRST_L] + I[h + o.C_COUNT] - 1)
+    if I[o.N_TERMS] == 0:
+        joint, compliance, status = _solve_all(P, I, S, J, L, G, load)
+    else:
+        moment = load
+        joint = S[x + o.X_JOINT]
+        compliance = 0.0
+        status = o.STATUS_DIVERGED
+        low, high = -1e300, 1e300
+        run_terms(P, I, S)
+        moment = load - S[x + o.X_MOMENT]
+        for _ in range(60):
+            _distribute(I, S)
+            joint, compliance, status = _solve_all(P, I, S, J, L, G, moment)
+            if status != o.STATUS_OK:
+                break
+            moved = abs(joint - S[x + o.X_JOINT])
+            S[x + o.X_JOINT] = joint
+            S[x + o.X_TENSION_H] = S[qh + o.Q_TENSION]
+            S[x + o.X_TENSION_L] = S[ql + o.Q_TENSION] if I[h + o.C_CLOSED] == 1 else math.nan
+            run_terms(P, I, S)
+            excess = moment - (load - S[x + o.X_MOMENT])
+            scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15
+            if abs(excess) <= scale and moved <= 1e-12:
+                break
+            if excess > 0.0:
+                high = min(high, moment)
+            else:
+                low = max(low, moment)
+            moment -= excess / (1.0 + S[x + o.X_MOMENT_SLOPE] * compliance)
+            if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
+                moment = 0.5 * (low + high)
+    S[x + o.X_JOINT] = joint
+    S[x + o.X_TENSION_H] = S[qh + o.Q_TENSION]
+    S[x + o.X_TENSION_L] = S[ql + o.Q_TENSION] if I[h + o.C_CLOSED] == 1 else math.nan
+    return status
+
+
+@njit
+def advance(
+    P: Floats, I: Ints, S: Floats, time: float, motor: float, load: float, temperature: float
+) -> None:
+    """Write one sample's readings into the context."""
+    x = I[o.S_CONTEXT]
+    S[x + o.X_DT] = time - S[x + o.X_TIME]
+    S[x + o.X_TIME] = time
+    S[x + o.X_MOTOR] = motor
+    S[x + o.X_LOAD] = load
+    S[x + o.X_TEMPERATURE] = temperature
+    S[x + o.X_COMMIT] = 0.0
+
+
+@njit
+def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
+    """Make the solved sample the state."""
+    x = I[o.S_CONTEXT]
+    if I[o.N_TERMS] > 0:
+        S[x + o.X_COMMIT] = 1.0
+        run_terms(P, I, S)
+        S[x + o.X_COMMIT] = 0.0
+    for ic in range(I[o.N_CIRCUITS]):
+        circuit_commit(P, I, S, J, L, G, ic)
+    S[x + o.X_MOTOR_OLD] = S[x + o.X_MOTOR]
+    S[x + o.X_LOAD_OLD] = S[x + o.X_LOAD]
+    S[x + o.X_JOINT_OLDER] = S[x + o.X_JOINT_OLD]
+    S[x + o.X_JOINT_OLD] = S[x + o.X_JOINT]
+    S[x + o.X_FIRST] = 0.0
+
+
+@njit
+def joint_run(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, inputs: Floats, outputs: Floats
+) -> tuple[int, int]:
+    """Step through rows of inputs (time, motor angle, load, temperature, others...); outputs: joint angle, reading, T_h, T_l, motor-side tensions.
+
+    Returns (number of rows done, status of the row that stopped it).
+    """
+    x = I[o.S_CONTEXT]
+    G = stacks(I, S)
+    for k in range(inputs.shape[0]):
+        advance(P, I, S, inputs[k, 0], inputs[k, 1], inputs[k, 2], inputs[k, 3])
+        for j in range(inputs.shape[1] - 4):
+            S[x + o.X_OTHER + j] = inputs[k, 4 + j]
+        status = joint_solve(P, I, S, J, L, G)
+        if status != o.STATUS_OK:
+            return k, status
+        joint_commit(P, I, S, J, L, G)
+        outputs[k, 0] = S[x + o.X_JOINT]
+        outputs[k, 1] = S[x + o.X_JOINT] + S[x + o.X_READING]
+        outputs[k, 2] = S[x + o.X_TENSION_H]
+        outputs[k, 3] = S[x + o.X_TENSION_L]
+    return inputs.shape[0], o.STATUS_OK

@@ -1,0 +1,48 @@
+"""Where everything lies in the flat arrays that the compiled kernel works on.
+
+`P` holds parameters (floats), `I` the structure (integers), `S` the whole state (floats), `J` the stack heights
+(integers), `L` the law tables. Flat arrays make a snapshot a copy and a call from Python cheap.
+"""
+
+from __future__ import annotations
+
+# --- structure I: header, then circuits, then terms
+N_CIRCUITS, N_CABLES, CAPACITY, N_TERMS, ITERATES, S_PROFILE, S_CABLE, S_CONTEXT, S_TERM, S_WET, NODES, HEADER = range(12)
+#   one circuit: first cable of chain h, cables in a chain, 1 if closed, first cable of chain l
+C_FIRST_H, C_COUNT, C_CLOSED, C_FIRST_L, CIRCUIT = range(5)
+#   one term: address of its compiled function, offset of its parameters in P, offset of its state in S
+T_ADDRESS, T_PARAMETER, T_STATE, TERM = range(4)
+
+# --- parameters P: circuits, then cables, then term parameters
+#   one circuit: product of r/R, moment factor N_ik, output radius, slack tension
+J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
+#   one cable
+(
+    R_OUT, R_IN, LENGTH, EA, T0, MU_OUT, MU_IN, W_OUT, W_IN, SCALE, WEIGHT, SIGN, RATIO, RADIUS,
+    GUIDE, GUIDE_LENGTH, PLAY_SHARE, PLAY_YIELD, VISCOUS, MERGE, CABLE,
+) = range(21)  # fmt: skip
+
+# --- state S: profiles [2 cables, 5, capacity], cables [.., CABLE_STATE], context, term states
+#   one cable: tension at output and input end, stretch, its derivative, shaft angle at its output, play, play trial,
+#   material passed over the guide and trial, pretension and stiffness factors, length offset, error bound of the stretch
+(
+    Q_TENSION, Q_TENSION_IN, Q_STRETCH, Q_COMPLIANCE, Q_SHAFT, Q_PLAY, Q_PLAY_TRY, Q_PASSED, Q_PASSED_TRY,
+    Q_T0, Q_EA, Q_OFFSET, Q_ERROR, Q_KEPT, Q_REFERENCE, CABLE_STATE,
+) = range(16)  # fmt: skip
+
+#   one wrap's pending step in the context: last point kept, meeting point (y, v, C, B), wrap angle, end value, integral
+M_TOTAL, M_K, M_Y, M_V, M_C, M_B, M_W, M_END, MEET = range(9)
+
+# --- context of the terms: what they may read ...
+(
+    X_TIME, X_DT, X_FIRST, X_COMMIT, X_MOTOR, X_MOTOR_OLD, X_JOINT, X_JOINT_OLD, X_JOINT_OLDER, X_LOAD, X_LOAD_OLD,
+    X_TENSION_H, X_TENSION_L, X_RADIUS, X_TEMPERATURE, X_OTHER,
+) = range(16)  # fmt: skip
+OTHERS = 4
+# ... and what they add to (moments on the output pulley, lengths of cable, factors, the joint encoder's reading)
+(
+    X_MOMENT, X_MOMENT_SLOPE, X_LENGTH_H, X_LENGTH_L, X_PRETENSION_H, X_PRETENSION_L, X_STIFFNESS_H, X_STIFFNESS_L,
+    X_READING, CONTEXT,
+) = range(X_OTHER + OTHERS, X_OTHER + OTHERS + 10)  # fmt: skip
+
+STATUS_OK, STATUS_UNWOUND, STATUS_SLACK, STATUS_DIVERGED, STATUS_OVERLOAD = range(5)

@@ -1,0 +1,238 @@
+"""The general history law of a wrapped cable: the tension profile is the state (sheet, section 1.1).
+
+A wrap is a list of points (y, v) from the termination (y = 0) to the departure point (y = wrap angle), straight in
+between: y [rad] is fixed to the drum, v = ln(T/T0) is the logarithmic tension. Coulomb friction bounds the slope,
+|dv/dy| <= mu (thesis 2-11). One step with new wrap angle w and new end value v_a:
+
+1. rotate: winding on appends cable, unwinding drops it;
+2. clamp into the friction cone of the end:  v(y) <- min(max(v(y), v_a - mu (w - y)), v_a + mu (w - y)).
+
+The clamp touches one contiguous piece at the departure point, so the list works as a stack: exact, amortised O(1).
+Where friction depends on tension or on the place in the groove, the law is the same in the coordinates
+v = int dT/(T m(T)) and sigma = mu int g(y) dy (table mode, see `tables.py`).
+
+Rows of `G[i]`: Y angle, V logarithmic tension, C integral of strain * EA/T0 from the termination, D bound on the error
+of v that merging left in the piece below a point, B integral of D * tau: the bound on the error of C.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.tables import groove, groove_inverse, strain
+
+Floats: TypeAlias = NDArray[np.float64]
+Meet: TypeAlias = tuple[float, float, int, float, float, float, float]
+
+Y, V, C, D, B = 0, 1, 2, 3, 4
+ROWS = 5
+
+# 8-point Gauss-Legendre on [0, 1]
+_x, _w = np.polynomial.legendre.leggauss(8)
+GAUSS_X = (_x + 1.0) / 2.0
+GAUSS_W = _w / 2.0
+
+
+@njit
+def stretch(d: float) -> float:
+    """(1 - exp(-d))/d, the mean of exp(s - d) over s in 0..d; series near zero."""
+    if abs(d) < 1e-4:
+        return 1.0 - d / 2.0 + d * d / 6.0 - d * d * d / 24.0
+    return -math.expm1(-d) / d
+
+
+@njit
+def piece(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
+    """Integral of e(v) over y1..y2 and of de/dv: e = strain * EA/T0 = tau - 1 for the plain cable."""
+    dy = y2 - y1
+    if L[0, 0, 0] == 0.0:
+        grown = dy * math.exp(v2) * stretch(v2 - v1)
+        return grown - dy, grown
+    total = 0.0
+    slope = 0.0
+    s1 = groove(L, law, y1)
+    span = groove(L, law, y2) - s1
+    for j in range(8):
+        y = y1 + dy * GAUSS_X[j]
+        share = (groove(L, law, y) - s1) / span if span > 0.0 else 0.0
+        e, de = strain(L, law, v1 + (v2 - v1) * share)
+        total += GAUSS_W[j] * e
+        slope += GAUSS_W[j] * de
+    return total * dy, slope * dy
+
+
+@njit
+def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, mu: float) -> Meet:
+    """What wrap i would hold at wrap angle w and end value v, without committing it.
+
+    Returns (integral of e, its derivative by v, last point kept, and the point where the cone meets the old profile:
+    y, v, C, B there).
+    """
+    top = n - 1
+    k = top
+    yp, vp = G[i, Y, top], G[i, V, top]
+    if w < yp:
+        k -= 1
+        while G[i, Y, k] > w:
+            k -= 1
+        y1, v1 = G[i, Y, k], G[i, V, k]
+        s1 = groove(L, law, y1)
+        share = (groove(L, law, w) - s1) / (groove(L, law, G[i, Y, k + 1]) - s1)
+        yp = w
+        vp = v1 + share * (G[i, V, k + 1] - v1)
+    sw = groove(L, law, w)
+    if abs(v - vp) <= mu * (sw - groove(L, law, yp)):
+        # cable wound on, or nothing at all happened: no slip
+        cp, bp = _running(G, L, law, i, k, n, yp, vp)
+        if w == yp:
+            return cp, 0.0, k, yp, vp, cp, bp
+        integral, _ = piece(L, law, yp, vp, w, v)
+        ahead, _ = piece(L, law, yp, vp, w, v + 1e-6)
+        return cp + integral, (ahead - integral) * 1e6, k, yp, vp, cp, bp
+    # the cone of the new end cuts into the profile: walk inward to where they meet
+    s = 1.0 if v > vp else -1.0
+    steep = s * mu
+    over_upper = v - steep * (sw - groove(L, law, yp)) - vp
+    y_upper = yp
+    over = 0.0
+    while k >= 0:
+        over = v - steep * (sw - groove(L, law, G[i, Y, k])) - G[i, V, k]
+        if over * s <= 0.0:
+            break
+        over_upper = over
+        y_upper = G[i, Y, k]
+        k -= 1
+    if k < 0:  # the whole wrap slips, down to the termination
+        ym = 0.0
+    elif L[0, 0, 0] == 0.0:
+        ym = G[i, Y, k] + over / (over - over_upper) * (y_upper - G[i, Y, k])
+    else:
+        sk = groove(L, law, G[i, Y, k])
+        share = over / (over - over_upper)
+        ym = groove_inverse(L, law, sk + share * (groove(L, law, y_upper) - sk), G[i, Y, k], y_upper)
+    vm = v - steep * (sw - groove(L, law, ym))
+    cm = bm = 0.0
+    if k >= 0:
+        cm, bm = _running(G, L, law, i, k, n, ym, vm)
+    integral, slope = piece(L, law, ym, vm, w, v)
+    return cm + integral, slope, k, ym, vm, cm, bm
+
+
+@njit
+def _running(
+    G: Floats, L: Floats, law: int, i: int, k: int, n: int, y: float, v: float
+) -> tuple[float, float]:
+    """C and B at a point (y, v) of the profile on the piece above point k."""
+    if k == n - 1 or y == G[i, Y, k]:
+        return G[i, C, k], G[i, B, k]
+    integral, _ = piece(L, law, G[i, Y, k], G[i, V, k], y, v)
+    error = G[i, D, k + 1]
+    return G[i, C, k] + integral, G[i, B, k] + error * (integral + y - G[i, Y, k])
+
+
+@njit
+def wrap_commit(
+    G: Floats,
+    L: Floats,
+    law: int,
+    i: int,
+    n: int,
+    meet: Meet,
+    w: float,
+    v: float,
+    slack_v: float,
+    tolerance: float,
+) -> int:
+    """Make an evaluated step the state; returns the new number of points.
+
+    `slack_v` bounds the error of the end value v (from earlier merging, through the solved tensions); `tolerance` bounds
+    the error of v that merging of neighbours may leave in a piece. The stack never outgrows its array.
+    """
+    total, _, k, ym, vm, cm, bm = meet
+    below = G[i, D, k + 1] if 0 <= k < n - 1 else 0.0
+    n = k + 1
+    if n == 0 or ym > G[i, Y, n - 1]:
+        G[i, Y, n], G[i, V, n], G[i, C, n], G[i, B, n] = ym, vm, cm, bm
+        G[i, D, n] = below
+        n += 1
+    if w > G[i, Y, n - 1]:
+        error = slack_v
+        if n >= 2:
+            merged = _merge_error(G, L, law, i, n, w, v)
+            if max(error, G[i, D, n - 1]) + merged <= tolerance:
+                error = max(error, G[i, D, n - 1]) + merged
+                n -= 1
+        G[i, Y, n], G[i, V, n], G[i, D, n] = w, v, error
+        integral = total - G[i, C, n - 1]  # `total` is the integral up to the end, whichever points were dropped
+        G[i, C, n] = total
+        G[i, B, n] = G[i, B, n - 1] + error * (integral + w - G[i, Y, n - 1])
+        n += 1
+    if n >= G.shape[2] - 3:
+        n = compact(G, L, law, i, n)
+    return n
+
+
+@njit
+def _merge_error(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float) -> float:
+    """Distance in v of the last point from the straight piece that would replace it."""
+    y0, y1 = G[i, Y, n - 2], G[i, Y, n - 1]
+    s0 = groove(L, law, y0)
+    share = (groove(L, law, y1) - s0) / (groove(L, law, w) - s0)
+    return abs(G[i, V, n - 2] + share * (v - G[i, V, n - 2]) - G[i, V, n - 1])
+
+
+@njit
+def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
+    """Halve the list by dropping the points that a straight piece replaces best; the error made is kept in D and B.
+
+    A chord of a mu-Lipschitz profile is mu-Lipschitz, so the friction bound survives.
+    """
+    costs = np.empty(n)
+    limit = 1e-12
+    while n > G.shape[2] // 2:
+        m = 1
+        for k in range(1, n - 1):
+            y0, v0 = G[i, Y, m - 1], G[i, V, m - 1]
+            y1, v1 = G[i, Y, k], G[i, V, k]
+            y2, v2 = G[i, Y, k + 1], G[i, V, k + 1]
+            s0 = groove(L, law, y0)
+            off = abs(v0 + (groove(L, law, y1) - s0) / (groove(L, law, y2) - s0) * (v2 - v0) - v1)
+            error = max(G[i, D, k], G[i, D, k + 1]) + off
+            costs[k] = error
+            if error <= limit:
+                G[i, D, k + 1] = error
+            else:
+                G[i, Y, m], G[i, V, m], G[i, D, m] = y1, v1, G[i, D, k]
+                m += 1
+        G[i, Y, m], G[i, V, m], G[i, D, m] = G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1]
+        n = m + 1
+        limit *= 4.0
+    accumulate(G, L, law, i, n)
+    return n
+
+
+@njit
+def accumulate(G: Floats, L: Floats, law: int, i: int, n: int) -> None:
+    """Recompute the running integrals C and B of wrap i."""
+    G[i, C, 0] = 0.0
+    G[i, B, 0] = 0.0
+    for k in range(1, n):
+        dy = G[i, Y, k] - G[i, Y, k - 1]
+        integral, _ = piece(L, law, G[i, Y, k - 1], G[i, V, k - 1], G[i, Y, k], G[i, V, k])
+        G[i, C, k] = G[i, C, k - 1] + integral
+        G[i, B, k] = G[i, B, k - 1] + G[i, D, k] * (integral + dy)
+
+
+@njit
+def wrap_fill(G: Floats, L: Floats, law: int, i: int, w: float, v: float, slope: float) -> int:
+    """Start wrap i straight: v at the departure point, falling inward by `slope` per sigma (0 = uniform)."""
+    G[i, :, :] = 0.0
+    G[i, V, 0] = v - slope * (groove(L, law, w) - groove(L, law, 0.0))
+    G[i, Y, 1], G[i, V, 1] = w, v
+    accumulate(G, L, law, i, 2)
+    return 2

@@ -1,0 +1,167 @@
+"""Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
+
+`L[law]` is a table of 4 rows. Row 0 is its head: [mode (the same in all laws), v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count].
+Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. In mode 1
+row 1 holds u = ln tau on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) = int m_g dy on an even
+grid of y, and row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
+Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.mechanics.jit import njit
+
+Floats: TypeAlias = NDArray[np.float64]
+
+SIZE = 4096
+U_LOW, U_HIGH = -14.0, 6.0
+STIFFENING = 10  # place in the head of b in EA(T) = EA (1 + b (tau - 1))
+
+
+def plain_law() -> Floats:
+    """The law of the thesis: constant mu, constant EA."""
+    return np.zeros((1, 16))
+
+
+def law_table(
+    tension_factor: Callable[[Floats], Floats],
+    groove_factor: Callable[[Floats], Floats],
+    wrap_max_rad: float,
+    stiffening: float = 0.0,
+) -> Floats:
+    """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the termination) and the
+    tangent stiffness EA (1 + stiffening (tau - 1)); both factors are vectorised and positive."""
+    table = np.zeros((4, SIZE))
+    u = np.linspace(U_LOW, U_HIGH, SIZE)
+    v = _integral(u, 1.0 / tension_factor(np.exp(u)))
+    v -= np.interp(0.0, u, v)
+    v_grid = np.linspace(v[0], v[-1], SIZE)
+    table[1] = np.interp(v_grid, v, u)
+    table[3] = v
+    y = np.linspace(0.0, wrap_max_rad, SIZE)
+    table[2] = _integral(y, groove_factor(y))
+    table[0, :11] = [
+        1.0, v[0], v_grid[1] - v_grid[0], SIZE, 0.0, y[1] - y[0], SIZE, U_LOW, u[1] - u[0], SIZE, stiffening
+    ]  # fmt: skip
+    return table
+
+
+def _integral(x: Floats, f: Floats) -> Floats:
+    """Running integral by Simpson's rule on the given grid's midpoints (trapezoid corrected by end slopes)."""
+    h = x[1] - x[0]
+    slope = np.gradient(f, h, edge_order=2)
+    steps = h * (f[1:] + f[:-1]) / 2.0 - h * h * (slope[1:] - slope[:-1]) / 12.0
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+@njit
+def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) -> float:
+    """Cubic interpolation on an even grid (Catmull-Rom); straight beyond its ends."""
+    p = (x - low) / step
+    k = int(p)
+    if k < 1:
+        k = 1
+    if k > SIZE - 3:
+        k = SIZE - 3
+    t = p - k
+    if t < -1.0 or t > 2.0:
+        edge = 0 if t < 0.0 else SIZE - 2
+        return L[law, row, edge] + (p - edge) * (L[law, row, edge + 1] - L[law, row, edge])
+    a, b, c, d = L[law, row, k - 1], L[law, row, k], L[law, row, k + 1], L[law, row, k + 2]
+    # Lagrange cubic through the four neighbours
+    return (
+        -a * t * (t - 1.0) * (t - 2.0) / 6.0
+        + b * (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0
+        - c * (t + 1.0) * t * (t - 2.0) / 2.0
+        + d * (t + 1.0) * t * (t - 1.0) / 6.0
+    )
+
+
+@njit
+def groove(L: Floats, law: int, y: float) -> float:
+    """Friction-weighted angle g(y); y itself for the plain law."""
+    if L[0, 0, 0] == 0.0:
+        return y
+    return look_up(L, law, 2, L[law, 0, 4], L[law, 0, 5], y)
+
+
+@njit
+def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
+    """The y between y_low and y_high with groove coordinate g (secant, then bisection where it leaves the bracket)."""
+    lo, hi = y_low, y_high
+    g_lo, g_hi = groove(L, law, lo), groove(L, law, hi)
+    y = lo
+    for _ in range(60):
+        if g_hi - g_lo <= 0.0:
+            return lo
+        y = lo + (hi - lo) * (g - g_lo) / (g_hi - g_lo)
+        found = groove(L, law, y)
+        if abs(found - g) < 1e-14:
+            return y
+        if found < g:
+            lo, g_lo = y, found
+        else:
+            hi, g_hi = y, found
+        middle = 0.5 * (lo + hi)
+        found = groove(L, law, middle)
+        if found < g:
+            lo, g_lo = middle, found
+        else:
+            hi, g_hi = middle, found
+    return y
+
+
+@njit
+def v_of_tau(L: Floats, law: int, tau: float) -> float:
+    """Profile variable of the tension ratio tau = T/T0: ln tau for the plain law."""
+    if L[0, 0, 0] == 0.0:
+        return math.log(tau)
+    return look_up(L, law, 3, L[law, 0, 7], L[law, 0, 8], math.log(tau))
+
+
+@njit
+def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
+    """Derivative of `v_of_tau`; 1/tau for the plain law."""
+    if L[0, 0, 0] == 0.0:
+        return 1.0 / tau
+    step = L[law, 0, 2]
+    du = (look_up(L, law, 1, L[law, 0, 1], step, v + 0.01 * step) - look_up(L, law, 1, L[law, 0, 1], step, v - 0.01 * step)) / (
+        0.02 * step
+    )
+    return 1.0 / (tau * du)
+
+
+@njit
+def tau_of_v(L: Floats, law: int, v: float) -> float:
+    """Tension ratio of the profile variable."""
+    if L[0, 0, 0] == 0.0:
+        return math.exp(v)
+    return math.exp(look_up(L, law, 1, L[law, 0, 1], L[law, 0, 2], v))
+
+
+@njit
+def strain_of_tau(L: Floats, law: int, tau: float) -> tuple[float, float]:
+    """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int d tau/(1 + b (tau - 1))."""
+    b = L[law, 0, STIFFENING]
+    if b == 0.0:
+        return tau - 1.0, 1.0
+    stiffness = 1.0 + b * (tau - 1.0)
+    if stiffness < 0.05:  # the law makes no sense beyond; stay finite and monotone
+        edge = (0.05 - 1.0) / b
+        return math.log(0.05) / b + (tau - 1.0 - edge) / 0.05, 1.0 / 0.05
+    return math.log1p(b * (tau - 1.0)) / b, 1.0 / stiffness
+
+
+@njit
+def strain(L: Floats, law: int, v: float) -> tuple[float, float]:
+    """e and de/dv at the profile variable v (table mode)."""
+    tau = tau_of_v(L, law, v)
+    e, de = strain_of_tau(L, law, tau)
+    return e, de / dv_dtau(L, law, tau, v)
