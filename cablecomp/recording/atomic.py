@@ -1,0 +1,94 @@
+"""Output that appears whole or not at all."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cablecomp.errors import InputError
+
+
+@contextmanager
+def atomic_directory(out: Path | str) -> Iterator[Path]:
+    """Give a temporary directory beside `out`; on success its files appear in `out`, on failure nothing does.
+
+    Files of an existing `out` that are not written anew stay. InputError if `out` cannot be made.
+    """
+    out = Path(out)
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: is a file; --out takes a directory, which is made if it is missing")
+    made = _make_parents(out)
+    try:
+        temporary = _sibling(out)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); choose another directory") from None
+    try:
+        yield temporary
+        _move_into(temporary, out)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        _remove_empty(made)
+        raise
+
+
+@contextmanager
+def atomic_file(path: Path | str) -> Iterator[Path]:
+    """Give a temporary path beside `path`; on success the file takes its place, on failure it is removed."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.partial-{os.getpid()}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _sibling(out: Path) -> Path:
+    for attempt in itertools.count():
+        candidate = out.absolute().with_name(f".{out.absolute().name}.partial-{os.getpid()}-{attempt}")
+        try:
+            candidate.mkdir()
+        except FileExistsError:
+            continue
+        return candidate
+    raise AssertionError("unreachable")
+
+
+def _move_into(source: Path, target: Path) -> None:
+    if not target.exists():
+        source.rename(target)
+        return
+    for item in sorted(source.iterdir()):
+        place = target / item.name
+        if item.is_dir() and place.is_dir():
+            _move_into(item, place)
+        else:
+            os.replace(item, place)
+    source.rmdir()
+
+
+def _make_parents(out: Path) -> list[Path]:
+    """Make the missing parents of `out` and return them, innermost first."""
+    missing = list(itertools.takewhile(lambda parent: not parent.exists(), out.absolute().parents))
+    try:
+        for parent in reversed(missing):
+            parent.mkdir()
+    except OSError as error:
+        raise InputError(f"{out}: cannot be made ({error.strerror}); choose another directory") from None
+    return missing
+
+
+def _remove_empty(directories: list[Path]) -> None:
+    for directory in directories:
+        try:
+            directory.rmdir()
+        except OSError:
+            return

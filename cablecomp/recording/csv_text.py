@@ -1,0 +1,218 @@
+"""CSV text to arrays, streaming: head, separator, numbers, and the exact line of anything that is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from cablecomp.errors import InputError
+from cablecomp.recording.source import Piece, Truncated, ahead, chunks
+from cablecomp.recording.table import FloatArray
+
+_HEAD_LIMIT: Final = 1 << 20
+_SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands before the first row: `first_line` is the line of the first row, counted from 1."""
+
+    columns: tuple[str, ...]
+    comments: tuple[str, ...]
+    separator: str
+    decimal_comma: bool
+    header_line: int
+    first_line: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Parsed rows, one array per column of the file; row k is line `first_line + k`; NaN where empty."""
+
+    first_line: int
+    arrays: list[FloatArray]
+    fraction: float
+    text: bytes
+    separator: str
+    ends_with_break: bool = True
+
+    def cell(self, row: int, column: int) -> str:
+        """Return the text of a cell, for messages."""
+        return self.text.split(b"\n")[row].decode("utf-8", "replace").split(self.separator)[column].strip()
+
+
+def read_head(path: Path, gzipped: bool) -> Head:
+    """Read comments and header line; InputError if there is no header or it holds numbers."""
+    text = b""
+    try:
+        for piece in chunks(path, gzipped, 1 << 16):
+            text += piece.data
+            head = _parse_head(text)
+            if head is not None and text.count(b"\n") >= head.first_line:
+                break
+            if len(text) > _HEAD_LIMIT:
+                break
+    except Truncated as error:
+        raise InputError(f"{path}: {error}, before the first row; copy or record the file anew") from None
+    head = _parse_head(text)
+    if head is None:
+        raise InputError(
+            f"{path}: has no header line; expected column names such as time_s,motor_position_rad"
+        )
+    if _is_number(head.columns[0]):
+        raise InputError(
+            f"{path}: line {head.header_line}: holds numbers where the column names are expected; "
+            "add a header line such as time_s,motor_position_rad,joint_torque_Nm"
+        )
+    return head
+
+
+def read_rows(path: Path, gzipped: bool, head: Head) -> Iterator[Rows]:
+    """Stream the rows below the head; InputError with the line for ragged rows, text, and files cut short."""
+    parser = _Parser(path, head)
+    skip, line, tail, fraction = head.size, head.first_line, b"", 0.0
+    carriage = b""
+    try:
+        for piece in _pieces(path, gzipped):
+            data, fraction = carriage + piece.data, piece.fraction
+            carriage = b"\r" if data.endswith(b"\r") else b""
+            data = _plain_breaks(data[: len(data) - len(carriage)])
+            if skip:
+                drop = min(skip, len(data))
+                data, skip = data[drop:], skip - drop
+            body, tail = _whole_lines(tail + data)
+            if body:
+                rows = parser.parse(body, line, fraction)
+                line += len(rows.arrays[0])
+                yield rows
+    except Truncated as error:
+        raise InputError(f"{path}: line {line}: {error}; copy or record the file anew") from None
+    rest = (tail + _plain_breaks(carriage)).rstrip(b"\n")
+    if rest:
+        yield parser.parse(rest, line, 1.0, last=not tail.endswith(b"\n"))
+
+
+def _pieces(path: Path, gzipped: bool) -> Iterator[Piece]:
+    pieces = chunks(path, gzipped)
+    return ahead(pieces) if gzipped else pieces
+
+
+@dataclass(frozen=True)
+class _Parser:
+    path: Path
+    head: Head
+
+    def parse(self, text: bytes, line: int, fraction: float, last: bool = False) -> Rows:
+        text = text.replace(b'"', b"") if b'"' in text else text
+        if self.head.decimal_comma:
+            text = text.replace(b",", b".")
+        arrays = self._fast(text) or self._slow(text, line, last)
+        return Rows(line, arrays, fraction, text, self.head.separator, not last)
+
+    def _fast(self, text: bytes) -> list[FloatArray] | None:
+        """Return the columns (NaN where a cell is empty), or None if any row may be ragged or hold text.
+
+        The parser refuses rows with too many cells and fills up short ones: with the right total of
+        separators and no refusal, no row is short either.
+        """
+        names = [f"c{i}" for i in range(len(self.head.columns))]
+        rows = text.count(b"\n") + (not text.endswith(b"\n"))
+        if text.count(self.head.separator.encode()) != rows * (len(names) - 1):
+            return None
+        try:
+            frame = pl.read_csv(
+                text, has_header=False, schema=dict.fromkeys(names, pl.Float64), separator=self.head.separator
+            )
+        except pl.exceptions.PolarsError:
+            return None
+        if frame.height != rows:
+            return None
+        return [frame[name].to_numpy() for name in names]
+
+    def _slow(self, text: bytes, line: int, last: bool) -> list[FloatArray]:
+        """Parse row by row: allows empty cells, and names the line and column of what is wrong."""
+        lines = text.decode("utf-8", "replace").removesuffix("\n").split("\n")
+        out = np.empty((len(lines), len(self.head.columns)))
+        for k, row in enumerate(lines):
+            cut = last and k == len(lines) - 1
+            out[k] = self._row(row, line + k, cut)
+        return list(np.ascontiguousarray(out.T))
+
+    def _row(self, row: str, line: int, cut: bool) -> list[float]:
+        where = f"{self.path}: line {line}"
+        ending = " and the file ends inside it: it was cut short; remove that line" if cut else ""
+        if not row.strip():
+            raise InputError(f"{where}: is empty; remove it, or end the recording before it")
+        cells = row.split(self.head.separator)
+        if len(cells) != len(self.head.columns):
+            raise InputError(
+                f"{where}: has {len(cells)} cell(s) where the header names {len(self.head.columns)} columns"
+                f"{ending or '; mend or remove that line'}"
+            )
+        values = []
+        for name, cell in zip(self.head.columns, cells, strict=True):
+            value = _number(cell)
+            if value is None:
+                raise InputError(
+                    f"{where}: column {name!r} holds {_shown(cell)}{ending or '; a number is expected there'}"
+                )
+            values.append(value)
+        return values
+
+
+def _parse_head(text: bytes) -> Head | None:
+    size, comments = 0, []
+    shift = 3 if text.startswith(b"\xef\xbb\xbf") else 0
+    lines = _plain_breaks(text[shift:].removesuffix(b"\r")).split(b"\n")
+    for number, raw in enumerate(lines, start=1):
+        size += len(raw) + 1
+        line = raw.decode("utf-8", "replace").strip()
+        if not line:
+            continue
+        if line.startswith("#"):
+            comments.append(line[1:].strip())
+            continue
+        separator = max(_SEPARATORS, key=line.count)
+        columns = tuple(name.strip().strip('"').strip() for name in line.split(separator))
+        first = lines[number].decode("utf-8", "replace") if number < len(lines) else ""
+        comma = separator != "," and "," in first
+        return Head(columns, tuple(comments), separator, comma, number, number + 1, size + shift)
+    return None
+
+
+def _whole_lines(text: bytes) -> tuple[bytes, bytes]:
+    """Split into whole lines and the rest; breaks at the end go to the rest: a file may end in them."""
+    body = text[: text.rfind(b"\n") + 1].rstrip(b"\n")
+    if not body:
+        return b"", text
+    return body + b"\n", text[len(body) + 1 :]
+
+
+def _plain_breaks(text: bytes) -> bytes:
+    return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text
+
+
+def _number(cell: str) -> float | None:
+    if "_" in cell:
+        return None
+    text = cell.strip()
+    if not text:
+        return float("nan")
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _is_number(text: str) -> bool:
+    return bool(text) and _number(text) is not None
+
+
+def _shown(cell: str) -> str:
+    return repr(cell if len(cell) <= 40 else cell[:37] + "...")

@@ -1,0 +1,88 @@
+"""Writing tables and canonical recordings as CSV: shortest text that reads back to the very same float64."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import IO, cast
+
+import numpy as np
+import polars as pl
+
+from cablecomp.errors import InternalError
+from cablecomp.recording.atomic import atomic_file
+from cablecomp.recording.channels import order, parse_header
+from cablecomp.recording.table import FloatArray
+
+
+class CsvWriter:
+    """Streams columns to a CSV file (gzip if the name ends in .gz); NaN is written as an empty cell.
+
+    Every finite number is written with as few digits as identify it: reading gives back the same bits.
+    """
+
+    def __init__(self, path: Path, names: Sequence[str], comments: Iterable[str] = ()) -> None:
+        self._names = tuple(names)
+        self._file = _open(path)
+        head = [f"# {line}" for text in comments for line in text.splitlines()]
+        self._file.write(("\n".join([*head, ",".join(self._names)]) + "\n").encode())
+
+    def write(self, columns: Mapping[str, FloatArray]) -> None:
+        """Append rows; every column named at the start must be there, all of one length."""
+        frame = pl.DataFrame({name: columns[name] for name in self._names})
+        frame.fill_nan(None).write_csv(self._file, include_header=False)
+
+    def flush(self) -> None:
+        """Hand everything to the operating system: it outlives a crash of this process."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """Finish the file; may be called again."""
+        self._file.close()
+
+    def __enter__(self) -> CsvWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _open(path: Path) -> IO[bytes]:
+    if path.suffix == ".gz":
+        return cast(IO[bytes], gzip.GzipFile(path, "wb", compresslevel=4, mtime=0))
+    return path.open("wb")
+
+
+def check_canonical(names: Iterable[str]) -> tuple[str, ...]:
+    """Return channel names in canonical order; InternalError if one is not canonical, InputError if unknown."""
+    names = tuple(names)
+    for column in parse_header(names):
+        if column.name != column.column:
+            raise InternalError(f"channel {column.column!r} must be written as {column.name!r}")
+    if "time_s" not in names:
+        raise InternalError("a recording must hold time_s")
+    return order(names)
+
+
+def write_canonical(
+    path: Path | str, columns: Mapping[str, FloatArray], comments: Iterable[str] = ()
+) -> None:
+    """Write a recording whole (gzip if the name ends in .gz); the file appears only when it is complete.
+
+    `columns` maps canonical names to float64 arrays of one length; `comments` become `#` lines at the head.
+    """
+    path = Path(path)
+    names = check_canonical(columns)
+    ready = {name: np.asarray(columns[name], dtype=np.float64) for name in names}
+    if len({values.shape for values in ready.values()}) != 1:
+        raise InternalError(f"columns of {path.name} differ in length")
+    with atomic_file(path) as temporary:
+        packed = temporary.with_name(f"{temporary.name}.gz") if path.suffix == ".gz" else temporary
+        with CsvWriter(packed, names, comments) as writer:
+            writer.write(ready)
+        if packed != temporary:
+            packed.rename(temporary)
