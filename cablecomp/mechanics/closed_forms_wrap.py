@@ -1,0 +1,222 @@
+"""Closed forms of one wrapped cable end (thesis, chapter 2): elongation, stiffness, tension bump, erasure.
+
+Everything here holds for a wrap with one free end and one termination that starts from uniform pretension.
+`tau` is the free end's tension over the pretension, `mu_wrap` = mu * wrap angle (infinite: the termination is
+never reached, as the thesis assumes). The `shape` functions are dimensionless: elongation * EA * mu / (R T0),
+positive when the cable is longer.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Number: TypeAlias = npt.ArrayLike
+
+_SERIES = 1.0 / np.arange(2.0, 20.0)
+
+
+def gap(excess: Number) -> Array:
+    """Return `x - ln(1 + x)` without cancellation for small x; x > -1."""
+    x = np.asarray(excess, dtype=float)
+    small = np.abs(x) < 0.06
+    y = np.where(small, x, 0.0)
+    series = np.zeros_like(y)
+    for coefficient in _SERIES[::-1]:  # x^2/2 - x^3/3 + x^4/4 - ...
+        series = coefficient - y * series
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(small, y * y * series, x - np.log1p(x)))
+
+
+def signed_mu(tau: Number, mu: Number) -> Array:
+    """Return mu* = mu sgn(tau - 1) (2-51); mu itself where tau = 1, where every formula below has the limit
+    0.
+    """
+    return np.where(np.asarray(tau) < 1.0, -np.asarray(mu, dtype=float), np.asarray(mu, dtype=float))
+
+
+def affected_angle_rad(tau: Number, mu: Number) -> Array:
+    """Angle of wrap whose tension the load changes, theta_aff = ln(tau)/mu* (2-24); rad, never negative."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.abs(np.log(np.asarray(tau, dtype=float))) / mu)
+
+
+def profile_tension_N(theta_rad: Number, tau: Number, mu: Number, pretension_N: Number) -> Array:
+    """Tension at `theta_rad` from the inner edge of the affected angle, T0 exp(mu* theta) (2-30); N."""
+    return np.asarray(np.asarray(pretension_N) * np.exp(signed_mu(tau, mu) * np.asarray(theta_rad)))
+
+
+def loading_shape(tau: Number, mu_wrap: Number = math.inf) -> Array:
+    """Dimensionless elongation of a wrap loaded from uniform pretension.
+
+    |shape| = tau - 1 - ln tau (2-48) while the affected angle is inside the wrap; beyond, the whole wrap
+    slips and shape = s tau (1 - exp(-s mu_wrap)) - mu_wrap with s = sgn(tau - 1) (own derivation: the
+    integral of the profile that ends at the termination). `tau` >= 0; 0 is a slack cable.
+    """
+    return loading_shape_of_excess(np.asarray(tau, dtype=float) - 1.0, mu_wrap)
+
+
+def loading_shape_of_excess(excess: Number, mu_wrap: Number = math.inf) -> Array:
+    """As `loading_shape`, of tau - 1: keeps its relative accuracy for loads of any smallness."""
+    x, c = np.broadcast_arrays(np.asarray(excess, dtype=float), np.asarray(mu_wrap, dtype=float))
+    sign = np.where(x < 0.0, -1.0, 1.0)
+    with np.errstate(divide="ignore"):
+        inside = np.abs(np.log1p(x)) <= c
+    return np.where(inside, sign * gap(x), slipped_shape(1.0 + x, c, sign))
+
+
+def loading_shape_of_log(log_tau: Number, mu_wrap: Number = math.inf) -> Array:
+    """As `loading_shape`, of ln tau: keeps its relative accuracy for tensions of any smallness."""
+    u, c = np.broadcast_arrays(np.asarray(log_tau, dtype=float), np.asarray(mu_wrap, dtype=float))
+    sign = np.where(u < 0.0, -1.0, 1.0)
+    # exp(u) - 1 - u; near 0 in the other form, which does not cancel
+    inside = np.where(np.abs(u) < 0.05, gap(np.expm1(np.clip(u, -1.0, 1.0))), np.expm1(u) - u)
+    return np.where(np.abs(u) <= c, sign * inside, slipped_shape(np.exp(u), c, sign))
+
+
+def slipped_shape(tau: Number, mu_wrap: Number, direction: Number) -> Array:
+    """Dimensionless elongation of a wrap that slips along all its length; `direction` +1 if the free end is
+    the tighter.
+    """
+    s, c = np.asarray(direction, dtype=float), np.asarray(mu_wrap, dtype=float)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(-s * np.asarray(tau) * np.expm1(-s * c) - c)
+
+
+def loading_shape_slope(tau: Number, mu_wrap: Number = math.inf) -> Array:
+    """d shape / d tau of `loading_shape`: |1 - 1/tau|, at most |1 - exp(-s mu_wrap)|; the wrap's
+    dimensionless compliance.
+    """
+    t, c = np.broadcast_arrays(np.asarray(tau, dtype=float), np.asarray(mu_wrap, dtype=float))
+    with np.errstate(divide="ignore", over="ignore"):
+        inside = np.abs((t - 1.0) / t)
+        return np.where(np.abs(np.log(t)) <= c, inside, np.abs(np.expm1(np.where(t < 1.0, c, -c))))
+
+
+def reversal_change(tau: Number, tau_peak: Number, mu_wrap: Number = math.inf) -> Array:
+    """Change of shape since the load reversed at `tau_peak`, reached in one monotone loading from uniform
+    pretension.
+
+    -s (sqrt(tau_peak) - sqrt(tau))^2 with s = sgn(tau_peak - 1): (2-79) less (2-48), free of cancellation.
+    Past the erasing load 1/tau_peak (2-71) the loading form takes over by itself; so it does where `tau` goes
+    on past the peak. In a wrap that had slipped to its termination, the corner arrives there at tau_peak
+    exp(-2 s mu_wrap) and the whole wrap slips back.
+    """
+    t, peak, c = _three(tau, tau_peak, mu_wrap)
+    s, log_t, log_peak = _logs(t, peak)
+    with np.errstate(invalid="ignore"):
+        back = s * (log_peak - log_t)
+        slipped = s * log_peak > c
+        bump = -s * ((peak - t) / (np.sqrt(peak) + np.sqrt(t))) ** 2
+        whole = slipped_shape(t, c, -s) - loading_shape(peak, c)
+        virgin = loading_shape(t, c) - loading_shape(peak, c)
+        in_bump = (back >= 0.0) & (back <= 2.0 * np.minimum(c, s * log_peak))
+        return np.where(in_bump, bump, np.where((back > 0.0) & slipped, whole, virgin))
+
+
+def reversal_slope(tau: Number, tau_peak: Number, mu_wrap: Number = math.inf) -> Array:
+    """d/d tau of `reversal_change`: |sqrt(tau_peak/tau) - 1| inside the bump; never negative."""
+    t, peak, c = _three(tau, tau_peak, mu_wrap)
+    s, log_t, log_peak = _logs(t, peak)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        back = s * (log_peak - log_t)
+        slipped = s * log_peak > c
+        in_bump = (back >= 0.0) & (back <= 2.0 * np.minimum(c, s * log_peak))
+        bump = np.abs(np.sqrt(peak / t) - 1.0)
+        whole = np.abs(np.expm1(s * c))
+        return np.where(in_bump, bump, np.where((back > 0.0) & slipped, whole, loading_shape_slope(t, c)))
+
+
+def unloading_shape(tau: Number, tau_peak: Number, mu_wrap: Number = math.inf) -> Array:
+    """Dimensionless elongation after one reversal: s (2 sqrt(tau tau_peak) - tau - 1 - ln
+    tau_peak) (2-79).
+    """
+    return loading_shape(tau_peak, mu_wrap) + reversal_change(tau, tau_peak, mu_wrap)
+
+
+def loading_elongation_m(
+    tau: Number, mu: Number, radius_m: Number, EA_N: Number, pretension_N: Number, wrap_rad: Number = math.inf
+) -> Array:
+    """Elongation of a wrap loaded from uniform pretension, R T0/(EA mu*) (tau - 1 - ln tau) (2-48); m."""
+    return np.asarray(
+        _scale(mu, radius_m, EA_N, pretension_N) * loading_shape(tau, np.asarray(mu) * np.asarray(wrap_rad))
+    )
+
+
+def unloading_elongation_m(
+    tau: Number,
+    tau_peak: Number,
+    mu: Number,
+    radius_m: Number,
+    EA_N: Number,
+    pretension_N: Number,
+    wrap_rad: Number = math.inf,
+) -> Array:
+    """Elongation after a peak, R T0/(EA mu*) (2 sqrt(tau tau_peak) - tau - 1 - ln tau_peak) (2-79); m."""
+    shape = unloading_shape(tau, tau_peak, np.asarray(mu) * np.asarray(wrap_rad))
+    return np.asarray(_scale(mu, radius_m, EA_N, pretension_N) * shape)
+
+
+def loading_stiffness_N_per_m(tau: Number, mu: Number, radius_m: Number, EA_N: Number) -> Array:
+    """Stiffness of the wrap during loading, k = (EA mu*/R) tau/(tau - 1) (2-49); N/m, infinite at tau = 1."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(
+            np.asarray(EA_N) * np.asarray(mu) / (np.asarray(radius_m) * loading_shape_slope(tau))
+        )
+
+
+def bump_corner_angle_rad(tau: Number, tau_peak: Number, mu: Number) -> Array:
+    """Angle from the departure point to the corner of the tension bump, alpha = ln(T_pk/T_app)/(2 mu*)
+    (2-62); rad.
+    """
+    return np.asarray(
+        np.abs(np.log(np.asarray(tau_peak, dtype=float) / np.asarray(tau))) / (2.0 * np.asarray(mu))
+    )
+
+
+def bump_corner_tension(tau: Number, tau_peak: Number) -> Array:
+    """Dimensionless tension at the corner of the bump, sqrt(tau tau_peak) (2-68)."""
+    return np.asarray(np.sqrt(np.asarray(tau, dtype=float) * np.asarray(tau_peak)))
+
+
+def bump_erasing_load(tau_peak: Number) -> Array:
+    """Dimensionless tension that erases the bump without turning the pulley, 1/tau_peak (2-71)."""
+    return np.asarray(1.0 / np.asarray(tau_peak, dtype=float))
+
+
+def bump_erasing_rotation_rad(tau: Number, tau_peak: Number, mu: Number) -> Array:
+    """Unwinding that erases the bump at constant load; rad.
+
+    beta = (|u_pk| - |u_app|)/mu, u = ln tau. The thesis's (2-74), ln(tau tau_peak)/mu*, is its special case
+    for loads at or past the pretension (tau <= 1 after a bump); above, the corner reaches the surface sooner
+    than (2-74) says.
+    """
+    erased = np.abs(np.log(np.asarray(tau_peak, dtype=float))) - np.abs(np.log(np.asarray(tau, dtype=float)))
+    return np.asarray(np.maximum(erased, 0.0) / mu)
+
+
+def corner_after_unwinding_rad(corner_rad: Number, unwound_rad: Number) -> Array:
+    """Corner angle once the pulley unwound by `unwound_rad` at constant load, alpha' = alpha - beta/2 (2-72);
+    rad.
+    """
+    return np.asarray(np.asarray(corner_rad, dtype=float) - np.asarray(unwound_rad) / 2.0)
+
+
+def _scale(mu: Number, radius_m: Number, EA_N: Number, pretension_N: Number) -> Any:
+    return np.asarray(radius_m) * np.asarray(pretension_N) / (np.asarray(EA_N) * np.asarray(mu))
+
+
+def _three(tau: Number, tau_peak: Number, mu_wrap: Number) -> tuple[Array, Array, Array]:
+    t, peak, c = np.broadcast_arrays(
+        np.asarray(tau, dtype=float), np.asarray(tau_peak, dtype=float), np.asarray(mu_wrap, dtype=float)
+    )
+    return t, peak, c
+
+
+def _logs(tau: Array, peak: Array) -> tuple[Array, Array, Array]:
+    with np.errstate(divide="ignore"):
+        return np.where(peak < 1.0, -1.0, 1.0), np.log(tau), np.log(peak)
