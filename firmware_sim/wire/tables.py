@@ -1,21 +1,21 @@
-"""The message tables (DBC) that ship in `configs/links`: `python -m firmware_sim.wire.tables DIRECTORY` writes them.
+"""The message tables (DBC) that ship in `configs/links`; `python -m firmware_sim.wire.tables DIRECTORY`
+writes them.
 
-Identifiers, N = 1…8 the number of the joint (11-bit, chosen so that sensor nodes stay clear of ODrive nodes 0…47
-and of MIT drive numbers):
+Identifiers (11-bit) of joint N = 1…8; sensor nodes stay clear of ODrive nodes 0…47 and of MIT drive ids:
 
-| identifier            | message        | from  | what it carries                                                         |
-|-----------------------|----------------|-------|-------------------------------------------------------------------------|
-| 0x600 + 0x10 (N-1)    | JointN_State   | joint | joint position (int32, 1e-6 rad), joint torque (int24, 1e-5 Nm), sequence |
-| 0x601 + 0x10 (N-1)    | JointN_Status  | joint | device time (uint32, us), temperature (int16, 0.01 degC), errors, sequence |
-| 0x400 + 0x10 (N-1)    | DriveN_Command | host  | targets: motor position, velocity, torque                               |
-| 0x401 + 0x10 (N-1)    | DriveN_Control | host  | state request, control mode, kp, kd, torque limit                       |
-| 0x402 + 0x10 (N-1)    | DriveN_State   | drive | motor position, velocity, torque, sequence                              |
-| 0x403 + 0x10 (N-1)    | DriveN_Status  | drive | state, mode, errors, current, temperature, sequence                     |
-| 0x700                 | Sync           | host  | step number; in stepped time every joint on the bus takes one step       |
+| identifier         | message        | from  | what it carries                                                    |
+|--------------------|----------------|-------|--------------------------------------------------------------------|
+| 0x600 + 0x10 (N-1) | JointN_State   | joint | angle (int32, 1e-6 rad), torque (int24, 1e-5 Nm), sequence         |
+| 0x601 + 0x10 (N-1) | JointN_Status  | joint | time (uint32, us), temperature (int16, 0.01 degC), flags, sequence |
+| 0x400 + 0x10 (N-1) | DriveN_Command | host  | targets: motor position, velocity, torque                          |
+| 0x401 + 0x10 (N-1) | DriveN_Control | host  | state request, control mode, kp, kd, torque limit                  |
+| 0x402 + 0x10 (N-1) | DriveN_State   | drive | motor position, velocity, torque, sequence                         |
+| 0x403 + 0x10 (N-1) | DriveN_Status  | drive | state, mode, flags, current, temperature, sequence                 |
+| 0x700              | Sync           | host  | step number; stepped by sync, every joint takes one step           |
 
-Intel byte order throughout. JointN_Status goes out with every tenth sample and at once when the error flags change;
-its sequence is that of the JointN_State sent just before, so a sample's device time is known to the microsecond.
-ODrive and MIT tables describe those makers' messages in the same terms.
+Intel byte order. JointN_Status goes out with every tenth sample and at once when its flags change; its
+sequence is that of
+the JointN_State sent just before, so that sample's device time is known to the microsecond.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ SYNC_ID = 0x700
 
 
 class Signal(NamedTuple):
-    """One signal: first bit, length in bits, scale, offset, unit; Intel unless `motorola`, unsigned unless `signed`."""
+    """One signal: first bit, length in bits, scale, offset, unit; Intel unless `motorola`, unsigned unless
+    `signed`."""
 
     name: str
     start: int
@@ -76,8 +77,8 @@ SENSOR_FLAGS = (
     "4 started afresh since the last status, 5 index not found yet, 6 bus errors seen, 7 internal"
 )
 DRIVE_FLAGS = (
-    "bit 0 command timeout, 1 over torque, 2 over velocity, 3 position limit, 4 motor encoder, 5 index not found, "
-    "6 over temperature, 7 emergency stop, 8 bad frame, 9 started afresh, 10 bus off, 11 not calibrated"
+    "bit 0 command timeout, 1 over torque, 2 over velocity, 3 position limit, 4 motor encoder, "
+    "5 index not found, 6 over temperature, 7 emergency stop, 8 bad frame, 9 started afresh, 10 bus off, 11 not calibrated"
 )
 
 
@@ -85,8 +86,24 @@ def sensor_messages(joint: int) -> tuple[Message, ...]:
     """Messages of the joint-side sensor node of joint 1…8."""
     base, node = SENSOR_BASE + STRIDE * (joint - 1), f"SensorNode{joint}"
     state = (
-        Signal("joint_position_rad", 0, 32, 1e-6, "rad", True, "joint (output pulley) angle"),
-        Signal("joint_torque_Nm", 32, 24, 1e-5, "Nm", True, "external moment on the output pulley"),
+        Signal(
+            "joint_position_rad",
+            0,
+            32,
+            1e-6,
+            "rad",
+            True,
+            "joint (output pulley) angle; lowest raw value = no value",
+        ),
+        Signal(
+            "joint_torque_Nm",
+            32,
+            24,
+            1e-5,
+            "Nm",
+            True,
+            "external moment on the output pulley; lowest raw value = no value",
+        ),
         Signal("sequence", 56, 8, comment="one more with every sample, wraps at 256"),
     )
     status = (
@@ -98,7 +115,7 @@ def sensor_messages(joint: int) -> tuple[Message, ...]:
             "us",
             comment="node's clock at the sample named by sequence; wraps at 2^32",
         ),
-        Signal("temperature_degC", 32, 16, 0.01, "degC", True, "at the joint"),
+        Signal("temperature_degC", 32, 16, 0.01, "degC", True, "at the joint; lowest raw value = no value"),
         Signal("error_flags", 48, 8, comment=SENSOR_FLAGS),
         Signal("sequence", 56, 8, comment="sequence of the JointN_State sent just before"),
     )
@@ -217,9 +234,19 @@ def _message(message: Message) -> str:
 
 
 def tables() -> dict[str, str]:
-    """File name -> text of every table that ships."""
-    note = "Sensor node and drive of a cable-driven joint, joints 1 to 8; SI units, named in each signal."
-    return {"cablecomp_joint.dbc": render(joint_table(), note)}
+    """File name -> text of every table that ships; each holds the sensor nodes, so that one table reads a
+    bus."""
+    from firmware_sim.wire.maker_tables import mit_table, odrive_table
+
+    sensors = tuple(m for j in range(1, JOINTS + 1) for m in sensor_messages(j))
+    joint = "Sensor node and drive of a cable-driven joint, joints 1 to 8; SI units, named in each signal."
+    odrive = "Sensor nodes of joints 1 to 8 and ODrive CANSimple nodes 1 to 8; ODrive counts in turns."
+    mit = "Sensor nodes of joints 1 to 8 and CubeMars AK80-9 drives 1 to 8 in MIT mode (replies on identifier 0)."
+    return {
+        "cablecomp_joint.dbc": render(joint_table(), joint),
+        "cablecomp_odrive.dbc": render((*sensors, *odrive_table(JOINTS), SYNC), odrive),
+        "cablecomp_mit_ak80_9.dbc": render((*sensors, *mit_table("AK80-9", JOINTS), SYNC), mit),
+    }
 
 
 def write_tables(directory: Path) -> None:

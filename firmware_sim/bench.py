@@ -1,0 +1,94 @@
+"""Several joints on one port: frames in, frames out, time from the caller or one step for each command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Literal
+
+from firmware_sim.errors import SimError
+from firmware_sim.joint import Asked, SimulatedJoint
+from firmware_sim.ports.base import Port
+from firmware_sim.wire.frame import Frame
+from firmware_sim.wire.tables import SYNC_ID
+
+Stepping = Literal["command", "sync"]
+
+
+class Bench:
+    """Joints behind a port. `tick` follows the caller's time; `pump` advances by one sample for each
+    stepping frame.
+
+    Stepped by "command", a joint takes one sample period for each command to it; by "sync", all joints take
+    one for each
+    Sync frame. A step tells, in this order: sensor samples, cyclic frames, then the answers to what stepped
+    it.
+    """
+
+    def __init__(self, port: Port, joints: Sequence[SimulatedJoint], stepping: Stepping = "command") -> None:
+        self.port = port
+        self.joints = tuple(joints)
+        self.stepping = stepping
+        self.steps = 0
+        self._route: dict[int, SimulatedJoint] = {}
+        for joint in self.joints:
+            for identifier in joint.wire.identifiers():
+                if identifier in self._route:
+                    raise SimError(
+                        f"joints {joint.number} and {self._route[identifier].number} share 0x{identifier:X}"
+                    )
+                self._route[identifier] = joint
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time of the joint that is furthest."""
+        return max(joint.time_s for joint in self.joints)
+
+    def tick(self, now_s: float) -> None:
+        """Follow the caller's time: hear what arrived, answer it, advance every joint to `now_s`."""
+        out: list[Frame] = []
+        for frame in self.port.poll(now_s):
+            joint = self._route.get(frame.identifier)
+            if joint is not None:
+                out += joint.render(joint.hear(frame).asked)
+        for joint in self.joints:
+            out += joint.advance_to(now_s)
+        if out:
+            self.port.send(out, now_s)
+
+    def pump(self) -> int:
+        """Stepped time: hear what arrived; returns the number of steps taken."""
+        before = self.steps
+        for frame in self.port.poll(self.time_s):
+            if frame.identifier == SYNC_ID and self.stepping == "sync":
+                self._step(self.joints, {})
+                continue
+            joint = self._route.get(frame.identifier)
+            if joint is None:
+                continue
+            heard = joint.hear(frame)
+            if heard.steps and self.stepping == "command":
+                self._step((joint,), {joint.number: heard.asked})
+            else:
+                self.port.send(joint.render(heard.asked), self.time_s)
+        return self.steps - before
+
+    def _step(self, joints: Sequence[SimulatedJoint], asked: dict[int, list[Asked]]) -> None:
+        self.steps += 1
+        out: list[Frame] = []
+        for joint in joints:
+            out += joint.advance_sample()
+            out += joint.render(asked.get(joint.number, ()))
+        self.port.send(out, self.time_s)
+
+    def close(self) -> None:
+        """Close the port."""
+        self.port.close()
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,74 @@
+"""From a joint's configuration file to a bench: plant, drives, sensor nodes, wires, port, faults."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from firmware_sim.bench import Bench, Stepping
+from firmware_sim.errors import SimError
+from firmware_sim.faults import DeviceFault, Fault, FaultyPort, LineFault, WireFault
+from firmware_sim.firmware import DriveConfig, SensorNodeConfig
+from firmware_sim.joint import SimulatedJoint, Timing
+from firmware_sim.plantlike import PlantLike
+from firmware_sim.ports.base import Port
+from firmware_sim.wire.base import DriveWire
+from firmware_sim.wire.dbc import DbcWire, load_map
+from firmware_sim.wire.mit import MitWire
+from firmware_sim.wire.odrive import OdriveRates, OdriveWire
+
+PROTOCOLS = ("mit", "odrive", "dbc")
+MakePlant = Callable[[int], PlantLike]
+
+
+@dataclass(frozen=True)
+class BenchConfig:
+    """What a bench consists of, apart from its plants and its port."""
+
+    protocol: str = "mit"
+    joints: int = 1
+    model: str = "AK80-9"
+    reply_id: int = 0
+    map_path: Path | None = None
+    rates: OdriveRates = field(default_factory=OdriveRates)
+    torque_constant: float = 0.1
+    drive: DriveConfig = field(default_factory=DriveConfig)
+    sensor: SensorNodeConfig = field(default_factory=SensorNodeConfig)
+    timing: Timing = field(default_factory=Timing)
+    stepping: Stepping = "command"
+
+    def __post_init__(self) -> None:
+        if self.protocol not in PROTOCOLS:
+            raise SimError(f"protocol {self.protocol!r}; one of {', '.join(PROTOCOLS)} is accepted")
+        if not 1 <= self.joints <= 32:
+            raise SimError(f"{self.joints} joints; 1 to 32 is accepted")
+
+
+def make_wire(config: BenchConfig, number: int) -> DriveWire:
+    """The drive wire of joint `number`."""
+    if config.protocol == "mit":
+        return MitWire(number, config.model, config.reply_id)
+    if config.protocol == "odrive":
+        return OdriveWire(number, config.rates, config.torque_constant)
+    mapped = None if config.map_path is None else load_map(config.map_path)
+    return DbcWire(number, mapped, config.sensor.status_every)
+
+
+def make_bench(config: BenchConfig, make_plant: MakePlant, port: Port, faults: Sequence[Fault] = ()) -> Bench:
+    """A bench of `config.joints` joints; `make_plant(number)` builds the plant of each."""
+    device = [f for f in faults if isinstance(f, DeviceFault)]
+    on_the_way = [f for f in faults if isinstance(f, (WireFault, LineFault))]
+    joints = [
+        SimulatedJoint(
+            make_plant(number),
+            make_wire(config, number),
+            number,
+            config.drive,
+            config.sensor,
+            config.timing,
+            device,
+        )
+        for number in range(1, config.joints + 1)
+    ]
+    return Bench(FaultyPort(port, on_the_way) if on_the_way else port, joints, config.stepping)

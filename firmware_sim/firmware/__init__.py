@@ -1,0 +1,31 @@
+"""Firmware of the simulated joint: the drive at the motor, the sensor node at the joint. No input or output
+here."""
+
+from firmware_sim.firmware.drive import Drive, DriveConfig, DriveReport
+from firmware_sim.firmware.records import (
+    DriveFlag,
+    DriveState,
+    Mode,
+    Request,
+    Sample,
+    SensorFlag,
+    Setpoint,
+    Status,
+)
+from firmware_sim.firmware.sensor_node import SensorNode, SensorNodeConfig
+
+__all__ = [
+    "Drive",
+    "DriveConfig",
+    "DriveFlag",
+    "DriveReport",
+    "DriveState",
+    "Mode",
+    "Request",
+    "Sample",
+    "SensorFlag",
+    "SensorNode",
+    "SensorNodeConfig",
+    "Setpoint",
+    "Status",
+]

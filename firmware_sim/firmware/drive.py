@@ -1,0 +1,331 @@
+"""A motor drive: state table, command watchdog, limits, index search, error flags, and the torque it
+commands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from firmware_sim.errors import SimError
+from firmware_sim.firmware.records import FAULTS, DriveFlag, DriveState, Mode, Request, Setpoint
+from firmware_sim.plantlike import Readings
+
+# What a request does in each state; a pair that is missing is refused and leaves everything as it is.
+TABLE: dict[tuple[DriveState, Request], DriveState] = {
+    (DriveState.DISABLED, Request.DISABLE): DriveState.DISABLED,
+    (DriveState.DISABLED, Request.CALIBRATE): DriveState.CALIBRATING,
+    (DriveState.DISABLED, Request.ENABLE): DriveState.ENABLED,
+    (DriveState.DISABLED, Request.CLEAR_FAULTS): DriveState.DISABLED,
+    (DriveState.DISABLED, Request.SET_ZERO): DriveState.DISABLED,
+    (DriveState.CALIBRATING, Request.DISABLE): DriveState.DISABLED,
+    (DriveState.ENABLED, Request.DISABLE): DriveState.DISABLED,
+    (DriveState.ENABLED, Request.ENABLE): DriveState.ENABLED,
+    (DriveState.ENABLED, Request.CLEAR_FAULTS): DriveState.ENABLED,
+    (DriveState.FAULT, Request.CLEAR_FAULTS): DriveState.DISABLED,
+    **{(state, Request.STOP): DriveState.FAULT for state in DriveState},
+    **{(state, Request.RESET): DriveState.DISABLED for state in DriveState},
+}
+
+
+@dataclass(frozen=True)
+class DriveConfig:
+    """Parameters of the drive; angles and torques at the input pulley.
+
+    `index_position_rad` is where the index of an incremental encoder lies (one a turn); None = absolute
+    encoder, at home
+    from the start. `calibrate_on_enable`: asked to enable before the index was found, the drive searches it
+    first, then
+    enables. `fault_damping_Nms_per_rad` brakes the motor in a fault (shorted windings); 0 lets it coast.
+    """
+
+    torque_limit_Nm: float = 18.0
+    velocity_limit_rad_s: float = 50.0
+    position_min_rad: float = -math.inf
+    position_max_rad: float = math.inf
+    command_timeout_s: float = 0.1
+    temperature_limit_degC: float = 90.0
+    index_position_rad: float | None = None
+    search_velocity_rad_s: float = 1.0
+    search_range_rad: float = 2.0 * math.pi
+    calibrate_on_enable: bool = True
+    fault_damping_Nms_per_rad: float = 0.0
+    position_gain_per_s: float = 20.0
+    velocity_gain_Nms_per_rad: float = 0.05
+    velocity_integrator_Nm_per_rad: float = 0.0
+    mode: Mode = Mode.IMPEDANCE
+
+    def __post_init__(self) -> None:
+        for name in ("torque_limit_Nm", "velocity_limit_rad_s", "search_velocity_rad_s", "search_range_rad"):
+            if not getattr(self, name) > 0.0:
+                raise SimError(f"drive: {name} is {getattr(self, name)!r}; a number above 0 is accepted")
+        if not self.position_min_rad < self.position_max_rad:
+            raise SimError("drive: position_min_rad must lie below position_max_rad; exchange them")
+
+
+class DriveReport(NamedTuple):
+    """What the drive tells of itself; the angle is NaN-free and counts from the encoder's own zero."""
+
+    state: DriveState
+    mode: Mode
+    flags: DriveFlag
+    position_rad: float
+    velocity_rad_s: float
+    torque_Nm: float
+    torque_command_Nm: float
+    current_A: float
+    temperature_degC: float
+    homed: bool
+
+
+class Drive:
+    """The drive of one motor: told by `request` and `command`, driven by `update` at each of its own
+    periods."""
+
+    def __init__(self, config: DriveConfig) -> None:
+        self.base = config
+        self._boot(0.0)
+
+    def _boot(self, now_s: float) -> None:
+        self.config = self.base
+        self.state = DriveState.DISABLED
+        self.mode = self.config.mode
+        self.flags = DriveFlag.STARTED_AFRESH
+        self.setpoint = Setpoint()
+        self.homed = self.config.index_position_rad is None
+        self.refused = 0
+        self._raw_zero: float | None = 0.0 if self.homed else None
+        self._last_command_s = now_s
+        self._last_raw: float | None = None
+        self._checked_raw: float | None = None
+        self._integral_Nm = 0.0
+        self._search_start: float | None = None
+        self._search_sign = 1.0
+        self._search_turn = 0
+        self._enable_when_homed = False
+        self._torque_command = 0.0
+        self._readings: Readings | None = None
+
+    # ---- what the host may ask -------------------------------------------------------------------
+
+    def request(self, request: Request, now_s: float) -> bool:
+        """Ask the state table; returns False where the table has no such entry."""
+        target = TABLE.get((self.state, request))
+        if target is None:
+            self.refused += 1
+            return False
+        if request is Request.RESET:
+            raw = self._last_raw
+            self._boot(now_s)
+            if self._raw_zero is None:
+                self._raw_zero = raw  # an incremental encoder counts from where it woke up
+            return True
+        if request is Request.STOP:
+            self._fault(DriveFlag.EMERGENCY_STOP)
+            return True
+        if request is Request.CLEAR_FAULTS:
+            self.flags = DriveFlag(0)
+        if request is Request.SET_ZERO and self._last_raw is not None:
+            self._raw_zero = self._last_raw
+        self._enter(target, now_s)
+        return True
+
+    def command(self, setpoint: Setpoint, now_s: float) -> None:
+        """New targets; feeds the watchdog whatever the state."""
+        if not all(map(math.isfinite, setpoint)):
+            self.flags |= DriveFlag.BAD_FRAME
+            return
+        self._last_command_s = now_s
+        self.setpoint = setpoint
+
+    def feed_watchdog(self, now_s: float) -> None:
+        """A message that is not a target but shows that the host lives."""
+        self._last_command_s = now_s
+
+    def set_mode(self, mode: Mode) -> None:
+        """Change the control mode; targets start from where the motor is."""
+        self.mode = mode
+        self._hold()
+
+    def set_limits(self, velocity_rad_s: float | None = None, torque_Nm: float | None = None) -> None:
+        """Narrow the limits; none can exceed what the drive was built for."""
+        if velocity_rad_s is not None and velocity_rad_s > 0.0:
+            limit = min(velocity_rad_s, self.base.velocity_limit_rad_s)
+            self.config = replace(self.config, velocity_limit_rad_s=limit)
+        if torque_Nm is not None and torque_Nm > 0.0:
+            self.config = replace(self.config, torque_limit_Nm=min(torque_Nm, self.base.torque_limit_Nm))
+
+    def set_gains(
+        self, position: float | None = None, velocity: float | None = None, integrator: float | None = None
+    ) -> None:
+        """Gains of the cascaded position and velocity loops (1/s, Nms/rad, Nm/rad)."""
+        c = self.config
+        self.config = replace(
+            c,
+            position_gain_per_s=c.position_gain_per_s if position is None else position,
+            velocity_gain_Nms_per_rad=c.velocity_gain_Nms_per_rad if velocity is None else velocity,
+            velocity_integrator_Nm_per_rad=c.velocity_integrator_Nm_per_rad
+            if integrator is None
+            else integrator,
+        )
+
+    def set_position(self, position_rad: float) -> None:
+        """Declare the present angle to be `position_rad`."""
+        if self._last_raw is not None:
+            self._raw_zero = self._last_raw - position_rad
+            self._hold()
+
+    # ---- its own period --------------------------------------------------------------------------
+
+    def update(self, readings: Readings, dt_s: float, now_s: float) -> float:
+        """One period of the drive: checks, then the torque (Nm) that the motor is told to make."""
+        if self._raw_zero is None and math.isfinite(readings.motor_position_rad):
+            self._raw_zero = readings.motor_position_rad
+        self._check(readings, dt_s, now_s)
+        self.observe(readings)
+        if self.state is DriveState.CALIBRATING:
+            wanted = self._search(now_s)
+        elif self.state is DriveState.ENABLED:
+            wanted = self._law(dt_s)
+        elif self.state is DriveState.FAULT:
+            wanted = -self.config.fault_damping_Nms_per_rad * self.velocity_rad_s
+        else:
+            wanted = 0.0
+        limit = self.config.torque_limit_Nm
+        if abs(wanted) > limit:
+            self.flags |= DriveFlag.OVER_TORQUE
+            wanted = math.copysign(limit, wanted)
+        self._torque_command = wanted
+        return wanted
+
+    def observe(self, readings: Readings) -> None:
+        """Take in readings without acting on them; what `report` then tells is as fresh as they are."""
+        self._readings = readings
+        if math.isfinite(readings.motor_position_rad):
+            self._last_raw = readings.motor_position_rad
+
+    @property
+    def position_rad(self) -> float:
+        """Angle as the drive knows it: the encoder's count less its zero."""
+        raw = self._last_raw
+        return 0.0 if raw is None or self._raw_zero is None else raw - self._raw_zero
+
+    @property
+    def velocity_rad_s(self) -> float:
+        """Motor velocity, 0 before the first reading."""
+        readings = self._readings
+        if readings is None or not math.isfinite(readings.motor_velocity_rad_s):
+            return 0.0
+        return readings.motor_velocity_rad_s
+
+    def report(self) -> DriveReport:
+        """State, flags and readings as the wire sends them."""
+        r = self._readings
+        return DriveReport(
+            self.state,
+            self.mode,
+            self.flags,
+            self.position_rad,
+            self.velocity_rad_s,
+            0.0 if r is None else r.motor_torque_Nm,
+            self._torque_command,
+            0.0 if r is None else r.motor_current_A,
+            25.0 if r is None else r.temperature_degC,
+            self.homed,
+        )
+
+    # ---- inside ----------------------------------------------------------------------------------
+
+    def _enter(self, target: DriveState, now_s: float) -> None:
+        if target is DriveState.ENABLED and not self.homed:
+            if not self.config.calibrate_on_enable:
+                self.flags |= DriveFlag.NOT_CALIBRATED
+                return
+            self._enable_when_homed = True
+            target = DriveState.CALIBRATING
+        if target is DriveState.CALIBRATING and self.homed and self.config.index_position_rad is None:
+            target = DriveState.DISABLED  # an absolute encoder has nothing to search
+        if target is DriveState.DISABLED:
+            self._enable_when_homed = False
+        if target is DriveState.CALIBRATING:
+            self._search_start, self._search_sign = None, 1.0
+        if target is DriveState.ENABLED and self.state is not DriveState.ENABLED:
+            self._hold()
+        self.state = target
+        self._last_command_s = now_s
+
+    def _hold(self) -> None:
+        self._integral_Nm = 0.0
+        self.setpoint = Setpoint(position_rad=self.position_rad)
+
+    def _fault(self, flag: DriveFlag) -> None:
+        self.flags |= flag
+        self._enable_when_homed = False
+        self.state = DriveState.FAULT
+
+    def _check(self, readings: Readings, dt_s: float, now_s: float) -> None:
+        c, raw, before = self.config, readings.motor_position_rad, self._checked_raw
+        self._checked_raw = raw
+        active = self.state in (DriveState.ENABLED, DriveState.CALIBRATING)
+        if not active:
+            return
+        found = DriveFlag(0)
+        if not math.isfinite(raw):
+            found |= DriveFlag.MOTOR_ENCODER
+        elif before is not None and abs(raw - before) > 4.0 * c.velocity_limit_rad_s * dt_s + 1e-2:
+            found |= DriveFlag.MOTOR_ENCODER  # no motor within its velocity limit moves so far in one period
+        if abs(readings.motor_velocity_rad_s) > 1.2 * c.velocity_limit_rad_s:
+            found |= DriveFlag.OVER_VELOCITY
+        if readings.temperature_degC > c.temperature_limit_degC:
+            found |= DriveFlag.OVER_TEMPERATURE
+        waited = now_s - self._last_command_s
+        if self.state is DriveState.ENABLED and 0.0 < c.command_timeout_s < waited:
+            found |= DriveFlag.COMMAND_TIMEOUT
+        if self.homed and not c.position_min_rad - 0.05 <= self.position_rad <= c.position_max_rad + 0.05:
+            found |= DriveFlag.POSITION_LIMIT
+        if found & FAULTS:
+            self._fault(found)
+
+    def _law(self, dt_s: float) -> float:
+        c, s = self.config, self.setpoint
+        position = min(max(s.position_rad, c.position_min_rad), c.position_max_rad)
+        if self.mode is Mode.TORQUE:
+            return s.torque_Nm
+        if self.mode is Mode.IMPEDANCE:
+            spring = s.kp_Nm_per_rad * (position - self.position_rad)
+            return spring + s.kd_Nms_per_rad * (s.velocity_rad_s - self.velocity_rad_s) + s.torque_Nm
+        velocity = s.velocity_rad_s
+        if self.mode is Mode.POSITION:
+            velocity += c.position_gain_per_s * (position - self.position_rad)
+        return self._velocity_loop(velocity, dt_s) + s.torque_Nm
+
+    def _velocity_loop(self, wanted_rad_s: float, dt_s: float) -> float:
+        c = self.config
+        wanted = min(max(wanted_rad_s, -c.velocity_limit_rad_s), c.velocity_limit_rad_s)
+        error = wanted - self.velocity_rad_s
+        self._integral_Nm += c.velocity_integrator_Nm_per_rad * error * dt_s
+        self._integral_Nm = min(max(self._integral_Nm, -c.torque_limit_Nm), c.torque_limit_Nm)
+        return c.velocity_gain_Nms_per_rad * error + self._integral_Nm
+
+    def _search(self, now_s: float) -> float:
+        """Turn slowly until the index passes; turn back once, then give up."""
+        raw, index = self._last_raw, self.config.index_position_rad
+        if raw is None or index is None:
+            return 0.0
+        if self._search_start is None:
+            self._search_start, self._search_turn = raw, math.floor((raw - index) / (2.0 * math.pi))
+        turn = math.floor((raw - index) / (2.0 * math.pi))
+        if turn != self._search_turn:
+            # The index says where in the turn the motor is; which turn it is, the drive takes to be that of
+            # its zero.
+            self._raw_zero, self.homed = 2.0 * math.pi * max(turn, self._search_turn), True
+            self.flags &= ~DriveFlag.NOT_CALIBRATED
+            self._enter(DriveState.ENABLED if self._enable_when_homed else DriveState.DISABLED, now_s)
+            return 0.0
+        travelled = (raw - self._search_start) * self._search_sign
+        if travelled > self.config.search_range_rad:
+            if self._search_sign < 0.0:
+                self._fault(DriveFlag.INDEX_NOT_FOUND)
+                return 0.0
+            self._search_sign, self._search_start = -1.0, raw
+        return self._velocity_loop(self._search_sign * self.config.search_velocity_rad_s, 0.0)

@@ -1,0 +1,8 @@
+"""Where frames go in and out: python-can buses, an slcan adapter or a serial device on a pseudo-terminal."""
+
+from firmware_sim.ports.base import Port
+from firmware_sim.ports.can_port import CanPort
+from firmware_sim.ports.open import BUSES, open_port
+from firmware_sim.ports.pty_port import PtyPort, SerialPort, SlcanPort
+
+__all__ = ["BUSES", "CanPort", "Port", "PtyPort", "SerialPort", "SlcanPort", "open_port"]

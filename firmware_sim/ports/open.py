@@ -1,0 +1,56 @@
+"""A port from its name: `virtual[:CHANNEL]`, `udp_multicast[:GROUP[:PORT]]`, `slcan`, `serial`,
+`INTERFACE:CHANNEL`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import can
+
+from firmware_sim.errors import SimError
+from firmware_sim.ports.base import Port
+from firmware_sim.ports.can_port import CanPort
+from firmware_sim.ports.pty_port import SerialPort, SlcanPort
+
+BUSES = "virtual[:CHANNEL], udp_multicast[:GROUP[:PORT]], slcan, serial, or INTERFACE:CHANNEL of python-can"
+GROUP, UDP_PORT = "239.74.163.2", 43113
+
+
+def open_port(bus: str, link: Path | None = None, bitrate: int | None = None) -> Port:
+    """Open a port; `link` names a pseudo-terminal, `bitrate` is for real interfaces. Raises SimError."""
+    interface, _, rest = bus.partition(":")
+    if interface == "slcan" and not rest:
+        return SlcanPort(link)
+    if interface == "serial" and not rest:
+        return SerialPort(link)
+    return open_can(interface, rest, bitrate)
+
+
+def open_can(interface: str, rest: str, bitrate: int | None = None) -> CanPort:
+    """A python-can bus as a port."""
+    options: dict[str, Any] = {"interface": interface, "channel": rest}
+    if interface == "virtual":
+        options["channel"] = rest or "cablecomp"
+    elif interface == "udp_multicast":
+        group, _, port = rest.partition(":")
+        # Hop limit 0: the frames never leave this computer.
+        options |= {"channel": group or GROUP, "port": _udp_port(port), "hop_limit": 0, "fd": False}
+    elif not rest:
+        raise SimError(f"bus {interface!r}: {BUSES} is accepted")
+    elif bitrate is not None:
+        options["bitrate"] = bitrate
+    try:
+        bus = can.Bus(**options)
+    except (can.CanError, OSError, ValueError, ImportError) as error:
+        text = " ".join(str(error).split())
+        raise SimError(f"bus {interface}:{options['channel']} cannot be opened: {text}") from None
+    return CanPort(bus, options)
+
+
+def _udp_port(text: str) -> int:
+    if not text:
+        return UDP_PORT
+    if not text.isdigit() or not 1024 <= int(text) <= 65535:
+        raise SimError(f"udp_multicast: port {text!r}; 1024 to 65535 is accepted")
+    return int(text)

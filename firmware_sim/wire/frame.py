@@ -1,0 +1,32 @@
+"""One frame on a wire, and the number-to-bits helpers that the codecs share."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Frame(NamedTuple):
+    """A CAN frame or a serial record: identifier, 0 to 8 bytes, and whether it asks (remote) instead of
+    telling."""
+
+    identifier: int
+    data: bytes = b""
+    remote: bool = False
+    extended: bool = False
+
+
+def to_raw(value: float, scale: float, bits: int) -> int:
+    """Signed integer nearest to value/scale; the lowest one is kept for "no value" (NaN), the others
+    saturate."""
+    top = (1 << (bits - 1)) - 1
+    if math.isnan(value):
+        return -top - 1
+    return min(
+        max(round(value / scale) if math.isfinite(value) else int(math.copysign(top, value)), -top), top
+    )
+
+
+def from_raw(raw: int, scale: float, bits: int) -> float:
+    """Inverse of `to_raw`."""
+    return math.nan if raw == -(1 << (bits - 1)) else raw * scale
