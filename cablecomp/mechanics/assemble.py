@@ -13,7 +13,6 @@ from cablecomp.errors import InputError
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import Ints
 from cablecomp.mechanics.profile import ROWS, Floats
-from cablecomp.mechanics.tables import plain_law
 
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
 
@@ -42,13 +41,13 @@ class Extension:
 
 @dataclass(frozen=True)
 class Model:
-    """The kernel's arrays for one joint: P and I never change, S and J are the initial state, L the law tables."""
+    """The kernel's arrays for one joint: P and I never change, S and J are the initial state, L the law tables (None = plain)."""
 
     P: Floats
     I: Ints
     S: Floats
     J: Ints
-    L: NDArray[np.float64]
+    L: NDArray[np.float64] | None
 
 
 def stage_ratios(stages: Sequence[Stage]) -> list[float]:
@@ -104,9 +103,8 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
         s_term += term.state_size
     P = np.array([*joints, *np.ravel(cables), *parameters, 0.0])
     I = np.array(header + structure, dtype=np.int64)
-    L = np.stack([plain_law()] * 3) if extra.law is None else extra.law
     S[s_context + o.X_RADIUS] = stages[-1].output_radius_m
-    return Model(P, I, S, np.zeros(2 * n_cables, dtype=np.int64), np.ascontiguousarray(L))
+    return Model(P, I, S, np.zeros(2 * n_cables, dtype=np.int64), extra.law)
 
 
 WET_NODES = 64

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.guide import guide_commit, guide_split
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import leaf_njit, njit
 from cablecomp.mechanics.profile import ROWS, B, Floats, wrap_commit, wrap_eval
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
@@ -27,7 +27,7 @@ def stacks(I: Ints, S: Floats) -> Floats:
     return S[first : first + size].reshape((wraps, ROWS, I[o.CAPACITY]))
 
 
-@njit
+@leaf_njit
 def law_of(P: Floats, p: int, end: int) -> int:
     """Which law table a wrap uses: 0, 1 = output drum of chain h, l; 2 = everything else."""
     if end == 1:
@@ -35,29 +35,35 @@ def law_of(P: Floats, p: int, end: int) -> int:
     return 0 if P[p + o.SIGN] > 0.0 else 1
 
 
-@njit
+@leaf_njit
 def drum_eval(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, end: int, tau: float, v: float, w: float
-) -> tuple[float, float]:
-    """Integral of strain * EA/T0 over one drum's wrap at end value v, and its derivative by v; kept as pending."""
+) -> tuple[float, float, float]:
+    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending."""
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     wrap = 2 * c + end
     mu = P[p + o.MU_OUT + end]
     m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
-    S[m + o.M_W], S[m + o.M_END] = w, v
-    if P[p + o.VISCOUS] > 0.0:
-        return viscous_eval(P, I, S, c, end, w, tau, mu)
-    total, slope, k, ym, vm, cm, bm = wrap_eval(G, L, law_of(P, p, end), wrap, J[wrap], w, v, mu)
+    S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w, v, tau
+    if L is not None:
+        if P[p + o.VISCOUS] > 0.0:
+            return viscous_eval(P, I, S, c, end, w, tau, mu)
+    total, slope, k, ym, vm, cm, bm, tm = wrap_eval(
+        G, L, law_of(P, p, end), wrap, J[wrap], w, v, tau, mu
+    )
     S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = total, k, ym, vm
-    S[m + o.M_C], S[m + o.M_B] = cm, bm
-    return total, slope
+    S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
+    # where the cone cuts, turning by dw lowers the slipped part by mu dw
+    turn = tau - 1.0 - (mu * slope if v > vm else -mu * slope) if slope > 0.0 else tau - 1.0
+    return total, slope, turn
 
 
-@njit
+@leaf_njit
 def cable_eval(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, tension: float, x_in: float, x_out: float
-) -> tuple[float, float]:
-    """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and its derivative [m/N].
+) -> tuple[float, float, float]:
+    """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and its derivatives
+    by the tension [m/N] and by the output shaft's angle [m/rad].
 
     With a guide in the path the input-side tension follows from the guide's friction and the material passed over it.
     """
@@ -68,15 +74,15 @@ def cable_eval(
     v = v_of_tau(L, 2, tau)
     w_out = P[p + o.W_OUT] + P[p + o.SIGN] * x_out
     w_in = P[p + o.W_IN] - P[p + o.SIGN] * x_in
-    e_out, a_out = drum_eval(P, I, S, J, L, G, c, 0, tau, v, w_out)
+    e_out, a_out, turn = drum_eval(P, I, S, J, L, G, c, 0, tau, v, w_out)
     S[q + o.Q_TENSION] = tension
     dv = dv_dtau(L, 2, tau, v)
-    e_in, a_in = drum_eval(P, I, S, J, L, G, c, 1, tau, v, w_in)
+    e_in, a_in, _ = drum_eval(P, I, S, J, L, G, c, 1, tau, v, w_in)
     e_span, a_span = strain_of_tau(L, 2, tau)
     length = P[p + o.LENGTH]
     total = P[p + o.R_OUT] * e_out + P[p + o.R_IN] * e_in + length * e_span
     slope = (P[p + o.R_OUT] * a_out + P[p + o.R_IN] * a_in) * dv + length * a_span
-    if P[p + o.PLAY_YIELD] > 0.0:
+    if L is not None:
         play, d_play = span_play(P[p + o.PLAY_YIELD], S[q + o.Q_PLAY], tension - t0)
         S[q + o.Q_PLAY_TRY] = play
         total += length * P[p + o.PLAY_SHARE] * play / t0
@@ -85,7 +91,7 @@ def cable_eval(
     S[q + o.Q_TENSION_IN] = tension
     S[q + o.Q_STRETCH] = total * unit
     S[q + o.Q_COMPLIANCE] = slope * unit / t0
-    return total * unit, slope * unit / t0
+    return total * unit, slope * unit / t0, P[p + o.SIGN] * P[p + o.R_OUT] * turn * unit
 
 
 @njit
@@ -105,21 +111,23 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
     """Make the last evaluation of cable c its state; `end_error` bounds the relative error of its tension."""
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     q = I[o.S_CABLE] + o.CABLE_STATE * c
-    S[q + o.Q_PLAY] = S[q + o.Q_PLAY_TRY]
-    if P[p + o.GUIDE] > 0.0:
-        guide_commit(P, I, S, J, c)
-    if P[p + o.VISCOUS] > 0.0:
-        viscous_commit(P, I, S, c)
-        return
+    if L is not None:
+        S[q + o.Q_PLAY] = S[q + o.Q_PLAY_TRY]
+        if P[p + o.GUIDE] > 0.0:
+            guide_commit(P, I, S, J, c)
+        if P[p + o.VISCOUS] > 0.0:
+            viscous_commit(P, I, S, c)
+            return
     error = 0.0
     for end in range(2):
         wrap = 2 * c + end
         m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
         meet = (
-            S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B]
+            S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B],
+            S[m + o.M_E],
         )  # fmt: skip
-        w, v = S[m + o.M_W], S[m + o.M_END]
-        J[wrap] = wrap_commit(G, L, law_of(P, p, end), wrap, J[wrap], meet, w, v, end_error, P[p + o.MERGE])
+        w, v, tau = S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU]
+        J[wrap] = wrap_commit(G, L, law_of(P, p, end), wrap, J[wrap], meet, w, v, tau, end_error, P[p + o.MERGE])
         error += P[p + (o.R_OUT if end == 0 else o.R_IN)] * G[wrap, B, J[wrap] - 1]
     S[q + o.Q_ERROR] = error * P[p + o.T0] / P[p + o.EA]
 

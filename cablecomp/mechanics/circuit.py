@@ -9,20 +9,22 @@ from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import Ints, cable_commit, cable_eval
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import leaf_njit, njit
 from cablecomp.mechanics.profile import Floats
 
 
-@njit
+@leaf_njit
 def chain_eval(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
-) -> tuple[float, float]:
-    """Rotation [rad] of the chain's output shaft out of its stretch, and its derivative by the output cable's tension.
+) -> tuple[float, float, float]:
+    """Rotation [rad] of the chain's output shaft out of its stretch, and its derivatives by the output cable's tension and by
+    that shaft's angle.
 
     The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their ratios (5-2).
     """
     theta = 0.0
     compliance = 0.0
+    turn = 0.0
     x = x_in
     for j in range(count):
         c = first + j
@@ -30,13 +32,14 @@ def chain_eval(
         q = I[o.S_CABLE] + o.CABLE_STATE * c
         scale = P[p + o.SCALE]
         shaft = x_out if j == count - 1 else S[q + o.Q_SHAFT]
-        stretch, slope = cable_eval(P, I, S, J, L, G, c, tension * scale, x, shaft)
+        stretch, slope, by_angle = cable_eval(P, I, S, J, L, G, c, tension * scale, x, shaft)
         stretch -= S[q + o.Q_OFFSET]
         theta += P[p + o.WEIGHT] * stretch
+        turn = P[p + o.WEIGHT] * by_angle
         compliance += P[p + o.WEIGHT] * slope * scale
         x = P[p + o.RATIO] * x + P[p + o.SIGN] * stretch / P[p + o.R_OUT]
         S[q + o.Q_SHAFT] = x
-    return theta, compliance
+    return theta, compliance, turn
 
 
 @njit
@@ -60,9 +63,9 @@ def circuit_solve(
         if tension <= floor:
             return x, 0.0, o.STATUS_SLACK
         for _ in range(60):
-            theta, slope = chain_eval(P, I, S, J, L, G, first_h, count, tension, x_in, x)
+            theta, slope, _ = chain_eval(P, I, S, J, L, G, first_h, count, tension, x_in, x)
             new = rigid + theta
-            if abs(new - x) <= 1e-15 + 1e-13 * abs(theta):
+            if abs(new - x) <= 1e-11:
                 return new, slope / radius, o.STATUS_OK
             x = new
         return x, slope / radius, o.STATUS_DIVERGED
@@ -71,23 +74,25 @@ def circuit_solve(
     lowest = floor if pull >= 0.0 else floor - pull
     low, high = lowest, 1e300
     tension = max(S[ql + o.Q_KEPT] - S[ql + o.Q_REFERENCE] * pull, lowest)
-    slack = False
     a_h = a_l = 1.0
     for iteration in range(80):
-        theta_h, a_h = chain_eval(P, I, S, J, L, G, first_h, count, tension + pull, x_in, x)
-        theta_l, a_l = chain_eval(P, I, S, J, L, G, first_l, count, tension, x_in, x)
+        theta_h, a_h, b_h = chain_eval(P, I, S, J, L, G, first_h, count, tension + pull, x_in, x)
+        theta_l, a_l, b_l = chain_eval(P, I, S, J, L, G, first_l, count, tension, x_in, x)
         gap = theta_h + theta_l
-        slack = tension <= lowest and gap >= 0.0
-        new = rigid + theta_h
-        if slack and pull < 0.0:
-            new = rigid - theta_l
-        step = 0.0 if slack else -gap / (a_h + a_l)
-        if abs(step) <= 1e-13 * unit and abs(new - x) <= 1e-11:
-            share = a_h * a_l / (a_h + a_l)
-            if slack:
-                share = a_h if pull >= 0.0 else a_l
-            return new, share / radius, o.STATUS_OK
-        x = new
+        if tension <= lowest and gap >= 0.0:  # one side is slack: the other alone carries and positions
+            new = rigid + theta_h if pull >= 0.0 else rigid - theta_l
+            if abs(new - x) <= 1e-11:
+                return new, (a_h if pull >= 0.0 else a_l) / radius, o.STATUS_OK
+            x = new
+            continue
+        # Newton in (T_l, x) on gap = 0 and rigid + theta_h - x = 0
+        off = rigid + theta_h - x
+        det = (a_h + a_l) * (b_h - 1.0) - a_h * (b_h + b_l)
+        step = (off * (b_h + b_l) - gap * (b_h - 1.0)) / det
+        turn = (gap * a_h - off * (a_h + a_l)) / det
+        if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
+            return x + turn, a_h * a_l / (a_h + a_l) / radius, o.STATUS_OK
+        x += turn
         if gap > 0.0:
             high = tension
         else:

@@ -1,22 +1,62 @@
-"""The project's numba decorators: compiled code is cached on disk beside the sources."""
+"""The project's numba decorators: compiled code is cached on disk, under a key made of all sources it is compiled from.
+
+Numba alone looks at the file of the compiled function only and would reuse machine code after a callee in another file
+has changed.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def _source_key() -> str:
+    digest = hashlib.sha256()
+    for folder in ("mechanics", "effects", "observer"):
+        for source in sorted((_PACKAGE / folder).glob("*.py")):
+            digest.update(source.name.encode() + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _base() -> Path:
+    chosen = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    return Path(chosen) if chosen else Path.home() / ".cache"
+
+
+CACHE = _base() / "cablecomp" / _source_key()
+
+
+def is_compiled() -> bool:
+    """True if an earlier run left compiled kernels of these very sources on disk."""
+    return any(CACHE.rglob("*.nbi"))
+
+
+def cached(decorate: Callable[[], F]) -> F:
+    """Run a numba decorator with the project's cache folder, leaving numba's own setting as it was."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE)
+    try:
+        return decorate()
+    finally:
+        numba.config.CACHE_DIR = before
+
 
 def njit(function: F) -> F:
     """Compile to machine code on first call, cache on disk; IEEE arithmetic, no reordering."""
-    compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
-    return compiled
+    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True)
+    return cached(lambda: compile_(function))
 
 
-def inline_njit(function: F) -> F:
-    """As `njit`, for small leaf functions that belong inside their caller."""
-    compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")(function)
-    return compiled
+def leaf_njit(function: F) -> F:
+    """As `njit`, for small leaf functions that belong inside their caller's machine code."""
+    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
+    return cached(lambda: compile_(function))

@@ -105,6 +105,7 @@ def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) ->
             if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
                 moment = 0.5 * (low + high)
     S[x + o.X_JOINT] = joint
+    S[x + o.X_COMPLIANCE] = compliance
     S[x + o.X_TENSION_H] = S[qh + o.Q_TENSION]
     S[x + o.X_TENSION_L] = S[ql + o.Q_TENSION] if I[h + o.C_CLOSED] == 1 else math.nan
     return status
@@ -116,6 +117,8 @@ def advance(
 ) -> None:
     """Write one sample's readings into the context."""
     x = I[o.S_CONTEXT]
+    # first guess of the angle: along the last compliance
+    S[x + o.X_JOINT] += S[x + o.X_COMPLIANCE] * (load - S[x + o.X_LOAD]) + S[x + o.X_RIGID] * (motor - S[x + o.X_MOTOR])
     S[x + o.X_DT] = time - S[x + o.X_TIME]
     S[x + o.X_TIME] = time
     S[x + o.X_MOTOR] = motor

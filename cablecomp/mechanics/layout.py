@@ -30,8 +30,9 @@ J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
     Q_T0, Q_EA, Q_OFFSET, Q_ERROR, Q_KEPT, Q_REFERENCE, CABLE_STATE,
 ) = range(16)  # fmt: skip
 
-#   one wrap's pending step in the context: last point kept, meeting point (y, v, C, B), wrap angle, end value, integral
-M_TOTAL, M_K, M_Y, M_V, M_C, M_B, M_W, M_END, MEET = range(9)
+#   one wrap's pending step in the context: last point kept, meeting point (y, v, C, B, exp v), wrap angle,
+#   end value and its exp
+M_TOTAL, M_K, M_Y, M_V, M_C, M_B, M_E, M_W, M_END, M_TAU, MEET = range(11)
 
 # --- context of the terms: what they may read ...
 (
@@ -42,7 +43,7 @@ OTHERS = 4
 # ... and what they add to (moments on the output pulley, lengths of cable, factors, the joint encoder's reading)
 (
     X_MOMENT, X_MOMENT_SLOPE, X_LENGTH_H, X_LENGTH_L, X_PRETENSION_H, X_PRETENSION_L, X_STIFFNESS_H, X_STIFFNESS_L,
-    X_READING, CONTEXT,
-) = range(X_OTHER + OTHERS, X_OTHER + OTHERS + 10)  # fmt: skip
+    X_READING, X_COMPLIANCE, X_RIGID, CONTEXT,
+) = range(X_OTHER + OTHERS, X_OTHER + OTHERS + 12)  # fmt: skip
 
 STATUS_OK, STATUS_UNWOUND, STATUS_SLACK, STATUS_DIVERGED, STATUS_OVERLOAD = range(5)

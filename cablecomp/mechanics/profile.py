@@ -12,7 +12,7 @@ Where friction depends on tension or on the place in the groove, the law is the 
 v = int dT/(T m(T)) and sigma = mu int g(y) dy (table mode, see `tables.py`).
 
 Rows of `G[i]`: Y angle, V logarithmic tension, C integral of strain * EA/T0 from the termination, D bound on the error
-of v that merging left in the piece below a point, B integral of D * tau: the bound on the error of C.
+of v that merging left in the piece below a point, B integral of D * tau: the bound on the error of C, E = exp(V).
 """
 
 from __future__ import annotations
@@ -23,36 +23,51 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.mechanics.jit import njit
-from cablecomp.mechanics.tables import groove, groove_inverse, strain
+from cablecomp.mechanics.jit import leaf_njit, njit
+from cablecomp.mechanics.tables import between, groove, strain
 
 Floats: TypeAlias = NDArray[np.float64]
-Meet: TypeAlias = tuple[float, float, int, float, float, float, float]
+Meet: TypeAlias = tuple[float, float, int, float, float, float, float, float]
 
-Y, V, C, D, B = 0, 1, 2, 3, 4
-ROWS = 5
+Y, V, C, D, B, E = 0, 1, 2, 3, 4, 5
+ROWS = 6
 
 # 8-point Gauss-Legendre on [0, 1]
 _x, _w = np.polynomial.legendre.leggauss(8)
 GAUSS_X = (_x + 1.0) / 2.0
 GAUSS_W = _w / 2.0
+F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
-@njit
-def stretch(d: float) -> float:
-    """(1 - exp(-d))/d, the mean of exp(s - d) over s in 0..d; series near zero."""
-    if abs(d) < 1e-4:
-        return 1.0 - d / 2.0 + d * d / 6.0 - d * d * d / 24.0
-    return -math.expm1(-d) / d
-
-
-@njit
-def piece(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
-    """Integral of e(v) over y1..y2 and of de/dv: e = strain * EA/T0 = tau - 1 for the plain cable."""
+@leaf_njit
+def piece(
+    L: Floats, law: int, y1: float, v1: float, t1: float, y2: float, v2: float, t2: float
+) -> tuple[float, float]:
+    """Integral of e(v) over y1..y2 and of de/dv; e = strain * EA/T0 = tau - 1 for the plain cable, whose tau are t1, t2."""
     dy = y2 - y1
+    d = v2 - v1
+    if L is None:
+        return _piece_plain(dy, d, t1, t2)
     if L[0, 0, 0] == 0.0:
-        grown = dy * math.exp(v2) * stretch(v2 - v1)
-        return grown - dy, grown
+        return _piece_plain(dy, d, t1, t2)
+    return _piece_table(L, law, y1, v1, y2, v2)
+
+
+@leaf_njit
+def _piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, float]:
+    """`piece` in closed form: exp(v) over a straight piece that rises by d."""
+    if abs(d) > 0.1:
+        grown = dy * (t2 - t1) / d
+    else:  # (1 - exp(-d))/d as a series: the difference of the exponentials would cancel
+        grown = dy * t2 * (1.0 - d * (F2 - d * (F3 - d * (F4 - d * (F5 - d * (F6 - d * (F7 - d * F8)))))))
+    return grown - dy, grown
+
+
+@njit
+def _piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
+    """`piece` by Gauss-Legendre quadrature, for tabulated laws."""
+    dy = y2 - y1
+    d = v2 - v1
     total = 0.0
     slope = 0.0
     s1 = groove(L, law, y1)
@@ -60,22 +75,22 @@ def piece(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tu
     for j in range(8):
         y = y1 + dy * GAUSS_X[j]
         share = (groove(L, law, y) - s1) / span if span > 0.0 else 0.0
-        e, de = strain(L, law, v1 + (v2 - v1) * share)
+        e, de = strain(L, law, v1 + d * share)
         total += GAUSS_W[j] * e
         slope += GAUSS_W[j] * de
     return total * dy, slope * dy
 
 
-@njit
-def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, mu: float) -> Meet:
+@leaf_njit
+def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, tau: float, mu: float) -> Meet:
     """What wrap i would hold at wrap angle w and end value v, without committing it.
 
     Returns (integral of e, its derivative by v, last point kept, and the point where the cone meets the old profile:
-    y, v, C, B there).
+    y, v, C, B, exp(v) there). `tau` is exp(v).
     """
     top = n - 1
     k = top
-    yp, vp = G[i, Y, top], G[i, V, top]
+    yp, vp, tp = G[i, Y, top], G[i, V, top], G[i, E, top]
     if w < yp:
         k -= 1
         while G[i, Y, k] > w:
@@ -85,15 +100,16 @@ def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float
         share = (groove(L, law, w) - s1) / (groove(L, law, G[i, Y, k + 1]) - s1)
         yp = w
         vp = v1 + share * (G[i, V, k + 1] - v1)
+        tp = math.exp(vp)
     sw = groove(L, law, w)
     if abs(v - vp) <= mu * (sw - groove(L, law, yp)):
         # cable wound on, or nothing at all happened: no slip
-        cp, bp = _running(G, L, law, i, k, n, yp, vp)
+        cp, bp = _running(G, L, law, i, k, n, yp, vp, tp)
         if w == yp:
-            return cp, 0.0, k, yp, vp, cp, bp
-        integral, _ = piece(L, law, yp, vp, w, v)
-        ahead, _ = piece(L, law, yp, vp, w, v + 1e-6)
-        return cp + integral, (ahead - integral) * 1e6, k, yp, vp, cp, bp
+            return cp, 0.0, k, yp, vp, cp, bp, tp
+        integral, slope = piece(L, law, yp, vp, tp, w, v, tau)
+        # its derivative by the new end alone: about half of the whole shift's, enough for Newton's method
+        return cp + integral, 0.5 * slope, k, yp, vp, cp, bp, tp
     # the cone of the new end cuts into the profile: walk inward to where they meet
     s = 1.0 if v > vp else -1.0
     steep = s * mu
@@ -109,69 +125,60 @@ def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float
         k -= 1
     if k < 0:  # the whole wrap slips, down to the termination
         ym = 0.0
-    elif L[0, 0, 0] == 0.0:
-        ym = G[i, Y, k] + over / (over - over_upper) * (y_upper - G[i, Y, k])
     else:
-        sk = groove(L, law, G[i, Y, k])
-        share = over / (over - over_upper)
-        ym = groove_inverse(L, law, sk + share * (groove(L, law, y_upper) - sk), G[i, Y, k], y_upper)
+        ym = between(L, law, G[i, Y, k], y_upper, over / (over - over_upper))
     vm = v - steep * (sw - groove(L, law, ym))
+    tm = math.exp(vm)
     cm = bm = 0.0
     if k >= 0:
-        cm, bm = _running(G, L, law, i, k, n, ym, vm)
-    integral, slope = piece(L, law, ym, vm, w, v)
-    return cm + integral, slope, k, ym, vm, cm, bm
+        cm, bm = _running(G, L, law, i, k, n, ym, vm, tm)
+    integral, slope = piece(L, law, ym, vm, tm, w, v, tau)
+    return cm + integral, slope, k, ym, vm, cm, bm, tm
 
 
-@njit
+@leaf_njit
 def _running(
-    G: Floats, L: Floats, law: int, i: int, k: int, n: int, y: float, v: float
+    G: Floats, L: Floats, law: int, i: int, k: int, n: int, y: float, v: float, t: float
 ) -> tuple[float, float]:
     """C and B at a point (y, v) of the profile on the piece above point k."""
     if k == n - 1 or y == G[i, Y, k]:
         return G[i, C, k], G[i, B, k]
-    integral, _ = piece(L, law, G[i, Y, k], G[i, V, k], y, v)
+    integral, _ = piece(L, law, G[i, Y, k], G[i, V, k], G[i, E, k], y, v, t)
     error = G[i, D, k + 1]
     return G[i, C, k] + integral, G[i, B, k] + error * (integral + y - G[i, Y, k])
 
 
 @njit
 def wrap_commit(
-    G: Floats,
-    L: Floats,
-    law: int,
-    i: int,
-    n: int,
-    meet: Meet,
-    w: float,
-    v: float,
-    slack_v: float,
-    tolerance: float,
-) -> int:
+    G: Floats, L: Floats, law: int, i: int, n: int, meet: Meet, w: float, v: float, tau: float, slack_v: float, tolerance: float
+) -> int:  # fmt: skip
     """Make an evaluated step the state; returns the new number of points.
 
     `slack_v` bounds the error of the end value v (from earlier merging, through the solved tensions); `tolerance` bounds
     the error of v that merging of neighbours may leave in a piece. The stack never outgrows its array.
     """
-    total, _, k, ym, vm, cm, bm = meet
+    total, _, k, ym, vm, cm, bm, tm = meet
     below = G[i, D, k + 1] if 0 <= k < n - 1 else 0.0
+    kept = k == n - 1  # nothing was cut off: cable was wound on, and may continue the piece below
     n = k + 1
     if n == 0 or ym > G[i, Y, n - 1]:
-        G[i, Y, n], G[i, V, n], G[i, C, n], G[i, B, n] = ym, vm, cm, bm
-        G[i, D, n] = below
+        G[i, Y, n], G[i, V, n], G[i, C, n] = ym, vm, cm
+        G[i, D, n], G[i, B, n], G[i, E, n] = below, bm, tm
         n += 1
-    if w > G[i, Y, n - 1]:
+        kept = False
+    last = n - 1
+    if w > G[i, Y, last]:
         error = slack_v
-        if n >= 2:
-            merged = _merge_error(G, L, law, i, n, w, v)
-            if max(error, G[i, D, n - 1]) + merged <= tolerance:
-                error = max(error, G[i, D, n - 1]) + merged
-                n -= 1
-        G[i, Y, n], G[i, V, n], G[i, D, n] = w, v, error
-        integral = total - G[i, C, n - 1]  # `total` is the integral up to the end, whichever points were dropped
-        G[i, C, n] = total
-        G[i, B, n] = G[i, B, n - 1] + error * (integral + w - G[i, Y, n - 1])
-        n += 1
+        if kept and last >= 1:
+            merged = max(error, G[i, D, last]) + _merge_error(G, L, law, i, n, w, v)
+            if merged <= tolerance:
+                error = merged
+                last -= 1
+        n = last + 2
+        G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1] = w, v, error
+        # `total` is the integral up to the end, whichever points were dropped
+        G[i, C, n - 1], G[i, E, n - 1] = total, tau
+        G[i, B, n - 1] = G[i, B, last] + error * (total - G[i, C, last] + w - G[i, Y, last])
     if n >= G.shape[2] - 3:
         n = compact(G, L, law, i, n)
     return n
@@ -221,9 +228,13 @@ def accumulate(G: Floats, L: Floats, law: int, i: int, n: int) -> None:
     """Recompute the running integrals C and B of wrap i."""
     G[i, C, 0] = 0.0
     G[i, B, 0] = 0.0
+    G[i, E, 0] = math.exp(G[i, V, 0])
     for k in range(1, n):
         dy = G[i, Y, k] - G[i, Y, k - 1]
-        integral, _ = piece(L, law, G[i, Y, k - 1], G[i, V, k - 1], G[i, Y, k], G[i, V, k])
+        G[i, E, k] = math.exp(G[i, V, k])
+        integral, _ = piece(
+            L, law, G[i, Y, k - 1], G[i, V, k - 1], G[i, E, k - 1], G[i, Y, k], G[i, V, k], G[i, E, k]
+        )
         G[i, C, k] = G[i, C, k - 1] + integral
         G[i, B, k] = G[i, B, k - 1] + G[i, D, k] * (integral + dy)
 

@@ -24,6 +24,7 @@ def joint_start(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, 
     S[x + o.X_MOTOR_OLD] = motor
     G = stacks(I, S)
     angle = motor
+    rigid = 1.0
     for ic in range(I[o.N_CIRCUITS]):
         h = o.HEADER + o.CIRCUIT * ic
         count = I[h + o.C_COUNT]
@@ -50,6 +51,8 @@ def joint_start(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, 
                 S[q + o.Q_REFERENCE] = 0.5 if I[h + o.C_CLOSED] == 1 else P[p + o.T0]
                 shaft = after
         angle *= P[o.JOINT * ic + o.J_RATIO]
+        rigid *= P[o.JOINT * ic + o.J_RATIO]
+    S[x + o.X_RIGID] = rigid
     S[x + o.X_JOINT] = angle
     S[x + o.X_JOINT_OLD] = angle
     S[x + o.X_JOINT_OLDER] = angle

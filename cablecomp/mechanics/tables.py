@@ -1,8 +1,8 @@
 """Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
 
-`L[law]` is a table of 4 rows. Row 0 is its head: [mode (the same in all laws), v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count].
-Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. In mode 1
-row 1 holds u = ln tau on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) = int m_g dy on an even
+`L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count].
+Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `L` is None for the plain drive without any
+extension: the compiler then leaves out all code that a plain drive does not need. In mode 1 row 1 holds u = ln tau on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) = int m_g dy on an even
 grid of y, and row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
 """
@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import leaf_njit, njit
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -26,8 +26,8 @@ STIFFENING = 10  # place in the head of b in EA(T) = EA (1 + b (tau - 1))
 
 
 def plain_law() -> Floats:
-    """The law of the thesis: constant mu, constant EA."""
-    return np.zeros((1, 16))
+    """The law of the thesis (constant mu, constant EA) in the form of a table."""
+    return np.zeros((4, 16))
 
 
 def law_table(
@@ -84,12 +84,25 @@ def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) ->
     )
 
 
-@njit
+@leaf_njit
 def groove(L: Floats, law: int, y: float) -> float:
     """Friction-weighted angle g(y); y itself for the plain law."""
+    if L is None:
+        return y
     if L[0, 0, 0] == 0.0:
         return y
     return look_up(L, law, 2, L[law, 0, 4], L[law, 0, 5], y)
+
+
+@leaf_njit
+def between(L: Floats, law: int, y_low: float, y_high: float, share: float) -> float:
+    """The angle whose groove coordinate lies by `share` between those of y_low and y_high."""
+    if L is None:
+        return y_low + share * (y_high - y_low)
+    if L[0, 0, 0] == 0.0:
+        return y_low + share * (y_high - y_low)
+    low = groove(L, law, y_low)
+    return groove_inverse(L, law, low + share * (groove(L, law, y_high) - low), y_low, y_high)
 
 
 @njit
@@ -118,19 +131,29 @@ def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -
     return y
 
 
-@njit
+@leaf_njit
 def v_of_tau(L: Floats, law: int, tau: float) -> float:
     """Profile variable of the tension ratio tau = T/T0: ln tau for the plain law."""
+    u = math.log(tau)
+    if L is None:
+        return u
     if L[0, 0, 0] == 0.0:
-        return math.log(tau)
-    return look_up(L, law, 3, L[law, 0, 7], L[law, 0, 8], math.log(tau))
+        return u
+    return look_up(L, law, 3, L[law, 0, 7], L[law, 0, 8], u)
+
+
+@leaf_njit
+def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
+    """Derivative of `v_of_tau`; 1/tau for the plain law."""
+    if L is None:
+        return 1.0 / tau
+    if L[0, 0, 0] == 0.0:
+        return 1.0 / tau
+    return _slope_table(L, law, tau, v)
 
 
 @njit
-def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
-    """Derivative of `v_of_tau`; 1/tau for the plain law."""
-    if L[0, 0, 0] == 0.0:
-        return 1.0 / tau
+def _slope_table(L: Floats, law: int, tau: float, v: float) -> float:
     step = L[law, 0, 2]
     du = (look_up(L, law, 1, L[law, 0, 1], step, v + 0.01 * step) - look_up(L, law, 1, L[law, 0, 1], step, v - 0.01 * step)) / (
         0.02 * step
@@ -138,18 +161,29 @@ def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
     return 1.0 / (tau * du)
 
 
-@njit
+@leaf_njit
 def tau_of_v(L: Floats, law: int, v: float) -> float:
     """Tension ratio of the profile variable."""
+    if L is None:
+        return math.exp(v)
     if L[0, 0, 0] == 0.0:
         return math.exp(v)
     return math.exp(look_up(L, law, 1, L[law, 0, 1], L[law, 0, 2], v))
 
 
-@njit
+@leaf_njit
 def strain_of_tau(L: Floats, law: int, tau: float) -> tuple[float, float]:
     """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int d tau/(1 + b (tau - 1))."""
-    b = L[law, 0, STIFFENING]
+    if L is None:
+        return tau - 1.0, 1.0
+    if L[0, 0, 0] == 0.0:
+        return tau - 1.0, 1.0
+    return stiffening_strain(L[law, 0, STIFFENING], tau)
+
+
+@njit
+def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
+    """The same for the stiffening coefficient b."""
     if b == 0.0:
         return tau - 1.0, 1.0
     stiffness = 1.0 + b * (tau - 1.0)
