@@ -1,0 +1,35 @@
+"""Joints on CAN buses and serial lines: frames without I/O, ports that read cheaply, devices, and the link
+that joins them."""
+
+from cablecomp.links.link import BusLink, Link, LinkStatus
+from cablecomp.links.readings import Age, JointReadings, MessageStats
+from cablecomp.links.records import (
+    CHANNELS,
+    BusState,
+    DriveState,
+    Mode,
+    MotorCommand,
+    Request,
+    clip_names,
+)
+from cablecomp.links.schema import LinkConfig, Timeouts, load_link, parse_link
+
+__all__ = [
+    "CHANNELS",
+    "Age",
+    "BusLink",
+    "BusState",
+    "DriveState",
+    "JointReadings",
+    "Link",
+    "LinkConfig",
+    "LinkStatus",
+    "MessageStats",
+    "Mode",
+    "MotorCommand",
+    "Request",
+    "Timeouts",
+    "clip_names",
+    "load_link",
+    "parse_link",
+]

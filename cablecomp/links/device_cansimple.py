@@ -1,0 +1,224 @@
+"""A joint's drive that is an ODrive (CANSimple)."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Final
+
+from cablecomp.errors import InputError
+from cablecomp.links import cansimple
+from cablecomp.links.cansimple import AxisState, Cmd, ControlMode
+from cablecomp.links.devices import Gear, Outgoing, Receiver, Take, chain
+from cablecomp.links.readings import JointReadings, MessageStats
+from cablecomp.links.records import Frame, Mode, MotorCommand, Request
+from cablecomp.links.schema import MotorEnd
+from cablecomp.links.schema_devices import CanSimpleDevice, OdriveData
+from cablecomp.links.units import Linear
+
+_TURN: Final = 2.0 * pi
+_COMMANDS: Final[dict[OdriveData, Cmd]] = {
+    "encoder": Cmd.GET_ENCODER_ESTIMATES,
+    "iq": Cmd.GET_IQ,
+    "torques": Cmd.GET_TORQUES,
+    "temperature": Cmd.GET_TEMPERATURE,
+    "bus": Cmd.GET_BUS_VOLTAGE_CURRENT,
+}
+_EXTRAS: Final[dict[OdriveData, str]] = {
+    "temperature": "other_motor_temperature_degC",
+    "bus": "other_bus_voltage_V",
+}
+_MODES: Final = {
+    Mode.TORQUE: ControlMode.TORQUE,
+    Mode.VELOCITY: ControlMode.VELOCITY,
+    Mode.POSITION: ControlMode.POSITION,
+}
+
+
+def extra_channels(device: CanSimpleDevice) -> tuple[str, ...]:
+    """Channels beside the common ones that the messages named by the device bring."""
+    return tuple(_EXTRAS[d] for d in _EXTRAS if d in (*device.cyclic, *device.polled))
+
+
+class CanSimpleDrive:
+    """Encodes commands to, and decodes messages from, one ODrive axis.
+
+    Motor torque comes from Get_Torques (its estimate), or from the measured Iq times
+    `torque_constant_Nm_per_A`.
+    """
+
+    def __init__(self, device: CanSimpleDevice, end: MotorEnd, readings: JointReadings) -> None:
+        self._node = end.node
+        cansimple.identifier(end.node, 0)
+        self._device = device
+        self._readings = readings
+        self._polled = tuple(cansimple.request(end.node, _COMMANDS[d]) for d in device.polled)
+        self._state = AxisState.UNDEFINED
+        self._set_mode(Mode(end.mode))
+        gear = Gear(end)
+        turns = Linear(_TURN)
+        self._position = chain(turns, gear.from_shaft("motor_position_rad"))
+        self._velocity = chain(turns, gear.from_shaft("motor_velocity_rad_s"))
+        self._torque = gear.from_shaft("motor_torque_Nm")
+        self._current = gear.from_shaft("motor_current_A")
+        to_position = gear.position()
+        self._to_turns = Linear(to_position.gain / _TURN, to_position.offset / _TURN)
+        self._to_turns_s = gear.velocity() / _TURN
+        self._to_torque = gear.torque()
+
+    def _set_mode(self, mode: Mode) -> None:
+        if mode not in _MODES:
+            raise InputError(
+                f"joint `{self._readings.name}`: an ODrive has no mode `{mode}`; "
+                f"accepted: {', '.join(_MODES)}"
+            )
+        self._mode = mode
+
+    def receivers(self) -> tuple[Receiver, ...]:
+        """See `Drive.receivers`."""
+        wanted = {*self._device.cyclic, *self._device.polled}
+        constant = self._device.torque_constant_Nm_per_A
+        of_iq: list[tuple[int, str, Linear]] = [(1, "motor_current_A", self._current)]
+        if constant is not None and "torques" not in wanted:
+            of_iq.append((1, "motor_torque_Nm", chain(Linear(constant), self._torque)))
+        maps: dict[OdriveData, list[tuple[int, str, Linear]]] = {
+            "encoder": [
+                (0, "motor_position_rad", self._position),
+                (1, "motor_velocity_rad_s", self._velocity),
+            ],
+            "iq": of_iq,
+            "torques": [(1, "motor_torque_Nm", self._torque)],
+            "temperature": [(1, _EXTRAS["temperature"], Linear(1.0))],
+            "bus": [(0, _EXTRAS["bus"], Linear(1.0))],
+        }
+        out = [Receiver(cansimple.identifier(self._node, Cmd.HEARTBEAT), self._heartbeat())]
+        for name in sorted(wanted):
+            identifier = cansimple.identifier(self._node, _COMMANDS[name])
+            out.append(Receiver(identifier, self._pair(name, maps[name])))
+        return tuple(out)
+
+    def _stats(self, name: str) -> MessageStats:
+        stats = MessageStats(f"{self._readings.name}: {self._device.id} {name}")
+        self._readings.messages.append(stats)
+        return stats
+
+    def _heartbeat(self) -> Take:
+        stats, readings = self._stats("heartbeat"), self._readings
+
+        def take(data: bytes, now_s: float) -> int:
+            if len(data) != 8:
+                stats.invalid += 1
+                return 0
+            heartbeat = cansimple.parse_heartbeat(data)
+            readings.state = cansimple.drive_state(heartbeat)
+            readings.error = heartbeat.error
+            stats.received += 1
+            stats.last_s = now_s
+            return 0
+
+        return take
+
+    def _pair(self, name: OdriveData, channels: list[tuple[int, str, Linear]]) -> Take:
+        stats, readings = self._stats(name), self._readings
+        places = [(which, readings.index(channel), *line) for which, channel, line in channels]
+        values, arrived, updates = readings.values, readings.arrived_s, readings.updates
+        is_reply = name == "encoder"
+
+        def take(data: bytes, now_s: float) -> int:
+            if len(data) != 8:
+                stats.invalid += 1
+                return 0
+            pair = cansimple.parse_pair(data)
+            # NaN and infinity are not equal to themselves times zero
+            if pair[0] * 0.0 != 0.0 or pair[1] * 0.0 != 0.0:
+                stats.invalid += 1
+                return 0
+            for which, place, gain, offset in places:
+                values[place] = gain * pair[which] + offset
+                arrived[place] = now_s
+                updates[place] += 1
+            if is_reply:
+                readings.replies += 1
+                readings.unanswered = 0
+            stats.received += 1
+            stats.last_s = now_s
+            return len(places)
+
+        return take
+
+    def command(self, command: MotorCommand) -> Outgoing:
+        """See `Drive.command`; gains are the ODrive's own, so a command with gains is refused."""
+        position_rad, velocity_rad_s, torque_Nm, stiffness, damping = command
+        if stiffness is not None or damping is not None:
+            raise InputError(
+                f"joint `{self._readings.name}`: an ODrive takes no stiffness or damping with a command; "
+                "leave both None; nothing was sent"
+            )
+        torque = torque_Nm * self._to_torque
+        if self._mode == Mode.POSITION:
+            gain, offset = self._to_turns
+            frame, clipped = cansimple.set_input_pos(
+                self._node, gain * position_rad + offset, velocity_rad_s * self._to_turns_s, torque
+            )
+        elif self._mode == Mode.VELOCITY:
+            frame, clipped = cansimple.set_input_vel(self._node, velocity_rad_s * self._to_turns_s, torque)
+        else:
+            frame, clipped = cansimple.set_input_torque(self._node, torque)
+        return Outgoing((frame, *self._polled), clipped)
+
+    def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
+        """See `Drive.request`; enabling sets mode and limits first; zero needs firmware 0.6."""
+        if mode is not None:
+            self._set_mode(mode)
+        node, device = self._node, self._device
+        if request == Request.ENABLE:
+            frames = [cansimple.set_controller_mode(node, _MODES[self._mode])]
+            if device.velocity_limit_turns_s is not None and device.current_limit_A is not None:
+                frames.append(
+                    cansimple.set_limits(node, device.velocity_limit_turns_s, device.current_limit_A)
+                )
+            return (*frames, cansimple.set_axis_state(node, AxisState.CLOSED_LOOP))
+        if request == Request.DISABLE:
+            return (cansimple.set_axis_state(node, AxisState.IDLE),)
+        if request == Request.STOP:
+            return (cansimple.estop(node),)
+        if request == Request.CALIBRATE:
+            return (cansimple.set_axis_state(node, AxisState.FULL_CALIBRATION),)
+        if request == Request.CLEAR_FAULTS:
+            return (cansimple.clear_errors(node),)
+        if request == Request.RESET:
+            return (cansimple.reboot(node),)
+        if device.firmware == "0.6":
+            return (cansimple.set_absolute_position(node, 0.0),)
+        return ()
+
+    def error_text(self, error: int) -> str:
+        """See `Drive.error_text`."""
+        names = [name for bit, name in _ERRORS.items() if error & bit]
+        return ", ".join(names) if names else (f"axis error 0x{error:X}" if error else "")
+
+
+_ERRORS: Final = {
+    0x01: "initializing",
+    0x02: "system level",
+    0x04: "timing error",
+    0x08: "missing estimate",
+    0x10: "bad config",
+    0x20: "drv fault",
+    0x40: "missing input",
+    0x100: "dc bus over voltage",
+    0x200: "dc bus under voltage",
+    0x400: "dc bus over current",
+    0x800: "dc bus over regen current",
+    0x1000: "current limit violation",
+    0x2000: "motor over temperature",
+    0x4000: "inverter over temperature",
+    0x8000: "velocity limit violation",
+    0x10000: "position limit violation",
+    0x1000000: "watchdog timer expired",
+    0x2000000: "estop requested",
+    0x4000000: "spinout detected",
+    0x8000000: "brake resistor disarmed",
+    0x10000000: "thermistor disconnected",
+    0x40000000: "calibration error",
+}
+"""Axis error bits of firmware 0.6 (ODrive's own message table)."""

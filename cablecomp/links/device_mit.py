@@ -1,0 +1,171 @@
+"""A joint's drive that speaks the MIT frame."""
+
+from __future__ import annotations
+
+from cablecomp.errors import InputError
+from cablecomp.links import mit
+from cablecomp.links.devices import Gear, Outgoing, Receiver
+from cablecomp.links.mit import MitRange, reply_counts, saturation
+from cablecomp.links.mit_profiles import error_text, profile, status_of
+from cablecomp.links.readings import JointReadings, MessageStats
+from cablecomp.links.records import (
+    MOTOR_POSITION,
+    MOTOR_TORQUE,
+    MOTOR_VELOCITY,
+    DriveState,
+    Frame,
+    Mode,
+    MotorCommand,
+    Request,
+)
+from cablecomp.links.schema import MotorEnd
+from cablecomp.links.schema_devices import MitDevice
+
+MOTOR_TEMPERATURE = "other_motor_temperature_degC"
+
+
+def extra_channels(device: MitDevice) -> tuple[str, ...]:
+    """Channels beside the common ones: the motor's temperature, where the reply has eight bytes."""
+    return (MOTOR_TEMPERATURE,) if _reply_length(device) == 8 else ()
+
+
+def _reply_length(device: MitDevice) -> int:
+    if device.reply_length is not None:
+        return device.reply_length
+    if device.model is not None:
+        return profile(device.model).reply_length
+    return 6 if device.family == "katz" else 8
+
+
+class MitDrive:
+    """Encodes commands and decodes replies of one drive.
+
+    Reply identifier, unless the link gives one: CubeMars the drive number, Damiao drive number + 0x10 (the
+    maker's advice for the master's identifier), Katz 0. CubeMars and Katz do not say whether the motor mode
+    is on: the state is then what was asked for last, once a reply has come.
+    """
+
+    def __init__(self, device: MitDevice, end: MotorEnd, readings: JointReadings) -> None:
+        base = profile(device.model) if device.model is not None else None
+        family = device.family if device.family is not None else (base.family if base else None)
+        if family is None:
+            raise InputError(f"device `{device.id}`: no family; cubemars, damiao or katz are accepted")
+        given = device.range
+        if given is not None:
+            self._scale = MitRange(*(getattr(given, name) for name in MitRange._fields))
+        elif base is not None:
+            self._scale = base.scale
+        self._family = family
+        self._length = _reply_length(device)
+        self._node = end.node
+        default = {"cubemars": end.node, "damiao": end.node + 0x10, "katz": 0}[family]
+        self._reply_id = end.reply_id if end.reply_id is not None else default
+        self._readings = readings
+        self._stats = MessageStats(f"{readings.name}: {device.id} reply")
+        readings.messages.append(self._stats)
+        self._temperature = readings.index(MOTOR_TEMPERATURE) if self._length == 8 else -1
+        self._asked = DriveState.UNKNOWN
+        self._mode = Mode(end.mode)
+        self._prepare(Gear(end), end)
+
+    def _prepare(self, gear: Gear, end: MotorEnd) -> None:
+        p, v, t, _, _ = self._scale
+        position, velocity, torque = (
+            gear.from_shaft(c) for c in ("motor_position_rad", "motor_velocity_rad_s", "motor_torque_Nm")
+        )
+        # value = gain * count + offset, calibration and count-to-value in one
+        self._p = (position.gain * 2 * p / mit.P_TOP, position.offset - position.gain * p)
+        self._v = (velocity.gain * 2 * v / mit.V_TOP, -velocity.gain * v)
+        self._t = (torque.gain * 2 * t / mit.V_TOP, -torque.gain * t)
+        self._to_position = gear.position()
+        self._to_velocity, self._to_torque, self._to_gain = gear.velocity(), gear.torque(), gear.gain()
+        self._kp = end.stiffness_Nm_per_rad * self._to_gain
+        self._kd = end.damping_Nms_per_rad * self._to_gain
+        if self._mode in (Mode.POSITION, Mode.IMPEDANCE) and self._kp <= 0:
+            raise InputError(
+                f"joint `{self._readings.name}`: motor.stiffness_Nm_per_rad is 0; a MIT drive in mode "
+                f"`{self._mode}` needs a positive one"
+            )
+
+    def receivers(self) -> tuple[Receiver, ...]:
+        """See `Drive.receivers`."""
+        mask = 0x0F if self._family == "damiao" else 0xFF
+        return (Receiver(self._reply_id, self.take, mask, self._node & mask),)
+
+    def take(self, data: bytes, now_s: float) -> int:
+        """Take one reply."""
+        stats, readings = self._stats, self._readings
+        if len(data) != self._length:
+            stats.invalid += 1
+            return 0
+        word = int.from_bytes(data, "big")
+        byte_7 = None
+        values, arrived, updates = readings.values, readings.arrived_s, readings.updates
+        if self._length == 8:
+            byte_7 = word & 0xFF
+            byte_6 = word >> 8 & 0xFF
+            word >>= 16
+            # Damiao: byte 6 MOSFETs, byte 7 motor; CubeMars: byte 6 motor (int8), byte 7 error
+            place = self._temperature
+            values[place] = float(byte_7 if self._family == "damiao" else byte_6 - 256 * (byte_6 >> 7))
+            arrived[place] = now_s
+            updates[place] += 1
+        n_p, n_v, n_t = reply_counts(word)
+        values[MOTOR_POSITION] = n_p * self._p[0] + self._p[1]
+        values[MOTOR_VELOCITY] = n_v * self._v[0] + self._v[1]
+        values[MOTOR_TORQUE] = n_t * self._t[0] + self._t[1]
+        for place in (MOTOR_POSITION, MOTOR_VELOCITY, MOTOR_TORQUE):
+            arrived[place] = now_s
+            updates[place] += 1
+        readings.saturated = saturation(n_p, n_v, n_t)
+        _, state, error = status_of(self._family, word >> 40, byte_7)
+        readings.state = self._asked if state is DriveState.UNKNOWN else state
+        readings.error = error
+        readings.replies += 1
+        readings.unanswered = 0
+        stats.received += 1
+        stats.last_s = now_s
+        return 4 if self._length == 8 else 3
+
+    def command(self, command: MotorCommand) -> Outgoing:
+        """See `Drive.command`."""
+        position_rad, velocity_rad_s, torque_Nm, stiffness, damping = command
+        mode = self._mode
+        kp = self._kp if stiffness is None else stiffness * self._to_gain
+        kd = self._kd if damping is None else damping * self._to_gain
+        if mode == Mode.TORQUE:
+            kp = kd = 0.0
+        elif mode == Mode.VELOCITY:
+            kp = 0.0
+        gain, offset = self._to_position
+        data, clipped = mit.pack_command(
+            self._scale,
+            gain * position_rad + offset,
+            velocity_rad_s * self._to_velocity,
+            kp,
+            kd,
+            torque_Nm * self._to_torque,
+        )
+        return Outgoing((Frame(self._node, data),), clipped)
+
+    def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
+        """See `Drive.request`; a CubeMars drive has no frame to clear faults: leaving and entering the mode
+        does it."""
+        if mode is not None:
+            self._mode = mode
+        if request == Request.ENABLE:
+            self._asked = DriveState.ENABLED
+            return (Frame(self._node, mit.ENTER),)
+        if request in (Request.DISABLE, Request.STOP):
+            self._asked = DriveState.DISABLED
+            return (Frame(self._node, mit.EXIT),)
+        if request == Request.SET_ZERO:
+            return (Frame(self._node, mit.ZERO),)
+        if request == Request.CLEAR_FAULTS:
+            self._asked = DriveState.DISABLED
+            return (Frame(self._node, mit.CLEAR if self._family == "damiao" else mit.EXIT),)
+        return ()
+
+    def error_text(self, error: int) -> str:
+        """See `Drive.error_text`."""
+        return error_text(self._family, error)

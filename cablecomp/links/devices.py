@@ -1,0 +1,96 @@
+"""What a link needs of a device: which identifiers it listens to, and the frames for a command or a
+request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from cablecomp.links.records import Frame, Mode, MotorCommand, Request
+from cablecomp.links.schema import MotorEnd
+from cablecomp.links.units import Linear
+
+Take = Callable[[bytes, float], int]
+"""Takes the data of one frame and its arrival time in s; returns how many channel values it brought (0 = not
+used)."""
+
+
+class Receiver(NamedTuple):
+    """Who takes the frames of an identifier; where several share it, `first_byte & mask == number` tells them
+    apart."""
+
+    identifier: int
+    take: Take
+    mask: int = 0
+    number: int = 0
+
+
+class Outgoing(NamedTuple):
+    """Frames of one command, and the CLIP_* bits of what had to be saturated."""
+
+    frames: tuple[Frame, ...]
+    clipped: int
+
+
+class Drive(Protocol):
+    """A drive of any protocol; commands are at the input pulley."""
+
+    def receivers(self) -> tuple[Receiver, ...]:
+        """What it listens to."""
+
+    def command(self, command: MotorCommand) -> Outgoing:
+        """Frames of one command in the mode last enabled; raises InputError on NaN or infinity."""
+
+    def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
+        """Frames of one request; empty if the protocol has none for it. `mode` None leaves the mode as it
+        is."""
+
+    def error_text(self, error: int) -> str:
+        """The maker's word for an error code, empty for 0."""
+
+
+class Gear:
+    """From the shaft that a drive reports to the input pulley and back.
+
+    `q_in = sign q / ratio - offset`, `dq_in = sign dq / ratio`, `M_in = sign ratio M`, gains at the pulley
+    are `ratio^2` times those at the shaft.
+    """
+
+    __slots__ = ("_offset", "_ratio", "_sign")
+
+    def __init__(self, end: MotorEnd) -> None:
+        self._sign = float(end.sign)
+        self._ratio = end.gear_ratio
+        self._offset = end.position_offset_rad
+
+    def from_shaft(self, channel: str) -> Linear:
+        """How a channel at the pulley comes from the drive's own value; other channels are left as they
+        are."""
+        if channel == "motor_position_rad":
+            return Linear(self._sign / self._ratio, -self._offset)
+        if channel == "motor_velocity_rad_s":
+            return Linear(self._sign / self._ratio)
+        if channel == "motor_torque_Nm":
+            return Linear(self._sign * self._ratio)
+        return Linear(self._sign if channel == "motor_current_A" else 1.0)
+
+    def position(self) -> Linear:
+        """Shaft angle from an angle of the pulley."""
+        return Linear(self._sign * self._ratio, self._sign * self._ratio * self._offset)
+
+    def velocity(self) -> float:
+        """Shaft velocity per velocity of the pulley."""
+        return self._sign * self._ratio
+
+    def torque(self) -> float:
+        """Shaft torque per torque at the pulley."""
+        return self._sign / self._ratio
+
+    def gain(self) -> float:
+        """Stiffness or damping at the shaft per stiffness or damping at the pulley."""
+        return 1.0 / self._ratio**2
+
+
+def chain(first: Linear, second: Linear) -> Linear:
+    """`second` after `first`."""
+    return Linear(second.gain * first.gain, second.gain * first.offset + second.offset)

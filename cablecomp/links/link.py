@@ -1,0 +1,283 @@
+"""A link: every joint on one bus or line, read without waiting and commanded once a cycle."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple, Protocol
+
+from cablecomp.errors import InputError
+from cablecomp.links import device_cansimple, device_dbc, device_mit
+from cablecomp.links.device_cansimple import CanSimpleDrive
+from cablecomp.links.device_dbc import DbcDrive, build_sources
+from cablecomp.links.device_mit import MitDrive
+from cablecomp.links.devices import Drive, Receiver, Take
+from cablecomp.links.port_can import can_port
+from cablecomp.links.port_line import serial_port
+from cablecomp.links.ports import Port
+from cablecomp.links.readings import JointReadings
+from cablecomp.links.records import BusState, Mode, MotorCommand, Request
+from cablecomp.links.schema import CanBus, JointEnds, LinkConfig, MotorEnd
+from cablecomp.links.schema_devices import CanSimpleDevice, DbcDevice, MitDevice
+
+
+class LinkStatus(NamedTuple):
+    """What a link has counted since it was opened, and the state of its bus; `fault` says in words why it is
+    not well.
+
+    `frames` came, of which `ignored` belong to no joint and `invalid` were damaged; `lost`, `repeated`,
+    `reordered`, `restarts` by the messages' own counters; `error_frames`, `overflows`, `dropped` as
+    controller, adapter and system tell; `backlogs`: polls that left frames for the next; `sent`,
+    `send_failures` frames; `clipped` commands of which something was saturated.
+    """
+
+    bus: BusState
+    fault: str
+    frames: int
+    ignored: int
+    invalid: int
+    lost: int
+    repeated: int
+    reordered: int
+    restarts: int
+    error_frames: int
+    overflows: int
+    dropped: int
+    backlogs: int
+    sent: int
+    send_failures: int
+    clipped: int
+
+
+class Link(Protocol):
+    """What the runtime holds on to."""
+
+    config: LinkConfig
+    joints: tuple[JointReadings, ...]
+
+    def open(self) -> None:
+        """Open bus or line; raises DeviceError or InputError with one line."""
+
+    def poll(self, now_s: float) -> int:
+        """Take everything that has come, stamped `now_s`; never waits, never raises; return how many values
+        came."""
+
+    def send(self, joint: int, command: MotorCommand) -> int:
+        """Send a command; return the CLIP_* bits of what was saturated; raises InputError on NaN or
+        infinity."""
+
+    def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool:
+        """Ask a drive to change state; False = the protocol has no such request, or the bus did not take
+        it."""
+
+    def stop(self) -> bool:
+        """Ask every drive to let go, by the quickest way that it has; never raises; False = a frame was not
+        taken."""
+
+    def sync(self, step: int) -> bool:
+        """Send the step counter (u32, little-endian) on `sync_id`: a simulated bus in stepped time takes one
+        step."""
+
+    def status(self) -> LinkStatus:
+        """Counts and state of the bus; changes nothing."""
+
+    def silent(self, now_s: float, longer_than_s: float) -> tuple[str, ...]:
+        """Messages that never came, or not for longer than that, by name."""
+
+    def close(self) -> None:
+        """Close; may be called twice."""
+
+
+class BusLink:
+    """A link on any port; builds the port from the configuration unless one is given."""
+
+    def __init__(self, config: LinkConfig, port: Port | None = None) -> None:
+        self.config = config
+        self._port = port if port is not None else make_port(config)
+        self._limit = config.bus.max_frames_per_poll
+        readings: list[JointReadings] = []
+        drives: list[Drive | None] = []
+        receivers: list[Receiver] = []
+        for ends in config.joint:
+            joint = JointReadings(ends.name, _others(config, ends))
+            drive = _make_drive(config, ends, joint)
+            readings.append(joint)
+            drives.append(drive)
+            receivers += drive.receivers() if drive is not None else ()
+            receivers += _sensor_receivers(config, ends, joint)
+        self.joints: tuple[JointReadings, ...] = tuple(readings)
+        self._drives: tuple[Drive | None, ...] = tuple(drives)
+        self._table = dispatch_table(receivers)
+        self._now_s = 0.0
+        self._values = 0
+        self._frames = 0
+        self._ignored = 0
+        self._sent = 0
+        self._clipped = 0
+
+    def open(self) -> None:
+        """See `Link.open`."""
+        self._port.open()
+
+    def poll(self, now_s: float) -> int:
+        """See `Link.poll`."""
+        self._now_s = now_s
+        self._values = 0
+        self._frames += self._port.drain(self._sink, self._limit)
+        return self._values
+
+    def _sink(self, identifier: int, data: bytes) -> None:
+        take = self._table.get(identifier)
+        if take is None:
+            self._ignored += 1
+        else:
+            self._values += take(data, self._now_s)
+
+    def send(self, joint: int, command: MotorCommand) -> int:
+        """See `Link.send`."""
+        drive, readings = self._drives[joint], self.joints[joint]
+        if drive is None:
+            raise InputError(f"joint `{readings.name}` has no motor on this link; add [joint.motor]")
+        frames, clipped = drive.command(command)
+        for identifier, data in frames:
+            self._sent += self._port.send(identifier, data)
+        readings.sent += 1
+        readings.unanswered += 1
+        self._clipped += clipped != 0
+        return clipped
+
+    def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool:
+        """See `Link.request`."""
+        drive = self._drives[joint]
+        frames = () if drive is None else drive.request(request, mode)
+        taken = [self._port.send(identifier, data) for identifier, data in frames]
+        self._sent += sum(taken)
+        return bool(taken) and all(taken)
+
+    def stop(self) -> bool:
+        """See `Link.stop`; both the stop and the disable request go out, for drives that know only one."""
+        done = True
+        for joint, drive in enumerate(self._drives):
+            if drive is not None:
+                stopped = self.request(joint, Request.STOP)
+                disabled = self.request(joint, Request.DISABLE)
+                done = done and (stopped or disabled)
+        return done
+
+    def sync(self, step: int) -> bool:
+        """See `Link.sync`; raises InputError if the configuration names no `sync_id`."""
+        identifier = self.config.bus.sync_id
+        if identifier is None:
+            raise InputError(f"link `{self.config.name}`: bus.sync_id is missing; add it to send steps")
+        return self._port.send(identifier, (step & 0xFFFF_FFFF).to_bytes(4, "little"))
+
+    def status(self) -> LinkStatus:
+        """See `Link.status`."""
+        port = self._port
+        messages = [m for joint in self.joints for m in joint.messages]
+        return LinkStatus(
+            port.state,
+            port.fault,
+            self._frames,
+            self._ignored,
+            port.counters.invalid + sum(m.invalid for m in messages),
+            sum(m.lost for m in messages),
+            sum(m.repeated for m in messages),
+            sum(m.reordered for m in messages),
+            sum(m.restarts for m in messages),
+            port.counters.error_frames,
+            port.counters.overflows,
+            port.dropped(),
+            port.counters.backlogs,
+            self._sent,
+            port.counters.send_failures,
+            self._clipped,
+        )
+
+    def silent(self, now_s: float, longer_than_s: float) -> tuple[str, ...]:
+        """See `Link.silent`."""
+        messages = [m for joint in self.joints for m in joint.messages]
+        ages = [now_s - m.last_s if m.received else inf for m in messages]
+        return tuple(m.name for m, age in zip(messages, ages, strict=True) if age > longer_than_s)
+
+    def error_text(self, joint: int) -> str:
+        """The maker's words for the drive's present error; empty if there is none."""
+        drive = self._drives[joint]
+        return "" if drive is None else drive.error_text(self.joints[joint].error)
+
+    def close(self) -> None:
+        """See `Link.close`."""
+        self._port.close()
+
+
+def make_port(config: LinkConfig) -> Port:
+    """The port that a configuration names; nothing is opened yet."""
+    bus = config.bus
+    if isinstance(bus, CanBus):
+        return can_port(bus.interface, bus.channel, bus.bitrate, bus.options)
+    return serial_port(bus.port, bus.baud)
+
+
+def dispatch_table(receivers: list[Receiver]) -> dict[int, Take]:
+    """Identifier -> who takes it; raises InputError where two would take the same frame."""
+    table: dict[int, Take] = {}
+    for identifier in {r.identifier for r in receivers}:
+        sharing = [r for r in receivers if r.identifier == identifier]
+        if len(sharing) == 1:
+            table[identifier] = sharing[0].take
+            continue
+        numbers = {r.number for r in sharing}
+        masks = {r.mask for r in sharing}
+        if len(masks) != 1 or 0 in masks or len(numbers) != len(sharing):
+            raise InputError(
+                f"identifier 0x{identifier & 0x1FFFFFFF:X} is listened to by two joints that cannot be told "
+                "apart; give each device its own node or reply_id"
+            )
+        table[identifier] = _shared({r.number: r.take for r in sharing}, masks.pop())
+    return table
+
+
+def _shared(takers: dict[int, Take], mask: int) -> Take:
+    def take(data: bytes, now_s: float) -> int:
+        taker = takers.get(data[0] & mask) if data else None
+        return 0 if taker is None else taker(data, now_s)
+
+    return take
+
+
+def _others(config: LinkConfig, ends: JointEnds) -> tuple[str, ...]:
+    names: list[str] = []
+    for end in (ends.motor, ends.sensor):
+        if end is None:
+            continue
+        device = config.device_of(end)
+        if isinstance(device, MitDevice):
+            names += device_mit.extra_channels(device)
+        elif isinstance(device, CanSimpleDevice):
+            names += device_cansimple.extra_channels(device)
+        else:
+            names += device_dbc.extra_channels(device)
+    return tuple(dict.fromkeys(names))
+
+
+def _make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> Drive | None:
+    end: MotorEnd | None = ends.motor
+    if end is None:
+        return None
+    device = config.device_of(end)
+    if isinstance(device, MitDevice):
+        return MitDrive(device, end, joint)
+    if isinstance(device, CanSimpleDevice):
+        return CanSimpleDrive(device, end, joint)
+    return DbcDrive(device, end, config.folder, joint)
+
+
+def _sensor_receivers(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> tuple[Receiver, ...]:
+    if ends.sensor is None:
+        return ()
+    device = config.device_of(ends.sensor)
+    if not isinstance(device, DbcDevice):
+        raise InputError(
+            f"joint `{ends.name}`: sensor device `{device.id}` speaks `{device.protocol}`; "
+            "a `dbc` device is accepted"
+        )
+    return build_sources(device, ends.sensor, config.folder, joint)

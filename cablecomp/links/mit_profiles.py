@@ -1,0 +1,123 @@
+"""Drives that speak the MIT frame: their ranges and what they put beside position, velocity and torque.
+
+Sources: CubeMars "AK Series Actuator Driver Manual" V1.0.8, p. 49-50 (table of ranges, reply of 8 bytes) and
+p. 39 (error codes); Damiao motors: makers' table of default PMAX/VMAX/TMAX (DM-J series, 2025) and manual
+DM-J4310-2EC V1.0 (state nibble, two temperatures, feedback sent to the master's identifier); "mini-cheetah":
+B. Katz's own firmware (6-byte reply to identifier 0). PMAX, VMAX and TMAX of a Damiao drive can be changed in
+the drive: a link's `range` then says what is set.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Literal, NamedTuple
+
+from cablecomp.errors import InputError
+from cablecomp.links.mit import MitRange
+from cablecomp.links.records import DriveState
+
+Family = Literal["cubemars", "damiao", "katz"]
+
+
+class MitProfile(NamedTuple):
+    """One model: ranges, who made the firmware, length of its reply in bytes, and the source of the
+    numbers."""
+
+    scale: MitRange
+    family: Family
+    reply_length: int
+    source: str
+
+
+_AK = "CubeMars AK Series Actuator Driver Manual V1.0.8 p. 49-50"
+_DM = "Damiao DM-J series, default PMAX/VMAX/TMAX; DM-J4310-2EC manual V1.0"
+_KATZ = "B. Katz, hobbyking_cheetah motor firmware"
+
+
+def _ak(velocity: float, torque: float) -> MitProfile:
+    return MitProfile(MitRange(12.5, velocity, torque), "cubemars", 8, _AK)
+
+
+def _dm(velocity: float, torque: float, position: float = 12.5) -> MitProfile:
+    return MitProfile(MitRange(position, velocity, torque), "damiao", 8, _DM)
+
+
+PROFILES: Final[dict[str, MitProfile]] = {
+    "AK10-9": _ak(50.0, 65.0),
+    "AK60-6": _ak(45.0, 15.0),
+    "AK70-10": _ak(50.0, 25.0),
+    "AK80-6": _ak(76.0, 12.0),
+    "AK80-9": _ak(50.0, 18.0),
+    "AK80-64": _ak(8.0, 144.0),
+    "AK80-80": _ak(8.0, 144.0),
+    "DM3507": _dm(50.0, 5.0, 12.566),
+    "DM4310": _dm(30.0, 10.0),
+    "DM4340": _dm(8.0, 28.0),
+    "DM6006": _dm(45.0, 20.0),
+    "DM8006": _dm(45.0, 40.0),
+    "DM8009": _dm(45.0, 54.0),
+    "DM10010": _dm(20.0, 200.0),
+    "DM10010L": _dm(25.0, 200.0),
+    "mini-cheetah": MitProfile(MitRange(12.5, 65.0, 18.0), "katz", 6, _KATZ),
+}
+"""Model -> profile. AK80-64 and AK80-80 share the manual's last column."""
+
+CUBEMARS_ERRORS: Final[dict[int, str]] = {
+    1: "over temperature",
+    2: "over current",
+    3: "over voltage",
+    4: "under voltage",
+    5: "encoder",
+    6: "phase currents unbalanced",
+}
+DAMIAO_ERRORS: Final[dict[int, str]] = {
+    0x8: "over voltage",
+    0x9: "under voltage",
+    0xA: "over current",
+    0xB: "MOSFET over temperature",
+    0xC: "motor over temperature",
+    0xD: "communication lost",
+    0xE: "overload",
+}
+
+
+class MitStatus(NamedTuple):
+    """State that a reply carries: drive number, state (UNKNOWN where the protocol does not say), error code
+    (0 = none)."""
+
+    node: int
+    state: DriveState
+    error: int
+
+
+def profile(model: str) -> MitProfile:
+    """Profile of a model; raises InputError with the models there are."""
+    found = PROFILES.get(model)
+    if found is None:
+        raise InputError(
+            f"unknown MIT model `{model}`; known: {', '.join(PROFILES)}; or give `range` for another drive"
+        )
+    return found
+
+
+def status_of(family: Family, first_byte: int, byte_7: int | None) -> MitStatus:
+    """What byte 0 and byte 7 of a reply say about the drive.
+
+    CubeMars: byte 0 is the drive number, byte 7 the error code; whether the motor mode is on is not reported.
+    Damiao: low nibble of byte 0 is the drive number, high nibble 0 disabled, 1 enabled, 8…E a fault. Katz:
+    byte 0 only.
+    """
+    if family == "damiao":
+        node, code = first_byte & 0x0F, first_byte >> 4
+        if code <= 1:
+            return MitStatus(node, DriveState.ENABLED if code else DriveState.DISABLED, 0)
+        return MitStatus(node, DriveState.FAULT, code)
+    error = byte_7 if family == "cubemars" and byte_7 is not None else 0
+    return MitStatus(first_byte, DriveState.FAULT if error else DriveState.UNKNOWN, error)
+
+
+def error_text(family: Family, error: int) -> str:
+    """The maker's word for an error code; an empty text for 0."""
+    if error == 0:
+        return ""
+    table = DAMIAO_ERRORS if family == "damiao" else CUBEMARS_ERRORS
+    return table.get(error, f"error code {error}")

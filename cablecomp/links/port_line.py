@@ -1,0 +1,166 @@
+"""A line of bytes (serial port, pseudo-terminal): records on it are cut by a reader, slcan text or COBS
+records."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import serial
+
+from cablecomp.errors import DeviceError
+from cablecomp.links import serial_frames, slcan_frames
+from cablecomp.links.ports import PortBase, Sink
+from cablecomp.links.records import BusState
+
+_MAX_PENDING = 65_536
+_CHUNK = 65_536
+
+
+class Reader(Protocol):
+    """Cuts bytes into frames."""
+
+    invalid: int
+
+    def feed(self, chunk: bytes, sink: Sink) -> int:
+        """Take bytes, hand whole frames to `sink`, return how many."""
+
+
+class LinePort(PortBase):
+    """Frames on a pyserial port: bytes are read from its file descriptor where it has one, else through
+    pyserial.
+
+    `attach` opens and returns the pyserial port and what closes it; `pack` makes a frame's bytes, `reader`
+    cuts what comes. What a full line does not take at once is kept and sent first the next time.
+    """
+
+    def __init__(
+        self,
+        attach: Callable[[], tuple[Any, Callable[[], None]]],
+        pack: Callable[[int, bytes], bytes],
+        reader: Reader,
+    ) -> None:
+        super().__init__()
+        self._attach = attach
+        self._pack = pack
+        self._reader = reader
+        self._port: Any = None
+        self._shut: Callable[[], None] | None = None
+        self._fd = -1
+        self._pending = bytearray()
+
+    def open(self) -> None:
+        """Open the port; raises DeviceError with one line."""
+        self._port, self._shut = self._attach()
+        try:
+            self._fd = self._port.fileno()
+            os.set_blocking(self._fd, False)
+        except (AttributeError, OSError, NotImplementedError):
+            self._fd = -1
+        self._pending.clear()
+        self.state, self.fault = BusState.ACTIVE, ""
+
+    def drain(self, sink: Sink, limit: int) -> int:
+        """See `Port.drain`; a line is read whole, so `limit` only ends the reading of further chunks."""
+        found = 0
+        while self.state == BusState.ACTIVE:
+            chunk = self._read()
+            if not chunk:
+                break
+            found += self._reader.feed(chunk, sink)
+            if found >= limit:
+                self.counters.backlogs += 1
+                break
+        self.counters.invalid = self._reader.invalid
+        self.counters.overflows = getattr(self._reader, "refused", 0)
+        return found
+
+    def _read(self) -> bytes:
+        try:
+            if self._fd >= 0:
+                return os.read(self._fd, _CHUNK)
+            waiting = self._port.in_waiting
+            return bytes(self._port.read(waiting)) if waiting else b""
+        except BlockingIOError:
+            return b""
+        except (OSError, serial.SerialException) as error:
+            self.lose(f"the line is gone ({error})")
+            return b""
+
+    def send(self, identifier: int, data: bytes) -> bool:
+        """See `Port.send`."""
+        if self.state != BusState.ACTIVE:
+            self.counters.send_failures += 1
+            return False
+        packed = self._pack(identifier, data)
+        if len(self._pending) + len(packed) > _MAX_PENDING:
+            self.counters.send_failures += 1
+            self._flush()
+            return False
+        self._pending += packed
+        return self._flush()
+
+    def _flush(self) -> bool:
+        try:
+            while self._pending:
+                if self._fd >= 0:
+                    sent = os.write(self._fd, self._pending)
+                else:
+                    sent = self._port.write(bytes(self._pending)) or 0
+                del self._pending[:sent]
+                if not sent:
+                    break
+        except BlockingIOError:
+            pass
+        except (OSError, serial.SerialException) as error:
+            self.counters.send_failures += 1
+            self.lose(f"the line is gone ({error})")
+            return False
+        return True
+
+    def dropped(self) -> int:
+        """A line tells of nothing dropped."""
+        return 0
+
+    def close(self) -> None:
+        """See `Port.close`."""
+        if self._shut is not None:
+            shut, self._shut = self._shut, None
+            if self.state == BusState.ACTIVE:
+                self._flush()
+            try:
+                shut()
+            except (OSError, serial.SerialException) as error:
+                self.fault = f"closing failed ({error})"
+        self._fd = -1
+        self.state = BusState.CLOSED
+
+
+def serial_port(port: str, baud: int) -> LinePort:
+    """COBS records on a serial port; opening raises DeviceError if it cannot be had."""
+
+    def attach() -> tuple[Any, Callable[[], None]]:
+        try:
+            line = serial.serial_for_url(port, baudrate=baud, timeout=0, write_timeout=0, exclusive=None)
+        except (OSError, ValueError, serial.SerialException) as error:
+            raise DeviceError(
+                f"serial port {port}: cannot be opened ({_brief(error)}); give a port that is there and free"
+            ) from None
+        return line, line.close
+
+    return LinePort(attach, serial_frames.pack_record, serial_frames.RecordReader())
+
+
+def slcan_port(bus: Callable[[], Any]) -> LinePort:
+    """slcan text on the line of a python-can slcan bus, which sets the adapter up and opens its channel."""
+
+    def attach() -> tuple[Any, Callable[[], None]]:
+        opened = bus()
+        return opened.serialPortOrig, opened.shutdown
+
+    return LinePort(attach, slcan_frames.pack_line, slcan_frames.LineReader())
+
+
+def _brief(error: BaseException) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -1,0 +1,187 @@
+"""Link configuration: `configs/links/*.toml` to frozen objects; an unknown key fails with one line.
+
+A link file names the bus, the devices on it (each once, with `{node}` in the names of its messages where
+several are alike), and the joints: which device with which node number moves each of them, and which one
+measures at the joint.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from cablecomp.config import explain, read_toml
+from cablecomp.errors import InputError
+from cablecomp.links.schema_devices import (
+    CanSimpleDevice,
+    DbcDevice,
+    Device,
+    Finite,
+    Frozen,
+    MitDevice,
+    Name,
+    Positive,
+)
+
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Sign = Literal[1, -1]
+ModeName = Literal["torque", "velocity", "position", "impedance"]
+
+
+class CanBus(Frozen):
+    """A CAN bus through python-can: `interface`, `channel`, `bitrate`, `options` go to `can.Bus`."""
+
+    kind: Literal["can"]
+    interface: Name
+    channel: str | int | None = None
+    bitrate: Annotated[int, Field(gt=0)] | None = None
+    options: dict[str, Any] = Field(default_factory=dict)
+    max_frames_per_poll: Annotated[int, Field(ge=1, le=100_000)] = 2048
+    sync_id: Annotated[int, Field(ge=0, le=0x7FF)] | None = None
+
+
+class SerialBus(Frozen):
+    """A serial port that carries COBS records; `port` is whatever pyserial opens (device, `socket://`,
+    `loop://`)."""
+
+    kind: Literal["serial"]
+    port: Name
+    baud: Annotated[int, Field(gt=0)] = 921_600
+    max_frames_per_poll: Annotated[int, Field(ge=1, le=100_000)] = 2048
+    sync_id: Annotated[int, Field(ge=0, le=0x7FF)] | None = None
+
+
+class Timeouts(Frozen):
+    """What happens as the oldest needed value ages, in s since it came: fresh and held until `hold_s`,
+    feed-forward faded out linearly from there to `fade_s`, safe stop at `stop_s`."""
+
+    hold_s: Positive = 0.01
+    fade_s: Positive = 0.1
+    stop_s: Positive = 0.2
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.hold_s < self.fade_s <= self.stop_s:
+            raise ValueError("hold_s < fade_s <= stop_s is accepted")
+        return self
+
+
+class MotorEnd(Frozen):
+    """The drive of a joint. `gear_ratio`: turns of the shaft that the drive reports per turn of the input
+    pulley.
+
+    `q_in = sign * q_drive / gear_ratio - position_offset_rad`, `torque = sign * gear_ratio * torque_drive`.
+    """
+
+    device: Name
+    node: Annotated[int, Field(ge=0, le=0x1FFF_FFFF)]
+    reply_id: Annotated[int, Field(ge=0, le=0x7FF)] | None = None
+    sign: Sign = 1
+    gear_ratio: Positive = 1.0
+    position_offset_rad: Finite = 0.0
+    mode: ModeName = "position"
+    stiffness_Nm_per_rad: NonNegative = 0.0
+    damping_Nms_per_rad: NonNegative = 0.0
+
+
+class SensorEnd(Frozen):
+    """The sensor node at the joint: `q_out = position_sign * q - position_offset_rad`, `M = torque_sign * m -
+    torque_offset_Nm`."""
+
+    device: Name
+    node: Annotated[int, Field(ge=0, le=0x1FFF_FFFF)] = 0
+    position_sign: Sign = 1
+    position_offset_rad: Finite = 0.0
+    torque_sign: Sign = 1
+    torque_offset_Nm: Finite = 0.0
+
+
+class JointEnds(Frozen):
+    """One joint on the bus."""
+
+    name: Name
+    motor: MotorEnd | None = None
+    sensor: SensorEnd | None = None
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if self.motor is None and self.sensor is None:
+            raise ValueError("`motor`, `sensor` or both are accepted")
+        return self
+
+
+class LinkConfig(Frozen):
+    """A link as its TOML file states it; `folder` is where relative paths start."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    name: Name
+    rate_Hz: Positive = 1000.0
+    bus: Annotated[CanBus | SerialBus, Field(discriminator="kind")]
+    timeouts: Timeouts = Timeouts()
+    device: tuple[Device, ...] = Field(min_length=1)
+    joint: tuple[JointEnds, ...] = Field(min_length=1)
+    folder: Path = Path()
+
+    @model_validator(mode="after")
+    def _references(self) -> Self:
+        ids = [d.id for d in self.device]
+        _distinct("device.id", ids)
+        _distinct("joint.name", [j.name for j in self.joint])
+        for joint in self.joint:
+            for end in (joint.motor, joint.sensor):
+                if end is not None and end.device not in ids:
+                    raise ValueError(
+                        f"joint `{joint.name}` names device `{end.device}`; accepted: {', '.join(ids)}"
+                    )
+        return self
+
+    def redirect(self, interface: str, channel: str, **options: Any) -> LinkConfig:
+        """The same link on another bus of the same kind of traffic: "serial" makes `channel` the port, any
+        other interface a CAN bus with these options; step identifier and frame limit stay."""
+        shared: dict[str, Any] = {
+            "max_frames_per_poll": self.bus.max_frames_per_poll,
+            "sync_id": self.bus.sync_id,
+        }
+        bus: CanBus | SerialBus
+        if interface == "serial":
+            bus = SerialBus(kind="serial", port=channel, **shared)
+        else:
+            if interface == "slcan":
+                options = {"sleep_after_open": 0, **options}
+            bus = CanBus(kind="can", interface=interface, channel=channel, options=options, **shared)
+        return self.model_copy(update={"bus": bus})
+
+    def device_of(self, end: MotorEnd | SensorEnd) -> MitDevice | CanSimpleDevice | DbcDevice:
+        """The device that an end names."""
+        return next(d for d in self.device if d.id == end.device)
+
+
+def _distinct(what: str, names: list[str]) -> None:
+    twice = next((n for n in names if names.count(n) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{what} `{twice}` is there twice; distinct names are accepted")
+
+
+def _tuples(data: Any) -> Any:
+    # TOML arrays arrive as lists; the strict models want tuples.
+    if isinstance(data, dict):
+        return {k: _tuples(v) for k, v in data.items()}
+    return tuple(_tuples(v) for v in data) if isinstance(data, list) else data
+
+
+def load_link(path: Path) -> LinkConfig:
+    """Read a link file; raises InputError with one line that names file, key, what was found, what is
+    accepted."""
+    return parse_link(read_toml(path), str(path), path.parent)
+
+
+def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkConfig:
+    """Validate a link already read; `where` names it in errors, relative paths start at `folder`."""
+    if "folder" in data:
+        raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
+    try:
+        return LinkConfig.model_validate({**_tuples(data), "folder": folder})
+    except ValidationError as error:
+        raise InputError(f"{where}: {explain(error)}") from None

@@ -1,0 +1,171 @@
+"""Configuration of the devices on a link: MIT drives, ODrives, and anything that a DBC table describes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from cablecomp.links.records import CHANNELS
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Name = Annotated[str, Field(min_length=1)]
+Value = Finite | str
+OdriveData = Literal["encoder", "iq", "torques", "temperature", "bus"]
+
+
+class Frozen(BaseModel):
+    """Frozen, strict, and closed to unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class MitScale(Frozen):
+    """Full scale of a MIT drive that is not in the table, at the shaft that it reports."""
+
+    position_rad: Positive
+    velocity_rad_s: Positive
+    torque_Nm: Positive
+    kp_Nm_per_rad: Positive = 500.0
+    kd_Nms_per_rad: Positive = 5.0
+
+
+class MitDevice(Frozen):
+    """A drive that speaks the MIT frame: a `model` of the table, or `range` and `family` of another one."""
+
+    protocol: Literal["mit"]
+    id: Name
+    model: str | None = None
+    range: MitScale | None = None
+    family: Literal["cubemars", "damiao", "katz"] | None = None
+    reply_length: Literal[6, 8] | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if self.model is None and (self.range is None or self.family is None):
+            raise ValueError("`model`, or `range` and `family` are accepted")
+        return self
+
+
+class CanSimpleDevice(Frozen):
+    """An ODrive: `cyclic` names what it sends by itself, `polled` what is asked for with every command
+    (firmware 0.6: all)."""
+
+    protocol: Literal["cansimple"]
+    id: Name
+    firmware: Literal["0.5", "0.6"] = "0.6"
+    cyclic: tuple[OdriveData, ...] = ("encoder",)
+    polled: tuple[OdriveData, ...] = ()
+    torque_constant_Nm_per_A: Positive | None = None
+    velocity_limit_turns_s: Positive | None = None
+    current_limit_A: Positive | None = None
+
+    @model_validator(mode="after")
+    def _known_to_firmware(self) -> Self:
+        if self.firmware == "0.5" and {"torques", "temperature"} & {*self.cyclic, *self.polled}:
+            raise ValueError(
+                "firmware 0.5 has no `torques` and no `temperature`; `encoder`, `iq`, `bus` are accepted"
+            )
+        if (self.velocity_limit_turns_s is None) != (self.current_limit_A is None):
+            raise ValueError(
+                "`velocity_limit_turns_s` and `current_limit_A` go together: both or none are accepted"
+            )
+        return self
+
+
+class ChannelSource(Frozen):
+    """Where a channel comes from: signal, unit (the table's if absent), and `gain * x + offset` in SI after
+    conversion.
+
+    `absent`: the counts by which the device says "no value": a number, or "lowest" for the lowest of the
+    signal.
+    """
+
+    signal: Name
+    unit: str | None = None
+    gain: Finite = 1.0
+    offset: Finite = 0.0
+    absent: int | Literal["lowest"] | None = None
+
+
+class StateSource(Frozen):
+    """A signal that tells the drive's state: the numbers, or words of the table, that mean each state."""
+
+    signal: Name
+    disabled: tuple[Value, ...] = ()
+    calibrating: tuple[Value, ...] = ()
+    enabled: tuple[Value, ...] = ()
+    fault: tuple[Value, ...] = ()
+
+
+class DbcMessage(Frozen):
+    """One message that a device sends. `sequence` counts this very message; `device_time` is the device's
+    clock.
+
+    `stamps`: the device time belongs to the frame of that other message whose counter equals
+    `stamps_sequence` here. `reply`: this message answers a command.
+    """
+
+    name: Name
+    channels: dict[str, ChannelSource] = Field(default_factory=dict)
+    sequence: str | None = None
+    device_time: str | None = None
+    stamps: str | None = None
+    stamps_sequence: str | None = None
+    state: StateSource | None = None
+    error: str | None = None
+    flags: str | None = None
+    reply: bool = False
+
+    @field_validator("channels", mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {k: {"signal": v} if isinstance(v, str) else v for k, v in value.items()}
+
+    @model_validator(mode="after")
+    def _canonical(self) -> Self:
+        for channel in self.channels:
+            if channel not in CHANNELS and not (channel.startswith("other_") and len(channel) > 6):
+                raise ValueError(f"`{channel}` is no channel; accepted: {', '.join(CHANNELS)}, other_<name>")
+        if (self.stamps is None) != (self.stamps_sequence is None):
+            raise ValueError("`stamps` and `stamps_sequence` go together: both or none are accepted")
+        return self
+
+
+class DbcCommand(Frozen):
+    """The message that commands motion: the signals that carry each part of a command, and constant ones."""
+
+    message: Name
+    position: str | None = None
+    velocity: str | None = None
+    torque: str | None = None
+    stiffness: str | None = None
+    damping: str | None = None
+    constants: dict[str, Value] = Field(default_factory=dict)
+
+
+class DbcRequest(Frozen):
+    """The message for one request; a value is a number, the table's word, or one of `{mode}`, `{stiffness}`,
+    `{damping}`."""
+
+    message: Name
+    values: dict[str, Value] = Field(default_factory=dict)
+
+
+class DbcDevice(Frozen):
+    """Any device that a DBC file describes; `dbc` is relative to the link file."""
+
+    protocol: Literal["dbc"]
+    id: Name
+    dbc: Name
+    message: tuple[DbcMessage, ...] = ()
+    command: DbcCommand | None = None
+    request: dict[
+        Literal["enable", "disable", "stop", "calibrate", "clear_faults", "set_zero", "reset"], DbcRequest
+    ] = Field(default_factory=dict)
+
+
+Device = Annotated[MitDevice | CanSimpleDevice | DbcDevice, Field(discriminator="protocol")]
