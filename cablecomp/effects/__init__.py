@@ -1,0 +1,6 @@
+"""Physics beyond the thesis's drive: one file per effect, found by name."""
+
+from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.catalogue import catalogue, extend, register
+
+__all__ = ["Change", "Effect", "Parameter", "catalogue", "extend", "register", "term"]

@@ -1,0 +1,154 @@
+"""The contract of an effect: one file, one physics, one neutral value that switches it off.
+
+An effect says in plain words what it is, names its parameters, and gives a `Change` to the drive. Most effects are a
+compiled *term*, a small function that reads the context of the solve (angles, load, tensions, time, temperature, other
+channels) and adds to it (moment taken from the load path, cable length, pretension and stiffness factors, encoder
+reading). A few change the law of friction or the cable path itself. The kernel only sums them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.config import JointConfig
+from cablecomp.mechanics import layout
+from cablecomp.mechanics.assemble import Term
+from cablecomp.mechanics.jit import cached, njit
+from cablecomp.mechanics.pointer import TERM_SIGNATURE
+
+Floats = NDArray[np.float64]
+TermFunction = Callable[[Any, Any, Any], None]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
+
+    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a scale is
+    given; `shape` marks parameters that say how, not how much (a phase, a time constant, an instant).
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    low: float
+    high: float
+    text: str
+    log: bool = False
+    shape: bool = False
+    scale: Callable[[JointConfig], float] | None = None
+
+    def bounds(self, config: JointConfig) -> tuple[float, float]:
+        """Prior range (low, high) for this joint, in the parameter's unit."""
+        unit = 1.0 if self.scale is None else self.scale(config)
+        return self.low * unit, self.high * unit
+
+
+def zero_load_compliance(config: JointConfig) -> float:
+    """Compliance of the free spans alone [rad/(N m)]: R^2 L/EA summed over stages, halved in a closed circuit."""
+    total, ratio = 0.0, 1.0
+    for stage in reversed(config.drive.stage):
+        total += ratio**2 * stage.free_length_m / (stage.EA_N * stage.output_radius_m**2)
+        ratio *= stage.input_radius_m / stage.output_radius_m
+    return total / 2.0 if config.drive.circuit == "closed" else total
+
+
+def pretension_moment(config: JointConfig) -> float:
+    """R T0 of the output stage [N m]: the natural unit of load."""
+    return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
+
+
+@dataclass(frozen=True)
+class Change:
+    """What one effect does to the drive; every default is neutral."""
+
+    terms: tuple[Term, ...] = ()
+    tension_factor: Callable[[Floats], Floats] | None = None
+    """mu/mu0 as a function of tau = T/T0, vectorised."""
+    joint_angle_factor: Callable[[Floats], Floats] | None = None
+    """mu/mu0 of the output drum's groove, as a function of the joint angle [rad] at which that place is at the departure point."""
+    stiffening: float = 0.0
+    guide_angle: float = 0.0
+    guide_length_m: float = 0.0
+    play_share: float = 0.0
+    play_yield_N: float = 0.0
+    viscous_Ns_per_m_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Physics beyond the thesis's drive, as one term of the joint model.
+
+    `id` is its public name; `statement` says in plain words what happens; `equation` and `source` state the law;
+    `acts_through` are the covariates in which its mismatch shows first; `bounded` is true where it preserves the order
+    of profiles, so that guaranteed bounds stay guaranteed.
+    """
+
+    id: str
+    statement: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    acts_through: tuple[str, ...]
+    bounded: bool
+    change: Callable[[Mapping[str, float], JointConfig], Change]
+    texts: tuple[str, ...] = field(default=())
+    """Names of parameters that are text, such as the channel that loads the cable."""
+    rank: int = 0
+    """Terms run in rising rank; a term that sees the sum of the others (a delay) ranks last."""
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name."""
+        return next(p for p in self.parameters if p.name == name)
+
+    def neutral(self) -> dict[str, float]:
+        """The values that switch the effect off (shape parameters at the middle of their range)."""
+        return {p.name: (0.5 * (p.low + p.high) if p.shape else p.neutral) for p in self.parameters}
+
+
+class CompiledTerm:
+    """A term function compiled to machine code when it is first used."""
+
+    def __init__(self, function: TermFunction, parameters: int, state: int) -> None:
+        self._function = function
+        self._parameters = parameters
+        self._state = state
+        self._address: int | None = None
+        self._entry: Any = None
+
+    @property
+    def address(self) -> int:
+        """Address of the machine code (compiled or read from the cache on first use)."""
+        if self._address is None:
+            inner = njit(self._function)
+            n_parameters, n_state = max(self._parameters, 1), max(self._state, 1)
+
+            def entry(context: Any, parameters: Any, state: Any) -> None:
+                inner(
+                    numba.carray(context, layout.CONTEXT),
+                    numba.carray(parameters, n_parameters),
+                    numba.carray(state, n_state),
+                )
+
+            compile_ = numba.cfunc(TERM_SIGNATURE)
+            self._entry = cached(lambda: compile_(entry))
+            self._address = int(self._entry.address)
+        return self._address
+
+    def __call__(self, *parameters: float) -> tuple[Term, ...]:
+        """The term with these parameter values, as the `terms` of a `Change`."""
+        return (Term(self.address, tuple(float(p) for p in parameters), self._state),)
+
+
+def term(parameters: int, state: int = 0) -> Callable[[TermFunction], CompiledTerm]:
+    """Make a function f(c, p, s) a term: c is the context (indices X_* of `mechanics.layout`), p its parameters, s its state.
+
+    It must add to the context only, and change `s` only when c[X_COMMIT] is set: the solver calls it several times a step.
+    """
+    return lambda function: CompiledTerm(function, parameters, state)

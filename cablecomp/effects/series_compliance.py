@@ -1,0 +1,35 @@
+"""Series compliance: torque sensor, coupling and mount give way in proportion to the load (thesis App. A.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, term, zero_load_compliance
+from cablecomp.mechanics.layout import X_LOAD, X_READING
+
+
+@term(parameters=1)
+def _compliance(c: Any, p: Any, s: Any) -> None:
+    c[X_READING] += p[0] * c[X_LOAD]
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(terms=_compliance(values["compliance_rad_per_Nm"]))
+
+
+EFFECT = Effect(
+    id="series_compliance",
+    statement="Something in series with the joint (torque sensor, coupling, mount) yields in proportion to the load.",
+    equation="q_out = q_drive + c_s M",
+    source="Snow 1993, App. A.3",
+    parameters=(
+        Parameter(
+            "compliance_rad_per_Nm", "rad/(N m)", 0.0, 0.0, 100.0, "added compliance", scale=zero_load_compliance
+        ),
+    ),
+    acts_through=("load",),
+    bounded=True,
+    change=_change,
+)

@@ -1,0 +1,321 @@
+"""The online observer of one cable-driven joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.config import JointConfig
+from cablecomp.effects import extend
+from cablecomp.effects.catalogue import is_bounded, other_channels
+from cablecomp.errors import InputError
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.assemble import Model, assemble
+from cablecomp.mechanics.profile import ROWS, Floats, V, Y
+from cablecomp.mechanics.start import joint_start
+from cablecomp.mechanics.tables import tau_of_v
+from cablecomp.observer import stepper as st
+from cablecomp.observer.bounds import BoundPair
+from cablecomp.observer.snapshot import pack, unpack
+from cablecomp.signals import NAN, Estimate, Sample
+
+
+class WrapProfile(NamedTuple):
+    """Tension along one wrap: angle [rad] from the termination, tension [N]."""
+
+    name: str
+    angle_rad: NDArray[np.float64]
+    tension_N: NDArray[np.float64]
+
+
+REASONS = {
+    o.STATUS_UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, wrap_input_rad and the angles' zero",
+    o.STATUS_SLACK: "the load would slacken the cable of an open circuit (T0 + M/R <= 0); check pretension_N and the load's sign",
+    o.STATUS_DIVERGED: "the tensions could not be solved; check the configuration's orders of magnitude",
+}
+
+
+class Observer:
+    """Tracks the tension history of a joint and predicts its deflection, sample by sample.
+
+    State: the tension profile on every wrap (sheet, section 1.1). `step` commits a sample, `peek` predicts without
+    committing; `run` steps through a block with the same compiled code. Time is an argument of every call. With
+    `bounds` two extreme histories run beside it: the true deflection lies between, whatever happened before the start
+    (NaN where an effect of the configuration gives no guarantee). Raises InputError for a sample that the joint cannot take.
+    """
+
+    def __init__(self, config: JointConfig, *, bounds: bool = False) -> None:
+        self.config = config
+        self.model: Model = assemble(config, extend(config))
+        self.channels = other_channels(config)
+        self._S, self._J = self.model.S.copy(), self.model.J.copy()
+        self._F = np.zeros(st.OPTIONS)
+        self._F[st.GAIN] = config.sensors.joint_torque_gain
+        self._F[st.OFFSET] = config.sensors.joint_torque_offset_Nm
+        self._F[st.CUTOFF] = 2.0 * np.pi * config.observer.input_filter_Hz
+        self._row = np.zeros(st.IN_OTHER + len(self.channels))
+        self._out = np.zeros(st.OUT_WIDTH)
+        self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
+        self._ratio = _rigid_ratio(config)
+        self._last_time = -np.inf
+        self._bounds = BoundPair(self.model) if bounds and is_bounded(config) else None
+
+    # --- the three ways to use it ---------------------------------------------------------------------------------
+
+    def step(self, sample: Sample) -> Estimate:
+        """Commit one sample and say what the joint does."""
+        self._read(sample)
+        if self.config.observer.load == "both_encoders":
+            self._solve_load()
+        status = st.step_one(*self._kernel(), self._row, self._out)
+        self._check(status, sample.time_s)
+        self._last_time = sample.time_s
+        low, high = NAN, NAN
+        if self._bounds is not None:
+            low, high = self._bounds.step(self._S)
+        return self._estimate(sample, low, high)
+
+    def peek(self, sample: Sample) -> Estimate:
+        """Predict the joint for a sample (for instance the load expected next) and commit nothing."""
+        self._read(sample)
+        self._check(st.peek_one(*self._kernel(), self._row, self._out, self._spare), sample.time_s)
+        return self._estimate(sample, NAN, NAN)
+
+    def run(self, columns: Mapping[str, NDArray[np.float64]], bounds: bool = False) -> dict[str, NDArray[np.float64]]:
+        """Step through a block of samples given as canonical channels; returns the estimates as columns.
+
+        Raises InputError naming the sample (counted from 0 within the block) that cannot be taken; those before it are committed.
+        """
+        rows = self._rows(columns)
+        outs = np.empty((len(rows), st.OUT_WIDTH))
+        low = np.full(len(rows), NAN)
+        high = np.full(len(rows), NAN)
+        if len(rows) and not np.isfinite(self._last_time):
+            self._start(rows[0, st.IN_TIME], rows[0, st.IN_MOTOR])
+        if self._bounds is not None and bounds or self.config.observer.load == "both_encoders":
+            self._run_slowly(rows, outs, low, high)
+        else:
+            done, status = st.run_block(*self._kernel(), rows, outs)
+            self._check(status, rows[min(done, len(rows) - 1), st.IN_TIME], done)
+        if len(rows):
+            self._last_time = float(rows[-1, st.IN_TIME])
+        offset = self._ratio * rows[:, st.IN_MOTOR]
+        return {
+            "deflection_rad": outs[:, st.OUT_JOINT] - offset,
+            "deflection_low_rad": low,
+            "deflection_high_rad": high,
+            "joint_position_rad": outs[:, st.OUT_JOINT],
+            "joint_torque_Nm": outs[:, st.OUT_LOAD],
+            "tension_h_N": outs[:, st.OUT_T_H],
+            "tension_l_N": outs[:, st.OUT_T_L],
+        }
+
+    def inverse(self, sample: Sample) -> Estimate:
+        """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
+        self._read(sample)
+        self._solve_load()
+        self._check(st.peek_one(*self._kernel(), self._row, self._out, self._spare), sample.time_s)
+        return self._estimate(sample, NAN, NAN)
+
+    def step_inverse(self, sample: Sample) -> Estimate:
+        """As `inverse`, and commits the sample with the torque found."""
+        self._read(sample)
+        self._solve_load()
+        self._check(st.step_one(*self._kernel(), self._row, self._out), sample.time_s)
+        self._last_time = sample.time_s
+        low, high = (NAN, NAN) if self._bounds is None else self._bounds.step(self._S)
+        return self._estimate(sample, low, high)
+
+    # --- state ----------------------------------------------------------------------------------------------------
+
+    def snapshot(self) -> bytes:
+        """The whole state as a small, versioned, checksummed block of bytes."""
+        states = [(self._S, self._J)]
+        if self._bounds is not None:
+            states += self._bounds.states()
+        return pack(self.config, self.model.I, states, self._F, self._last_time)
+
+    def restore(self, data: bytes) -> None:
+        """Take up a state from `snapshot`; raises InputError if it is damaged or belongs to another joint."""
+        states = [(self._S, self._J)]
+        if self._bounds is not None:
+            states += self._bounds.states()
+        self._last_time = unpack(data, self.config, self.model.I, states, self._F)
+
+    def save(self, path: Path) -> None:
+        """Write the snapshot to a file, atomically: a power cut leaves the old file or the new one."""
+        spare = path.with_name(path.name + ".part")
+        spare.write_bytes(self.snapshot())
+        spare.replace(path)
+
+    def load(self, path: Path) -> None:
+        """Restore from a file written by `save`."""
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror}); give a snapshot file") from None
+        self.restore(data)
+
+    def copy(self) -> Observer:
+        """An independent observer in the same state."""
+        twin = Observer(self.config, bounds=self._bounds is not None)
+        twin.restore(self.snapshot())
+        return twin
+
+    # --- what can be asked ----------------------------------------------------------------------------------------
+
+    def compile(self) -> None:
+        """Have every kernel compiled (or read from the cache) before a loop is armed; the state stays as it is."""
+        twin = Observer(self.config, bounds=self._bounds is not None)
+        still = Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(self.channels))
+        twin.step(still)
+        twin.peek(still)
+        twin.inverse(still)
+        columns = {"time_s": np.array([1.0]), "motor_position_rad": np.zeros(1), "joint_torque_Nm": np.zeros(1)}
+        columns |= {"joint_position_rad": np.zeros(1), "temperature_degC": np.zeros(1), "motor_torque_Nm": np.zeros(1)}
+        twin.run(columns | {name: np.zeros(1) for name in self.channels})
+
+    def stiffness(self) -> float:
+        """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
+        return 1.0 / float(self._S[self.model.I[o.S_CONTEXT] + o.X_COMPLIANCE])
+
+    def merge_error_rad(self) -> float:
+        """Bound [rad] on the error of the present deflection that merging of profile pieces can have made."""
+        total, ratio = 0.0, 1.0
+        I, P = self.model.I, self.model.P
+        first = int(I[o.N_CIRCUITS]) * o.JOINT
+        for c in range(int(I[o.N_CABLES])):
+            weight = P[first + o.CABLE * c + o.WEIGHT]
+            total += weight * self._S[I[o.S_CABLE] + o.CABLE_STATE * c + o.Q_ERROR]
+        return float(total * ratio)
+
+    def pieces(self) -> int:
+        """Number of points that describe all profiles: the memory in use."""
+        return int(self._J.sum())
+
+    def profiles(self) -> list[WrapProfile]:
+        """The tension profile on every wrap, termination first."""
+        I, P = self.model.I, self.model.P
+        wraps = 2 * int(I[o.N_CABLES])
+        first = int(I[o.S_PROFILE])
+        G = self._S[first : first + wraps * ROWS * int(I[o.CAPACITY])].reshape(wraps, ROWS, -1)
+        result = []
+        for wrap in range(wraps):
+            p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * (wrap // 2)
+            q = int(I[o.S_CABLE]) + o.CABLE_STATE * (wrap // 2)
+            n = int(self._J[wrap])
+            t0 = P[p + o.T0] * self._S[q + o.Q_T0] * self._S[q + o.Q_EA]
+            tau = np.array([tau_of_v(self.model.L, 2, v) for v in G[wrap, V, :n]])
+            result.append(WrapProfile(_wrap_name(self.config, wrap, P[p + o.SIGN]), G[wrap, Y, :n].copy(), t0 * tau))
+        return result
+
+    # --- inside ---------------------------------------------------------------------------------------------------
+
+    def _kernel(self) -> tuple[Floats, ...]:
+        model = self.model
+        return model.P, model.I, self._S, self._J, model.L, self._F  # type: ignore[return-value]
+
+    def _start(self, time_s: float, motor: float) -> None:
+        m = self.model
+        joint_start(m.P, m.I, self._S, self._J, m.L, time_s, motor, 0.0)
+        if self._bounds is not None:
+            self._bounds.start(time_s, motor)
+
+    def _read(self, sample: Sample) -> None:
+        if sample.time_s < self._last_time:
+            raise InputError(
+                f"sample at {sample.time_s:g} s comes after one at {self._last_time:g} s; time must not run backwards"
+            )
+        row = self._row
+        row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_JOINT] = sample.time_s, sample.motor_position_rad, sample.joint_position_rad
+        load = self.config.observer.load
+        row[st.IN_LOAD] = sample.joint_torque_Nm
+        if load == "motor_torque":
+            row[st.IN_LOAD] = -sample.motor_torque_Nm / self._ratio
+        row[st.IN_TEMPERATURE] = sample.temperature_degC
+        for k, value in enumerate(sample.other[: len(self.channels)]):
+            row[st.IN_OTHER + k] = value
+        if not np.isfinite(self._last_time):
+            self._start(sample.time_s, sample.motor_position_rad)
+
+    def _rows(self, columns: Mapping[str, NDArray[np.float64]]) -> Floats:
+        time = columns["time_s"]
+        rows = np.full((len(time), len(self._row)), NAN)
+        rows[:, st.IN_TIME] = time
+        rows[:, st.IN_MOTOR] = columns["motor_position_rad"]
+        if self.config.observer.load == "motor_torque":
+            rows[:, st.IN_LOAD] = -_need(columns, "motor_torque_Nm") / self._ratio
+        elif self.config.observer.load == "joint_torque":
+            rows[:, st.IN_LOAD] = _need(columns, "joint_torque_Nm")
+        if "joint_position_rad" in columns:
+            rows[:, st.IN_JOINT] = columns["joint_position_rad"]
+        if "temperature_degC" in columns:
+            rows[:, st.IN_TEMPERATURE] = columns["temperature_degC"]
+        for k, name in enumerate(self.channels):
+            rows[:, st.IN_OTHER + k] = _need(columns, name)
+        return rows
+
+    def _run_slowly(self, rows: Floats, outs: Floats, low: Floats, high: Floats) -> None:
+        """Sample by sample: where bounds or the inverse are wanted as well."""
+        for k, row in enumerate(rows):
+            self._row[:] = row
+            if self.config.observer.load == "both_encoders":
+                self._solve_load()
+            status = st.step_one(*self._kernel(), self._row, outs[k])
+            self._check(status, row[st.IN_TIME], k)
+            if self._bounds is not None:
+                shift = outs[k, st.OUT_JOINT] - outs[k, st.OUT_DRIVE] - self._ratio * row[st.IN_MOTOR]
+                a, b = self._bounds.step(self._S)
+                low[k], high[k] = a + shift, b + shift
+
+    def _solve_load(self) -> None:
+        status = st.find_load(*self._kernel(), self._row, self._out, self._spare)
+        self._check(status, self._row[st.IN_TIME])
+
+    def _check(self, status: int, time_s: float, index: int | None = None) -> None:
+        if status != o.STATUS_OK:
+            where = f"sample at {time_s:g} s" if index is None else f"sample {index}: at {time_s:g} s"
+            raise InputError(f"{where} {REASONS[status]}")
+
+    def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
+        out = self._out
+        joint = float(out[st.OUT_JOINT])
+        rigid = self._ratio * sample.motor_position_rad
+        shift = joint - float(out[st.OUT_DRIVE]) - rigid
+        return Estimate(
+            sample.time_s,
+            joint - rigid,
+            low + shift,
+            high + shift,
+            joint,
+            float(out[st.OUT_LOAD]),
+            float(out[st.OUT_T_H]),
+            float(out[st.OUT_T_L]),
+        )
+
+
+def _need(columns: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
+    if name not in columns:
+        raise InputError(f"channel `{name}` is missing; the recording has {', '.join(sorted(columns))}")
+    return columns[name]
+
+
+def _rigid_ratio(config: JointConfig) -> float:
+    return float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))
+
+
+def _wrap_name(config: JointConfig, wrap: int, sign: float) -> str:
+    stages = len(config.drive.stage)
+    closed = config.drive.circuit == "closed"
+    cable = wrap // 2
+    if closed and config.drive.arrangement == "series":
+        stage = cable // 2
+    else:
+        stage = cable % stages
+    side = "output" if wrap % 2 == 0 else "input"
+    label = f"cable {'h' if sign > 0 else 'l'}, {side} pulley"
+    return label if stages == 1 else f"stage {stage + 1}, {label}"

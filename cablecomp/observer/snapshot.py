@@ -1,0 +1,73 @@
+"""A snapshot: magic, version, joint, the used part of the state, SHA-256. A power cycle loses no history."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.errors import InputError
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.cable import Ints
+from cablecomp.mechanics.profile import ROWS, Floats
+
+MAGIC = b"CABLECMP"
+VERSION = 1
+State = tuple[Floats, Ints]
+
+
+def pack(config: JointConfig, I: Ints, states: Sequence[State], options: Floats, last_time: float) -> bytes:
+    """Serialise the states (scalars whole, profiles as far as they are used)."""
+    parts = [MAGIC, struct.pack("<HH", VERSION, len(states)), _joint_key(config), struct.pack("<d", last_time)]
+    parts.append(options.tobytes())
+    for S, J in states:
+        parts += [J.astype("<i8").tobytes(), S[: I[o.S_PROFILE]].tobytes()]
+        parts += [np.ascontiguousarray(_used(I, S, J, wrap)).tobytes() for wrap in range(len(J))]
+    body = b"".join(parts)
+    return body + hashlib.sha256(body).digest()
+
+
+def unpack(data: bytes, config: JointConfig, I: Ints, states: Sequence[State], options: Floats) -> float:
+    """Fill the states from a snapshot and return the time of its last sample; nothing is touched unless all of it is sound."""
+    body, digest = data[:-32], data[-32:]
+    if len(data) < 60 or not body.startswith(MAGIC):
+        raise InputError("snapshot: is none of ours (wrong first bytes); give a file written by Observer.save")
+    if hashlib.sha256(body).digest() != digest:
+        raise InputError("snapshot: its checksum does not fit, the file is damaged; start from a known state instead")
+    version, count = struct.unpack_from("<HH", body, 8)
+    if version != VERSION:
+        raise InputError(f"snapshot: has version {version}; this program reads version {VERSION}")
+    if body[12:28] != _joint_key(config):
+        raise InputError(f"snapshot: belongs to another joint configuration than `{config.name}`; use its own")
+    if count != len(states):
+        raise InputError(f"snapshot: holds {count} histories, this observer {len(states)}; open it with the same `bounds`")
+    (last_time,) = struct.unpack_from("<d", body, 28)
+    place = 36
+    options[:] = np.frombuffer(body, "<f8", len(options), place)
+    place += 8 * len(options)
+    small = int(I[o.S_PROFILE])
+    for S, J in states:
+        J[:] = np.frombuffer(body, "<i8", len(J), place)
+        place += 8 * len(J)
+        S[:small] = np.frombuffer(body, "<f8", small, place)
+        place += 8 * small
+        for wrap in range(len(J)):
+            used = ROWS * int(J[wrap])
+            _used(I, S, J, wrap)[:] = np.frombuffer(body, "<f8", used, place).reshape(ROWS, -1)
+            place += 8 * used
+    return float(last_time)
+
+
+def _used(I: Ints, S: Floats, J: Ints, wrap: int) -> Floats:
+    size = ROWS * int(I[o.CAPACITY])
+    first = int(I[o.S_PROFILE]) + wrap * size
+    return S[first : first + size].reshape(ROWS, -1)[:, : int(J[wrap])]
+
+
+def _joint_key(config: JointConfig) -> bytes:
+    """What the state depends on: drive, effects, memory (not the joint's name or its sensors)."""
+    text = config.model_dump_json(include={"drive", "effect", "observer"})
+    return hashlib.sha256(text.encode()).digest()[:16]

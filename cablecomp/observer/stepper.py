@@ -1,0 +1,137 @@
+"""Compiled steps of the observer: readings in, solved joint out; the same code for one sample and for a block."""
+
+from __future__ import annotations
+
+import math
+
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.cable import Ints, stacks
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.joint import advance, joint_commit, joint_solve
+from cablecomp.mechanics.profile import Floats
+
+# options F: [torque gain, torque offset, filter angular frequency, 0]; filter state follows: two one-poles each for angle and load
+GAIN, OFFSET, CUTOFF, STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, OPTIONS = range(9)
+# one row of inputs
+IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
+# one row of outputs
+OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_WIDTH = range(7)
+
+
+@njit
+def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, float]:
+    """Causal input filter: two equal one-pole stages, exact for uneven steps; off at cutoff 0."""
+    if F[CUTOFF] <= 0.0:
+        return motor, load
+    if F[STARTED] == 0.0:
+        F[STARTED] = 1.0
+        F[MOTOR_1] = F[MOTOR_2] = motor
+        F[LOAD_1] = F[LOAD_2] = load
+        return motor, load
+    share = -math.expm1(-F[CUTOFF] * dt)
+    F[MOTOR_1] += share * (motor - F[MOTOR_1])
+    F[MOTOR_2] += share * (F[MOTOR_1] - F[MOTOR_2])
+    F[LOAD_1] += share * (load - F[LOAD_1])
+    F[LOAD_2] += share * (F[LOAD_1] - F[LOAD_2])
+    return F[MOTOR_2], F[LOAD_2]
+
+
+@njit
+def predict(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, F: Floats, row: Floats, out: Floats
+) -> int:
+    """Solve the joint for one row of readings without committing it; `out` gets the outputs. Returns a status."""
+    x = I[o.S_CONTEXT]
+    raw = (row[IN_LOAD] - F[OFFSET]) / F[GAIN]
+    dt = row[IN_TIME] - S[x + o.X_TIME]
+    motor, load = smooth(F, dt, row[IN_MOTOR], raw)
+    advance(P, I, S, row[IN_TIME], motor, load, row[IN_TEMPERATURE])
+    for j in range(row.shape[0] - IN_OTHER):
+        S[x + o.X_OTHER + j] = row[IN_OTHER + j]
+    status = joint_solve(P, I, S, J, L, G)
+    drive = S[x + o.X_JOINT] + S[x + o.X_RIGID] * (row[IN_MOTOR] - motor)
+    out[OUT_DRIVE] = drive
+    out[OUT_JOINT] = drive + S[x + o.X_READING]
+    out[OUT_LOAD] = row[IN_LOAD]
+    out[OUT_T_H] = S[x + o.X_TENSION_H]
+    out[OUT_T_L] = S[x + o.X_TENSION_L]
+    out[OUT_COMPLIANCE] = S[x + o.X_COMPLIANCE]
+    return status
+
+
+@njit
+def step_one(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats
+) -> int:
+    """One sample, committed."""
+    G = stacks(I, S)
+    status = predict(P, I, S, J, L, G, F, row, out)
+    if status == o.STATUS_OK:
+        joint_commit(P, I, S, J, L, G)
+    return status
+
+
+@njit
+def peek_one(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats, spare: Floats
+) -> int:
+    """One sample, nothing committed: everything but the profiles (which a prediction never touches) is put back."""
+    small = I[o.S_PROFILE]
+    spare[:small] = S[:small]
+    spare[small : small + OPTIONS] = F
+    status = predict(P, I, S, J, L, stacks(I, S), F, row, out)
+    S[:small] = spare[:small]
+    F[:] = spare[small : small + OPTIONS]
+    return status
+
+
+@njit
+def run_block(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats
+) -> tuple[int, int]:
+    """Step through a block of rows; returns how many were done and the status of the row that stopped it."""
+    G = stacks(I, S)
+    for k in range(rows.shape[0]):
+        status = predict(P, I, S, J, L, G, F, rows[k], outs[k])
+        if status != o.STATUS_OK:
+            return k, status
+        joint_commit(P, I, S, J, L, G)
+    return rows.shape[0], o.STATUS_OK
+
+
+@njit
+def find_load(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats, spare: Floats
+) -> int:
+    """The load [N m] under which the joint encoder would read row[IN_JOINT], by Newton's method; written to row[IN_LOAD].
+
+    Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
+    are slack every load near zero fits, and the nearest is taken.
+    """
+    x = I[o.S_CONTEXT]
+    low, high = -1e300, 1e300
+    load = S[x + o.X_LOAD] * F[GAIN] + F[OFFSET]
+    for _ in range(60):
+        row[IN_LOAD] = load
+        status = peek_one(P, I, S, J, L, F, row, out, spare)
+        if status != o.STATUS_OK and status != o.STATUS_SLACK:
+            return status
+        if status == o.STATUS_SLACK:  # an open circuit's cable would go slack: more load is needed
+            low = max(low, load)
+            load = 0.5 * (load + high) if high < 1e299 else 0.5 * load
+            continue
+        miss = out[OUT_JOINT] - row[IN_JOINT]
+        if abs(miss) < 1e-13:
+            return o.STATUS_OK
+        if miss > 0.0:
+            high = load
+        else:
+            low = load
+        step = -miss / max(out[OUT_COMPLIANCE], 1e-12)
+        new = load + step
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - load) <= 1e-14 + 1e-13 * abs(load):
+            return o.STATUS_OK
+        load = new
+    return o.STATUS_OK
