@@ -28,7 +28,7 @@ _ROWS: Final = 1 << 14
 def open_mcap(path: Path) -> tuple[tuple[str, ...], RowStream]:
     """Return column names and a stream of rows; InputError if damaged or no JSON topic holds a channel.
 
-    Fields that are no channels are left out. Without a time channel, time is log time since the first message.
+    Fields that are no channels are left out. Without a time channel, log time since the first message is it.
     """
     names, seen, clock = _discover(path)
     if not names:
@@ -161,7 +161,11 @@ def _fields(topic: str, message: Any, path: Path) -> dict[str, float]:
         raise InputError(f"{path}: topic {topic} holds a message that is not JSON; export it anew") from None
     if not isinstance(content, dict):
         return {}
-    fields = {name: float(v) for name, v in content.items() if isinstance(v, int | float) and v is not True}
+    fields = {
+        name: math.nan if value is None else float(value)
+        for name, value in content.items()
+        if value is None or (isinstance(value, int | float) and not isinstance(value, bool))
+    }
     if len(fields) == 1 and next(iter(fields)) in ("value", "data"):
         return {topic.rsplit("/", 1)[-1]: next(iter(fields.values()))}
     return fields

@@ -23,7 +23,7 @@ class Recorder:
     `append` copies one row into a buffer, without waiting for the disk; each full buffer (`rows_per_write`,
     1 s at 1 kHz by default) is formatted and flushed to the operating system by another thread. `close`
     writes the rest; it also happens at the end of a `with` block, on an unhandled exception and at the
-    interpreter's exit. If the process is killed, the file holds every full buffer, in whole rows. A row must be
+    interpreter's exit. If the process is killed, the file holds every full buffer. A row must be
     finite in all channels but `temperature_degC` and `other_*`: the recorder writes what it is given (NaN as
     an empty cell), and reading refuses empty cells elsewhere.
     """

@@ -58,7 +58,7 @@ def _open(path: Path) -> IO[bytes]:
 
 
 def check_canonical(names: Iterable[str]) -> tuple[str, ...]:
-    """Return channel names in canonical order; InternalError if one is not canonical, InputError if unknown."""
+    """Return channel names in canonical order; InternalError if one is not canonical."""
     names = tuple(names)
     for column in parse_header(names):
         if column.name != column.column:

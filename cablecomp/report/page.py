@@ -84,7 +84,12 @@ def code(text: str) -> str:
 
 def figure(fig: Any, caption: str = "") -> str:
     """Return a plotly figure as HTML that needs the plotly.js of the page around it."""
-    config = {"displaylogo": False, "responsive": True, "toImageButtonOptions": {"format": "svg"}}
+    config = {
+        "displaylogo": False,
+        "responsive": True,
+        "toImageButtonOptions": {"format": "svg"},
+        "modeBarButtonsToRemove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"],
+    }
     html = pio.to_html(fig, include_plotlyjs=False, full_html=False, config=config)
     note = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f"<figure>{html}{note}</figure>"
@@ -105,7 +110,9 @@ def page(title: str, lead: str, sections: Iterable[Section]) -> str:
         f'<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<style>{_CSS}</style><script>{get_plotlyjs()}</script></head>"
         f'<body><header><h1>{escape(title)}</h1><p class="lead">{escape(lead)}</p><nav>{links}</nav></header>'
-        f"<main>{body}</main></body></html>\n"
+        f"<main>{body}</main>"
+        # figures are drawn while the page is still being laid out: let each take its final width
+        f"<script>window.dispatchEvent(new Event('resize'));</script></body></html>\n"
     )
 
 
@@ -141,12 +148,12 @@ header {{ padding-top: 32px; }}
 h1 {{ font-size: 27px; line-height: 1.25; margin: 0 0 6px; letter-spacing: -0.01em; }}
 h2 {{ font-size: 19px; margin: 0 0 8px; }}
 p {{ margin: 0 0 10px; }}
-.lead {{ color: {style.MUTED}; max-width: 92ch; }}
+.lead {{ color: {style.MUTED}; max-width: 120ch; }}
 nav {{ display: flex; flex-wrap: wrap; gap: 6px 18px; margin: 10px 0 18px; font-size: 14px; }}
 a {{ color: {style.PREDICTED}; text-decoration: none; }} a:hover {{ text-decoration: underline; }}
 section {{ background: {style.PAPER}; border: 1px solid {style.RULE}; border-radius: 10px; padding: 20px 22px;
   margin: 0 0 18px; scroll-margin-top: 8px; }}
-.facts {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(168px, 1fr)); gap: 12px; }}
+.facts {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 12px; }}
 .fact {{ border: 1px solid {style.RULE}; border-left: 4px solid #94a3b8; border-radius: 8px;
   padding: 10px 14px; }}
 .fact.good {{ border-left-color: #0b8a6f; }} .fact.warn {{ border-left-color: #b7791f; }}
@@ -155,7 +162,8 @@ section {{ background: {style.PAPER}; border: 1px solid {style.RULE}; border-rad
 .fact .label {{ color: {style.MUTED}; font-size: 13px; }}
 .fact .value {{ font-size: 22px; font-weight: 600; font-variant-numeric: tabular-nums; white-space: nowrap; }}
 .fact .remark {{ color: {style.MUTED}; font-size: 12.5px; line-height: 1.35; }}
-.columns {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 18px; }}
+.columns {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(440px, 1fr)); gap: 18px; }}
+.columns > div {{ min-width: 0; }}
 figure {{ margin: 0 0 8px; }} figcaption {{ color: {style.MUTED}; font-size: 13.5px; margin: 2px 0 8px; }}
 .scroll {{ overflow-x: auto; }}
 table {{ border-collapse: collapse; font-size: 14px; margin: 4px 0 10px; }}

@@ -1,0 +1,45 @@
+"""A progress bar on the terminal, only for what takes long."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+
+@contextmanager
+def progress_bar(
+    title: str,
+    console: Console | None = None,
+    delay_s: float = 2.0,
+    clock: Callable[[], float] = time.monotonic,
+) -> Iterator[Callable[[float, int], None]]:
+    """Give a function to be told (share done, samples done); a bar appears once `delay_s` have passed.
+
+    `console` is where to draw (standard error by default).
+    """
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[samples]:,} samples"),
+        TimeRemainingColumn(),
+        console=console or Console(stderr=True),
+        transient=True,
+    )
+    task = bar.add_task(title, total=1.0, samples=0)
+    started = clock()
+
+    def told(fraction: float, samples: int) -> None:
+        bar.update(task, completed=fraction, samples=samples)
+        if not bar.live.is_started and clock() - started >= delay_s:
+            bar.start()
+
+    try:
+        yield told
+    finally:
+        if bar.live.is_started:
+            bar.stop()
