@@ -31,6 +31,7 @@ ZERO: Final = bytes.fromhex("FFFFFFFFFFFFFFFE")
 CLEAR: Final = bytes.fromhex("FFFFFFFFFFFFFFFB")
 """Clear errors (Damiao only)."""
 
+_HALF: Final = 0.5 + 1e-9  # so that a tie goes down whatever the last bit of the quotient
 P_TOP: Final = 65535
 V_TOP: Final = 4095
 
@@ -90,7 +91,7 @@ def count(value: float, low: float, high: float, top: int) -> int:
         return 0
     if value >= high:
         return top
-    return ceil((value - low) * (top / (high - low)) - 0.5)
+    return ceil((value - low) * top / (high - low) - _HALF)
 
 
 def value_of(n: int, low: float, high: float, top: int) -> float:
