@@ -327,5 +327,5 @@ class Drive:
             if self._search_sign < 0.0:
                 self._fault(DriveFlag.INDEX_NOT_FOUND)
                 return 0.0
-            self._search_sign, self._search_start = -1.0, raw
+            self._search_sign = -1.0
         return self._velocity_loop(self._search_sign * self.config.search_velocity_rad_s, 0.0)

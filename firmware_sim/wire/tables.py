@@ -3,15 +3,15 @@ writes them.
 
 Identifiers (11-bit) of joint N = 1…8; sensor nodes stay clear of ODrive nodes 0…47 and of MIT drive ids:
 
-| identifier         | message        | from  | what it carries                                                    |
-|--------------------|----------------|-------|--------------------------------------------------------------------|
-| 0x600 + 0x10 (N-1) | JointN_State   | joint | angle (int32, 1e-6 rad), torque (int24, 1e-5 Nm), sequence         |
-| 0x601 + 0x10 (N-1) | JointN_Status  | joint | time (uint32, us), temperature (int16, 0.01 degC), flags, sequence |
-| 0x400 + 0x10 (N-1) | DriveN_Command | host  | targets: motor position, velocity, torque                          |
-| 0x401 + 0x10 (N-1) | DriveN_Control | host  | state request, control mode, kp, kd, torque limit                  |
-| 0x402 + 0x10 (N-1) | DriveN_State   | drive | motor position, velocity, torque, sequence                         |
-| 0x403 + 0x10 (N-1) | DriveN_Status  | drive | state, mode, flags, current, temperature, sequence                 |
-| 0x700              | Sync           | host  | step number; stepped by sync, every joint takes one step           |
+| identifier       | message        | from  | what it carries                                                   |
+|------------------|----------------|-------|-------------------------------------------------------------------|
+| 0x600 + 16 (N-1) | JointN_State   | joint | angle (int32, 1e-6 rad), torque (int24, 1e-5 Nm), sequence         |
+| 0x601 + 16 (N-1) | JointN_Status  | joint | time (uint32, us), temperature (int16, 0.01 degC), flags, sequence |
+| 0x400 + 16 (N-1) | DriveN_Command | host  | targets: motor position, velocity, torque                         |
+| 0x401 + 16 (N-1) | DriveN_Control | host  | state request, control mode, kp, kd, torque limit                 |
+| 0x402 + 16 (N-1) | DriveN_State   | drive | motor position, velocity, torque, sequence                        |
+| 0x403 + 16 (N-1) | DriveN_Status  | drive | state, mode, flags, current, temperature, sequence                |
+| 0x700            | Sync           | host  | step number; stepped by sync, every joint takes one step          |
 
 Intel byte order. JointN_Status goes out with every tenth sample and at once when its flags change; its
 sequence is that of
