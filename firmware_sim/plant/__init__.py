@@ -1,0 +1,35 @@
+"""The simulated joint: cables as material points with Coulomb friction at every point, motor, link,
+sensors, effects."""
+
+from firmware_sim.plant.bench import PlantRun, simulate
+from firmware_sim.plant.config import EffectSpec, PlantConfig, StageConfig
+from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings, PlantTruth, noiseless
+from firmware_sim.plant.effects import EFFECTS, LISTED, UNLISTED, EffectKind
+from firmware_sim.plant.errors import PlantError
+from firmware_sim.plant.mesh import COARSE, FINE, NORMAL, Resolution
+from firmware_sim.plant.sensors import SensorSpec, measure
+
+__all__ = [
+    "COARSE",
+    "EFFECTS",
+    "FINE",
+    "LISTED",
+    "NORMAL",
+    "UNLISTED",
+    "EffectKind",
+    "EffectSpec",
+    "LinkSpec",
+    "MotorSpec",
+    "Plant",
+    "PlantConfig",
+    "PlantError",
+    "PlantReadings",
+    "PlantRun",
+    "PlantTruth",
+    "Resolution",
+    "SensorSpec",
+    "StageConfig",
+    "measure",
+    "noiseless",
+    "simulate",
+]

@@ -1,0 +1,259 @@
+"""Compiled mechanics of one cable: stretch, contact, friction at material points, and one linear solve.
+
+The cable is a row of material points with unstressed lengths between them. A point on a drum or guide
+sticks to it while the net pull of its two elements stays within `2 tanh(mu dθ/2)` of their mean tension
+(over a point of contact angle dθ that is the capstan ratio e^(mu dθ), exactly), and slides at that force
+otherwise, plus `c v dθ` where viscous. Which points stick is found by an active-set iteration around a
+tridiagonal solve.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from firmware_sim.plant.jit import njit
+from firmware_sim.plant.records import FREE, GUIDE, IN, OUT, Nodes
+
+
+@njit
+def refresh_tension(c: Any, nodes: Nodes) -> None:
+    """Tension and tangent stiffness of every element: T = EA ε, or with stiffening b: dT/dε = EA (1 + b
+    (T/T0 − 1)).
+
+    A slack element keeps the fraction `slack_ratio` of EA, so that positions stay determined.
+    """
+    y, l0, tension, slope = nodes.y, nodes.l0, nodes.tension, nodes.slope
+    EA, b, T0 = c.EA, c.stiffening, c.T0
+    weak = EA * c.slack_ratio
+    if b == 0.0:
+        for e in range(c.first, c.first + c.count - 1):
+            strain = (y[e + 1] - y[e]) / l0[e] - 1.0 - c.eigenstrain
+            rate = EA if strain > 0.0 else weak
+            tension[e] = rate * strain
+            slope[e] = rate / l0[e]
+        return
+    reach = -60.0 if b >= 1.0 else (math.log1p(-b) / b)
+    zero = T0 / EA * (1.0 + reach)  # strain at which the stiffening cable goes slack
+    for e in range(c.first, c.first + c.count - 1):
+        strain = (y[e + 1] - y[e]) / l0[e] - 1.0 - c.eigenstrain
+        if strain > zero:
+            growth = min(b * (EA / T0 * strain - 1.0), 30.0)
+            tension[e] = T0 * (1.0 + math.expm1(growth) / b)
+            slope[e] = EA * math.exp(growth) / l0[e]
+        else:
+            tension[e] = weak * (strain - zero)
+            slope[e] = weak / l0[e]
+
+
+@njit
+def _grip(x: float) -> float:
+    """2 tanh(x/2), to 1e-7 for x below 0.5."""
+    if x > 0.5:
+        return 2.0 * math.tanh(0.5 * x)
+    s = x * x
+    return x * (1.0 - s / 12.0 + s * s / 120.0)
+
+
+@njit
+def find_contacts(c: Any, nodes: Nodes, h: float) -> None:
+    """Lay each node's share of the cable on what it touches; sets `where`, `grip` and `drag`."""
+    y, where, grip, drag, tension = nodes.y, nodes.where, nodes.grip, nodes.drag, nodes.tension
+    first, last = c.first, c.first + c.count - 1
+    A, B = c.A, c.A + c.free_m + c.guide_arc_m - c.ext  # departure points
+    g0 = c.A + 0.5 * c.free_m
+    g1 = g0 + c.guide_arc_m
+    mu_out, mu_in = c.mu_out * c.mu_scale / c.R, c.mu_in * c.mu_scale / c.r
+    groove = c.groove_amplitude != 0.0
+    pressed = c.pressure_exponent != 0.0
+    c.i_out, c.i_in = first, last
+    right = 0.5 * (y[first] + y[first + 1])
+    for i in range(first + 1, last):
+        left = right
+        right = 0.5 * (y[i] + y[i + 1])
+        x = 0.0
+        drag[i] = 0.0
+        if left < A:
+            where[i] = OUT
+            c.i_out = i
+            arc = min(right, A) - left
+            x = mu_out * arc
+            if groove:
+                joint = c.sign * (y[i] / c.R - c.wrap_out)  # joint angle at which this groove point departs
+                x *= max(0.0, 1.0 + c.groove_amplitude * math.cos(joint - c.groove_phase))
+            drag[i] = c.viscous_out * arc / h
+        elif right > B:
+            where[i] = IN
+            if c.i_in == last:
+                c.i_in = i
+            arc = right - max(left, B)
+            x = mu_in * arc
+            drag[i] = c.viscous_in * arc / h
+        elif right > g0 and left < g1 and c.guide_mu_per_m > 0.0:
+            where[i] = GUIDE
+            x = c.guide_mu_per_m * c.mu_scale * (min(right, g1) - max(left, g0))
+        else:
+            where[i] = FREE
+        if pressed and x > 0.0:
+            mean = max(0.5 * (tension[i - 1] + tension[i]) / c.T0, 1e-3)
+            x *= mean ** (-c.pressure_exponent)
+        grip[i] = _grip(x)
+
+
+@njit
+def solve_cable(c: Any, nodes: Nodes) -> float:
+    """Linear solve under the present sticking set; returns the largest unbalanced force, N.
+
+    Unknown is the change of every y: alpha (by itself) + beta dY (path length) + gamma dA (arc on the
+    output drum). A sticking node keeps its place on what it touches: 0 on the output drum, dY on the input
+    drum, dA on a guide.
+    """
+    y, old, tension, slope = nodes.y, nodes.old, nodes.tension, nodes.slope
+    al, be, ga, up = nodes.alpha, nodes.beta, nodes.gamma, nodes.upper
+    first, last = c.first, c.first + c.count - 1
+    shift_Y, shift_A = c.Y - c.Y_old, c.A - c.A_old
+    al[first], be[first], ga[first], up[first] = 0.0, 0.0, 0.0, 0.0
+    worst = 0.0
+    for i in range(first + 1, last):
+        where, mode = nodes.where[i], nodes.mode[i]
+        on_in = 1.0 if where == IN else 0.0
+        on_guide = 1.0 if where == GUIDE else 0.0
+        if where != FREE and mode == 0:
+            moved = y[i] - old[i] - on_in * shift_Y - on_guide * shift_A
+            al[i], be[i], ga[i], up[i] = -moved, on_in, on_guide, 0.0
+            continue
+        grip = mode * nodes.grip[i] if where != FREE else 0.0
+        low, high = tension[i - 1], tension[i]
+        mean = 0.5 * (low + high)
+        force = grip * mean if mean > 0.0 else 0.0
+        half = 0.5 * grip * (1.0 - c.pressure_exponent) if mean > 0.0 else 0.0
+        drag = nodes.drag[i]
+        residual = high - low - force - drag * (y[i] - old[i] - on_in * shift_Y - on_guide * shift_A)
+        worst = max(worst, abs(residual))
+        below = slope[i - 1] * (1.0 + half)
+        above = slope[i] * (1.0 - half)
+        pivot = -slope[i] * (1.0 - half) - slope[i - 1] * (1.0 + half) - drag
+        scale = 1.0 / (pivot - below * up[i - 1])
+        up[i] = above * scale
+        al[i] = (-residual - below * al[i - 1]) * scale
+        be[i] = (-drag * on_in - below * be[i - 1]) * scale
+        ga[i] = (-drag * on_guide - below * ga[i - 1]) * scale
+    al[last], be[last], ga[last] = 0.0, 1.0, 0.0
+    for i in range(last - 1, first, -1):
+        al[i] -= up[i] * al[i + 1]
+        be[i] -= up[i] * be[i + 1]
+        ga[i] -= up[i] * ga[i + 1]
+    e, k = c.i_out, c.i_in - 1
+    c.T_out, c.T_in = tension[e], tension[k]
+    c.dT_out = slope[e] * (al[e + 1] - al[e])
+    c.dT_out_dY = slope[e] * (be[e + 1] - be[e])
+    c.dT_out_dA = slope[e] * (ga[e + 1] - ga[e])
+    c.dT_in = slope[k] * (al[k + 1] - al[k])
+    c.dT_in_dY = slope[k] * (be[k + 1] - be[k])
+    c.dT_in_dA = slope[k] * (ga[k + 1] - ga[k])
+    return worst
+
+
+@njit
+def move_nodes(c: Any, nodes: Nodes, dY: float, dA: float) -> None:
+    """Apply the solved change for given changes of path length and of arc on the output drum."""
+    y, al, be, ga = nodes.y, nodes.alpha, nodes.beta, nodes.gamma
+    for i in range(c.first + 1, c.first + c.count):
+        y[i] += al[i] + be[i] * dY + ga[i] * dA
+
+
+@njit
+def carry_along(c: Any, nodes: Nodes, dY: float, dA: float) -> None:
+    """First guess of a step: each node moves with what it touches, those between in proportion."""
+    y = nodes.y
+    span = max(c.Y - c.A, 1e-12)
+    for i in range(c.first + 1, c.first + c.count):
+        if nodes.where[i] == IN or i == c.first + c.count - 1:
+            y[i] += dY
+        elif nodes.where[i] != OUT:
+            share = min(max((y[i] - c.A) / span, 0.0), 1.0)
+            y[i] += share * dY
+
+
+@njit
+def update_modes(c: Any, nodes: Nodes, tolerance: float, rush: bool) -> int:
+    """Let overloaded nodes slide and nodes that slide backwards stick; returns how many changed.
+
+    With `rush`, a node set free hands the tension it would leave behind on to its inner neighbour, so that
+    a slip front passes many nodes in one iteration.
+    """
+    changed = 0
+    shift_Y, shift_A = c.Y - c.Y_old, c.A - c.A_old
+    first, last = c.first, c.first + c.count - 1
+    changed += _sweep(c, nodes, c.i_out, first, -1, 0.0, tolerance, rush)
+    changed += _sweep(c, nodes, c.i_in, last, 1, shift_Y, tolerance, rush)
+    if c.guide_mu_per_m > 0.0:
+        for i in range(c.i_out + 1, c.i_in):
+            if nodes.where[i] == GUIDE:
+                changed += _set_mode(nodes, i, nodes.tension[i - 1], nodes.tension[i], shift_A, tolerance)
+    return changed
+
+
+@njit
+def _sweep(
+    c: Any, nodes: Nodes, start: int, end: int, step: int, shift: float, tolerance: float, rush: bool
+) -> int:
+    """Modes of one drum, from its departure point inwards."""
+    changed = 0
+    carrying = False
+    carried = 0.0
+    i = start
+    while i != end:
+        low, high = nodes.tension[i - 1], nodes.tension[i]
+        if carrying and step < 0:
+            high = carried
+        if carrying and step > 0:
+            low = carried
+        was = nodes.mode[i]
+        count = _set_mode(nodes, i, low, high, shift, tolerance)
+        changed += count
+        now = nodes.mode[i]
+        carrying = rush and count > 0 and was == 0
+        if carrying:
+            half = 0.5 * now * nodes.grip[i]
+            carried = high * (1.0 - half) / (1.0 + half) if step < 0 else low * (1.0 + half) / (1.0 - half)
+        i += step
+    return changed
+
+
+@njit
+def _set_mode(nodes: Nodes, i: int, low: float, high: float, shift: float, tolerance: float) -> int:
+    mode = nodes.mode[i]
+    if mode == 0:
+        pull = high - low
+        bound = nodes.grip[i] * max(0.5 * (low + high), 0.0) + tolerance
+        if pull > bound:
+            nodes.mode[i] = 1
+            return 1
+        if pull < -bound:
+            nodes.mode[i] = -1
+            return 1
+        return 0
+    if mode * (nodes.y[i] - nodes.old[i] - shift) < -1e-13:
+        nodes.mode[i] = 0
+        return 1
+    return 0
+
+
+@njit
+def lumped_extension(c: Any, T: float) -> float:
+    """Extra length of the free span at tension T: strand friction as a play in the tension, and what was
+    let go.
+
+    e = play_compliance · play(T) + released; play(T) stays while |T − play| < play_yield.
+    """
+    play = min(max(c.play, T - c.play_yield), T + c.play_yield)
+    extension: float = c.play_compliance * (play - c.play_zero) + c.released_m
+    return extension
+
+
+@njit
+def lumped_slope(c: Any, T: float) -> float:
+    """Derivative of `lumped_extension` by T, m/N."""
+    slope: float = c.play_compliance if abs(T - c.play) > c.play_yield else 0.0
+    return slope

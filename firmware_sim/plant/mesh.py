@@ -1,0 +1,91 @@
+"""Spacing of the material points along one cable."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware_sim.plant.config import StageConfig
+from firmware_sim.plant.errors import PlantError
+from firmware_sim.plant.records import Floats
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How finely the plant is resolved.
+
+    `friction_step` is the friction angle mu dθ per material point where the cable can touch a drum; the
+    discretisation error falls with its square. `steps_per_spacing` bounds the arc wound in one time step to
+    a share of that spacing.
+    """
+
+    friction_step: float = 0.02
+    spacings_per_step: float = 1.0
+    max_nodes: int = 6000
+    growth: float = 0.25
+    ramp_steps: int = 60
+
+    def __post_init__(self) -> None:
+        if not (0 < self.friction_step < 0.5 and self.spacings_per_step > 0 and self.max_nodes >= 16):
+            raise PlantError(
+                f"resolution {self}: friction_step in (0, 0.5), spacings_per_step > 0 "
+                "and max_nodes >= 16 are accepted"
+            )
+
+
+COARSE = Resolution(friction_step=0.05, spacings_per_step=2.0)
+NORMAL = Resolution()
+FINE = Resolution(friction_step=0.007, spacings_per_step=0.5, max_nodes=20000)
+
+
+def fine_spacing(stage: StageConfig, resolution: Resolution, guide_arc_m: float) -> tuple[float, float]:
+    """Spacing wanted near the output and near the input drum, m.
+
+    A share of the friction length R/mu; never more than 0.2 rad of contact nor than what lets one point
+    touch two bodies.
+    """
+    apart = 0.9 * stage.free_length_m * (0.5 if guide_arc_m > 0 else 1.0)
+    guide = guide_arc_m / 8 if guide_arc_m > 0 else math.inf
+    out = resolution.friction_step * stage.output_radius_m / stage.mu_output
+    inner = resolution.friction_step * stage.input_radius_m / stage.mu_input
+    out = min(out, 0.2 * stage.output_radius_m, apart, max(guide, 0.1 * out))
+    inner = min(inner, 0.2 * stage.input_radius_m, apart, max(guide, 0.1 * inner))
+    return out, inner
+
+
+def element_lengths(
+    stage: StageConfig, arcs: tuple[float, float, float], travel_m: float, resolution: Resolution
+) -> Floats:
+    """Stretched element lengths from termination to termination.
+
+    `arcs` = (arc on the output drum, free length and guide, arc on the input drum) at the start, m. Cable
+    that can come to lie on a drum within `travel_m`, and a guide's surroundings, are fine; spacing grows
+    with the distance from there.
+    """
+    on_out, span, on_in = arcs
+    guide = span - stage.free_length_m
+    fine_out, fine_in = fine_spacing(stage, resolution, guide)
+    total = on_out + span + on_in
+    edges = [(-math.inf, on_out + travel_m, fine_out), (total - on_in - travel_m, math.inf, fine_in)]
+    if guide > 0:
+        middle = on_out + 0.5 * stage.free_length_m
+        edges.append((middle - travel_m, middle + guide + travel_m, min(fine_out, fine_in)))
+
+    def wanted(p: float) -> float:
+        return min(fine + resolution.growth * max(low - p, p - high, 0.0) for low, high, fine in edges)
+
+    lengths: list[float] = []
+    position = 0.0
+    while position < total:
+        length = wanted(position + 0.5 * wanted(position))
+        lengths.append(length)
+        position += length
+        if len(lengths) > resolution.max_nodes:
+            raise PlantError(
+                f"the cable needs more than {resolution.max_nodes} material points at this resolution; "
+                "raise friction_step or max_nodes, or give a longer free length"
+            )
+    result = np.asarray(lengths)
+    return np.asarray(result * (total / result.sum()))

@@ -1,0 +1,216 @@
+"""What the compiled plant works on: node arrays and records of cables, shafts, couplings, surroundings."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
+
+FREE, OUT, IN, GUIDE = 0, 1, 2, 3  # where a node lies: span, output drum, input drum, fixed guide
+
+# One cable from its termination on the output drum (path coordinate 0) to that on the input drum.
+CABLE = np.dtype(
+    [
+        ("first", "i8"),  # index of the first node
+        ("count", "i8"),  # number of nodes
+        ("shaft_out", "i8"),
+        ("shaft_in", "i8"),
+        ("side", "i8"),  # 0: cable h, 1: cable l
+        ("sign", "f8"),  # +1: +q_out winds it on (cable h), -1: cable l
+        # geometry
+        ("R", "f8"),
+        ("r", "f8"),
+        ("wrap_out", "f8"),  # rad at position zero
+        ("wrap_in", "f8"),
+        ("free_m", "f8"),
+        ("runout_m", "f8"),  # eccentricity of the output pulley
+        ("runout_phase", "f8"),
+        ("in_runout_m", "f8"),
+        ("in_runout_phase", "f8"),
+        ("climb_m_per_rad", "f8"),  # growth of the output radius with angle
+        # cable
+        ("EA", "f8"),
+        ("T0", "f8"),
+        ("stiffening", "f8"),
+        ("slack_ratio", "f8"),  # stiffness of a slack element over EA (regularisation)
+        # friction
+        ("mu_out", "f8"),
+        ("mu_in", "f8"),
+        ("guide_mu_per_m", "f8"),
+        ("guide_arc_m", "f8"),
+        ("viscous_out", "f8"),  # N s/m per metre of arc
+        ("viscous_in", "f8"),
+        ("pressure_exponent", "f8"),
+        ("groove_amplitude", "f8"),
+        ("groove_phase", "f8"),
+        ("mu_scale", "f8"),  # time-varying factor on every coefficient
+        # length budget
+        ("play_compliance", "f8"),  # m/N
+        ("play_yield", "f8"),  # N
+        ("play", "f8"),  # N, state
+        ("play_zero", "f8"),  # N, reference
+        ("released_m", "f8"),  # length let go into the free span
+        ("end_shift_m", "f8"),  # displacement of the output termination towards the span
+        ("eigenstrain", "f8"),  # thermal strain and creep
+        ("force_tol", "f8"),  # N, below which forces count as equal (rounding of positions)
+        # state of the present step
+        ("A", "f8"),  # m, arc on the output drum
+        ("Y", "f8"),  # m, whole path
+        ("A_old", "f8"),
+        ("Y_old", "f8"),
+        ("ext", "f8"),  # m, extension of the lumped element
+        ("ext_new", "f8"),
+        ("lead_out", "f8"),  # m/rad, dA/dq_out
+        ("lead_in", "f8"),
+        ("i_out", "i8"),  # last node that touches the output drum
+        ("i_in", "i8"),  # first node that touches the input drum
+        ("T_out", "f8"),
+        ("T_in", "f8"),
+        ("dT_out", "f8"),  # change of T_out by the solve alone, then per dY, per dA
+        ("dT_out_dY", "f8"),
+        ("dT_out_dA", "f8"),
+        ("dT_in", "f8"),
+        ("dT_in_dY", "f8"),
+        ("dT_in_dA", "f8"),
+    ]
+)
+
+SHAFT = np.dtype(
+    [
+        ("q", "f8"),
+        ("q_1", "f8"),  # previous step
+        ("q_2", "f8"),
+        ("v", "f8"),
+        ("v_1", "f8"),
+        ("v_2", "f8"),
+        ("a", "f8"),
+        ("prescribed", "i8"),
+        ("inertia", "f8"),
+        ("viscous", "f8"),
+        ("coulomb_Nm", "f8"),
+        ("load_coefficient", "f8"),  # friction torque per N·m of radial cable load R (T_h + T_l)
+        ("presliding", "f8"),  # rad
+        ("bristle", "f8"),  # rad, anchor of the presliding spring
+        ("bearing_mode", "i8"),
+        ("bearing_limit", "f8"),
+        ("gravity_Nm", "f8"),
+        ("gravity_phase", "f8"),
+        ("spring_Nm", "f8"),  # saturation torque of a parallel spring
+        ("spring_rate", "f8"),  # N·m/rad
+        ("wall_stiffness", "f8"),
+        ("wall_damping", "f8"),
+        ("wall_at", "f8"),
+        ("preload_Nm", "f8"),  # constant torque along +q, scaled by the pretension factor
+        ("external_Nm", "f8"),
+        ("load_Nm", "f8"),  # result: torque that reaches the cables, bearing friction not yet taken off
+        ("contact_Nm", "f8"),
+        ("cable_Nm", "f8"),  # result: torque of all cables on the shaft
+        ("radial_Nm", "f8"),  # result: sum of R T over the shaft's cables
+    ]
+)
+
+COUPLING = np.dtype(
+    [
+        ("a", "i8"),
+        ("b", "i8"),
+        ("stiffness", "f8"),
+        ("damping", "f8"),
+        ("gap", "f8"),  # rad, total clearance
+        ("torque_Nm", "f8"),  # result: on shaft a, along +q
+    ]
+)
+
+# Effects that follow time, temperature or another channel, and the time stepper's own memory.
+SURROUND = np.dtype(
+    [
+        ("load_shaft", "i8"),  # where the external moment acts
+        ("output_shaft", "i8"),
+        ("start_s", "f8"),
+        ("relax_fraction", "f8"),
+        ("relax_time_s", "f8"),
+        ("thermal_per_K", "f8"),
+        ("thermal_ref", "f8"),
+        ("mu_per_K", "f8"),
+        ("mu_ref", "f8"),
+        ("slip_m", "f8"),
+        ("slip_time_s", "f8"),
+        ("slip_behind_wrap", "f8"),
+        ("break_fraction", "f8"),
+        ("break_time_s", "f8"),
+        ("EA_whole", "f8"),
+        ("crosstalk", "f8"),
+        ("ageing_gain", "f8"),
+        ("ageing_count", "f8"),
+        ("reversals", "f8"),
+        ("load_direction", "f8"),
+        ("load_turn", "f8"),
+        ("h_prev", "f8"),
+        ("iterations", "i8"),
+        ("failures", "i8"),
+        ("is_open", "i8"),
+    ]
+)
+
+
+class Nodes(NamedTuple):
+    """Per-node and per-element arrays, all cables one after another; element e joins nodes e and e+1."""
+
+    y: Floats  # m, path coordinate from the output termination
+    old: Floats  # m, at the start of the step
+    l0: Floats  # m, unstressed length of element e
+    tension: Floats  # N, of element e
+    slope: Floats  # N/m, dT/dy of element e
+    grip: Floats  # friction force over mean tension at which the node slides
+    drag: Floats  # N/m, viscous force per slip of this step
+    alpha: Floats  # solution: change of y by itself,
+    beta: Floats  # per change of path length,
+    gamma: Floats  # per change of arc on the output drum
+    upper: Floats  # elimination work space
+    mode: Codes  # -1, +1: slides that way; 0: sticks
+    where: Codes  # FREE, OUT, IN, GUIDE
+    saved_mode: Codes
+
+
+class Drive(NamedTuple):
+    """Everything that one joint consists of, parameters and state; records are numpy structured arrays."""
+
+    cables: Any
+    shafts: Any
+    couplings: Any
+    surround: Any
+    nodes: Nodes
+    saved_cables: Any
+    saved_shafts: Any
+    saved_couplings: Any
+    saved_surround: Any
+    matrix: Floats
+    rhs: Floats
+
+
+def allocate_nodes(total: int) -> Nodes:
+    """Zeroed arrays for `total` nodes."""
+    f = [np.zeros(total) for _ in range(11)]
+    c = [np.zeros(total, dtype=np.int8) for _ in range(3)]
+    return Nodes(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], c[0], c[1], c[2])
+
+
+def make_drive(cables: Any, shafts: Any, couplings: Any, surround: Any, nodes: Nodes) -> Drive:
+    """Bind records and nodes, with room to step back to the start of a step."""
+    n = len(shafts)
+    return Drive(
+        cables,
+        shafts,
+        couplings,
+        surround,
+        nodes,
+        cables.copy(),
+        shafts.copy(),
+        couplings.copy(),
+        surround.copy(),
+        np.zeros((n, n)),
+        np.zeros(n),
+    )
