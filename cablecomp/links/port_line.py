@@ -142,7 +142,9 @@ def serial_port(port: str, baud: int) -> LinePort:
 
     def attach() -> tuple[Any, Callable[[], None]]:
         try:
-            line = serial.serial_for_url(port, baudrate=baud, timeout=0, write_timeout=0, exclusive=None)
+            # pyserial's URL ports (loop://, socket://, …) take a write timeout of 0 for one that has passed.
+            wait = None if "://" in port else 0
+            line = serial.serial_for_url(port, baudrate=baud, timeout=0, write_timeout=wait)
         except (OSError, ValueError, serial.SerialException) as error:
             raise DeviceError(
                 f"serial port {port}: cannot be opened ({_brief(error)}); give a port that is there and free"
