@@ -187,10 +187,8 @@ class _Run:
         match = _SAMPLE.fullmatch(message)
         if match is None:
             return f"{self._recording.path}: {message}"
-        row = int(match[1])
-        when = f"at {block.columns['time_s'][row]:.6g} s: " if row < block.rows else ""
-        line = block.first_line + row
-        return f"{self._recording.path}: {self._recording.line_word} {line}: {when}{match[2]}"
+        line = block.first_line + int(match[1])
+        return f"{self._recording.path}: {self._recording.line_word} {line}: {match[2]}"
 
     def _mark(self, block: Block, row: int, load: FloatArray | None) -> None:
         self._here = (
@@ -205,8 +203,11 @@ class _Run:
     def _count(self, replayed: Replayed) -> None:
         times, shown = replayed.block.columns["time_s"], replayed.deflection_measured_rad
         width = replayed.predicted["deflection_high_rad"] - replayed.predicted["deflection_low_rad"]
+        known = width[np.isfinite(width)]
         if math.isnan(self._first_time):
-            self._first_time, self._width_first = float(times[0]), float(width[0])
+            self._first_time = float(times[0])
+        if math.isnan(self._width_first) and len(known):
+            self._width_first = float(known[0])
         self._last_time, self._width_last = float(times[-1]), float(width[-1])
         curve = replayed.predicted["deflection_rad"] if shown is None else shown
         self._lowest = min(self._lowest, float(curve.min()))

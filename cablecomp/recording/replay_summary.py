@@ -16,7 +16,7 @@ class ReplaySummary:
 
     rmse, mean, sd and max (largest magnitude) are of the residual; the baseline is the best straight line of
     measured deflection against load; the range is that of measured (else predicted) deflection; bounds widths
-    are high - low at the first and last row.
+    are high - low where first known and at the last row.
     """
 
     recording: str

@@ -19,7 +19,7 @@ INSTANTS: Final = (START, GREATEST, BACK, LEAST, END)
 
 
 class WrapProfile(Protocol):
-    """Tension along one wrap: `angle_rad` from the departure point of the free span, `tension_N` there."""
+    """Tension along one wrap: `angle_rad` from the termination, `tension_N` there."""
 
     @property
     def name(self) -> str: ...

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from cablecomp.recording.replay_summary import ReplaySummary
-from cablecomp.recording.snapshots import BACK, END, GREATEST, LEAST, START, Snapshot
+from cablecomp.recording.snapshots import BACK, END, GREATEST, LEAST, START, Snapshot, WrapProfile
 from cablecomp.recording.table import FloatArray
 from cablecomp.report import style
 from cablecomp.report.replay_display import Display
 
+_MEASURED: Final = style.translucent(style.MEASURED, 0.5)  # broad and pale, so that a prediction on it shows
 _TIME: Final = style.label("time", "s")
 _INSTANT_COLOURS: Final = {
     START: "#94a3b8",
@@ -55,7 +56,7 @@ def over_time(display: Display, summary: ReplaySummary) -> Any:
             x=time, y=_small(low * unit.factor), name="guaranteed bounds",
             fill="tonexty", fillcolor=style.BOUNDS, row=1, col=1, **edge,
         )  # fmt: skip
-    _curve(fig, time, rows["deflection_measured_rad"] * unit.factor, "measured", style.MEASURED, 2.4, row=1)
+    _curve(fig, time, rows["deflection_measured_rad"] * unit.factor, "measured", _MEASURED, 3.2, row=1)
     _curve(fig, time, rows["deflection_rad"] * unit.factor, "predicted", style.PREDICTED, 1.4, row=1)
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
     if loaded:
@@ -72,7 +73,7 @@ def loop(display: Display, summary: ReplaySummary) -> Any:
     rows, unit = display.rows, scale(summary.deflection_range_rad)
     fig = style.figure(460)
     load, measured = rows["load_Nm"], rows["deflection_measured_rad"]
-    _curve(fig, load, measured * unit.factor, "measured", style.MEASURED, 2.4)
+    _curve(fig, load, measured * unit.factor, "measured", _MEASURED, 3.0)
     slope, offset = summary.baseline_linear_slope_rad_per_Nm, summary.baseline_linear_offset_rad
     if slope is not None and offset is not None:
         ends = np.array([np.nanmin(load), np.nanmax(load)])
@@ -158,13 +159,14 @@ def profiles(snapshots: Sequence[Snapshot]) -> Any:
     for instant, snapshot in enumerate(snapshots):
         colour = _colour(snapshot)
         for k, profile in enumerate(snapshot.profiles):
+            angle, tension = _capstan(profile)
             fig.add_scatter(
-                x=_small(profile.angle_rad), y=_small(profile.tension_N), mode="lines",
+                x=_small(angle), y=_small(tension), mode="lines",
                 line={"color": colour, "width": 2}, name=instant_name(snapshot),
                 legendgroup=str(instant), showlegend=k == 0,
                 row=k // columns + 1, col=k % columns + 1,
             )  # fmt: skip
-    fig.update_xaxes(title_text=style.label("angle from the free span", "rad"), row=lines)
+    fig.update_xaxes(title_text=style.label("angle from the termination", "rad"), row=lines)
     for line in range(lines):
         fig.update_yaxes(title_text=style.label("tension", "N"), row=line + 1, col=1)
     return fig
@@ -174,6 +176,16 @@ def instant_name(snapshot: Snapshot) -> str:
     """Return how a chosen instant is called on the page."""
     load = "" if snapshot.load_Nm is None else f", {snapshot.load_Nm:.3g} N·m"
     return f"{snapshot.label} ({snapshot.time_s:.4g} s{load})".replace("-", "−")
+
+
+def _capstan(profile: WrapProfile, points: int = 12) -> tuple[FloatArray, FloatArray]:
+    """Angle and tension drawn between the points of a profile, where tension grows or falls exponentially."""
+    angle, tension = np.asarray(profile.angle_rad), np.asarray(profile.tension_N)
+    knots = np.arange(len(angle), dtype=np.float64)
+    dense = np.linspace(0.0, len(angle) - 1.0, (len(angle) - 1) * points + 1)
+    if len(angle) < 2 or tension.min() <= 0.0:
+        return angle, tension
+    return np.interp(dense, knots, angle), np.exp(np.interp(dense, knots, np.log(tension)))
 
 
 def _colour(snapshot: Snapshot) -> str:

@@ -52,8 +52,8 @@ def _sections(summary: ReplaySummary, display: Display, config_text: str) -> Ite
     yield Section(
         "Deflection over time",
         page.figure(replay_figures.over_time(display, summary)),
-        "Deflection of the joint against the motor, measured and predicted. The band holds the truth for "
-        "every admissible history before the recording; dots on the load are the instants shown below.",
+        f"Deflection of the joint against the motor, measured and predicted. {_band(display)} "
+        "Dots on the load are the instants shown below.",
     )
     if display.has("load_Nm"):
         yield Section("Load–deflection loop", page.figure(replay_figures.loop(display, summary)))
@@ -71,6 +71,12 @@ def _sections(summary: ReplaySummary, display: Display, config_text: str) -> Ite
     yield Section("What is assumed about the joint", page.bullets(summary.assumptions))
     if config_text:
         yield Section("Configuration", page.fold(f"{summary.joint}, as used", page.code(config_text)))
+
+
+def _band(display: Display) -> str:
+    if display.has("deflection_low_rad"):
+        return "The band holds the truth for every admissible history before the recording."
+    return "No guaranteed bounds were computed, or this joint's effects do not allow any."
 
 
 def _residual(display: Display) -> str:

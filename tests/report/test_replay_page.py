@@ -135,7 +135,13 @@ def test_the_page_is_self_contained_and_escaped(tmp_path: Path) -> None:
     ):
         assert f"<h2>{title}</h2>" in html
     plain = re.sub(r"\\u([0-9a-f]{4})", lambda match: chr(int(match[1], 16)), html)
-    for unit in ("time / s", "load / N·m", "tension / N", "angle from the free span / rad", "deflection / "):
+    for unit in (
+        "time / s",
+        "load / N·m",
+        "tension / N",
+        "angle from the termination / rad",
+        "deflection / ",
+    ):
         assert unit in plain
     assert "known only within (1 sigma): mu_input ±30 %" in html
     assert "order of magnitude, taken at the value given: EA_N" in html
