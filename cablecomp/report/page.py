@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -90,7 +91,8 @@ def figure(fig: Any, caption: str = "") -> str:
         "toImageButtonOptions": {"format": "svg"},
         "modeBarButtonsToRemove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"],
     }
-    html = pio.to_html(fig, include_plotlyjs=False, full_html=False, config=config)
+    name = f"figure-{hashlib.sha256(fig.to_json().encode()).hexdigest()[:12]}"  # same figure, same page
+    html = pio.to_html(fig, include_plotlyjs=False, full_html=False, config=config, div_id=name)
     note = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f"<figure>{html}{note}</figure>"
 
