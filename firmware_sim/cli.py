@@ -40,6 +40,9 @@ def make_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     p.add_argument("--config", type=Path, required=True, help="joint configuration (TOML)")
+    p.add_argument(
+        "--scenario", type=Path, help="motor, link, loads, effects, faults (firmware_sim/scenario.py)"
+    )
     p.add_argument("--bus", required=True, help=BUSES)
     p.add_argument("--link", type=Path, help="symbolic link to the pseudo-terminal (slcan, serial)")
     p.add_argument("--bitrate", type=int, help="bit rate of a real CAN interface")
@@ -54,13 +57,14 @@ def make_parser() -> argparse.ArgumentParser:
     p.add_argument("--fault", action="append", default=[], metavar="SPEC", help="see below; may be repeated")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--sample-rate", type=float, default=1000.0, help="of the sensor node, Hz")
-    p.add_argument("--drive-rate", type=float, default=4000.0, help="of drive and plant, Hz")
+    p.add_argument("--drive-rate", type=float, default=2000.0, help="of drive and plant, Hz")
     p.add_argument(
         "--torque-limit", type=float, default=DriveConfig.torque_limit_Nm, help="Nm at the input pulley"
     )
     p.add_argument("--velocity-limit", type=float, default=DriveConfig.velocity_limit_rad_s, help="rad/s")
     p.add_argument("--command-timeout", type=float, default=DriveConfig.command_timeout_s, help="s; 0 = none")
     p.add_argument("--index", type=float, help="incremental motor encoder, its index at this angle (rad)")
+    p.add_argument("--fault-damping", type=float, default=0.0, help="Nms/rad; brake of a drive in fault")
     p.add_argument("--status-every", type=int, default=10, help="samples between two JointN_Status")
     p.add_argument("--duration", type=float, default=math.inf, help="end after this many seconds")
     p.add_argument("--until-stdin-closes", action="store_true", help="end when standard input closes")
@@ -77,6 +81,7 @@ def bench_config(options: argparse.Namespace) -> BenchConfig:
         velocity_limit_rad_s=options.velocity_limit,
         command_timeout_s=options.command_timeout,
         index_position_rad=options.index,
+        fault_damping_Nms_per_rad=options.fault_damping,
     )
     return BenchConfig(
         protocol=options.protocol,
@@ -91,21 +96,22 @@ def bench_config(options: argparse.Namespace) -> BenchConfig:
     )
 
 
-def plant_maker(config: Path, seed: int) -> MakePlant:
-    """Builds the plant of each joint from a joint configuration; each joint has noise of its own."""
-    from firmware_sim.plant import Plant, PlantConfig  # compiled code: only where a plant is wanted
-
-    loaded = PlantConfig.from_toml(config)
-    return lambda number: Plant(loaded, seed=seed + number)
-
-
 def main(arguments: Sequence[str] | None = None, make_plant: MakePlant | None = None) -> int:
     """Run until asked to end; returns the exit code (2 for bad input)."""
     try:
         options = make_parser().parse_args(arguments)
         config = bench_config(options)
-        faults = [parse_fault(text, options.seed + i) for i, text in enumerate(options.fault)]
-        maker = plant_maker(options.config, options.seed) if make_plant is None else make_plant
+        specs = list(options.fault)
+        maker = make_plant
+        if maker is None:
+            from firmware_sim import scenario  # compiled code: only where a plant is wanted
+
+            told = (
+                scenario.Scenario() if options.scenario is None else scenario.load_scenario(options.scenario)
+            )
+            maker = scenario.plant_maker(options.config, told, options.seed)
+            specs += told.faults
+        faults = [parse_fault(text, options.seed + i) for i, text in enumerate(specs)]
         port = open_port(options.bus, options.link, options.bitrate)
         try:
             bench = make_bench(config, maker, port, faults)

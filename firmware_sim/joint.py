@@ -20,14 +20,14 @@ from firmware_sim.wire.sensor import state_frame, status_frame
 class Timing:
     """Periods: of drive loop and plant (`step_s`), and of the sensor node (`steps_per_sample` of them)."""
 
-    step_s: float = 2.5e-4
-    steps_per_sample: int = 4
+    step_s: float = 5e-4
+    steps_per_sample: int = 2
     catch_up_s: float = 0.05
 
     def __post_init__(self) -> None:
         if not 0.0 < self.step_s <= 0.01 or self.steps_per_sample < 1:
             raise SimError(
-                f"timing: step {self.step_s} s, {self.steps_per_sample} steps a sample; 0 to 0.01 s, 1 or more"
+                f"timing: step {self.step_s} s, {self.steps_per_sample} a sample; up to 0.01 s, 1 or more"
             )
 
     @property

@@ -14,12 +14,14 @@ from firmware_sim.errors import SimError
 
 
 class SimProcess:
-    """`python -m firmware_sim ARGUMENTS` as a context manager; `where` says how to reach it (its first line).
+    """`python -m firmware_sim ARGUMENTS` as a context manager; `where` says how to reach it (its first
+    line). On a
+    machine where the plant was never run, compiling it takes the better part of a minute.
 
     The child ends when its standard input closes, hence also when this process dies.
     """
 
-    def __init__(self, arguments: Sequence[str], ready_s: float = 60.0) -> None:
+    def __init__(self, arguments: Sequence[str], ready_s: float = 240.0) -> None:
         command = [sys.executable, "-m", "firmware_sim", *arguments, "--until-stdin-closes"]
         self._child = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

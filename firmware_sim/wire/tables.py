@@ -3,15 +3,15 @@ writes them.
 
 Identifiers (11-bit) of joint N = 1…8; sensor nodes stay clear of ODrive nodes 0…47 and of MIT drive ids:
 
-| identifier       | message        | from  | what it carries                                                   |
-|------------------|----------------|-------|-------------------------------------------------------------------|
-| 0x600 + 16 (N-1) | JointN_State   | joint | angle (int32, 1e-6 rad), torque (int24, 1e-5 Nm), sequence         |
-| 0x601 + 16 (N-1) | JointN_Status  | joint | time (uint32, us), temperature (int16, 0.01 degC), flags, sequence |
-| 0x400 + 16 (N-1) | DriveN_Command | host  | targets: motor position, velocity, torque                         |
-| 0x401 + 16 (N-1) | DriveN_Control | host  | state request, control mode, kp, kd, torque limit                 |
-| 0x402 + 16 (N-1) | DriveN_State   | drive | motor position, velocity, torque, sequence                        |
-| 0x403 + 16 (N-1) | DriveN_Status  | drive | state, mode, flags, current, temperature, sequence                |
-| 0x700            | Sync           | host  | step number; stepped by sync, every joint takes one step          |
+| identifier       | message        | from  | what it carries                                               |
+|------------------|----------------|-------|---------------------------------------------------------------|
+| 0x600 + 16 (N-1) | JointN_State   | joint | angle (int32 1e-6 rad), torque (int24 1e-5 Nm), sequence      |
+| 0x601 + 16 (N-1) | JointN_Status  | joint | time (uint32 us), temp. (int16 0.01 degC), flags, sequence |
+| 0x400 + 16 (N-1) | DriveN_Command | host  | targets: motor position, velocity, torque                     |
+| 0x401 + 16 (N-1) | DriveN_Control | host  | state request, control mode, kp, kd, torque limit             |
+| 0x402 + 16 (N-1) | DriveN_State   | drive | motor position, velocity, torque, sequence                    |
+| 0x403 + 16 (N-1) | DriveN_Status  | drive | state, mode, flags, current, temperature, sequence            |
+| 0x700            | Sync           | host  | step number; stepped by sync, every joint takes one step      |
 
 Intel byte order. JointN_Status goes out with every tenth sample and at once when its flags change; its
 sequence is that of
@@ -78,7 +78,8 @@ SENSOR_FLAGS = (
 )
 DRIVE_FLAGS = (
     "bit 0 command timeout, 1 over torque, 2 over velocity, 3 position limit, 4 motor encoder, "
-    "5 index not found, 6 over temperature, 7 emergency stop, 8 bad frame, 9 started afresh, 10 bus off, 11 not calibrated"
+    "5 index not found, 6 over temperature, 7 emergency stop, 8 bad frame, "
+    "9 started afresh, 10 bus off, 11 not calibrated"
 )
 
 
@@ -239,9 +240,9 @@ def tables() -> dict[str, str]:
     from firmware_sim.wire.maker_tables import mit_table, odrive_table
 
     sensors = tuple(m for j in range(1, JOINTS + 1) for m in sensor_messages(j))
-    joint = "Sensor node and drive of a cable-driven joint, joints 1 to 8; SI units, named in each signal."
+    joint = "Sensor nodes and drives of cable-driven joints 1 to 8; SI units, named in each signal."
     odrive = "Sensor nodes of joints 1 to 8 and ODrive CANSimple nodes 1 to 8; ODrive counts in turns."
-    mit = "Sensor nodes of joints 1 to 8 and CubeMars AK80-9 drives 1 to 8 in MIT mode (replies on identifier 0)."
+    mit = "Sensor nodes of joints 1 to 8, AK80-9 drives 1 to 8 in MIT mode (replies on identifier 0)."
     return {
         "cablecomp_joint.dbc": render(joint_table(), joint),
         "cablecomp_odrive.dbc": render((*sensors, *odrive_table(JOINTS), SYNC), odrive),

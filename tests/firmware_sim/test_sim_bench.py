@@ -216,8 +216,11 @@ MAP = """[device]
 dbc = "maker.dbc"
 [device.command]
 message = "Axis{joint}_Target"
-signals = { Pos = "motor_position_target_rad", TorqueFF = "motor_torque_target_Nm", Stiff = "kp_Nm_per_rad",
-Cmd = "request" }
+[device.command.signals]
+Pos = "motor_position_target_rad"
+TorqueFF = "motor_torque_target_Nm"
+Stiff = "kp_Nm_per_rad"
+Cmd = "request"
 [device.state]
 message = "Axis{joint}_Info"
 signals = { Pos = "motor_position_rad", State = "drive_state" }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -146,7 +148,7 @@ def test_jumping_encoders_are_seen() -> None:
     assert bench.joints[0].drive.flags & DriveFlag.MOTOR_ENCODER
     _, port = run("jump:which=joint,jump=0.1,p=0.05,start=0.1")
     late = [s.joint_position_rad for t, s in states(port) if t > 0.4]
-    spikes = sum(abs(a - b) > 0.05 for a, b in zip(late, late[1:], strict=False))
+    spikes = sum(abs(a - b) > 0.05 for a, b in pairwise(late))
     assert 4 < spikes < 40
 
 
@@ -168,11 +170,7 @@ def test_silent_sensor_node_counts_on() -> None:
     _, port = run("silent:node=sensor,start=0.2,stop=0.3")
     samples = states(port)
     assert not [t for t, _ in samples if 0.2011 < t < 0.2999]
-    gap = [
-        (a, b)
-        for (_, a), (_, b) in zip(samples, samples[1:], strict=False)
-        if b.sequence != (a.sequence + 1) % 256
-    ]
+    gap = [(a, b) for (_, a), (_, b) in pairwise(samples) if b.sequence != (a.sequence + 1) % 256]
     assert len(gap) == 1
     assert (gap[0][1].sequence - gap[0][0].sequence) % 256 == 101  # a hundred samples were not heard
 
@@ -208,11 +206,13 @@ def test_a_fault_of_one_joint_leaves_the_other_alone() -> None:
 # ---- text ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["fly", "drop:p", "drop:q=1", "drop:p=often", "drop:p=2", "drop:start=2,stop=1", "drop:direction=up", "stuck:which=eye",
-     "offset:channel=mood", "silent:node=all", "saturate:which=host"],
-)  # fmt: skip
+WRONG = (
+    "fly drop:p drop:q=1 drop:p=often drop:p=2 drop:start=2,stop=1 drop:direction=up stuck:which=eye "
+    "offset:channel=mood silent:node=all saturate:which=host"
+)
+
+
+@pytest.mark.parametrize("text", WRONG.split())
 def test_wrong_specifications_are_one_line(text: str) -> None:
     with pytest.raises(SimError) as caught:
         parse_fault(text)

@@ -30,10 +30,8 @@ UDP = "udp_multicast:239.74.163.7:43907"
 
 
 @contextmanager
-def served(bus: str, stepped: bool = True, link: Path | None = None, faults: tuple[str, ...] = (), **options: Any) -> Iterator[BenchThread]:  # fmt: skip
-    port = open_port(bus, link)
-    parsed = [parse_fault(text) for text in faults]
-    bench = make_bench(BenchConfig(**options), lambda number: TwoMass(), port, parsed)
+def served(bus: str, stepped: bool = True, link: Path | None = None) -> Iterator[BenchThread]:
+    bench = make_bench(BenchConfig(), lambda number: TwoMass(), open_port(bus, link))
     with BenchThread(bench, stepped=stepped) as thread:
         yield thread
 
@@ -49,6 +47,12 @@ def until(told: Callable[[], Any], wanted: Callable[[Any], bool], seconds: float
         if wanted(item):
             return heard
     raise AssertionError(f"not heard within {seconds} s; heard {heard[-5:]}")
+
+
+def read_to_the_end(line: serial.Serial) -> None:
+    """Read on until the line breaks."""
+    for _ in range(5):
+        line.read(4096)
 
 
 def can_conversation(bus: can.BusABC) -> None:
@@ -207,8 +211,7 @@ def test_cable_pulled_and_plugged_again(tmp_path: Path) -> None:
             bench.tick(0.025)
             assert not link.exists()
             with pytest.raises((serial.SerialException, OSError)):
-                for _ in range(5):
-                    line.read(4096)
+                read_to_the_end(line)
         bench.tick(0.045)
         assert link.exists()
         with serial.Serial(str(link), timeout=0.2) as line:

@@ -83,7 +83,7 @@ def test_logger_records_and_player_replays(tmp_path: Path, suffix: str) -> None:
             if m.arbitration_id == 1:  # the host's side of the recording drives a second joint
                 player.send(m)
                 bench.pump()
-        again = [m for m in iter(lambda: ear.recv(0.0), None)]
+        again = list(iter(lambda: ear.recv(0.0), None))
         assert bench.joints[0].drive.state is DriveState.ENABLED
     told = [[bytes(m.data) for m in listened if m.arbitration_id == 0x600] for listened in (heard, again)]
     assert len(told[0]) == 60
