@@ -10,6 +10,8 @@ import numpy as np
 from cablecomp.mechanics.closed_forms_wrap import Array
 
 _ROUNDS = 300
+_NEWTON = 2.0**-33  # after a Newton step this small, relative to x, the error is its square: rounding
+_BISECTION = 2.0**-51
 
 
 class ValueSlope(NamedTuple):
@@ -28,21 +30,20 @@ def solve_increasing(function: Callable[[Array], ValueSlope], low: Array, high: 
     low, high = np.array(low, dtype=float), np.array(high, dtype=float)
     x = 0.5 * (low + high)
     last = high - low
+    done = np.zeros(x.shape, dtype=bool)
     for _ in range(_ROUNDS):
         value, slope = function(x)
         low = np.where(value <= 0.0, x, low)
         high = np.where(value >= 0.0, x, high)
-        middle = 0.5 * (low + high)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             step = -value / slope
             newton = x + step
-            # A step of a few ulp may round onto the bracket's edge; it is taken all the same.
             good = np.isfinite(newton) & (newton >= low) & (newton <= high) & (2.0 * np.abs(step) <= last)
-        following = np.where(good, newton, middle)
-        following = np.where(value == 0.0, x, following)
+        following = np.where(good, newton, 0.5 * (low + high))
         last = np.where(good, np.abs(step), 0.5 * (high - low))
         moved = np.abs(following - x)
-        x = following
-        if np.all(moved <= 2.0**-52 * np.abs(x)):
+        x = np.where(done | (value == 0.0), x, following)
+        done |= (value == 0.0) | (moved <= np.where(good, _NEWTON, _BISECTION) * np.abs(x))
+        if np.all(done):
             break
     return x
