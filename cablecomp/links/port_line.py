@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from typing import Any, Protocol
 
+import can
 import serial
 
 from cablecomp.errors import DeviceError
@@ -16,12 +17,18 @@ from cablecomp.links.records import BusState
 
 _MAX_PENDING = 65_536
 _CHUNK = 65_536
+_GONE = (BusState.CLOSED, BusState.LOST)
 
 
 class Reader(Protocol):
     """Cuts bytes into frames."""
 
     invalid: int
+    overflows: int
+    flags: int
+
+    def question(self) -> bytes:
+        """Bytes to ask the far end for its state, if there is a reason to."""
 
     def feed(self, chunk: bytes, sink: Sink) -> int:
         """Take bytes, hand whole frames to `sink`, return how many."""
@@ -64,7 +71,7 @@ class LinePort(PortBase):
     def drain(self, sink: Sink, limit: int) -> int:
         """See `Port.drain`; a line is read whole, so `limit` only ends the reading of further chunks."""
         found = 0
-        while self.state == BusState.ACTIVE:
+        while self.state not in _GONE:
             chunk = self._read()
             if not chunk:
                 break
@@ -73,8 +80,28 @@ class LinePort(PortBase):
                 self.counters.backlogs += 1
                 break
         self.counters.invalid = self._reader.invalid
-        self.counters.overflows = getattr(self._reader, "refused", 0)
+        self.counters.overflows = self._reader.overflows
+        if found:
+            self.heard()
+        question = self._reader.question()
+        if question:
+            self._pending += question
+            self._flush()
+        if self._reader.flags >= 0:
+            self._note_flags()
         return found
+
+    def _note_flags(self) -> None:
+        """Take an slcan adapter's status flags, once: bit 7 bus error, bit 5 error passive, bit 3 data
+        overrun."""
+        flags, self._reader.flags = self._reader.flags, -1
+        self.counters.error_frames += flags != 0
+        if flags & 0x80:
+            self.state, self.fault = BusState.OFF, "the adapter reports a bus error"
+        elif flags & 0x20:
+            self.state, self.fault = BusState.PASSIVE, "the adapter is error-passive"
+        else:
+            self.state, self.fault = BusState.ACTIVE, ""
 
     def _read(self) -> bytes:
         try:
@@ -90,7 +117,7 @@ class LinePort(PortBase):
 
     def send(self, identifier: int, data: bytes) -> bool:
         """See `Port.send`."""
-        if self.state != BusState.ACTIVE:
+        if self.state in _GONE:
             self.counters.send_failures += 1
             return False
         packed = self._pack(identifier, data)
@@ -127,11 +154,11 @@ class LinePort(PortBase):
         """See `Port.close`."""
         if self._shut is not None:
             shut, self._shut = self._shut, None
-            if self.state == BusState.ACTIVE:
+            if self.state not in _GONE:
                 self._flush()
             try:
                 shut()
-            except (OSError, serial.SerialException) as error:
+            except (OSError, serial.SerialException, can.CanError) as error:
                 self.fault = f"closing failed ({error})"
         self._fd = -1
         self.state = BusState.CLOSED
@@ -159,7 +186,15 @@ def slcan_port(bus: Callable[[], Any]) -> LinePort:
 
     def attach() -> tuple[Any, Callable[[], None]]:
         opened = bus()
-        return opened.serialPortOrig, opened.shutdown
+
+        def shut() -> None:
+            # python-can first tells the adapter to close its channel, which fails once the cable is out.
+            try:
+                opened.shutdown()
+            finally:
+                opened.serialPortOrig.close()
+
+        return opened.serialPortOrig, shut
 
     return LinePort(attach, slcan_frames.pack_line, slcan_frames.LineReader())
 

@@ -78,11 +78,17 @@ class RecordReader:
     length); empty pieces are not counted, so extra zeros may be used to flush a line.
     """
 
-    __slots__ = ("_rest", "invalid")
+    __slots__ = ("_rest", "flags", "invalid", "overflows")
 
     def __init__(self) -> None:
         self._rest = b""
+        self.flags = -1
         self.invalid = 0
+        self.overflows = 0
+
+    def question(self) -> bytes:
+        """A serial line is asked nothing."""
+        return b""
 
     def feed(self, chunk: bytes, sink: Sink) -> int:
         """Take bytes; call `sink(identifier, data)` for every whole record; return how many there were."""

@@ -51,21 +51,24 @@ class LineReader:
     """Cuts a byte stream into slcan lines; frames go to `sink`, acknowledgements are passed over, the rest is
     counted.
 
-    `refused` counts BEL answers (the adapter could not send, or did not understand), `invalid` lines that are
-    no frame.
+    `overflows` counts BEL answers (the adapter could not send, or did not understand), `invalid` lines that
+    are no frame. `flags`: the adapter's last answer to `F` (bit 7 bus error, bit 5 error passive; -1 = no
+    answer).
     """
 
-    __slots__ = ("_rest", "invalid", "refused")
+    __slots__ = ("_asked", "_rest", "flags", "invalid", "overflows")
 
     def __init__(self) -> None:
         self._rest = b""
+        self._asked = 0
         self.invalid = 0
-        self.refused = 0
+        self.overflows = 0
+        self.flags = -1
 
     def feed(self, chunk: bytes, sink: Sink) -> int:
         """Take bytes; call `sink(identifier, data)` for every frame; return how many there were."""
         if b"\a" in chunk:
-            self.refused += chunk.count(b"\a")
+            self.overflows += chunk.count(b"\a")
             chunk = chunk.replace(b"\a", b"\r")
         lines = (self._rest + chunk).split(b"\r")
         self._rest = lines.pop()[-2 * MAX_LINE :]
@@ -75,6 +78,22 @@ class LineReader:
             if frame is not None:
                 sink(*frame)
                 found += 1
-            elif line not in (b"", b"z", b"Z") and line[:1] not in b"VNF":
-                self.invalid += 1
+            elif line not in (b"", b"z", b"Z"):
+                self._take_answer(line)
         return found
+
+    def _take_answer(self, line: bytes) -> None:
+        try:
+            if line[:1] == b"F" and len(line) == 3:
+                self.flags = int(line[1:], 16)
+                return
+        except ValueError:
+            pass
+        self.invalid += line[:1] not in b"VN"
+
+    def question(self) -> bytes:
+        """What to ask the adapter next: its flags, after it has refused something; else nothing."""
+        if self.overflows == self._asked:
+            return b""
+        self._asked = self.overflows
+        return b"F\r"

@@ -52,4 +52,15 @@ def test_refusals_and_noise_are_counted() -> None:
     chunk = b"z\r\a\aV1013\rt1zz\rt0011AA\r"
     reader.feed(chunk, lambda identifier, data: out.append((identifier, data)))
     assert out == [(1, b"\xaa")]
-    assert (reader.refused, reader.invalid) == (2, 1)
+    assert (reader.overflows, reader.invalid) == (2, 1)
+
+
+def test_a_refusal_leads_to_one_question_and_its_answer() -> None:
+    reader = LineReader()
+    assert reader.question() == b""
+    reader.feed(b"\a", lambda identifier, data: None)
+    assert (reader.question(), reader.question()) == (b"F\r", b"")
+    reader.feed(b"F80\r", lambda identifier, data: None)
+    assert (reader.flags, reader.invalid) == (0x80, 0)
+    reader.feed(b"F8x\r", lambda identifier, data: None)
+    assert (reader.flags, reader.invalid) == (0x80, 1)

@@ -1,0 +1,291 @@
+"""Both ends of the wire, written apart from the same manuals, meet: every protocol over every kind of
+wire."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cablecomp.errors import DeviceError
+from cablecomp.links import BusLink, BusState, DriveState, Mode, MotorCommand, Request, load_link
+from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE, MOTOR_VELOCITY
+from firmware_sim.bench import Bench
+from firmware_sim.build import BenchConfig, make_bench
+from firmware_sim.errors import SimError
+from firmware_sim.faults import parse_fault
+from firmware_sim.firmware import DriveConfig
+from firmware_sim.plantlike import Readings
+from firmware_sim.ports import open_port
+
+CONFIGS = Path(__file__).parents[2] / "configs" / "links"
+WIRES = ("virtual", "udp_multicast", "slcan", "serial")
+PROTOCOLS = {
+    "mit": ("mit-virtual.toml", {"protocol": "mit"}),
+    "damiao": ("damiao-socketcan.toml", {"protocol": "mit", "model": "DM4310", "reply_id": 0x11}),
+    "odrive": ("odrive-virtual.toml", {"protocol": "odrive"}),
+    "dbc": ("dbc-virtual.toml", {"protocol": "dbc"}),
+}
+# Half a count of what each wire carries: motor position in rad, motor velocity in rad/s, motor torque in Nm
+RESOLUTION = {
+    "mit": (25 / 65535, 100 / 4095, 36 / 4095),
+    "damiao": (25 / 65535, 60 / 4095, 20 / 4095),
+    "odrive": (2e-6, 2e-5, 1e-5),
+    "dbc": (1e-6, 0.025, 1e-3),
+}
+
+
+class Spring:
+    """A motor on a spring to a joint that carries a load; only what a wire test needs."""
+
+    def __init__(self, number: int) -> None:
+        self.time_s = 0.0
+        self.motor = self.rate = 0.0
+        self.load_Nm = 0.5 + 0.25 * number
+
+    def step(self, dt_s: float, motor_torque_command_Nm: float, /) -> Readings:
+        """One semi-implicit Euler step of `J q'' = u + M - d q'`."""
+        self.rate += dt_s * (motor_torque_command_Nm + self.load_Nm - 0.5 * self.rate) / 0.02
+        self.motor += dt_s * self.rate
+        self.time_s += dt_s
+        joint = self.motor + self.load_Nm / 50.0
+        return Readings(
+            self.time_s,
+            self.motor,
+            self.rate,
+            joint,
+            self.rate,
+            self.load_Nm,
+            motor_torque_command_Nm,
+            motor_torque_command_Nm / 0.1,
+            30.0,
+        )
+
+
+def terminal_of(bench: Bench) -> Any:
+    """The port behind the faults."""
+    return getattr(bench.port, "port", bench.port)
+
+
+class Meeting:
+    """A simulated bench, stepped by commands, and a link to it."""
+
+    def __init__(self, protocol: str, wire: str, joints: int = 1, faults: tuple[str, ...] = ()) -> None:
+        name, options = PROTOCOLS[protocol]
+        if joints > 1:
+            name = "mit-virtual-8.toml"
+        bus = {
+            "virtual": f"virtual:{uuid.uuid4().hex}",
+            "udp_multicast": f"udp_multicast:239.74.163.2:{20000 + os.getpid() % 20000}",
+        }.get(wire, wire)
+        config = BenchConfig(joints=joints, drive=DriveConfig(torque_limit_Nm=8.0), **options)
+        self.bench: Bench = make_bench(config, Spring, open_port(bus), [parse_fault(f, 3) for f in faults])
+        where = self.bench.port.describe()
+        reach = {k: v for k, v in where.items() if k in ("port", "hop_limit")}
+        base = load_link(CONFIGS / name)
+        self.link = BusLink(base.redirect(where["interface"], where["channel"], **reach))
+        self.link.open()
+        self.now_s = 0.0
+        if wire == "slcan":
+            self.until(lambda: terminal_of(self.bench).adapter.open)
+
+    def until(self, reached: Callable[[], object]) -> None:
+        """Let both ends work until something is reached; the kernel hands bytes over in its own time."""
+        for _ in range(2000):
+            self.bench.pump()
+            self.link.poll(self.now_s)
+            if reached():
+                return
+            self.bench.port.wait(0.001)
+        raise AssertionError(f"not reached: {self.link.status()}")
+
+    def cycle(self, command: MotorCommand) -> None:
+        """One command to every joint, one step of each, and all that they tell."""
+        self.now_s += 1e-3
+        wanted = [j.messages for j in self.link.joints]
+        before = [sum(m.received for m in messages) for messages in wanted]
+        steps = self.bench.steps
+        for joint in range(len(self.link.joints)):
+            self.link.send(joint, command)
+        self.until(
+            lambda: (
+                self.bench.steps - steps == len(wanted)
+                and all(sum(m.received for m in w) >= b + 2 for w, b in zip(wanted, before, strict=True))
+            )
+        )
+
+    def close(self) -> None:
+        self.link.close()
+        self.bench.close()
+
+
+@pytest.fixture
+def meet() -> Iterator[Any]:
+    made: list[Meeting] = []
+
+    def make(*args: Any, **options: Any) -> Meeting:
+        try:
+            made.append(Meeting(*args, **options))
+        except (SimError, DeviceError) as error:
+            if "udp_multicast" in args:
+                pytest.skip(f"no multicast here: {error}")
+            raise
+        return made[-1]
+
+    yield make
+    for meeting in made:
+        meeting.close()
+
+
+@pytest.mark.parametrize("wire", WIRES)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
+    meeting = meet(protocol, wire)
+    link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
+    mode = Mode.POSITION if protocol == "odrive" else Mode.IMPEDANCE
+    assert link.request(0, Request.CLEAR_FAULTS)
+    assert link.request(0, Request.ENABLE, mode)
+    meeting.until(lambda: device.drive.state.name == "ENABLED")
+    gains = (None, None) if protocol in ("odrive", "dbc") else (60.0, 2.0)
+    command = MotorCommand(0.4, 0.0, -device.plant.load_Nm, *gains)
+    tolerance = RESOLUTION[protocol]
+    for _ in range(120):
+        meeting.cycle(command)
+        truth = device.truth
+        assert joint.values[MOTOR_POSITION] == pytest.approx(truth.motor_position_rad, abs=tolerance[0])
+        assert joint.values[MOTOR_VELOCITY] == pytest.approx(truth.motor_velocity_rad_s, abs=tolerance[1])
+        assert joint.values[JOINT_POSITION] == pytest.approx(truth.joint_position_rad, abs=0.51e-6)
+        assert joint.values[JOINT_TORQUE] == pytest.approx(truth.joint_torque_Nm, abs=0.51e-5)
+    assert joint.values[MOTOR_TORQUE] == pytest.approx(device.truth.motor_torque_Nm, abs=0.05)
+    told = device.drive.setpoint
+    assert told.position_rad == pytest.approx(0.4, abs=tolerance[0])
+    assert told.torque_Nm == pytest.approx(command.torque_Nm, abs=max(tolerance[2], 5e-4))
+    if protocol != "odrive":
+        assert told.kp_Nm_per_rad == pytest.approx(200.0 if protocol == "dbc" else 60.0, abs=500 / 4095)
+        assert told.kd_Nms_per_rad == pytest.approx(2.0, abs=5 / 4095)
+    assert joint.device_s[JOINT_POSITION] == pytest.approx(device.time_s, abs=0.0111)
+    assert joint.state == DriveState.ENABLED
+    status = link.status()
+    assert (status.bus, status.invalid, status.lost, status.repeated, status.reordered) == (
+        BusState.ACTIVE,
+        0,
+        0,
+        0,
+        0,
+    )
+    assert link.request(0, Request.DISABLE)
+    meeting.until(lambda: device.drive.state.name == "DISABLED")
+    assert link.stop()
+    meeting.until(lambda: device.drive.state.name in ("DISABLED", "FAULT"))
+
+
+def test_eight_joints_on_one_bus(meet: Any) -> None:
+    meeting = meet("mit", "virtual", joints=8)
+    for n in range(8):
+        meeting.link.request(n, Request.ENABLE)
+    meeting.until(lambda: all(j.drive.state.name == "ENABLED" for j in meeting.bench.joints))
+    for _ in range(20):
+        meeting.cycle(MotorCommand(0.1))
+    for joint, device in zip(meeting.link.joints, meeting.bench.joints, strict=True):
+        assert joint.values[JOINT_TORQUE] == pytest.approx(0.5 + 0.25 * device.number, abs=1e-5)
+        assert joint.values[MOTOR_POSITION] == pytest.approx(device.truth.motor_position_rad, abs=4e-4)
+    assert meeting.link.status().ignored == 0
+
+
+def test_frames_that_the_wire_loses_are_counted_one_by_one(meet: Any) -> None:
+    meeting = meet("mit", "virtual", faults=("drop:p=0.3,direction=tx,id=0x600,mask=0x7FF",))
+    meeting.link.request(0, Request.ENABLE)
+    joint = meeting.link.joints[0]
+    for k in range(300):
+        meeting.now_s = 1e-3 * k
+        meeting.link.send(0, MotorCommand())
+        meeting.bench.pump()
+        meeting.link.poll(meeting.now_s)
+    state = next(m for m in joint.messages if m.name.endswith("Joint1_State"))
+    first_to_last = state.received + state.lost
+    assert state.received < 260
+    assert 290 <= first_to_last <= 300
+    assert state.lost == meeting.link.status().lost
+    assert (state.repeated, state.reordered, state.restarts) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "field"), [("repeat:p=0.2", "repeated"), ("reorder:spread=0.004", "reordered")]
+)
+def test_repeated_and_reordered_frames_never_turn_time_back(meet: Any, spec: str, field: str) -> None:
+    meeting = meet("mit", "virtual", faults=(f"{spec},direction=tx,id=0x600,mask=0x7FF",))
+    meeting.link.request(0, Request.ENABLE)
+    node = next(m for m in meeting.link.joints[0].messages if m.name.endswith("Joint1_State"))
+    newest = -1
+    for k in range(300):
+        meeting.link.send(0, MotorCommand())
+        meeting.bench.pump()
+        meeting.link.poll(1e-3 * k)
+        if node.sequence >= 0:
+            assert newest < 0 or (node.sequence - newest) % 256 < 128
+            newest = node.sequence
+    assert getattr(meeting.link.status(), field) > 10
+
+
+def test_a_pulled_cable_is_a_lost_bus(meet: Any) -> None:
+    for wire in ("serial", "slcan"):
+        meeting = meet("mit", wire)
+        meeting.link.request(0, Request.ENABLE)
+        meeting.cycle(MotorCommand())
+        meeting.bench.port.unplug()
+        meeting.link.send(0, MotorCommand())
+        meeting.link.poll(1.0)
+        assert meeting.link.status().bus == BusState.LOST
+        assert not meeting.link.stop()
+        assert meeting.link.joints[0].ages(1.0).joint_position_s > 0.9
+        meeting.bench.port.plug()
+        meeting.link.close()
+        where = meeting.bench.port.describe()
+        meeting.link = BusLink(meeting.link.config.redirect(where["interface"], where["channel"]))
+        meeting.link.open()
+        meeting.cycle(MotorCommand())
+
+
+def test_bus_off_behind_an_slcan_adapter(meet: Any) -> None:
+    meeting = meet("mit", "slcan", faults=("bus_off:start=0.02,stop=0.04",))
+    link, port = meeting.link, meeting.bench.port
+    link.request(0, Request.ENABLE)
+    for _ in range(15):
+        meeting.cycle(MotorCommand())
+    port.poll(0.03)
+    link.send(0, MotorCommand())
+
+    def told() -> bool:
+        port.poll(0.03)
+        link.poll(1.0)
+        return link.status().bus == BusState.OFF
+
+    for _ in range(2000):
+        if told():
+            break
+        port.wait(0.001)
+    assert link.status().bus == BusState.OFF
+    assert "bus error" in link.status().fault
+    assert link.status().overflows >= 1
+
+
+def test_a_sensor_node_that_restarts_is_followed_again(meet: Any) -> None:
+    meeting = meet("mit", "virtual", faults=("reset:start=0.15,node=sensor,boot=0.02",))
+    meeting.link.request(0, Request.ENABLE)
+    joint = meeting.link.joints[0]
+    oldest = 0.0
+    for k in range(300):
+        now = 1e-3 * k
+        meeting.link.send(0, MotorCommand())
+        meeting.bench.pump()
+        meeting.link.poll(now)
+        if k > 5:
+            oldest = max(oldest, joint.age_s(JOINT_POSITION, now))
+    assert 0.015 < oldest < 0.03
+    assert joint.age_s(JOINT_POSITION, 0.299) < 1.5e-3
+    status = meeting.link.status()
+    assert status.restarts == 1 or status.lost > 0
