@@ -37,13 +37,18 @@ class SimProcess:
     def _first_line(self, ready_s: float) -> dict[str, Any]:
         out = self._child.stdout
         assert out is not None
-        line = out.readline() if select.select([out], [], [], ready_s)[0] else ""
+        heard = bool(select.select([out], [], [], ready_s)[0])
+        line = out.readline() if heard else ""
         if not line:
-            code = self._child.poll()
-            said = "" if code is None or self._child.stderr is None else self._child.stderr.read().strip()
+            said = self._last_words() if heard else ""
             raise SimError(said or f"the simulated joint was not ready after {ready_s} s; try again")
         where: dict[str, Any] = json.loads(line)
         return where
+
+    def _last_words(self) -> str:
+        """What a child that closed its output said on its error stream."""
+        self._child.wait(10.0)
+        return "" if self._child.stderr is None else self._child.stderr.read().strip()
 
     @property
     def alive(self) -> bool:

@@ -49,8 +49,7 @@ class DriveFlag(IntFlag):
     EMERGENCY_STOP = 1 << 7
     BAD_FRAME = 1 << 8
     STARTED_AFRESH = 1 << 9
-    BUS_OFF = 1 << 10
-    NOT_CALIBRATED = 1 << 11
+    NOT_CALIBRATED = 1 << 10
 
 
 FAULTS = (
@@ -72,9 +71,6 @@ class SensorFlag(IntFlag):
     TORQUE_SATURATED = 1 << 2
     OVER_TEMPERATURE = 1 << 3
     STARTED_AFRESH = 1 << 4
-    INDEX_NOT_FOUND = 1 << 5
-    BUS_ERRORS = 1 << 6
-    INTERNAL = 1 << 7
 
 
 class Setpoint(NamedTuple):

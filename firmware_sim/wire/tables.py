@@ -74,12 +74,12 @@ REQUESTS = (
 MODES = ((0, "torque"), (1, "velocity"), (2, "position"), (3, "impedance"))
 SENSOR_FLAGS = (
     "bit 0 joint encoder lost, 1 joint encoder jumped, 2 torque sensor saturated, 3 over temperature, "
-    "4 started afresh since the last status, 5 index not found yet, 6 bus errors seen, 7 internal"
+    "4 started afresh; the others are 0"
 )
 DRIVE_FLAGS = (
     "bit 0 command timeout, 1 over torque, 2 over velocity, 3 position limit, 4 motor encoder, "
     "5 index not found, 6 over temperature, 7 emergency stop, 8 bad frame, "
-    "9 started afresh, 10 bus off, 11 not calibrated"
+    "9 started afresh, 10 not calibrated"
 )
 
 

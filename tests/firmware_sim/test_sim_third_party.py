@@ -3,8 +3,10 @@ that ship."""
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import can
@@ -123,3 +125,79 @@ def test_a_refused_frame_is_counted_not_fatal() -> None:
     bench.tick(0.01)
     assert port.errors > 10
     bench.close()
+
+
+def multicast(port: int) -> list[str]:
+    """Bus options of python-can's command lines."""
+    group = ["-i", "udp_multicast", "-c", "239.74.163.8"]
+    return [*group, "--bus-kwargs", f"port={port}", "hop_limit=0", "fd=False"]
+
+
+def udp(port: int) -> can.BusABC:
+    return can.Bus(interface="udp_multicast", channel="239.74.163.8", port=port, hop_limit=0, fd=False)
+
+
+def waiting(port: int) -> int:
+    """Bytes that lie unread in any socket on this UDP port."""
+    rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    return sum(int(row[4].split(":")[1], 16) for row in rows if int(row[1].split(":")[1], 16) == port)
+
+
+def multicast_works() -> bool:
+    if not Path("/proc/net/udp").exists():
+        return False
+    try:
+        with udp(43910) as bus:
+            bus.send(message(1, b""))
+        return True
+    except (OSError, can.CanError):
+        return False
+
+
+@pytest.mark.skipif(not multicast_works(), reason="needs Linux and a route for multicast")
+def test_the_command_lines_of_logger_and_player_across_processes(tmp_path: Path) -> None:
+    path = tmp_path / "bus.log"
+    logger = subprocess.Popen(
+        [sys.executable, "-u", "-m", "can.logger", "-f", str(path), *multicast(43911)],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    try:
+        port = open_port("udp_multicast:239.74.163.8:43911")
+        with make_bench(BenchConfig(), lambda number: TwoMass(), port) as bench, udp(43911) as host:
+            assert logger.stdout is not None
+            logger.stdout.readline()  # "Connected to …"
+            end = time.monotonic() + 10.0
+            while not path.exists() and time.monotonic() < end:
+                port.wait(0.02)
+            host.send(message(1, ENTER))
+            for _ in range(40):
+                host.send(message(1, HOLD))
+            end = time.monotonic() + 5.0
+            while bench.steps < 40 and time.monotonic() < end:
+                port.wait(0.1)
+                bench.pump()
+            time_of_recording = bench.joints[0].truth
+            for _ in range(20):
+                host.send(message(0x7FF, b""))  # whatever the logger leaves behind is among these
+            end = time.monotonic() + 10.0
+            while waiting(43911) and time.monotonic() < end:
+                bench.pump()
+                while host.recv(0.0) is not None:
+                    pass
+    finally:
+        logger.send_signal(signal.SIGINT)
+        logger.wait(10.0)
+        logger.stdout.close()  # type: ignore[union-attr]
+    text = path.read_text()
+    assert text.count(" 600#") == 40
+    only_host = tmp_path / "host.log"
+    only_host.write_text("".join(line for line in text.splitlines(keepends=True) if " 001#" in line))
+    port = open_port("udp_multicast:239.74.163.8:43912")
+    with make_bench(BenchConfig(), lambda number: TwoMass(), port) as bench:
+        player = [sys.executable, "-m", "can.player", *multicast(43912), "--", str(only_host)]
+        subprocess.run(player, timeout=60, check=True, capture_output=True)
+        end = time.monotonic() + 5.0
+        while bench.steps < 40 and time.monotonic() < end:
+            port.wait(0.1)
+            bench.pump()
+        assert bench.joints[0].truth == time_of_recording
