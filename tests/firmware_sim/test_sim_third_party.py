@@ -3,9 +3,15 @@ that ship."""
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
+import os
+import select
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -201,3 +207,37 @@ def test_the_command_lines_of_logger_and_player_across_processes(tmp_path: Path)
             port.wait(0.1)
             bench.pump()
         assert bench.joints[0].truth == time_of_recording
+
+
+@pytest.mark.skipif(not multicast_works(), reason="needs Linux and a route for multicast")
+def test_cantools_monitor_shows_the_bus_with_the_shipped_table() -> None:
+    master, slave = os.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
+    table = str(LINKS / TABLES["mit"])
+    monitor = subprocess.Popen(
+        [sys.executable, "-m", "cantools", "monitor", "--single-line", *multicast(43913), "--", table],
+        stdin=slave, stdout=slave, stderr=slave, env={**os.environ, "TERM": "xterm"},
+    )  # fmt: skip
+    os.close(slave)
+    screen = b""
+    try:
+        port = open_port("udp_multicast:239.74.163.8:43913")
+        with make_bench(BenchConfig(), lambda number: TwoMass(), port) as bench:
+            end, now = time.monotonic() + 20.0, 0.0
+            while b"joint_position_rad" not in screen and time.monotonic() < end:
+                now += 0.01
+                bench.tick(now)
+                if select.select([master], [], [], 0.01)[0]:
+                    screen += os.read(master, 65536)
+        os.write(master, b"q")
+        end = time.monotonic() + 10.0
+        while monitor.poll() is None and time.monotonic() < end:
+            if select.select([master], [], [], 0.05)[0]:
+                with contextlib.suppress(OSError):  # the terminal's last reader is gone
+                    os.read(master, 65536)
+    finally:
+        monitor.kill()
+        monitor.wait()
+        os.close(master)
+    assert b"Joint1_State(" in screen
+    assert b"joint_position_rad" in screen
