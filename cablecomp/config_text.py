@@ -1,0 +1,61 @@
+"""A joint configuration back to TOML: what is written reads back as the same configuration."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.errors import InputError
+
+
+def joint_toml(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
+    """TOML text of a joint; keys that stand at their default of None are left out, floats keep every
+    digit."""
+    data = config.model_dump(by_alias=True, exclude_none=True)
+    lines = [f"# {line}" for line in comments]
+    lines += [f"{key} = {_value(data[key])}" for key in ("schema", "name")]
+    drive = dict(data["drive"])
+    stages = drive.pop("stage")
+    lines += _table("drive", drive)
+    for stage in stages:
+        lines += _table("drive.stage", stage, array=True)
+    for name in ("tolerance", "sensors", "observer", "limits"):
+        if data.get(name):
+            lines += _table(name, data[name])
+    for effect in config.effect:
+        lines += _table("effect", {"id": effect.id, **effect.parameters}, array=True)
+    return "\n".join(lines) + "\n"
+
+
+def write_joint(path: Path, config: JointConfig, comments: tuple[str, ...] = ()) -> None:
+    """Write a joint configuration; raises InputError if the place does not take it."""
+    try:
+        path.write_text(joint_toml(config, comments), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+
+
+def _table(name: str, values: dict[str, Any], array: bool = False) -> list[str]:
+    head = f"\n[[{name}]]" if array else f"\n[{name}]"
+    return [head, *(f"{_key(key)} = {_value(value)}" for key, value in values.items())]
+
+
+def _key(key: str) -> str:
+    bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
+    return key if bare else json.dumps(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_value(v) for v in value)}]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    return json.dumps(str(value), ensure_ascii=False)

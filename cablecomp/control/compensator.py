@@ -1,0 +1,273 @@
+"""The compensator: one sample and one reference in, one motor command out.
+
+Position mode: motor target `q_in = (q_ref - deflection(expected load)) / N`, N = product of r/R; rigid drive:
+q_out = N q_in; the motor holds the joint's load with the torque -N M. Force mode: the motor goes where the
+drive, between the measured joint position and the motor, carries the load wanted: `q_in = (q_out -
+deflection(wanted load)) / N`.
+"""
+
+from __future__ import annotations
+
+from math import isfinite, prod, tanh
+from typing import NamedTuple, Protocol
+
+from cablecomp.config import JointConfig
+from cablecomp.control.command import FULL, Command, Feed, Reference
+from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
+from cablecomp.control.shaping import Bump, LoadAhead, Slope
+from cablecomp.errors import InputError
+from cablecomp.signals import NAN, Estimate, Sample
+
+
+class ObserverLike(Protocol):
+    """What the compensator needs of an observer."""
+
+    def step(self, sample: Sample) -> Estimate:
+        """Take a sample in."""
+
+    def peek(self, sample: Sample) -> Estimate:
+        """Say what would be, commit nothing."""
+
+    def step_inverse(self, sample: Sample) -> Estimate:
+        """Take a sample in, the load being found from both encoders."""
+
+
+class Gains(NamedTuple):
+    """Gains and filters in use, all known numbers (rad, Nm, s, Hz)."""
+
+    load_filter_Hz: float
+    load_lead_s: float
+    joint_feedback_per_s: float
+    force_feedback_per_s: float
+    motor_integral_per_s: float
+
+
+DEFAULT_GAINS = Gains(20.0, 0.0, 0.0, 4.0, 10.0)
+"""Slow and safe for a stiff, light joint; `design_loop` gives the joint's own."""
+
+
+def gains_of(options: CompensatorOptions, designed: Gains = DEFAULT_GAINS) -> Gains:
+    """The options' own gains; those left open are taken from `designed`."""
+    return Gains(
+        *(d if (own := getattr(options, name)) is None else own for name, d in designed._asdict().items())
+    )
+
+
+def ratio_of(config: JointConfig) -> float:
+    """Joint angle per motor angle of the rigid drive: N = product of r/R over the stages."""
+    return prod(s.input_radius_m / s.output_radius_m for s in config.drive.stage)
+
+
+class Compensator:
+    """Controls one joint; the state is in the open attributes, time comes with the sample.
+
+    `step` takes the sample of now and the reference of the next instant (one period on). NaN in
+    `sample.joint_position_rad` = no joint encoder: feedback then rests. After `enable`, `disable` or a change
+    of mode the target runs on without a step and blends over within `blend_s`.
+    """
+
+    def __init__(
+        self,
+        config: JointConfig,
+        options: CompensatorOptions,
+        period_s: float,
+        observer: ObserverLike,
+        *,
+        gains: Gains = DEFAULT_GAINS,
+        motor: MotorModel | None = None,
+    ) -> None:
+        if not period_s > 0.0:
+            raise InputError(f"period_s is {period_s}; a time above 0 is accepted")
+        self.options = options
+        self.gains = gains_of(options, gains)
+        self.observer = observer
+        self.ratio = ratio_of(config)
+        self.period_s = period_s
+        self.active = options.feed_forward is not FeedForward.NONE
+        self.load = LoadAhead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
+        self.bump = Bump(options.blend_s, period_s)
+        self.deflection_slope = Slope(options.velocity_filter_Hz, period_s)
+        self.joint_slope = Slope(options.velocity_filter_Hz, period_s)
+        self.motor_trim_rad = 0.0
+        self.joint_trim_rad = 0.0
+        self.force_trim_Nm = 0.0
+        self.deflection_used_rad = 0.0
+        self.target_rad = NAN
+        self.estimate: Estimate | None = None
+        self._motor = MotorModel() if motor is None else motor
+        self._reference: Reference | None = None
+        self._switch = True
+        self._velocity = 0.0
+        self._linear = options.linear_stiffness_Nm_per_rad
+        self._from_sensor = options.load != "reference"
+
+    def enable(self) -> None:
+        """Let feed-forward act from the next step on, without a step in the target."""
+        self._switch = self._switch or not self.active
+        self.active = True
+
+    def disable(self) -> None:
+        """Let feed-forward rest from the next step on, without a step in the target."""
+        self._switch = self._switch or self.active
+        self.active = False
+
+    def reset(self) -> None:
+        """Start control anew where the motor stands; the observer keeps its history."""
+        self.load.reset()
+        self.deflection_slope.reset()
+        self.joint_slope.reset()
+        self.motor_trim_rad = self.joint_trim_rad = self.force_trim_Nm = 0.0
+        self.target_rad, self._velocity, self._reference, self._switch = NAN, 0.0, None, True
+
+    def step(
+        self, sample: Sample, reference: Reference, feed: Feed = FULL, *, joint_ok: bool = True
+    ) -> Command:
+        """One period; returns the motor command (rad, rad/s, Nm at the input pulley) and the observer's view.
+
+        `joint_ok` False: the joint encoder's value is not to be trusted, feedback on it rests.
+        """
+        if self.options.mode is ControlMode.POSITION:
+            estimate = self.observer.step(sample)
+            self.estimate = estimate
+            return self._position(sample, reference, feed, estimate, joint_ok)
+        estimate = self._known_torque(sample)
+        self.estimate = estimate
+        return self._force(sample, reference, feed, estimate)
+
+    # ---- position mode ---------------------------------------------------------------------------
+
+    def _position(
+        self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate, joint_ok: bool
+    ) -> Command:
+        load = self._expected_load(sample, reference)
+        if not feed.held:
+            self.deflection_used_rad = self._deflection(sample, reference, load)
+        used = feed.weight * self.deflection_used_rad if self.active else 0.0
+        n, now = self.ratio, self._reference
+        if joint_ok and now is not None and self.gains.joint_feedback_per_s > 0.0 and not feed.held:
+            self._joint_feedback(now.joint_position_rad - sample.joint_position_rad)
+        wanted = (reference.joint_position_rad - used + self.joint_trim_rad) / n
+        velocity = (reference.joint_velocity_rad_s - self.deflection_slope.step(used)) / n
+        torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, load)
+        return self._command(sample, reference, wanted, velocity, torque, used, estimate)
+
+    def _expected_load(self, sample: Sample, reference: Reference) -> float:
+        stated = reference.joint_torque_Nm
+        if not self._from_sensor:
+            return stated if isfinite(stated) else 0.0
+        if self.options.load == "sensor" or not isfinite(stated):
+            return self.load.step(sample.joint_torque_Nm)
+        before = self._reference
+        expected_now = stated if before is None else before.joint_torque_Nm
+        if not isfinite(expected_now):
+            expected_now = stated
+        return stated + self.load.step(sample.joint_torque_Nm - expected_now)
+
+    def _deflection(self, sample: Sample, reference: Reference, load: float) -> float:
+        if self._linear is not None and self.options.feed_forward is FeedForward.LINEAR:
+            return load / self._linear
+        ahead = Sample(
+            sample.time_s + self.period_s,
+            sample.motor_position_rad + self._velocity * self.period_s,
+            load,
+            NAN,
+            sample.motor_torque_Nm,
+            sample.temperature_degC,
+            sample.other,
+        )
+        return self.observer.peek(ahead).deflection_rad
+
+    def _joint_feedback(self, error: float) -> None:
+        if error == error:
+            limit = self.options.joint_feedback_limit_rad
+            trim = self.joint_trim_rad + self.gains.joint_feedback_per_s * self.period_s * error
+            self.joint_trim_rad = min(max(trim, -limit), limit)
+
+    # ---- force and impedance mode ----------------------------------------------------------------
+
+    def _known_torque(self, sample: Sample) -> Estimate:
+        source = self.options.torque_from
+        if source == "encoders":
+            return self.observer.step_inverse(sample)
+        if source == "motor_torque":
+            sample = sample._replace(joint_torque_Nm=-sample.motor_torque_Nm / self.ratio)
+        return self.observer.step(sample)
+
+    def _force(self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate) -> Command:
+        measured = sample.joint_position_rad
+        joint = measured if isfinite(measured) else estimate.joint_position_rad
+        joint_velocity = self.joint_slope.step(joint)
+        wanted_Nm = self._wanted_torque(reference, joint, joint_velocity)
+        if not feed.held:
+            self._force_feedback(wanted_Nm - estimate.joint_torque_Nm)
+            asked = wanted_Nm + self.force_trim_Nm
+            self.deflection_used_rad = self._deflection(sample, reference, asked)
+        used = feed.weight * self.deflection_used_rad if self.active else 0.0
+        wanted = (joint + joint_velocity * self.period_s - used) / self.ratio
+        velocity = (joint_velocity - self.deflection_slope.step(used)) / self.ratio
+        torque = self._torque(velocity, 0.0, wanted_Nm)
+        return self._command(sample, reference, wanted, velocity, torque, used, estimate)
+
+    def _wanted_torque(self, reference: Reference, joint: float, velocity: float) -> float:
+        base = reference.joint_torque_Nm if isfinite(reference.joint_torque_Nm) else 0.0
+        if self.options.mode is ControlMode.FORCE:
+            return base
+        o = self.options
+        pull = o.impedance_stiffness_Nm_per_rad * (reference.joint_position_rad - joint)
+        return base - pull - o.impedance_damping_Nms_per_rad * (reference.joint_velocity_rad_s - velocity)
+
+    def _force_feedback(self, error_Nm: float) -> None:
+        if error_Nm == error_Nm:
+            self.force_trim_Nm += self.gains.force_feedback_per_s * self.period_s * error_Nm
+
+    # ---- common ----------------------------------------------------------------------------------
+
+    def _torque(self, velocity: float, acceleration: float, load: float) -> float:
+        m = self._motor
+        friction = m.viscous_Nms_per_rad * velocity
+        if m.coulomb_Nm > 0.0:
+            friction += m.coulomb_Nm * tanh(velocity / self.options.coulomb_velocity_rad_s)
+        return m.inertia_kgm2 * acceleration + friction - self.ratio * load
+
+    def _command(
+        self,
+        sample: Sample,
+        reference: Reference,
+        wanted: float,
+        velocity: float,
+        torque: float,
+        used: float,
+        estimate: Estimate,
+    ) -> Command:
+        if self._switch:
+            self._begin(sample, wanted)
+        else:
+            limit = self.options.motor_integral_limit_rad
+            error = self.target_rad - sample.motor_position_rad
+            trim = self.motor_trim_rad + self.gains.motor_integral_per_s * self.period_s * error
+            self.motor_trim_rad = min(max(trim, -limit), limit)
+        target = wanted + self.bump.step()
+        self._velocity = velocity + self.bump.slope
+        self.target_rad = target
+        self._reference = reference
+        e = estimate
+        return Command(
+            target + self.motor_trim_rad,
+            self._velocity,
+            torque,
+            used,
+            e.deflection_rad,
+            e.deflection_low_rad,
+            e.deflection_high_rad,
+            e.joint_position_rad,
+            e.joint_torque_Nm,
+            e.tension_h_N,
+            e.tension_l_N,
+        )
+
+    def _begin(self, sample: Sample, wanted: float) -> None:
+        before = self.target_rad
+        if before != before:
+            before = sample.motor_position_rad
+        self.bump.start(before + self._velocity * self.period_s - wanted)
+        self._switch = False

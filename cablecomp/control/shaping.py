@@ -1,0 +1,94 @@
+"""Small signal shapers with explicit state: the load expected next, a velocity, a bump that dies away."""
+
+from __future__ import annotations
+
+from math import exp, pi
+
+from cablecomp.errors import InputError
+
+
+class LoadAhead:
+    """Expected load: `(1 + s lead) / (1 + s tau)^2` of the reading, tau = 1/(2 pi f), exact for a held input.
+
+    `rate` is the filtered rate of change (Nm/s). A constant comes through as it is, a ramp of rate r late by
+    `(2 tau - lead) r`: with lead = 2 tau + latency a ramp is foreseen over the loop's latency.
+    """
+
+    __slots__ = ("_a", "_lead", "_tau", "first", "rate", "second", "started")
+
+    def __init__(self, filter_Hz: float, lead_s: float, period_s: float) -> None:
+        self._tau = 1.0 / (2.0 * pi * filter_Hz)
+        self._a = -exp(-period_s / self._tau) + 1.0
+        self._lead = lead_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything; the next reading is taken as if it had always been there."""
+        self.first = self.second = self.rate = 0.0
+        self.started = False
+
+    def step(self, load_Nm: float) -> float:
+        """Take a reading (Nm), give the expected load (Nm)."""
+        if not self.started:
+            self.first = self.second = load_Nm
+            self.started = True
+        self.first += self._a * (load_Nm - self.first)
+        self.second += self._a * (self.first - self.second)
+        self.rate = (self.first - self.second) / self._tau
+        return self.second + self._lead * self.rate
+
+
+class Slope:
+    """Filtered rate of change of a signal: first difference through a first-order low pass."""
+
+    __slots__ = ("_a", "_period", "last", "rate", "started")
+
+    def __init__(self, filter_Hz: float, period_s: float) -> None:
+        self._a = 1.0 - exp(-2.0 * pi * filter_Hz * period_s)
+        self._period = period_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.last = self.rate = 0.0
+        self.started = False
+
+    def step(self, value: float) -> float:
+        """Take a value, give its rate per second."""
+        if not self.started:
+            self.last = value
+            self.started = True
+        self.rate += self._a * ((value - self.last) / self._period - self.rate)
+        self.last = value
+        return self.rate
+
+
+class Bump:
+    """What is added to a target so that a switch costs no step: `size (1 - 3 x^2 + 2 x^3)`, x = time since
+    over `blend_s`."""
+
+    __slots__ = ("_period", "_total", "left", "size", "slope")
+
+    def __init__(self, blend_s: float, period_s: float) -> None:
+        if not blend_s > 0.0:
+            raise InputError(f"blend_s is {blend_s}; a time above 0 is accepted")
+        self._total = max(1, round(blend_s / period_s))
+        self._period = period_s
+        self.size = 0.0
+        self.slope = 0.0
+        self.left = 0
+
+    def start(self, size: float) -> None:
+        """Begin anew with `size`, rad."""
+        self.size = size
+        self.left = self._total
+
+    def step(self) -> float:
+        """Present addition (rad); `slope` then holds its rate (rad/s)."""
+        if self.left == 0:
+            self.slope = 0.0
+            return 0.0
+        x = 1.0 - self.left / self._total
+        self.left -= 1
+        self.slope = self.size * 6.0 * x * (x - 1.0) / (self._total * self._period)
+        return self.size * (1.0 + x * x * (2.0 * x - 3.0))

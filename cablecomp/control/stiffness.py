@@ -1,0 +1,199 @@
+"""The drive's stiffness over its range, history included, and its hysteresis as a nonlinearity: both found by
+the observer."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import control
+from cablecomp.config import JointConfig
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
+
+Floats = NDArray[np.float64]
+
+
+class StiffnessRange(NamedTuple):
+    """Tangent stiffness dM/dtheta (Nm/rad) along the greatest load cycle: 0, +max, -max, 0.
+
+    `zero_Nm_per_rad` at first touch, `low_Nm_per_rad` and `high_Nm_per_rad` the extremes, `secant_Nm_per_rad`
+    load over deflection at the peak, `width_rad` the greatest width of the loop; the arrays are the cycle
+    itself.
+    """
+
+    zero_Nm_per_rad: float
+    low_Nm_per_rad: float
+    high_Nm_per_rad: float
+    secant_Nm_per_rad: float
+    width_rad: float
+    load_Nm: Floats
+    deflection_rad: Floats
+    stiffness_Nm_per_rad: Floats
+
+    def spread(self, count: int = 5) -> tuple[float, ...]:
+        """`count` stiffnesses over the range, geometrically spaced, lowest first."""
+        return tuple(float(k) for k in np.geomspace(self.low_Nm_per_rad, self.high_Nm_per_rad, count))
+
+
+def greatest_load(config: JointConfig, load_max_Nm: float | None = None) -> float:
+    """The load to design for: as given, else the joint's limit, else half of what slackens a cable (R T0)."""
+    if load_max_Nm is not None:
+        if not load_max_Nm > 0.0:
+            raise InputError(f"load_max_Nm is {load_max_Nm}; a number above 0 is accepted")
+        return load_max_Nm
+    if config.limits.joint_torque_max_Nm is not None:
+        return config.limits.joint_torque_max_Nm
+    last = config.drive.stage[-1]
+    return last.output_radius_m * last.pretension_N
+
+
+def plain(config: JointConfig) -> JointConfig:
+    """The same joint, loaded by a known torque, without input filter: what the design looks at."""
+    options = config.observer.model_copy(update={"load": "joint_torque", "input_filter_Hz": 0.0})
+    return config.model_copy(update={"observer": options})
+
+
+def stiffness_range(
+    config: JointConfig, load_max_Nm: float | None = None, samples: int = 400
+) -> StiffnessRange:
+    """Walk the greatest load cycle with the motor held and note the tangent stiffness at every step."""
+    most = greatest_load(config, load_max_Nm)
+    lowest = -most if config.drive.circuit == "closed" else 0.0
+    way = np.concatenate(
+        [
+            np.linspace(0, most, samples // 4),
+            np.linspace(most, lowest, samples // 2),
+            np.linspace(lowest, 0, samples // 4),
+        ]
+    )
+    observer = Observer(plain(config))
+    rows: list[tuple[float, float]] = []
+    for k, load in enumerate(way):
+        found = observer.step(
+            Sample(1e3 * k, 0.0, float(load), 0.0, 0.0, 20.0, (0.0,) * len(observer.channels))
+        )
+        rows.append((found.deflection_rad, observer.stiffness()))
+    deflection, stiffness = (np.array(c) for c in zip(*rows, strict=True))
+    n = samples // 4
+    down = np.interp(way[:n], way[n : n + samples // 2][::-1], deflection[n : n + samples // 2][::-1])
+    width = float(np.max(np.abs(down - deflection[:n])))
+    peak = float(deflection[n - 1])
+    useful = stiffness[1:][np.isfinite(stiffness[1:]) & (stiffness[1:] > 0)]
+    return StiffnessRange(
+        float(stiffness[1]),
+        float(useful.min()),
+        float(useful.max()),
+        most / peak,
+        width,
+        way,
+        deflection,
+        stiffness,
+    )
+
+
+class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc]
+    """Deflection to load of a joint, motor held, as python-control's describing functions want a
+    nonlinearity.
+
+    `describing_function(A)` = first harmonic of the load over the amplitude of a sinusoidal deflection of A
+    rad, in the third cycle, mean removed (Nm/rad, complex: the imaginary part is the loop's loss). `bias_Nm`
+    = load about which it swings.
+    """
+
+    def __init__(self, config: JointConfig, bias_Nm: float = 0.0, samples: int = 120) -> None:
+        super().__init__()
+        self._config = plain(config)
+        self._samples = samples
+        self._bias_Nm = bias_Nm
+        self._cache: dict[float, complex] = {}
+        self._live: Observer | None = None
+        self._time = 0.0
+
+    def __call__(self, deflection_rad: float) -> float:
+        """Load (Nm) at a deflection (rad), history kept between calls; see `reset`."""
+        if self._live is None:
+            self._live = self._started()
+        self._time += 1e3
+        sample = Sample(self._time, 0.0, 0.0, float(deflection_rad), 0.0, 20.0)
+        return self._live.step_inverse(_full(sample, self._live)).joint_torque_Nm
+
+    def reset(self) -> None:
+        """Forget the history of calls."""
+        self._live = None
+
+    def _isstatic(self) -> bool:
+        return False
+
+    def describing_function(self, A: float) -> complex:
+        """First harmonic of the load over A, Nm/rad."""
+        key = float(A)
+        if key not in self._cache:
+            self._cache[key] = self._harmonic(key)
+        return self._cache[key]
+
+    def _started(self) -> Observer:
+        observer = Observer(self._config)
+        self._time = 1.0
+        found = observer.step(_full(Sample(0.0, 0.0, self._bias_Nm, 0.0, 0.0, 20.0), observer))
+        self._middle = found.deflection_rad
+        return observer
+
+    def _harmonic(self, amplitude: float) -> complex:
+        observer = self._started()
+        n = self._samples
+        phase = 2.0 * np.pi * np.arange(1, 3 * n + 1) / n
+        loads = []
+        for k, angle in enumerate(self._middle + amplitude * np.sin(phase)):
+            sample = Sample(1e3 * (k + 1), 0.0, 0.0, float(angle), 0.0, 20.0)
+            loads.append(observer.step_inverse(_full(sample, observer)).joint_torque_Nm)
+        last, at = np.array(loads[-n:]), phase[-n:]
+        last = last - last.mean()
+        in_phase = 2.0 * float(np.mean(last * np.sin(at)))
+        quadrature = 2.0 * float(np.mean(last * np.cos(at)))
+        return complex(in_phase, quadrature) / amplitude
+
+
+def to_nlsys(config: JointConfig, period_s: float = 1e-3, name: str = "drive") -> Any:
+    """The drive as a python-control nonlinear I/O system, discrete in time, its whole history in the state
+    vector.
+
+    Inputs: motor_position_rad, joint_torque_Nm. Outputs: joint_position_rad, deflection_rad, tension_h_N,
+    tension_l_N. The start is uniform pretension at the first motor angle; `system.params["start"]` is that
+    state vector.
+    """
+    model = Observer(plain(config))
+    model.step(_full(Sample(0.0, 0.0, 0.0, 0.0, 0.0, 20.0), model))
+    start = model.vector()
+
+    def sample(t: float, u: Floats) -> Sample:
+        return _full(Sample(t + period_s, float(u[0]), float(u[1]), 0.0, 0.0, 20.0), model)
+
+    def update(t: float, x: Floats, u: Floats, params: Any) -> Floats:
+        model.set_vector(x)
+        model.step(sample(t, u))
+        return model.vector()
+
+    def output(t: float, x: Floats, u: Floats, params: Any) -> Floats:
+        model.set_vector(x)
+        e = model.peek(sample(t, u))
+        low = e.tension_l_N if e.tension_l_N == e.tension_l_N else 0.0
+        return np.array([e.joint_position_rad, e.deflection_rad, e.tension_h_N, low])
+
+    return control.nlsys(
+        update,
+        output,
+        name=name,
+        inputs=["motor_position_rad", "joint_torque_Nm"],
+        outputs=["joint_position_rad", "deflection_rad", "tension_h_N", "tension_l_N"],
+        states=len(start),
+        dt=period_s,
+        params={"start": start},
+    )
+
+
+def _full(sample: Sample, observer: Observer) -> Sample:
+    return sample._replace(other=(0.0,) * len(observer.channels))

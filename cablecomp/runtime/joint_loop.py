@@ -1,0 +1,265 @@
+"""One joint's cycle: readings in, judged, observed, compensated, gated, sent, recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import nan
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+from cablecomp.config import JointConfig
+from cablecomp.control.command import Command, Reference
+from cablecomp.control.compensator import Compensator
+from cablecomp.control.degrade import NORMAL, DegradeState, DegradeTimes, Phase, degrade, feed_of
+from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gate_names
+from cablecomp.links.link import Link
+from cablecomp.links.records import DriveState, MotorCommand, Request
+from cablecomp.runtime.health import Checked, Health, health_names
+from cablecomp.runtime.log import EventLog, JointLog
+from cablecomp.signals import Estimate, Sample
+
+References = Callable[[float], Reference]
+"""What is wanted of a joint at a time (s since the run was armed)."""
+
+
+@dataclass(frozen=True)
+class JointSetup:
+    """All that is needed to run one joint: its place on the link, configuration, controller, health, limits,
+    reference."""
+
+    place: int
+    name: str
+    config: JointConfig
+    compensator: Compensator
+    health: Health
+    limits: GateLimits
+    times: DegradeTimes
+    reference: References
+    stiffness_Nm_per_rad: float | None = None
+    damping_Nms_per_rad: float | None = None
+
+
+class View(NamedTuple):
+    """What the live view shows of a joint."""
+
+    name: str
+    time_s: float
+    phase: Phase
+    sample: Sample
+    estimate: Estimate
+    command: Command
+    reference: Reference
+    flags: int
+
+
+@dataclass
+class JointTally:
+    """Sums over the run, of cycles under control: position error (measured and predicted) and torque error,
+    squared."""
+
+    cycles: int = 0
+    position_square: float = 0.0
+    position_count: int = 0
+    torque_square: float = 0.0
+    torque_count: int = 0
+    residual_square: float = 0.0
+    deflection_square: float = 0.0
+    phases: dict[str, int] = field(default_factory=dict)
+
+
+class JointLoop:
+    """Runs one joint on one link, cycle by cycle; `stop_reason` says why it wants the run stopped ("" = it
+    does not)."""
+
+    def __init__(self, setup: JointSetup, link: Link, folder: Path | None, events: EventLog) -> None:
+        self.setup = setup
+        self.readings = link.joints[setup.place]
+        self.degraded: DegradeState = NORMAL
+        self.stop_reason = ""
+        self.step_s = nan
+        self.view: View | None = None
+        self.tally = JointTally()
+        self.log: JointLog | None = None
+        self.checked: Checked | None = None
+        self._link = link
+        self._folder = folder
+        self._events = events
+        self._sent = SafeCommand(nan, 0.0, 0.0, 0)
+        self._predicted = nan
+        self._flags = 0
+        self._gate_flags = 0
+        self._offset = setup.config.sensors.joint_position_offset_rad
+        self._last_reference = Reference()
+
+    @property
+    def ready(self) -> bool:
+        """Whether every channel that is needed has come."""
+        return self.checked is not None and self.checked.ready
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the drive says that it is enabled."""
+        return self.readings.state is DriveState.ENABLED
+
+    def listen(self, now_s: float) -> None:
+        """Before the drive is enabled: judge what came. A drive left enabled is disabled first; then it gets
+        commands, without effect on a disabled drive, because many drives speak only when spoken to."""
+        self.checked = self.setup.health.check(self.readings, now_s)
+        if self.readings.sent == 0:
+            self._link.request(self.setup.place, Request.DISABLE)
+        self._send(SafeCommand(self._here(), 0.0, 0.0, 0))
+
+    def hold(self, now_s: float) -> None:
+        """While the drive is being enabled: observe and record, and ask it to stay where it is."""
+        self._cycle(now_s, None)
+        self._send(SafeCommand(self._here(), 0.0, 0.0, 0))
+
+    def begin(self) -> None:
+        """Control starts from where the motor is."""
+        self.setup.compensator.reset()
+        here = self._here()
+        self._sent = SafeCommand(here, 0.0, 0.0, 0)
+
+    def run(self, now_s: float, since_s: float) -> None:
+        """One cycle under control; `since_s` = time since control began."""
+        self._cycle(now_s, since_s)
+        if not self.stop_reason:
+            self._send(self._sent)
+
+    def stand(self, now_s: float) -> None:
+        """After the stop: observe and record, command nothing."""
+        self._cycle(now_s, None)
+
+    # ---- inside ----------------------------------------------------------------------------------
+
+    def _here(self) -> float:
+        checked = self.checked
+        return 0.0 if checked is None or not checked.ready else checked.sample.motor_position_rad
+
+    def _send(self, safe: SafeCommand) -> None:
+        s = self.setup
+        command = MotorCommand(
+            safe.motor_position_rad,
+            safe.motor_velocity_rad_s,
+            safe.motor_torque_Nm,
+            s.stiffness_Nm_per_rad,
+            s.damping_Nms_per_rad,
+        )
+        self._link.send(s.place, command)
+
+    def _cycle(self, now_s: float, since_s: float | None) -> None:
+        s = self.setup
+        target = self._sent.motor_position_rad if since_s is not None else nan
+        checked = s.health.check(self.readings, now_s, self._predicted + self._offset, target)
+        self.checked = checked
+        period = s.compensator.period_s
+        if since_s is not None:
+            self._judge(checked, now_s, period)
+        reference = s.reference(period + (0.0 if since_s is None else since_s))
+        sample = checked.sample
+        begin = perf_counter()
+        command = s.compensator.step(sample, reference, feed_of(self.degraded), joint_ok=checked.joint_ok)
+        self.step_s = perf_counter() - begin
+        estimate = s.compensator.estimate
+        assert estimate is not None
+        self._predicted = estimate.joint_position_rad
+        if since_s is not None and not self.stop_reason:
+            self._pass(command, checked, now_s, period)
+        self._note(checked.flags, now_s)
+        self._count(sample, estimate, since_s)
+        self.view = View(
+            s.name, now_s, self.degraded.phase, sample, estimate, command, reference, checked.flags
+        )
+        self._record(sample, estimate, command, reference, checked)
+        self._last_reference = reference
+
+    def _judge(self, checked: Checked, now_s: float, period_s: float) -> None:
+        before = self.degraded.phase
+        s = self.setup
+        self.degraded = degrade(self.degraded, period_s, checked.motor_age_s, checked.load_age_s, s.times)
+        phase = self.degraded.phase
+        if phase is not before:
+            self._events.add(now_s, s.name, f"{before.name.lower()} -> {phase.name.lower()}")
+        if phase is Phase.STOPPED:
+            words = ", ".join(health_names(checked.flags)) or "data too old"
+            self.stop_reason = self.stop_reason or words
+        elif checked.fatal:
+            self.stop_reason = self.stop_reason or ", ".join(health_names(checked.flags))
+        elif self.readings.state in (DriveState.FAULT, DriveState.DISABLED):
+            state = self.readings.state.name.lower()
+            self.stop_reason = self.stop_reason or f"drive reports {state} (error {self.readings.error:#x})"
+
+    def _pass(self, command: Command, checked: Checked, now_s: float, period_s: float) -> None:
+        s = self.setup
+        position = checked.sample.motor_position_rad
+        safe = gate(command, self._sent, position, checked.motor_age_s, period_s, s.limits)
+        if safe.flags & ~self._gate_flags:
+            words = ", ".join(gate_names(safe.flags & ~self._gate_flags))
+            self._events.add(now_s, s.name, f"gate: {words}")
+        self._gate_flags = safe.flags
+        if safe.flags & MUST_STOP:
+            self.stop_reason = self.stop_reason or f"gate: {', '.join(gate_names(safe.flags & MUST_STOP))}"
+        self._sent = safe
+
+    def _note(self, flags: int, now_s: float) -> None:
+        fresh, gone = flags & ~self._flags, self._flags & ~flags
+        self._flags = flags
+        if fresh:
+            self._events.add(now_s, self.setup.name, ", ".join(health_names(fresh)))
+        if gone:
+            self._events.add(now_s, self.setup.name, "over: " + ", ".join(health_names(gone)))
+
+    def _count(self, sample: Sample, estimate: Estimate, since_s: float | None) -> None:
+        tally = self.tally
+        name = self.degraded.phase.name.lower()
+        tally.phases[name] = tally.phases.get(name, 0) + 1
+        if since_s is None:
+            return
+        tally.cycles += 1
+        wanted = self._last_reference
+        measured = sample.joint_position_rad
+        if measured == measured:
+            tally.position_square += (measured - self._offset - wanted.joint_position_rad) ** 2
+            tally.position_count += 1
+            tally.residual_square += (measured - estimate.joint_position_rad - self._offset) ** 2
+        tally.deflection_square += estimate.deflection_rad**2
+        if (
+            wanted.joint_torque_Nm == wanted.joint_torque_Nm
+            and estimate.joint_torque_Nm == estimate.joint_torque_Nm
+        ):
+            tally.torque_square += (estimate.joint_torque_Nm - wanted.joint_torque_Nm) ** 2
+            tally.torque_count += 1
+
+    def _record(
+        self, sample: Sample, estimate: Estimate, command: Command, reference: Reference, checked: Checked
+    ) -> None:
+        if self._folder is None:
+            return
+        if self.log is None:
+            comments = (f"cablecomp run, joint {self.setup.name}, configuration joint.toml",)
+            self.log = JointLog(self._folder, sample, self.readings.others, comments)
+        sent, state = self._sent, self.degraded
+        self.log.append(
+            sample,
+            estimate,
+            self._offset,
+            (
+                sample.time_s,
+                state.phase,
+                state.weight,
+                checked.flags,
+                sent.flags,
+                reference.joint_position_rad,
+                reference.joint_torque_Nm,
+                sent.motor_position_rad,
+                sent.motor_velocity_rad_s,
+                sent.motor_torque_Nm,
+                command.deflection_ahead_rad,
+                command.joint_torque_Nm,
+                min(checked.motor_age_s, 1e9),
+                min(checked.load_age_s, 1e9),
+                self.step_s,
+            ),
+        )

@@ -1,0 +1,278 @@
+"""The loop: absolute ticks, all joints of one link, from listening through enabling and control to a safe
+stop."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from math import inf
+from pathlib import Path
+from time import perf_counter
+
+from cablecomp.errors import DeviceError
+from cablecomp.links.link import Link
+from cablecomp.links.records import BusState, Mode, Request
+from cablecomp.runtime.clock import Clock, Tick, Ticker
+from cablecomp.runtime.joint_loop import JointLoop, JointSetup
+from cablecomp.runtime.log import EventLog
+from cablecomp.runtime.priority import QUIET, Granted, Policy, armed
+from cablecomp.runtime.timing import CycleTimes, TimingReport
+
+BUS_EVERY = 5  # ticks between two looks at the bus's own state
+COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
+DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
+
+
+class Stage(IntEnum):
+    """Where a run stands."""
+
+    LISTENING = 0
+    ENABLING = 1
+    RUNNING = 2
+    STOPPING = 3
+
+
+@dataclass(frozen=True)
+class LoopOptions:
+    """How long things may take (s): first data, enabling, the run itself, watching after the stop."""
+
+    duration_s: float
+    listen_s: float = 2.0
+    enable_s: float = 3.0
+    settle_s: float = 0.05
+    after_s: float = 0.1
+    mode: Mode = Mode.IMPEDANCE
+    policy: Policy = QUIET
+
+
+AfterTick = Callable[[Tick, Stage], None]
+"""Called once a tick after the commands went out: steps a simulated bus, feeds the live view."""
+
+
+class Loop:
+    """Runs joints on a link. `run` returns when the time is over or something asked for a stop; the stop
+    command is sent in every case, an unexpected exception included, and all logs are closed."""
+
+    def __init__(
+        self,
+        link: Link,
+        setups: tuple[JointSetup, ...],
+        clock: Clock,
+        period_s: float,
+        options: LoopOptions,
+        folder: Path | None = None,
+        after_tick: AfterTick | None = None,
+    ) -> None:
+        self.link = link
+        self.options = options
+        self.period_s = period_s
+        self.stage = Stage.LISTENING
+        self.stop_reason = ""
+        self.times = CycleTimes()
+        self.events = EventLog(Path("/dev/null") if folder is None else folder / "events.jsonl")
+        folders = [None if folder is None else _folder_of(folder, s, len(setups)) for s in setups]
+        self.joints = tuple(JointLoop(s, link, f, self.events) for s, f in zip(setups, folders, strict=True))
+        self._clock = clock
+        self._after = after_tick
+        self._ticker: Ticker | None = None
+        self._granted = Granted()
+        self._stage_s = 0.0
+        self._armed_s = 0.0
+        self._last_begin = -inf
+        self._first_tick: Tick | None = None
+        self._last_tick: Tick | None = None
+        self._asked_to_stop = ""
+        self._ticks = 0
+
+    def ask_to_stop(self, why: str) -> None:
+        """End the run at the next tick, safely; may be called from another thread or a signal handler."""
+        self._asked_to_stop = why
+
+    def run(self) -> TimingReport:
+        """Compile, arm, run, stop; returns how the time was kept. Raises DeviceError if no data come or no
+        drive enables."""
+        for joint in self.joints:
+            compile_all = getattr(joint.setup.compensator.observer, "compile", None)
+            if compile_all is not None:
+                compile_all()
+        try:
+            self.link.open()
+            with armed(self.options.policy) as self._granted:
+                self._loop()
+        finally:
+            self._close()
+        return self.report()
+
+    def report(self) -> TimingReport:
+        """How time and data were kept so far."""
+        t, status = self.times, self.link.status()
+        first, last = self._first_tick, self._last_tick
+        span = 0.0 if first is None or last is None else last.now_s - first.now_s
+        return TimingReport(
+            rate_Hz=(self._ticks - 1) / span if span > 0.0 else 0.0,
+            asked_Hz=1.0 / self.period_s,
+            ticks=self._ticks,
+            skipped=0 if self._ticker is None else self._ticker.skipped,
+            misses=t.misses,
+            period=t.period.spread(),
+            jitter=t.jitter.spread(),
+            poll=t.poll.spread(),
+            step=t.step.spread(),
+            cycle=t.cycle.spread(),
+            data_age=t.data_age.spread(),
+            frames=status.frames,
+            lost_frames=status.lost,
+            invalid_frames=status.invalid,
+            repeated_frames=status.repeated,
+            reordered_frames=status.reordered,
+            dropped_frames=status.dropped,
+            send_failures=status.send_failures,
+            policy=tuple(self._granted.lines),
+        )
+
+    # ---- inside ----------------------------------------------------------------------------------
+
+    def _loop(self) -> None:
+        ticker = self._ticker = Ticker(self._clock, self.period_s)
+        while True:
+            tick = ticker.wait()
+            begin = perf_counter()
+            self.link.poll(tick.now_s)
+            polled = perf_counter()
+            done = self._one(tick)
+            self._account(tick, begin, polled, perf_counter())
+            if self._after is not None:
+                self._after(tick, self.stage)
+            if done:
+                return
+
+    def _one(self, tick: Tick) -> bool:
+        now = tick.now_s
+        if self.stage is Stage.LISTENING:
+            self._listen(now)
+        elif self.stage is Stage.ENABLING:
+            self._enable(now)
+        elif self.stage is Stage.RUNNING:
+            self._run(tick)
+        else:
+            for joint in self.joints:
+                joint.stand(now)
+            return now - self._stage_s >= self.options.after_s
+        return False
+
+    def _listen(self, now: float) -> None:
+        for joint in self.joints:
+            joint.listen(now)
+        if self._asked_to_stop:
+            self._stop(self._asked_to_stop, now)
+        elif all(joint.ready for joint in self.joints) and now >= self.options.settle_s:
+            self._go(Stage.ENABLING, now)
+            for joint in self.joints:
+                self.link.request(joint.setup.place, Request.CLEAR_FAULTS, self.options.mode)
+                self.link.request(joint.setup.place, Request.ENABLE, self.options.mode)
+        elif now > self.options.listen_s:
+            missing = (
+                ", ".join(self.link.silent(now, self.options.listen_s / 2)) or "a channel that is needed"
+            )
+            names = ", ".join(j.setup.name for j in self.joints if not j.ready)
+            raise DeviceError(
+                f"link `{self.link.config.name}`: nothing from {names} within {self.options.listen_s:g} s "
+                f"(silent: {missing}); check power, wiring, bitrate and node numbers"
+            )
+
+    def _enable(self, now: float) -> None:
+        for joint in self.joints:
+            joint.hold(now)
+        waited = now - self._stage_s
+        if self._asked_to_stop:
+            self._stop(self._asked_to_stop, now)
+        elif all(joint.enabled for joint in self.joints) and waited >= DISABLE_GRACE * self.period_s:
+            for joint in self.joints:
+                joint.begin()
+            self._armed_s = now
+            self._go(Stage.RUNNING, now)
+        elif waited > self.options.enable_s:
+            states = ", ".join(f"{j.setup.name} is {j.readings.state.name.lower()}" for j in self.joints)
+            raise DeviceError(
+                f"link `{self.link.config.name}`: not every drive enabled within {self.options.enable_s:g} s "
+                f"({states}); clear its faults and calibrate it"
+            )
+
+    def _run(self, tick: Tick) -> None:
+        now = tick.now_s
+        since = now - self._armed_s
+        for joint in self.joints:
+            joint.run(now, since)
+        if tick.skipped:
+            self.events.add(now, "", f"{tick.skipped} ticks skipped")
+        why = self._asked_to_stop or next(
+            (f"{j.setup.name}: {j.stop_reason}" for j in self.joints if j.stop_reason), ""
+        )
+        if not why and tick.number % BUS_EVERY == 0:
+            why = self._bus_trouble()
+        if not why and since >= self.options.duration_s:
+            why = "time is over"
+        if why:
+            self._stop(why, now)
+
+    def _bus_trouble(self) -> str:
+        status = self.link.status()
+        return (
+            ""
+            if status.bus in (BusState.ACTIVE, BusState.PASSIVE)
+            else f"bus is {status.bus.name.lower()}: {status.fault}"
+        )
+
+    def _stop(self, why: str, now: float) -> None:
+        self.link.stop()
+        self.stop_reason = why
+        self.events.add(now, "", f"stop: {why}")
+        self._go(Stage.STOPPING, now)
+
+    def _go(self, stage: Stage, now: float) -> None:
+        self.events.add(now, "", f"{self.stage.name.lower()} -> {stage.name.lower()}")
+        self.stage, self._stage_s = stage, now
+
+    def _account(self, tick: Tick, begin: float, polled: float, end: float) -> None:
+        t = self.times
+        self._ticks += 1
+        if self._first_tick is None:
+            self._first_tick = tick
+        else:
+            t.period.add(tick.now_s - self._last_begin)
+        self._last_tick, self._last_begin = tick, tick.now_s
+        if self.stage is not Stage.RUNNING:
+            return
+        t.jitter.add(tick.late_s)
+        t.poll.add(polled - begin)
+        t.cycle.add(end - begin)
+        for joint in self.joints:
+            t.step.add(joint.step_s)
+            checked = joint.checked
+            if checked is not None:
+                age = max(checked.motor_age_s, checked.load_age_s)
+                t.data_age.add(min(age, 1e9))
+        if end - begin + tick.late_s > self.period_s:
+            t.misses += 1
+        if tick.number % COLLECT_EVERY == 0 and not gc.isenabled() and end - begin < 0.5 * self.period_s:
+            gc.collect(0)
+
+    def _close(self) -> None:
+        """Stop command, whatever happened; then the link and every log, each one tried."""
+        try:
+            if self.stage is not Stage.STOPPING:
+                self.link.stop()
+                self.stop_reason = self.stop_reason or "ended by an error"
+                self.events.add(self._last_begin, "", f"stop: {self.stop_reason}")
+        finally:
+            for joint in self.joints:
+                if joint.log is not None:
+                    joint.log.close()
+            self.events.close()
+            self.link.close()
+
+
+def _folder_of(folder: Path, setup: JointSetup, count: int) -> Path:
+    return folder if count == 1 else folder / setup.name
