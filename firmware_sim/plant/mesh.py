@@ -43,13 +43,14 @@ FINE = Resolution(friction_step=0.007, spacings_per_step=0.5, max_nodes=20000)
 def fine_spacing(stage: StageConfig, resolution: Resolution, guide_arc_m: float) -> tuple[float, float]:
     """Spacing wanted near the output and near the input drum, m.
 
-    A share of the friction length R/mu; never more than 0.2 rad of contact nor than what lets one point
+    A share of the friction length R/mu, from 0.01 to 0.2 rad of contact, never more than what lets one point
     touch two bodies.
     """
     apart = 0.9 * stage.free_length_m * (0.5 if guide_arc_m > 0 else 1.0)
     guide = guide_arc_m / 8 if guide_arc_m > 0 else math.inf
     out = resolution.friction_step * stage.output_radius_m / stage.mu_output
     inner = resolution.friction_step * stage.input_radius_m / stage.mu_input
+    out, inner = max(out, 0.01 * stage.output_radius_m), max(inner, 0.01 * stage.input_radius_m)
     out = min(out, 0.2 * stage.output_radius_m, apart, max(guide, 0.1 * out))
     inner = min(inner, 0.2 * stage.input_radius_m, apart, max(guide, 0.1 * inner))
     return out, inner
