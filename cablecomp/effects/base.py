@@ -1,13 +1,14 @@
 """The contract of an effect: one file, one physics, one neutral value that switches it off.
 
-An effect says in plain words what it is, names its parameters, and gives a `Change` to the drive. Most effects are a
-compiled *term*, a small function that reads the context of the solve (angles, load, tensions, time, temperature, other
-channels) and adds to it (moment taken from the load path, cable length, pretension and stiffness factors, encoder
-reading). A few change the law of friction or the cable path itself. The kernel only sums them.
+An effect says in plain words what it is, names its parameters, and gives a `Change` to the drive. Most are a
+compiled *term*, a small function that reads the context of the solve (angles, load, tensions, time,
+temperature, other channels) and adds to it (moment taken from the load path, cable length, pretension and
+stiffness factors, encoder reading). A few change the law of friction or the cable path itself. The kernel only sums them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,8 +31,10 @@ TermFunction = Callable[[Any, Any, Any], None]
 class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
 
-    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a scale is
-    given; `shape` marks parameters that say how, not how much (a phase, a time constant, an instant).
+    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a
+    scale is given; `shape` marks parameters that say how, not how much (a phase, a time constant, an
+    instant). `minimum`..`maximum`, in the parameter's unit, is what the law can take; beyond, a configuration is
+    refused.
     """
 
     name: str
@@ -43,6 +46,12 @@ class Parameter:
     log: bool = False
     shape: bool = False
     scale: Callable[[JointConfig], float] | None = None
+    minimum: float = -math.inf
+    maximum: float = math.inf
+
+    def middle(self) -> float:
+        """Middle of low..high (geometric where `log`)."""
+        return math.sqrt(self.low * self.high) if self.log else 0.5 * (self.low + self.high)
 
     def bounds(self, config: JointConfig) -> tuple[float, float]:
         """Prior range (low, high) for this joint, in the parameter's unit."""
@@ -51,7 +60,7 @@ class Parameter:
 
 
 def zero_load_compliance(config: JointConfig) -> float:
-    """Compliance of the free spans alone [rad/(N m)]: R^2 L/EA summed over stages, halved in a closed circuit."""
+    """Compliance of the free spans alone [rad/(N m)]: L/(EA R^2) over stages, halved in a closed circuit."""
     total, ratio = 0.0, 1.0
     for stage in reversed(config.drive.stage):
         total += ratio**2 * stage.free_length_m / (stage.EA_N * stage.output_radius_m**2)
@@ -64,6 +73,31 @@ def pretension_moment(config: JointConfig) -> float:
     return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
 
 
+def drum_radius(config: JointConfig) -> float:
+    """R of the output stage [m]."""
+    return config.drive.stage[-1].output_radius_m
+
+
+def pretension(config: JointConfig) -> float:
+    """T0 of the output stage [N]."""
+    return config.drive.stage[-1].pretension_N
+
+
+def cable_strain(config: JointConfig) -> float:
+    """T0/EA of the output stage [-]: the strain under which its cable stands."""
+    return config.drive.stage[-1].pretension_N / config.drive.stage[-1].EA_N
+
+
+def wrap_deflection(config: JointConfig) -> float:
+    """T0/(EA mu_eff) over stages, at the output [rad]: the thesis's unit of deflection, (3-17), (4-18)."""
+    total, ratio = 0.0, 1.0
+    for stage in reversed(config.drive.stage):
+        r_over_R = stage.input_radius_m / stage.output_radius_m
+        total += ratio * stage.pretension_N / stage.EA_N * (1.0 / stage.mu_output + r_over_R / stage.mu_input)
+        ratio *= r_over_R
+    return total
+
+
 @dataclass(frozen=True)
 class Change:
     """What one effect does to the drive; every default is neutral."""
@@ -72,10 +106,12 @@ class Change:
     tension_factor: Callable[[Floats], Floats] | None = None
     """mu/mu0 as a function of tau = T/T0, vectorised."""
     joint_angle_factor: Callable[[Floats], Floats] | None = None
-    """mu/mu0 of the output drum's groove, as a function of the joint angle [rad] at which that place is at the departure point."""
+    """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs from that place."""
     stiffening: float = 0.0
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
+    extra_length_m: float = 0.0
+    """Free cable beyond the stage's own free length."""
     play_share: float = 0.0
     play_yield_N: float = 0.0
     viscous_Ns_per_m_rad: float = 0.0
@@ -85,9 +121,9 @@ class Change:
 class Effect:
     """Physics beyond the thesis's drive, as one term of the joint model.
 
-    `id` is its public name; `statement` says in plain words what happens; `equation` and `source` state the law;
-    `acts_through` are the covariates in which its mismatch shows first; `bounded` is true where it preserves the order
-    of profiles, so that guaranteed bounds stay guaranteed.
+    `id` is its public name; `statement` says in plain words what happens; `equation` and `source` give the
+    law; `acts_through` are the covariates in which its mismatch shows, best first (`other` stands for the channel
+    it reads); `bounded` is true where it preserves the order of profiles: guaranteed bounds stay guaranteed.
     """
 
     id: str
@@ -109,7 +145,7 @@ class Effect:
 
     def neutral(self) -> dict[str, float]:
         """The values that switch the effect off (shape parameters at the middle of their range)."""
-        return {p.name: (0.5 * (p.low + p.high) if p.shape else p.neutral) for p in self.parameters}
+        return {p.name: (p.middle() if p.shape else p.neutral) for p in self.parameters}
 
 
 class CompiledTerm:
@@ -147,8 +183,9 @@ class CompiledTerm:
 
 
 def term(parameters: int, state: int = 0) -> Callable[[TermFunction], CompiledTerm]:
-    """Make a function f(c, p, s) a term: c is the context (indices X_* of `mechanics.layout`), p its parameters, s its state.
+    """Make a function f(c, p, s) a term: c context (places X_* of `mechanics.layout`), p parameters, s state.
 
-    It must add to the context only, and change `s` only when c[X_COMMIT] is set: the solver calls it several times a step.
+    It must add to the context only, and change `s` only when c[X_COMMIT] is set: the solver calls it several
+    times a step.
     """
     return lambda function: CompiledTerm(function, parameters, state)

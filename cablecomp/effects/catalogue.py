@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import math
 import pkgutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
-from cablecomp.effects.base import Change, Effect, Floats
+from cablecomp.effects.base import Change, Effect, Floats, Parameter
 from cablecomp.errors import InputError
 from cablecomp.mechanics.assemble import Extension
+from cablecomp.mechanics.layout import OTHERS
 from cablecomp.mechanics.tables import law_table, plain_law
 
 _registered: dict[str, Effect] = {}
@@ -38,23 +41,41 @@ def _built_in() -> dict[str, Effect]:
 
 
 def catalogue() -> dict[str, Effect]:
-    """Every known effect by its id: each file of this package that defines `EFFECT`, and those registered by the user."""
+    """Every known effect by its id: each file of this package with an `EFFECT`, and those registered."""
     return {**_built_in(), **_registered}
 
 
+def with_effects(config: JointConfig, effects: Sequence[tuple[str, Mapping[str, Any]]]) -> JointConfig:
+    """The same joint with exactly these effects, (id, {parameter: value}) each; `extend` checks them.
+
+    Cheap (some microseconds), so that a fit may call it for every new parameter value.
+    """
+    entries = tuple(EffectEntry.model_construct(None, id=name, **values) for name, values in effects)
+    return config.model_copy(update={"effect": entries})
+
+
+def acts_through(entry: EffectEntry) -> tuple[str, ...]:
+    """Covariates in which this effect's mismatch shows, best first, with its channel's `other:<name>`."""
+    channel = str(entry.parameters.get("channel", ""))
+    names = _look_up(entry.id).acts_through
+    return tuple(f"other:{channel.removeprefix('other_')}" if n == "other" else n for n in names)
+
+
 def extend(config: JointConfig) -> Extension | None:
-    """What the configuration's effects change in the plain drive; None if nothing. Raises InputError for unknown ids or keys."""
+    """What the configuration's effects change in the plain drive; None if there are none.
+
+    Raises InputError for an unknown id, an unknown or missing parameter, or a value that the law cannot take.
+    """
     if not config.effect:
         return None
-    known = sorted(
-        ((_look_up(entry.id), entry) for entry in config.effect), key=lambda pair: pair[0].rank
-    )
+    known = sorted(((_look_up(entry.id), entry) for entry in config.effect), key=lambda pair: pair[0].rank)
     changes = [effect.change(_values(effect, entry, config), config) for effect, entry in known]
     return Extension(
         terms=tuple(t for change in changes for t in change.terms),
         law=_law(changes, config),
         guide_angle=sum(c.guide_angle for c in changes),
         guide_length_m=sum(c.guide_length_m for c in changes),
+        extra_length_m=sum(c.extra_length_m for c in changes),
         play_share=sum(c.play_share for c in changes),
         play_yield_N=max(c.play_yield_N for c in changes),
         viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
@@ -76,33 +97,59 @@ def _look_up(name: str) -> Effect:
 
 
 def _values(effect: Effect, entry: EffectEntry, config: JointConfig) -> dict[str, float]:
-    """The parameters of one entry, complete and finite; a text parameter (a channel) becomes its place among the others."""
+    """The parameters of one entry, complete and finite; a channel becomes its place among the others."""
     allowed = {p.name for p in effect.parameters} | set(effect.texts)
     values: dict[str, float] = {}
     for key, value in entry.parameters.items():
         if key not in allowed:
             raise InputError(
-                f"{config.name}: unknown key `effect.{key}` of effect `{effect.id}`; it takes {', '.join(sorted(allowed))}"
+                f"{config.name}: unknown key `effect.{key}` of effect `{effect.id}`; "
+                f"it takes {', '.join(sorted(allowed))}"
             )
         if key in effect.texts:
-            values[key] = float(other_channels(config).index(str(value)))
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise InputError(f"{config.name}: key `effect.{key}` is {value!r}; a finite number is accepted")
-        values[key] = float(value)
+            values[key] = float(_place(str(value), config))
+        else:
+            values[key] = _number(value, effect.parameter(key), config)
     missing = [name for name in sorted(allowed) if name not in values]
     if missing:
         raise InputError(f"{config.name}: effect `{effect.id}` lacks key `{missing[0]}`; add it")
     return values
 
 
+def _number(value: object, parameter: Parameter, config: JointConfig) -> float:
+    """The value of a parameter, within what its law can take."""
+    key = f"{config.name}: key `effect.{parameter.name}` is {value!r}"
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{key}; a finite number [{parameter.unit}] is accepted")
+    if not parameter.minimum <= value <= parameter.maximum:
+        raise InputError(
+            f"{key}; {parameter.minimum:g} to {parameter.maximum:g} [{parameter.unit}] is accepted"
+        )
+    return float(value)
+
+
+def _place(channel: str, config: JointConfig) -> int:
+    """Place of a further channel among those that the kernel gets."""
+    if not channel.startswith("other_"):
+        raise InputError(
+            f"{config.name}: key `effect.channel` is '{channel}'; a channel `other_<name>` is accepted"
+        )
+    place = other_channels(config).index(channel)
+    if place >= OTHERS:
+        raise InputError(
+            f"{config.name}: key `effect.channel` '{channel}' is one channel too many; {OTHERS} are accepted"
+        )
+    return place
+
+
 def other_channels(config: JointConfig) -> list[str]:
     """The further channels that effects of this joint read, in the order in which the kernel gets them."""
     names: list[str] = []
     for entry in config.effect:
-        channel = entry.parameters.get("channel")
-        if isinstance(channel, str) and channel not in names:
-            names.append(channel)
+        for key in _look_up(entry.id).texts:
+            channel = str(entry.parameters.get(key, ""))
+            if channel and channel not in names:
+                names.append(channel)
     return names
 
 

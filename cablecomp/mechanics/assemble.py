@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from cablecomp.config import JointConfig, Stage
 from cablecomp.errors import InputError
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import Ints
-from cablecomp.mechanics.profile import ROWS, Floats
+from cablecomp.mechanics.profile import ROWS, Floats, Ints
+from cablecomp.mechanics.viscous import W_HEAD
 
+WET_NODES = 96  # grid nodes of a drum with viscous slip
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
 
 
@@ -34,6 +35,7 @@ class Extension:
     law: NDArray[np.float64] | None = None
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
+    extra_length_m: float = 0.0
     play_share: float = 0.0
     play_yield_N: float = 0.0
     viscous_Ns_per_m_rad: float = 0.0
@@ -89,11 +91,12 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
     s_term = s_context + sizes["context"]
     s_wet = s_term + sizes["terms"]
     nodes = WET_NODES if extra.viscous_Ns_per_m_rad > 0.0 else 0
-    s_profile = s_wet + 2 * nodes * 2 * n_cables
+    s_profile = s_wet + (W_HEAD + 4 * nodes) * 2 * n_cables
     capacity = config.observer.max_pieces
-    S = np.zeros(s_profile + 2 * n_cables * ROWS * capacity)
+    n_stacks = (3 if extra.guide_angle > 0.0 else 2) * n_cables
+    S = np.zeros(s_profile + n_stacks * ROWS * capacity)
     header = [
-        n_circuits, n_cables, capacity, len(extra.terms), 0, s_profile, s_cable, s_context, s_term, s_wet, nodes
+        n_circuits, n_cables, capacity, len(extra.terms), n_stacks, s_profile, s_cable, s_context, s_term, s_wet, nodes
     ]  # fmt: skip
     p_terms = len(joints) + o.CABLE * n_cables
     parameters: list[float] = []
@@ -104,17 +107,14 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
     P = np.array([*joints, *np.ravel(cables), *parameters, 0.0])
     I = np.array(header + structure, dtype=np.int64)
     S[s_context + o.X_RADIUS] = stages[-1].output_radius_m
-    return Model(P, I, S, np.zeros(2 * n_cables, dtype=np.int64), extra.law)
-
-
-WET_NODES = 64
+    return Model(P, I, S, np.zeros(n_stacks, dtype=np.int64), extra.law)
 
 
 def _cable(stage: Stage, n_i: float, last: Stage, sign: float, config: JointConfig, extra: Extension) -> list[float]:
     """Parameters of one cable, in the order of the layout."""
     row = [0.0] * o.CABLE
     row[o.R_OUT], row[o.R_IN] = stage.output_radius_m, stage.input_radius_m
-    row[o.LENGTH], row[o.EA], row[o.T0] = stage.free_length_m, stage.EA_N, stage.pretension_N
+    row[o.LENGTH], row[o.EA], row[o.T0] = stage.free_length_m + extra.extra_length_m, stage.EA_N, stage.pretension_N
     row[o.MU_OUT], row[o.MU_IN] = stage.mu_output, stage.mu_input
     row[o.W_OUT], row[o.W_IN] = stage.wrap_output_rad, stage.wrap_input_rad
     row[o.SCALE] = n_i * last.output_radius_m / stage.output_radius_m

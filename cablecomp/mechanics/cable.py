@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
-
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import leaf_njit, njit
-from cablecomp.mechanics.profile import ROWS, B, Floats, wrap_commit, wrap_eval
+from cablecomp.mechanics.profile import ROWS, B, Floats, Ints, wrap_commit, wrap_eval
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 
-Ints: TypeAlias = NDArray[np.int64]
 OUT, IN = 0, 1
 
 
 @njit
 def stacks(I: Ints, S: Floats) -> Floats:
-    """The profiles of all wraps as an array [wrap, row, point]; wrap 2c is cable c's output drum, 2c + 1 its input drum."""
-    wraps = 2 * I[o.N_CABLES]
+    """All profiles as an array [stack, row, point]: 2c is cable c's output drum, 2c + 1 its input drum, guides follow."""
+    wraps = I[o.N_STACKS]
     first = I[o.S_PROFILE]
     size = wraps * ROWS * I[o.CAPACITY]
     return S[first : first + size].reshape((wraps, ROWS, I[o.CAPACITY]))
@@ -77,6 +71,18 @@ def cable_eval(
     e_out, a_out, turn = drum_eval(P, I, S, J, L, G, c, 0, tau, v, w_out)
     S[q + o.Q_TENSION] = tension
     dv = dv_dtau(L, 2, tau, v)
+    unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA]
+    if L is not None:
+        if P[p + o.GUIDE] > 0.0:
+            far, a_far, tau_in = guide_split(P, I, S, J, L, G, c, v, x_in, w_in)
+            e_span, a_span = strain_of_tau(L, 2, tau)
+            near_length = 0.5 * P[p + o.LENGTH]
+            total = P[p + o.R_OUT] * e_out + near_length * e_span + far
+            slope = (P[p + o.R_OUT] * a_out + a_far) * dv + near_length * a_span
+            S[q + o.Q_TENSION_IN] = tau_in * t0
+            S[q + o.Q_STRETCH] = total * unit
+            S[q + o.Q_COMPLIANCE] = slope * unit / t0
+            return total * unit, slope * unit / t0, P[p + o.SIGN] * P[p + o.R_OUT] * turn * unit
     e_in, a_in, _ = drum_eval(P, I, S, J, L, G, c, 1, tau, v, w_in)
     e_span, a_span = strain_of_tau(L, 2, tau)
     length = P[p + o.LENGTH]
@@ -87,7 +93,6 @@ def cable_eval(
         S[q + o.Q_PLAY_TRY] = play
         total += length * P[p + o.PLAY_SHARE] * play / t0
         slope += length * P[p + o.PLAY_SHARE] * d_play
-    unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA]
     S[q + o.Q_TENSION_IN] = tension
     S[q + o.Q_STRETCH] = total * unit
     S[q + o.Q_COMPLIANCE] = slope * unit / t0
@@ -114,9 +119,10 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
     if L is not None:
         S[q + o.Q_PLAY] = S[q + o.Q_PLAY_TRY]
         if P[p + o.GUIDE] > 0.0:
-            guide_commit(P, I, S, J, c)
+            guide_commit(I, S, J, G, c)
         if P[p + o.VISCOUS] > 0.0:
-            viscous_commit(P, I, S, c)
+            viscous_commit(I, S, 2 * c)
+            viscous_commit(I, S, 2 * c + 1)
             return
     error = 0.0
     for end in range(2):

@@ -8,9 +8,9 @@ angle; that coupling is weak (strain, about 1e-3), so the angle is updated in th
 from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import Ints, cable_commit, cable_eval
+from cablecomp.mechanics.cable import cable_commit, cable_eval
 from cablecomp.mechanics.jit import leaf_njit, njit
-from cablecomp.mechanics.profile import Floats
+from cablecomp.mechanics.profile import Floats, Ints
 
 
 @leaf_njit

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import Ints, stacks
+from cablecomp.mechanics.cable import stacks
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
 from cablecomp.mechanics.jit import njit
 from cablecomp.mechanics.pointer import call_term
-from cablecomp.mechanics.profile import Floats
+from cablecomp.mechanics.profile import Floats, Ints
 
 
 @njit

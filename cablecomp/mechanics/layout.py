@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 # --- structure I: header, then circuits, then terms
-N_CIRCUITS, N_CABLES, CAPACITY, N_TERMS, ITERATES, S_PROFILE, S_CABLE, S_CONTEXT, S_TERM, S_WET, NODES, HEADER = range(12)
+N_CIRCUITS, N_CABLES, CAPACITY, N_TERMS, N_STACKS, S_PROFILE, S_CABLE, S_CONTEXT, S_TERM, S_WET, NODES, HEADER = range(12)
 #   one circuit: first cable of chain h, cables in a chain, 1 if closed, first cable of chain l
 C_FIRST_H, C_COUNT, C_CLOSED, C_FIRST_L, CIRCUIT = range(5)
 #   one term: address of its compiled function, offset of its parameters in P, offset of its state in S
@@ -24,11 +24,13 @@ J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
 
 # --- state S: profiles [2 cables, 5, capacity], cables [.., CABLE_STATE], context, term states
 #   one cable: tension at output and input end, stretch, its derivative, shaft angle at its output, play, play trial,
-#   material passed over the guide and trial, pretension and stiffness factors, length offset, error bound of the stretch
+#   pretension and stiffness factors, length offset, error bound of the stretch, warm start and reference of the solver;
+#   with a guide: stretch of the input side, end values of the guide, input shaft, and the same pending
 (
-    Q_TENSION, Q_TENSION_IN, Q_STRETCH, Q_COMPLIANCE, Q_SHAFT, Q_PLAY, Q_PLAY_TRY, Q_PASSED, Q_PASSED_TRY,
-    Q_T0, Q_EA, Q_OFFSET, Q_ERROR, Q_KEPT, Q_REFERENCE, CABLE_STATE,
-) = range(16)  # fmt: skip
+    Q_TENSION, Q_TENSION_IN, Q_STRETCH, Q_COMPLIANCE, Q_SHAFT, Q_PLAY, Q_PLAY_TRY,
+    Q_T0, Q_EA, Q_OFFSET, Q_ERROR, Q_KEPT, Q_REFERENCE, Q_SIDE, Q_GUIDE_END, Q_GUIDE_FAR, Q_SHAFT_IN,
+    Q_SIDE_TRY, Q_GUIDE_TRY, Q_SHAFT_IN_TRY, CABLE_STATE,
+) = range(21)  # fmt: skip
 
 #   one wrap's pending step in the context: last point kept, meeting point (y, v, C, B, exp v), wrap angle,
 #   end value and its exp

@@ -27,6 +27,7 @@ from cablecomp.mechanics.jit import leaf_njit, njit
 from cablecomp.mechanics.tables import between, groove, strain
 
 Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
 Meet: TypeAlias = tuple[float, float, int, float, float, float, float, float]
 
 Y, V, C, D, B, E = 0, 1, 2, 3, 4, 5
@@ -126,7 +127,9 @@ def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float
     if k < 0:  # the whole wrap slips, down to the termination
         ym = 0.0
     else:
-        ym = between(L, law, G[i, Y, k], y_upper, over / (over - over_upper))
+        # both differences vanish together where the new end lies on the old profile to the last bit
+        share = over / (over - over_upper) if over != over_upper else 1.0
+        ym = between(L, law, G[i, Y, k], y_upper, share)
     vm = v - steep * (sw - groove(L, law, ym))
     tm = math.exp(vm)
     cm = bm = 0.0

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import Ints, law_of, stacks
+from cablecomp.mechanics.cable import law_of, stacks
+from cablecomp.mechanics.arc import arc_fill
 from cablecomp.mechanics.jit import njit
-from cablecomp.mechanics.profile import Floats, wrap_fill
+from cablecomp.mechanics.profile import Floats, Ints, wrap_fill
 from cablecomp.mechanics.tables import v_of_tau
+from cablecomp.mechanics.viscous import viscous_fill
+
+VISCOUS_TRAVEL = 4.0  # rotation [rad] beyond position zero that the viscous grid covers
 
 
 @njit
@@ -42,6 +46,13 @@ def joint_start(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, 
                     law = law_of(P, p, end)
                     v = v_of_tau(L, law, 1.0)
                     J[2 * c + end] = wrap_fill(G, L, law, 2 * c + end, max(w, 1e-3), v, -slope * mu)
+                    if I[o.NODES] > 0:
+                        reach = P[p + o.W_OUT + end] + VISCOUS_TRAVEL
+                        viscous_fill(I, S, 2 * c + end, max(w, 1e-3), max(reach, w + 1.0))
+                if I[o.N_STACKS] > 2 * I[o.N_CABLES]:
+                    arc = 2 * I[o.N_CABLES] + c
+                    J[arc] = arc_fill(G, arc, P[p + o.GUIDE], 0.0)
+                S[q + o.Q_SHAFT_IN] = shaft
                 S[q + o.Q_SHAFT] = after
                 S[q + o.Q_T0] = 1.0
                 S[q + o.Q_EA] = 1.0

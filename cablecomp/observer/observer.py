@@ -160,6 +160,18 @@ class Observer:
             raise InputError(f"{path}: cannot be read ({error.strerror}); give a snapshot file") from None
         self.restore(data)
 
+    def vector(self) -> Floats:
+        """The state as one vector of floats, bounds left out; `set_vector` takes it up (for solvers that own the state)."""
+        return np.concatenate([self._S, self._J.astype(np.float64), self._F, [self._last_time]])
+
+    def set_vector(self, vector: Floats) -> None:
+        """Take up a state given by `vector` of an observer of the same configuration."""
+        s, j = len(self._S), len(self._J)
+        self._S[:] = vector[:s]
+        self._J[:] = vector[s : s + j]
+        self._F[:] = vector[s + j : s + j + len(self._F)]
+        self._last_time = float(vector[-1])
+
     def copy(self) -> Observer:
         """An independent observer in the same state."""
         twin = Observer(self.config, bounds=self._bounds is not None)
@@ -200,9 +212,9 @@ class Observer:
     def profiles(self) -> list[WrapProfile]:
         """The tension profile on every wrap, termination first."""
         I, P = self.model.I, self.model.P
-        wraps = 2 * int(I[o.N_CABLES])
+        wraps, stacks = 2 * int(I[o.N_CABLES]), int(I[o.N_STACKS])
         first = int(I[o.S_PROFILE])
-        G = self._S[first : first + wraps * ROWS * int(I[o.CAPACITY])].reshape(wraps, ROWS, -1)
+        G = self._S[first : first + stacks * ROWS * int(I[o.CAPACITY])].reshape(stacks, ROWS, -1)
         result = []
         for wrap in range(wraps):
             p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * (wrap // 2)

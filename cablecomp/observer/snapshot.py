@@ -11,8 +11,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import Ints
-from cablecomp.mechanics.profile import ROWS, Floats
+from cablecomp.mechanics.profile import ROWS, Floats, Ints
 
 MAGIC = b"CABLECMP"
 VERSION = 1

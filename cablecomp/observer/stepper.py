@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import Ints, stacks
+from cablecomp.mechanics.cable import stacks
 from cablecomp.mechanics.jit import njit
 from cablecomp.mechanics.joint import advance, joint_commit, joint_solve
-from cablecomp.mechanics.profile import Floats
+from cablecomp.mechanics.profile import Floats, Ints
 
 # options F: [torque gain, torque offset, filter angular frequency, 0]; filter state follows: two one-poles each for angle and load
 GAIN, OFFSET, CUTOFF, STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, OPTIONS = range(9)

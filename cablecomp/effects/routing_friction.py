@@ -1,0 +1,42 @@
+"""Routing friction: the cable slides over fixed guides, idlers or through a sheath between the pulleys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter
+
+FRICTIONLESS = 1e-5  # below, a guide is nothing but more free cable
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    angle, arc = max(values["mu_angle"], 0.0), max(values["arc_length_m"], 0.0)
+    if angle < FRICTIONLESS:
+        return Change(extra_length_m=arc)
+    return Change(guide_angle=angle, guide_length_m=arc)
+
+
+EFFECT = Effect(
+    id="routing_friction",
+    statement="The cable rubs on fixed guides, idlers or a sheath between the pulleys; tension is lost over the bends in "
+    "the direction of sliding, and motion is lost at each reversal until all of the path slides the other way.",
+    equation="ln(T_out/T_in) = -+ mu Theta while sliding; in between the guide's tension profile sticks, clamped from both ends",
+    source="capstan law (Euler-Eytelwein); Kaneko et al. 1991; profile law of a doubly free arc",
+    parameters=(
+        Parameter("mu_angle", "-", 0.0, 0.0, 5.0, "friction coefficient times total bend angle of the path"),
+        Parameter(
+            "arc_length_m",
+            "m",
+            0.0,
+            0.0,
+            4.0,
+            "length of cable lying on guides or in the sheath",
+            shape=True,
+            scale=lambda config: config.drive.stage[-1].free_length_m,
+        ),
+    ),
+    acts_through=("reversal", "load_direction", "velocity", "load"),
+    bounded=False,
+    change=_change,
+)
