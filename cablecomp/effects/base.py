@@ -3,7 +3,8 @@
 An effect says in plain words what it is, names its parameters, and gives a `Change` to the drive. Most are a
 compiled *term*, a small function that reads the context of the solve (angles, load, tensions, time,
 temperature, other channels) and adds to it (moment taken from the load path, cable length, pretension and
-stiffness factors, encoder reading). A few change the law of friction or the cable path itself. The kernel only sums them.
+stiffness factors, encoder reading). A few change the law of friction or the cable path itself. The kernel
+only sums them.
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ TermFunction = Callable[[Any, Any, Any], None]
 class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
 
-    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a
-    scale is given; `shape` marks parameters that say how, not how much (a phase, a time constant, an
-    instant). `minimum`..`maximum`, in the parameter's unit, is what the law can take; beyond, a configuration is
-    refused.
+    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where
+    a scale is given; `shape` marks parameters that say how, not how much (a phase, a time constant, an
+    instant). `minimum`..`maximum`, in the parameter's unit, is what the law can take; beyond it a
+    configuration is refused.
     """
 
     name: str
@@ -106,7 +107,7 @@ class Change:
     tension_factor: Callable[[Floats], Floats] | None = None
     """mu/mu0 as a function of tau = T/T0, vectorised."""
     joint_angle_factor: Callable[[Floats], Floats] | None = None
-    """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs from that place."""
+    """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs there."""
     stiffening: float = 0.0
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
@@ -122,8 +123,9 @@ class Effect:
     """Physics beyond the thesis's drive, as one term of the joint model.
 
     `id` is its public name; `statement` says in plain words what happens; `equation` and `source` give the
-    law; `acts_through` are the covariates in which its mismatch shows, best first (`other` stands for the channel
-    it reads); `bounded` is true where it preserves the order of profiles: guaranteed bounds stay guaranteed.
+    law; `acts_through` are the covariates in which its mismatch shows, best first (`other` stands for the
+    channel it reads); `bounded` is true where it preserves the order of profiles: guaranteed bounds stay
+    guaranteed.
     """
 
     id: str

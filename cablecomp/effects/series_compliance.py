@@ -1,4 +1,4 @@
-"""Series compliance: torque sensor, coupling and mount give way in proportion to the load (thesis App. A.3)."""
+"""Series compliance: torque sensor, coupling and mount give way in proportion to the load."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term, zero_load_compliance
-from cablecomp.mechanics.layout import X_LOAD, X_READING
+from cablecomp.mechanics.layout import X_LOAD, X_MOMENT, X_READING
 
 
 @term(parameters=1)
 def _compliance(c: Any, p: Any, s: Any) -> None:
-    c[X_READING] += p[0] * c[X_LOAD]
+    c[X_READING] += p[0] * (c[X_LOAD] - c[X_MOMENT])
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -21,15 +21,23 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 EFFECT = Effect(
     id="series_compliance",
-    statement="Something in series with the joint (torque sensor, coupling, mount) yields in proportion to the load.",
-    equation="q_out = q_drive + c_s M",
+    statement="Something in series with the joint (torque sensor, coupling, mount) yields in proportion to "
+    "the load.",
+    equation="q_out = q_drive + c_s M, M the moment in the load path",
     source="Snow 1993, App. A.3",
     parameters=(
         Parameter(
-            "compliance_rad_per_Nm", "rad/(N m)", 0.0, 0.0, 100.0, "added compliance", scale=zero_load_compliance
+            "compliance_rad_per_Nm",
+            "rad/(N m)",
+            0.0,
+            0.0,
+            100.0,
+            "added compliance",
+            scale=zero_load_compliance,
         ),
     ),
     acts_through=("load",),
     bounded=True,
     change=_change,
+    rank=5,
 )

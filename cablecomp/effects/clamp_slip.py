@@ -1,0 +1,53 @@
+"""Clamp slip: a termination or clamp of cable h gives way once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, term, wrap_deflection
+from cablecomp.mechanics.layout import X_LENGTH_H, X_TIME
+
+
+@term(parameters=2)
+def _slip(c: Any, p: Any, s: Any) -> None:
+    """p: length let go [m], instant [s]."""
+    if c[X_TIME] >= p[1]:
+        c[X_LENGTH_H] -= p[0]
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(terms=_slip(values["slip_m"], values["time_s"]))
+
+
+def _loop_arc(config: JointConfig) -> float:
+    """Arc on the output drum that its unit of deflection makes [m]."""
+    return drum_radius(config) * wrap_deflection(config)
+
+
+EFFECT = Effect(
+    id="clamp_slip",
+    statement="A clamp or termination of cable h slipped once: the joint stands off from then on, and the "
+    "pretension is lower.",
+    equation="length of cable h + s for t >= t*",
+    source="kinematics; in a closed circuit the joint moves by about s/(2R), and both tensions fall",
+    parameters=(
+        Parameter(
+            "slip_m",
+            "m",
+            0.0,
+            1e-4,
+            1.0,
+            "s, length let go",
+            log=True,
+            scale=_loop_arc,
+            minimum=0.0,
+            maximum=0.1,
+        ),
+        Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", shape=True),
+    ),
+    acts_through=("time",),
+    bounded=True,
+    change=_change,
+)

@@ -1,0 +1,65 @@
+"""Pretension relaxation: cable and terminations creep, the pretension falls with the logarithm of time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.mechanics.layout import X_COMMIT, X_FIRST, X_PRETENSION_H, X_PRETENSION_L, X_TIME
+
+LEAST = 0.05  # share of T0 below which the law is not followed further
+
+
+@term(parameters=2, state=1)
+def _relax(c: Any, p: Any, s: Any) -> None:
+    """p: fraction, time constant [s]; s: time of the first sample [s]."""
+    start = c[X_TIME] if c[X_FIRST] != 0.0 else s[0]
+    factor = max(1.0 - p[0] * math.log1p((c[X_TIME] - start) / p[1]), LEAST)
+    c[X_PRETENSION_H] *= factor
+    c[X_PRETENSION_L] *= factor
+    if c[X_COMMIT] != 0.0:
+        s[0] = start
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(terms=_relax(values["fraction"], values["time_constant_s"]))
+
+
+EFFECT = Effect(
+    id="pretension_relaxation",
+    statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
+    "more slowly.",
+    equation="T0(t) = T0 (1 - a ln(1 + t/t_c)), t since the recording's first sample",
+    source="logarithmic stress relaxation of steel wire and polymers at constant length: W. N. Findley, J. "
+    "S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
+    parameters=(
+        Parameter(
+            "fraction",
+            "-",
+            0.0,
+            1e-4,
+            0.2,
+            "a, loss per factor e of time",
+            log=True,
+            minimum=-0.5,
+            maximum=0.5,
+        ),
+        Parameter(
+            "time_constant_s",
+            "s",
+            0.0,
+            0.1,
+            1000.0,
+            "t_c, when the fall sets in",
+            log=True,
+            shape=True,
+            minimum=1e-6,
+        ),
+    ),
+    acts_through=("time",),
+    bounded=True,
+    change=_change,
+)

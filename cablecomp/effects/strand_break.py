@@ -1,0 +1,48 @@
+"""Strand break: wires of cable h break at an instant, and it is softer from then on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.mechanics.layout import X_STIFFNESS_H, X_TIME
+
+
+@term(parameters=2)
+def _break(c: Any, p: Any, s: Any) -> None:
+    """p: share of EA lost, instant [s]."""
+    if c[X_TIME] >= p[1]:
+        c[X_STIFFNESS_H] *= 1.0 - p[0]
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(terms=_break(values["fraction"], values["time_s"]))
+
+
+EFFECT = Effect(
+    id="strand_break",
+    statement="Wires of cable h broke: from one instant on it is softer, and at the same stretch it pulls "
+    "less.",
+    equation="EA_h -> EA_h (1 - f) for t >= t*, stretch unchanged",
+    source="EA is modulus times metallic area; a broken wire carries nothing (G. A. Costello, Theory of "
+    "Wire Rope, 1990)",
+    parameters=(
+        Parameter(
+            "fraction",
+            "-",
+            0.0,
+            1e-3,
+            0.9,
+            "f, share of the cross-section lost",
+            log=True,
+            minimum=0.0,
+            maximum=0.95,
+        ),
+        Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", shape=True),
+    ),
+    acts_through=("time", "load"),
+    bounded=True,
+    change=_change,
+)

@@ -1,0 +1,51 @@
+"""Strand friction: the wires of the cable rub against each other; its free span shows a loop of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, pretension
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(play_share=values["fraction"], play_yield_N=values["yield_N"])
+
+
+EFFECT = Effect(
+    id="strand_friction",
+    statement="Wires rub inside the cable: part of its stretch follows the tension only after a change has "
+    "overcome their grip.",
+    equation="free span's stretch = L/EA (T - T0 + s P_y[T - T0]), P_y the play operator of radius y",
+    source="bending and axial hysteresis of spiral strands by interwire friction: K. O. Papailiou, On the "
+    "bending stiffness of transmission line conductors, IEEE Trans. Power Delivery 12 (1997); play "
+    "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989",
+    parameters=(
+        Parameter(
+            "fraction",
+            "-",
+            0.0,
+            1e-3,
+            10.0,
+            "s, stretch behind the play over the elastic one",
+            log=True,
+            minimum=0.0,
+            maximum=100.0,
+        ),
+        Parameter(
+            "yield_N",
+            "N",
+            0.0,
+            0.01,
+            1.0,
+            "y, change of tension that the grip holds",
+            log=True,
+            shape=True,
+            scale=pretension,
+            minimum=1e-9,
+        ),
+    ),
+    acts_through=("load_direction", "reversal", "load"),
+    bounded=False,
+    change=_change,
+)

@@ -1,0 +1,61 @@
+"""Thermal pretension: cable and frame expand differently, so that the pretension follows the temperature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, cable_strain, term
+from cablecomp.mechanics.layout import X_PRETENSION_H, X_PRETENSION_L, X_TEMPERATURE
+
+LEAST = 0.05  # share of T0 below which the law is not followed further
+
+
+@term(parameters=2)
+def _expand(c: Any, p: Any, s: Any) -> None:
+    """p: coefficient [1/K], reference [degC]; without a temperature nothing is changed."""
+    warm = c[X_TEMPERATURE]
+    if not math.isnan(warm):
+        factor = max(1.0 + p[0] * (warm - p[1]), LEAST)
+        c[X_PRETENSION_H] *= factor
+        c[X_PRETENSION_L] *= factor
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(terms=_expand(values["coefficient_per_K"], values["reference_degC"]))
+
+
+def _per_strain(config: JointConfig) -> float:
+    """EA/T0 [-]: share of the pretension per unit of strain that cable and frame differ by."""
+    return 1.0 / cable_strain(config)
+
+
+EFFECT = Effect(
+    id="thermal_pretension",
+    statement="Cable and frame expand differently with temperature, and the pretension rises or falls with "
+    "it.",
+    equation="T0(ϑ) = T0 (1 + k (ϑ - ϑ_ref)), with k = (α_frame - α_cable) EA/T0 for a stiff frame",
+    source="thermal strain of a member held at constant length: S. Timoshenko, Strength of Materials, part "
+    "I, 1930",
+    parameters=(
+        Parameter(
+            "coefficient_per_K",
+            "1/K",
+            0.0,
+            -5e-5,
+            5e-5,
+            "k; the range is that of expansion coefficients times EA/T0",
+            scale=_per_strain,
+            minimum=-1.0,
+            maximum=1.0,
+        ),
+        Parameter(
+            "reference_degC", "degC", 0.0, 0.0, 40.0, "temperature at which T0 is the nominal one", shape=True
+        ),
+    ),
+    acts_through=("temperature", "time"),
+    bounded=True,
+    change=_change,
+)
