@@ -9,6 +9,8 @@ Coulomb friction acts, such as viscous slip.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,7 +32,29 @@ from cablecomp.mechanics.closed_forms_stage import total_ratio
 from cablecomp.mechanics.design import check_settled
 from cablecomp.mechanics.geometry import sensor_deflection_rad
 
-__all__ = ["BenchRecording", "BenchResult", "Measured", "evaluate_bench"]
+__all__ = ["BenchRecording", "BenchResult", "Measured", "bench_recording", "evaluate_bench"]
+
+
+def bench_recording(columns: Mapping[str, Array], config: JointConfig) -> BenchRecording:
+    """Return what the bench evaluation needs out of a recording's canonical channels.
+
+    Deflection = joint_position_rad - prod(r/R) motor_position_rad; without a motor channel the input pulley
+    counts as held still. Raises InputError that names a missing channel, and as `BenchRecording`.
+    """
+    for name in ("time_s", "joint_torque_Nm", "joint_position_rad"):
+        if name not in columns:
+            there = ", ".join(columns) or "no channel"
+            raise InputError(
+                f"recording has no channel {name}, which a bench evaluation needs; there is {there}"
+            )
+    deflection = np.asarray(columns["joint_position_rad"], dtype=float)
+    if "motor_position_rad" in columns:
+        deflection = deflection - total_ratio(config.drive) * np.asarray(columns["motor_position_rad"])
+    return BenchRecording(
+        np.asarray(columns["time_s"], dtype=float),
+        np.asarray(columns["joint_torque_Nm"], dtype=float),
+        deflection,
+    )
 
 
 def evaluate_bench(
@@ -53,10 +77,23 @@ def evaluate_bench(
     data = _prepare(recording, config, sensor_stiffness_Nm_per_rad)
     bench = DriveOnBench(config.drive, narrow_tensions)
     loading = branch_of("loading", data.loading, data, bench, config, None)
-    unloading = (
-        branch_of("unloading", data.unloading, data, bench, config, data.peak) if data.unloading else None
-    )
+    unloading = None
+    if data.unloading:
+        found = branch_of("unloading", data.unloading, data, bench, config, data.peak)
+        unloading = _after_unsettled(found, loading)
     return _result(config, data, loading, unloading)
+
+
+def _after_unsettled(unloading: Branch, loading: Branch) -> Branch:
+    """Unloading from a peak that had not settled is no surer than that peak."""
+    if unloading.true is None or not loading.points:
+        return unloading
+    peak = loading.points[-1]
+    if peak.settled or peak.mu_eff is None:
+        return unloading
+    share = peak.mu_eff.sd / peak.mu_eff.value
+    true = unloading.true
+    return replace(unloading, true=Measured(true.value, math.hypot(true.sd, share * true.value)))
 
 
 def _prepare(recording: BenchRecording, config: JointConfig, sensor_stiffness: float) -> BenchData:
