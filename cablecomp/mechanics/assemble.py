@@ -124,6 +124,7 @@ def _cable(stage: Stage, n_i: float, last: Stage, sign: float, config: JointConf
     row[o.GUIDE], row[o.GUIDE_LENGTH] = extra.guide_angle, extra.guide_length_m
     row[o.PLAY_SHARE], row[o.PLAY_YIELD] = extra.play_share, extra.play_yield_N
     row[o.VISCOUS] = extra.viscous_Ns_per_m_rad
+    row[o.JOINT_DRUM] = float(stage is config.drive.stage[-1])
     row[o.MERGE] = config.observer.merge_tolerance
     return row
 

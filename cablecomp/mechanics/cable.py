@@ -23,8 +23,8 @@ def stacks(I: Ints, S: Floats) -> Floats:
 
 @leaf_njit
 def law_of(P: Floats, p: int, end: int) -> int:
-    """Which law table a wrap uses: 0, 1 = output drum of chain h, l; 2 = everything else."""
-    if end == 1:
+    """Which law table a wrap uses: 0, 1 = the joint's own drum in chain h, l; 2 = everything else."""
+    if end == 1 or P[p + o.JOINT_DRUM] == 0.0:
         return 2
     return 0 if P[p + o.SIGN] > 0.0 else 1
 
@@ -112,8 +112,11 @@ def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
 
 
 @njit
-def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, end_error: float) -> None:
-    """Make the last evaluation of cable c its state; `end_error` bounds the relative error of its tension."""
+def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int) -> None:
+    """Make the last evaluation of cable c its state, and renew the bound on what merging has done to its stretch.
+
+    In a closed circuit an error of the stretch moves the tensions against it, so the errors of later cable do not add to it.
+    """
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     q = I[o.S_CABLE] + o.CABLE_STATE * c
     if L is not None:
@@ -133,7 +136,7 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
             S[m + o.M_E],
         )  # fmt: skip
         w, v, tau = S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU]
-        J[wrap] = wrap_commit(G, L, law_of(P, p, end), wrap, J[wrap], meet, w, v, tau, end_error, P[p + o.MERGE])
+        J[wrap] = wrap_commit(G, L, law_of(P, p, end), wrap, J[wrap], meet, w, v, tau, P[p + o.MERGE])
         error += P[p + (o.R_OUT if end == 0 else o.R_IN)] * G[wrap, B, J[wrap] - 1]
     S[q + o.Q_ERROR] = error * P[p + o.T0] / P[p + o.EA]
 

@@ -59,7 +59,7 @@ def circuit_solve(
         return x, 0.0, o.STATUS_UNWOUND
     if closed == 0:
         q = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
-        tension = S[q + o.Q_REFERENCE] + pull
+        tension = S[q + o.Q_REFERENCE] * S[q + o.Q_T0] + pull
         if tension <= floor:
             return x, 0.0, o.STATUS_SLACK
         for _ in range(60):
@@ -100,8 +100,11 @@ def circuit_solve(
         tension += step
         if tension < lowest:
             tension = lowest
-        elif iteration > 12 and abs(step) > 1e-9 * unit and not low < tension < high:
-            tension = 0.5 * (low + high)
+        elif iteration > 8 and high < 1e299:
+            if high - low <= 1e-11 * unit:
+                return x, a_h * a_l / (a_h + a_l) / radius, o.STATUS_OK
+            if not low < tension < high:
+                tension = 0.5 * (low + high)
     return x, a_h * a_l / (a_h + a_l) / radius, o.STATUS_DIVERGED
 
 
@@ -124,31 +127,24 @@ def unwound_ok(
 
 @njit
 def circuit_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, ic: int) -> None:
-    """Make the last solution of circuit `ic` its state, with the error of earlier merging carried into the new end values."""
+    """Make the last solution of circuit `ic` its state."""
     h = o.HEADER + o.CIRCUIT * ic
     first_h, count, closed, first_l = I[h], I[h + o.C_COUNT], I[h + o.C_CLOSED], I[h + o.C_FIRST_L]
-    last_h = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
-    error_h = error_l = 0.0
     if closed == 1:
-        last_l = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
-        theta_error = 0.0
-        a_h = a_l = 0.0
-        for jj in range(count):
-            ph = o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first_h + jj)
-            qh = I[o.S_CABLE] + o.CABLE_STATE * (first_h + jj)
-            qc = I[o.S_CABLE] + o.CABLE_STATE * (first_l + jj)
-            theta_error += P[ph + o.WEIGHT] * (S[qh + o.Q_ERROR] + S[qc + o.Q_ERROR])
-            a_h += P[ph + o.WEIGHT] * P[ph + o.SCALE] * S[qh + o.Q_COMPLIANCE]
-            a_l += P[ph + o.WEIGHT] * P[ph + o.SCALE] * S[qc + o.Q_COMPLIANCE]
-        tension_error = theta_error / (a_h + a_l)
-        error_h = tension_error / S[last_h + o.Q_TENSION]
-        error_l = tension_error / S[last_l + o.Q_TENSION]
         # warm start of the next solution: T_l moves against M by h's share of the compliance
+        a_h = a_l = 0.0
+        for j in range(count):
+            p = o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first_h + j)
+            gain = P[p + o.WEIGHT] * P[p + o.SCALE]
+            a_h += gain * S[I[o.S_CABLE] + o.CABLE_STATE * (first_h + j) + o.Q_COMPLIANCE]
+            a_l += gain * S[I[o.S_CABLE] + o.CABLE_STATE * (first_l + j) + o.Q_COMPLIANCE]
+        last_h = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
+        last_l = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
         share = a_h / (a_h + a_l)
         pull = S[last_h + o.Q_TENSION] - S[last_l + o.Q_TENSION]
         S[last_l + o.Q_KEPT] = S[last_l + o.Q_TENSION] + share * pull
         S[last_l + o.Q_REFERENCE] = share
-        for jj in range(count):
-            cable_commit(P, I, S, J, L, G, first_l + jj, error_l)
-    for jj in range(count):
-        cable_commit(P, I, S, J, L, G, first_h + jj, error_h)
+    for j in range(count):
+        cable_commit(P, I, S, J, L, G, first_h + j)
+        if closed == 1:
+            cable_commit(P, I, S, J, L, G, first_l + j)

@@ -27,7 +27,7 @@ def run_terms(P: Floats, I: Ints, S: Floats) -> None:
 
 @njit
 def _distribute(I: Ints, S: Floats) -> None:
-    """Hand the terms' factors and lengths to the cables of the output circuit (lengths) and of all circuits (factors)."""
+    """Hand the terms' pretension factors to all cables, their lengths and stiffness factors to those at the joint."""
     x = I[o.S_CONTEXT]
     last = I[o.N_CIRCUITS] - 1
     for ic in range(last + 1):
@@ -38,8 +38,8 @@ def _distribute(I: Ints, S: Floats) -> None:
             for j in range(count):
                 q = I[o.S_CABLE] + o.CABLE_STATE * (first + j)
                 S[q + o.Q_T0] = S[x + o.X_PRETENSION_H + chain]
-                S[q + o.Q_EA] = S[x + o.X_STIFFNESS_H + chain]
                 if ic == last and j == count - 1:
+                    S[q + o.Q_EA] = S[x + o.X_STIFFNESS_H + chain]
                     S[q + o.Q_OFFSET] = S[x + o.X_LENGTH_H + chain]
 
 
@@ -85,6 +85,9 @@ def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) ->
         moment = load - S[x + o.X_MOMENT]
         for _ in range(60):
             _distribute(I, S)
+            before_slope, before_h, before_l = (
+                S[x + o.X_MOMENT_SLOPE], S[x + o.X_LENGTH_H], S[x + o.X_LENGTH_L]
+            )  # fmt: skip
             joint, compliance, status = _solve_all(P, I, S, J, L, G, moment)
             if status != o.STATUS_OK:
                 break
@@ -95,7 +98,9 @@ def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) ->
             run_terms(P, I, S)
             excess = moment - (load - S[x + o.X_MOMENT])
             scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15
-            if abs(excess) <= scale and moved <= 1e-12:
+            # settled, or nothing that the solve depends on has followed the angle
+            same = S[x + o.X_LENGTH_H] == before_h and S[x + o.X_LENGTH_L] == before_l
+            if abs(excess) <= scale and (moved <= 1e-12 or (same and before_slope == 0.0)):
                 break
             if excess > 0.0:
                 high = min(high, moment)

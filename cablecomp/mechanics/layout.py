@@ -19,8 +19,8 @@ J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
 #   one cable
 (
     R_OUT, R_IN, LENGTH, EA, T0, MU_OUT, MU_IN, W_OUT, W_IN, SCALE, WEIGHT, SIGN, RATIO, RADIUS,
-    GUIDE, GUIDE_LENGTH, PLAY_SHARE, PLAY_YIELD, VISCOUS, MERGE, CABLE,
-) = range(21)  # fmt: skip
+    GUIDE, GUIDE_LENGTH, PLAY_SHARE, PLAY_YIELD, VISCOUS, MERGE, JOINT_DRUM, CABLE,
+) = range(22)  # fmt: skip
 
 # --- state S: profiles [2 cables, 5, capacity], cables [.., CABLE_STATE], context, term states
 #   one cable: tension at output and input end, stretch, its derivative, shaft angle at its output, play, play trial,

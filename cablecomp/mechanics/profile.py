@@ -153,12 +153,12 @@ def _running(
 
 @njit
 def wrap_commit(
-    G: Floats, L: Floats, law: int, i: int, n: int, meet: Meet, w: float, v: float, tau: float, slack_v: float, tolerance: float
+    G: Floats, L: Floats, law: int, i: int, n: int, meet: Meet, w: float, v: float, tau: float, tolerance: float
 ) -> int:  # fmt: skip
     """Make an evaluated step the state; returns the new number of points.
 
-    `slack_v` bounds the error of the end value v (from earlier merging, through the solved tensions); `tolerance` bounds
-    the error of v that merging of neighbours may leave in a piece. The stack never outgrows its array.
+    `tolerance` bounds the error of v that merging of neighbours may leave in a piece; a merged piece's integral is that
+    of the straight piece, so that the stretch stays a continuous function of the tension. The stack never outgrows its array.
     """
     total, _, k, ym, vm, cm, bm, tm = meet
     below = G[i, D, k + 1] if 0 <= k < n - 1 else 0.0
@@ -171,15 +171,16 @@ def wrap_commit(
         kept = False
     last = n - 1
     if w > G[i, Y, last]:
-        error = slack_v
+        error = 0.0
         if kept and last >= 1:
-            merged = max(error, G[i, D, last]) + _merge_error(G, L, law, i, n, w, v)
+            merged = G[i, D, last] + _merge_error(G, L, law, i, n, w, v)
             if merged <= tolerance:
                 error = merged
                 last -= 1
+                straight, _ = piece(L, law, G[i, Y, last], G[i, V, last], G[i, E, last], w, v, tau)
+                total = G[i, C, last] + straight
         n = last + 2
         G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1] = w, v, error
-        # `total` is the integral up to the end, whichever points were dropped
         G[i, C, n - 1], G[i, E, n - 1] = total, tau
         G[i, B, n - 1] = G[i, B, last] + error * (total - G[i, C, last] + w - G[i, Y, last])
     if n >= G.shape[2] - 3:
@@ -202,7 +203,7 @@ def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
 
     A chord of a mu-Lipschitz profile is mu-Lipschitz, so the friction bound survives.
     """
-    costs = np.empty(n)
+    made = np.zeros(n)  # error made here, by the piece below each point; the limit is on this alone
     limit = 1e-12
     while n > G.shape[2] // 2:
         m = 1
@@ -212,14 +213,14 @@ def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
             y2, v2 = G[i, Y, k + 1], G[i, V, k + 1]
             s0 = groove(L, law, y0)
             off = abs(v0 + (groove(L, law, y1) - s0) / (groove(L, law, y2) - s0) * (v2 - v0) - v1)
-            error = max(G[i, D, k], G[i, D, k + 1]) + off
-            costs[k] = error
+            error = max(made[k], made[k + 1]) + off
             if error <= limit:
-                G[i, D, k + 1] = error
+                made[k + 1] = error
+                G[i, D, k + 1] = max(G[i, D, k], G[i, D, k + 1]) + off
             else:
-                G[i, Y, m], G[i, V, m], G[i, D, m] = y1, v1, G[i, D, k]
+                G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = y1, v1, G[i, D, k], made[k]
                 m += 1
-        G[i, Y, m], G[i, V, m], G[i, D, m] = G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1]
+        G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1], made[n - 1]
         n = m + 1
         limit *= 4.0
     accumulate(G, L, law, i, n)

@@ -21,7 +21,7 @@ from cablecomp.mechanics.jit import leaf_njit, njit
 Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
-U_LOW, U_HIGH = -14.0, 6.0
+U_LOW, U_HIGH = -7.0, 2.5
 STIFFENING = 10  # place in the head of b in EA(T) = EA (1 + b (tau - 1))
 
 
