@@ -1,0 +1,304 @@
+"""Where a residual is more than noise: over time and over the covariates, with honest p-values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from cablecomp.diagnosis.crossfit import BlockSums, block_sums, coefficients, gains
+from cablecomp.diagnosis.segments import segment
+from cablecomp.diagnosis.series import Series, blocks_of, thin
+from cablecomp.diagnosis.views import View, load_path, views
+from cablecomp.identification.smoothing import FloatArray, IntArray
+
+_ENERGY_SHARE: Final = 0.8
+_TIE: Final = 0.05
+_MOST_INTERVALS: Final = 40
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """One covariate's part in the mismatch, as in `diagnosis.json`.
+
+    `share` of the energy beyond noise that the covariate accounts for in blocks not used for fitting;
+    `low`, `high`: the range of the covariate that holds four fifths of that; `intervals_s`: when; `p_value`
+    against autocorrelated noise, corrected for all covariates asked; `how`: in plain words, how the
+    residual follows it; `share_sd`: sd of the share between blocks.
+    """
+
+    covariate: str
+    share: float
+    low: float
+    high: float
+    intervals_s: tuple[tuple[float, float], ...]
+    p_value: float
+    how: str
+    share_sd: float
+
+    def entry(self) -> dict[str, Any]:
+        """Return the entry of `diagnosis.json`."""
+        return {
+            "covariate": self.covariate,
+            "share": self.share,
+            "range": [self.low, self.high],
+            "intervals_s": [list(interval) for interval in self.intervals_s],
+            "p_value": self.p_value,
+            "how": self.how,
+        }
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the mismatch is.
+
+    `mismatch`: all covariates, ranked; `excess_rms`: RMS of the residual beyond its noise in rad (0 if
+    none); `energy_ratio`: mean of (residual/sigma)^2, 1 for pure noise; `changes_s`: instants at which the
+    residual's dependence on the load path changes.
+    """
+
+    mismatch: tuple[Mismatch, ...]
+    excess_rms: float
+    energy_ratio: float
+    changes_s: tuple[float, ...]
+
+    def significant(self, level: float = 0.05) -> tuple[Mismatch, ...]:
+        """Return the covariates whose corrected p-value is below `level`."""
+        return tuple(entry for entry in self.mismatch if entry.p_value < level)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    view: View
+    sums: BlockSums
+    share: float
+    per_block: FloatArray
+    score: float
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """Thinned series, blocks and weights, and what every fit contains beside the view."""
+
+    series: Series
+    block: IntArray
+    weight: FloatArray
+    nuisance: FloatArray
+    excess: float
+
+
+@dataclass(frozen=True)
+class _Base:
+    gain: FloatArray
+    null: FloatArray
+
+
+def locate(
+    series: Series,
+    rng: np.random.Generator,
+    nuisance: FloatArray | None = None,
+    surrogates: int = 999,
+) -> Location:
+    """Rank the covariates by the share of the mismatch that they account for.
+
+    Each covariate is asked in a few ways (views); a view's share is the energy that its fit on the other
+    blocks removes from a block, over the energy beyond noise. Surrogates flip the sign of whole blocks,
+    longer than the residual remembers: noise cannot tell, a dependence is destroyed. p-values compare with
+    the largest score over all views of each surrogate. `nuisance` (n x p): sensitivities of the prediction
+    to the calibration parameters; what they can explain is not counted, for the covariate or against it.
+    Near ties go to the covariate that leaves less to the other.
+    """
+    ground = _ground(series, nuisance)
+    plain = _sums(ground, ground.nuisance)
+    signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, plain.blocks))
+    looped = _sums(ground, _with_path(ground))
+    bases = {
+        False: _Base(gains(plain), gains(plain, signs)),
+        True: _Base(gains(looped), gains(looped, signs)),
+    }
+    energy = float(plain.energy.sum())
+    answers: list[_Answer] = []
+    highest = np.full(surrogates, -np.inf)
+    for view in views(ground.series):
+        sums = _sums(ground, np.column_stack((_beneath(view, ground), view.basis)))
+        base = bases[view.beyond_loop]
+        per_block = gains(sums) - base.gain
+        total = float(per_block.sum())
+        strength = float(_strength(total, energy))
+        null = _strength((gains(sums, signs) - base.null).sum(axis=1), energy)
+        # the lower tail is long where a fit extrapolates: the scale is that of the upper one
+        centre, upper = (float(value) for value in np.quantile(null, (0.5, 0.95)))
+        scale = max(upper - centre, 1e-12)
+        highest = np.maximum(highest, (null - centre) / scale)
+        score = (strength - centre) / scale
+        answers.append(_Answer(view, sums, total / ground.excess, per_block, score))
+    best = _best_views(answers, ground.excess)
+    ranked = _ranked(best, ground)
+    fitted = {id(answer): answer.view.basis @ _own(answer, ground) for answer in ranked}
+    regressors = np.column_stack((np.ones(ground.series.samples), load_path(ground.series)))
+    pieces = segment(ground.series.residual / ground.series.sigma, regressors)
+    mismatch = tuple(
+        Mismatch(
+            answer.view.covariate,
+            float(np.clip(answer.share, 0.0, 1.0)),
+            *_range(answer.view.covariate, fitted[id(answer)], ground),
+            _intervals(answer.view.covariate, fitted[id(answer)], ground, pieces.bounds, pieces.coefficients),
+            _p_value(highest, _top_score(answer, answers)),
+            answer.view.how,
+            _share_sd(answer.per_block, ground.excess),
+        )
+        for answer in ranked
+    )
+    ratio = float(np.mean((series.residual / series.sigma) ** 2))
+    excess = float(np.sqrt(max(0.0, np.mean(series.residual**2 - series.sigma**2))))
+    times = ground.series.covariates.values["time"][pieces.changes]
+    return Location(mismatch, excess, ratio, tuple(float(t) for t in times))
+
+
+def _ground(series: Series, nuisance: FloatArray | None) -> _Ground:
+    columns = np.ones((series.samples, 1))
+    if nuisance is not None:
+        columns = np.column_stack((columns, np.asarray(nuisance, dtype=np.float64)))
+    thinned = thin(series, columns)
+    small = thinned.series
+    weight = 1.0 / small.sigma**2
+    energy = float(np.sum(weight * small.residual**2))
+    # below a tenth of the energy the part beyond noise is not known well enough to divide by
+    excess = max(energy - small.samples, 0.1 * energy, 1e-300)
+    return _Ground(small, blocks_of(small), weight, _orthonormal(thinned.extra, weight), excess)
+
+
+def _orthonormal(columns: FloatArray, weight: FloatArray) -> FloatArray:
+    root = np.sqrt(weight)[:, None]
+    u, singular, _ = np.linalg.svd(columns * root, full_matrices=False)
+    return np.asarray((u / root)[:, singular > 1e-9 * singular[0]], dtype=np.float64)
+
+
+def _with_path(ground: _Ground) -> FloatArray:
+    return np.column_stack((ground.nuisance, load_path(ground.series)))
+
+
+def _beneath(view: View, ground: _Ground) -> FloatArray:
+    return _with_path(ground) if view.beyond_loop else ground.nuisance
+
+
+def _sums(ground: _Ground, basis: FloatArray) -> BlockSums:
+    return block_sums(basis, ground.series.residual, ground.weight, ground.block)
+
+
+def _own(answer: _Answer, ground: _Ground) -> FloatArray:
+    """Coefficients of the view's own regressors."""
+    return coefficients(answer.sums)[-answer.view.width :]
+
+
+def _p_value(highest: FloatArray, score: float) -> float:
+    return float(1 + np.count_nonzero(highest >= score)) / (len(highest) + 1)
+
+
+def _strength(gain: Any, energy: float) -> Any:
+    """Logarithm of energy before over energy after: grows without bound as little is left."""
+    return -np.log(np.clip(1.0 - gain / max(energy, 1e-300), 1e-9, None))
+
+
+def _share_sd(per_block: FloatArray, excess: float) -> float:
+    return float(np.std(per_block, ddof=1) * np.sqrt(len(per_block)) / excess)
+
+
+def _top_score(answer: _Answer, answers: list[_Answer]) -> float:
+    return max(other.score for other in answers if other.view.covariate == answer.view.covariate)
+
+
+def _best_views(answers: list[_Answer], excess: float) -> list[_Answer]:
+    """One view per covariate: the narrowest one within a standard error of the best."""
+    chosen = []
+    for name in dict.fromkeys(answer.view.covariate for answer in answers):
+        group = [answer for answer in answers if answer.view.covariate == name]
+        top = max(group, key=lambda answer: answer.share)
+        close = [
+            answer
+            for answer in group
+            if top.share - answer.share
+            <= max(0.01, _share_sd(top.per_block - answer.per_block, excess) if answer is not top else 0.01)
+        ]
+        chosen.append(min(close, key=lambda answer: answer.view.width))
+    return chosen
+
+
+def _ranked(best: list[_Answer], ground: _Ground) -> list[_Answer]:
+    """Order by share; among near ties, the covariate that leaves least to the others is first."""
+    order = sorted(best, key=lambda answer: -answer.share)
+    if not order or order[0].share <= 0.0:
+        return order
+    tied = [
+        answer
+        for answer in order
+        if order[0].share - answer.share
+        <= np.clip(_share_sd(order[0].per_block - answer.per_block, ground.excess), _TIE, 2.0 * _TIE)
+        and answer.share > 0.5 * order[0].share
+    ][:5]
+    if len(tied) < 2:
+        return order
+    left = {id(answer): 0.0 for answer in tied}
+    for i, first in enumerate(tied):
+        for second in tied[i + 1 :]:
+            together = _joint_share(first, second, ground)
+            # what each one still adds when the other is there; a narrow view needs less to be preferred
+            left[id(first)] = max(left[id(first)], together - first.share)
+            left[id(second)] = max(left[id(second)], together - second.share)
+    narrowness = {id(answer): 0.004 * min(answer.view.width, 12) for answer in tied}
+    tied.sort(key=lambda answer: left[id(answer)] + narrowness[id(answer)])
+    return tied + [answer for answer in order if not any(answer is other for other in tied)]
+
+
+def _joint_share(first: _Answer, second: _Answer, ground: _Ground) -> float:
+    beneath = _with_path(ground) if first.view.beyond_loop or second.view.beyond_loop else ground.nuisance
+    base = gains(_sums(ground, beneath)).sum()
+    basis = np.column_stack((beneath, first.view.basis, second.view.basis))
+    return float(gains(_sums(ground, basis)).sum() - base) / ground.excess
+
+
+def _range(name: str, fitted: FloatArray, ground: _Ground) -> tuple[float, float]:
+    """The shortest range of the covariate that holds four fifths of the fitted energy."""
+    x = ground.series.covariates.values[name]
+    order = np.argsort(x, kind="stable")
+    energy = np.cumsum((ground.weight * fitted**2)[order])
+    if energy[-1] <= 0.0:
+        return float(x.min()), float(x.max())
+    before = np.concatenate(([0.0], energy[:-1]))
+    ends = np.searchsorted(energy, before + _ENERGY_SHARE * energy[-1] * (1.0 - 1e-12))
+    valid = ends < len(x)
+    low = x[order]
+    widths = np.where(valid, low[np.minimum(ends, len(x) - 1)] - low, np.inf)
+    start = int(np.argmin(widths))
+    return float(low[start]), float(low[min(int(ends[start]), len(x) - 1)])
+
+
+def _intervals(
+    name: str, fitted: FloatArray, ground: _Ground, bounds: IntArray, pieces: FloatArray
+) -> tuple[tuple[float, float], ...]:
+    """The times that hold four fifths of the fitted energy, short gaps closed; for time, whole pieces
+    between changes.
+    """
+    time = ground.series.covariates.values["time"]
+    energy = ground.weight * fitted**2
+    starts = ground.series.covariates.starts
+    if name == "time" and len(bounds) > 2:
+        piece = np.repeat(np.arange(len(bounds) - 1), np.diff(bounds))
+        energy = np.bincount(piece, energy)[piece] / np.diff(bounds)[piece]
+        starts = np.union1d(ground.series.covariates.starts, bounds[1:-1])
+    if energy.sum() <= 0.0:
+        return ()
+    descending = np.sort(energy)[::-1]
+    level = descending[int(np.searchsorted(np.cumsum(descending), _ENERGY_SHARE * energy.sum()))]
+    found: list[tuple[int, int]] = []
+    gap = max(2, int(np.bincount(ground.block).min() // 3))
+    for index in np.flatnonzero(energy >= level):
+        crosses = found and np.any((starts > found[-1][1]) & (starts <= index))
+        if found and index - found[-1][1] <= gap and not crosses:
+            found[-1] = (found[-1][0], int(index))
+        else:
+            found.append((int(index), int(index)))
+    found.sort(key=lambda pair: -float(energy[pair[0] : pair[1] + 1].sum()))
+    kept = sorted(found[:_MOST_INTERVALS])
+    return tuple((float(time[a]), float(time[b])) for a, b in kept)

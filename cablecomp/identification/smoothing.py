@@ -1,0 +1,147 @@
+"""Zero-phase local fits of noisy, quantised, unevenly sampled channels: value, rate and second rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.mechanics.jit import njit
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_GROUPED_WIDTH: Final = 32
+_GAP: Final = 10.0
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A channel after a local quadratic fit.
+
+    `value`, `slope` (unit/s), `curvature` (unit/s^2) have the channel's length; `gain` = sd of `value` over
+    sd of a white reading; `slope_gain` = sd of `slope` over sd of a reading (1/s); `half_width_s` = half
+    the window.
+    """
+
+    value: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+    gain: float
+    slope_gain: float
+    half_width_s: float
+
+
+def step_s(time_s: FloatArray) -> float:
+    """Return the usual time step (median of the positive steps) in s; 1 if there is none."""
+    steps = np.diff(time_s)
+    steps = steps[steps > 0.0]
+    return float(np.median(steps)) if len(steps) else 1.0
+
+
+def segment_bounds(time_s: FloatArray) -> IntArray:
+    """Return indices 0, …, n that cut the samples at gaps in time (steps beyond 10 times the usual one)."""
+    cuts = np.flatnonzero(np.diff(time_s) > _GAP * step_s(time_s)) + 1
+    return np.concatenate(([0], cuts, [len(time_s)])).astype(np.int64)
+
+
+def local_fit(time_s: FloatArray, values: FloatArray, half_width_s: float) -> Smooth:
+    """Fit a quadratic in a tricube window around every sample, by the time stamps as they are.
+
+    Windows end at gaps. Wide windows work on means of neighbouring samples, so that the cost does not grow
+    with the width. Readings must be finite.
+    """
+    group = max(1, int(half_width_s / step_s(time_s) / _GROUPED_WIDTH))
+    if group == 1:
+        value, slope, curvature, gain, slope_gain = _local_quadratic(
+            time_s, values, segment_bounds(time_s), half_width_s
+        )
+        return Smooth(
+            value, slope, curvature, float(np.median(gain)), float(np.median(slope_gain)), half_width_s
+        )
+    coarse_time, coarse = group_means(time_s, group), group_means(values, group)
+    inner = local_fit(coarse_time, coarse, half_width_s)
+    nearest = np.minimum(np.arange(len(time_s)) // group, len(coarse) - 1)
+    offset = time_s - coarse_time[nearest]
+    slope = np.interp(time_s, coarse_time, inner.slope)
+    # the quadratic of the nearest group; its error is that of a window shifted by half a group
+    value = inner.value[nearest] + inner.slope[nearest] * offset + 0.5 * inner.curvature[nearest] * offset**2
+    curvature = np.interp(time_s, coarse_time, inner.curvature)
+    root = float(np.sqrt(group))
+    return Smooth(value, slope, curvature, inner.gain / root, inner.slope_gain / root, half_width_s)
+
+
+def fit_to_noise(time_s: FloatArray, values: FloatArray, sigma: float) -> Smooth:
+    """Smooth with the widest window that still fits the readings to within their noise `sigma`
+    (quantisation included).
+
+    The window grows by factors of two; it stops growing when, in more than a tenth of the recording, the
+    misfit exceeds what noise explains. The bias of the result is then of the order of the noise or below.
+    """
+    step = step_s(time_s)
+    chunk = max(8, len(values) // 60)
+    best = local_fit(time_s, values, 2.01 * step)
+    half = 4
+    while half < max(5, len(values) // 12):
+        candidate = local_fit(time_s, values, (half + 0.01) * step)
+        misfit = group_means((values - candidate.value) ** 2, chunk)
+        allowed = sigma**2 * (1.05 + 3.0 * np.sqrt(2.0 / chunk))
+        if np.quantile(misfit, 0.9) > allowed:
+            break
+        best, half = candidate, half * 2
+    return best
+
+
+def group_means(values: FloatArray, size: int) -> FloatArray:
+    """Return means of consecutive groups of `size` samples (the last group may be shorter)."""
+    starts = np.arange(0, len(values), size)
+    counts = np.diff(np.append(starts, len(values)))
+    return np.asarray(np.add.reduceat(values, starts) / counts, dtype=np.float64)
+
+
+@njit
+def _local_quadratic(
+    time_s: FloatArray, values: FloatArray, bounds: IntArray, half_width_s: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    n = len(values)
+    value, slope, curvature = values.copy(), np.zeros(n), np.zeros(n)
+    gain, slope_gain = np.ones(n), np.zeros(n)
+    for b in range(len(bounds) - 1):
+        first, last = bounds[b], bounds[b + 1]
+        low, high = first, first
+        for i in range(first, last):
+            while time_s[low] < time_s[i] - half_width_s:
+                low += 1
+            while high < last and time_s[high] <= time_s[i] + half_width_s:
+                high += 1
+            s0 = s1 = s2 = s3 = s4 = y0 = y1 = y2 = 0.0
+            for j in range(low, high):
+                x = (time_s[j] - time_s[i]) / half_width_s
+                w = (1.0 - min(1.0, abs(x)) ** 3) ** 3
+                s0 += w
+                s1 += w * x
+                s2 += w * x * x
+                s3 += w * x**3
+                s4 += w * x**4
+                y0 += w * values[j]
+                y1 += w * x * values[j]
+                y2 += w * x * x * values[j]
+            # cofactors of the symmetric 3 x 3 normal matrix
+            c00, c01, c02 = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2
+            c11, c12, c22 = s0 * s4 - s2 * s2, s1 * s2 - s0 * s3, s0 * s2 - s1 * s1
+            det = s0 * c00 + s1 * c01 + s2 * c02
+            if high - low < 4 or det <= 1e-9 * s0 * s0 * s0:
+                continue
+            value[i] = (c00 * y0 + c01 * y1 + c02 * y2) / det
+            slope[i] = (c01 * y0 + c11 * y1 + c12 * y2) / det / half_width_s
+            curvature[i] = 2.0 * (c02 * y0 + c12 * y1 + c22 * y2) / det / half_width_s**2
+            g = gs = 0.0
+            for j in range(low, high):
+                x = (time_s[j] - time_s[i]) / half_width_s
+                w = (1.0 - min(1.0, abs(x)) ** 3) ** 3
+                g += (w * (c00 + c01 * x + c02 * x * x) / det) ** 2
+                gs += (w * (c01 + c11 * x + c12 * x * x) / det / half_width_s) ** 2
+            gain[i], slope_gain[i] = np.sqrt(g), np.sqrt(gs)
+    return value, slope, curvature, gain, slope_gain

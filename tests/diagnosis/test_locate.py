@@ -1,0 +1,113 @@
+"""Laws of locating: planted dependences rank first, noise gives uniform p-values, instants are found."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from planted import SIGMA, autoregressive, causes, columns, recording
+
+from cablecomp.diagnosis.covariates import Covariates, covariates
+from cablecomp.diagnosis.locate import locate
+from cablecomp.diagnosis.segments import segment
+from cablecomp.diagnosis.series import make_series, thin
+from cablecomp.diagnosis.views import load_path
+from cablecomp.errors import InputError
+from cablecomp.identification.smoothing import FloatArray
+
+
+@cache
+def bench(kind: str) -> tuple[Covariates, dict[str, FloatArray]]:
+    channels, found = recording(kind)
+    return found, causes(channels, found)
+
+
+SWEEP = sorted(set(bench("sweep")[1]) - {"dwell"})
+HOLD = sorted(set(bench("hold")[1]) - {"velocity", "motor_angle"})
+
+
+@pytest.mark.parametrize(("kind", "cause"), [("sweep", c) for c in SWEEP] + [("hold", c) for c in HOLD])
+def test_a_planted_dependence_ranks_first(kind: str, cause: str) -> None:
+    found, shapes = bench(kind)
+    rng = np.random.default_rng(7)
+    shape = shapes[cause]
+    noise = SIGMA * rng.standard_normal(found.samples) + autoregressive(rng, found.samples, 60.0, SIGMA)
+    residual = 3.0 * SIGMA * shape / np.std(shape) + noise
+    location = locate(make_series(residual, SIGMA, found), np.random.default_rng(1), surrogates=199)
+    first = location.mismatch[0]
+    assert first.covariate == cause.split(",")[0]
+    assert first.p_value < 0.05
+    assert first.share > 0.6
+    assert location.excess_rms == pytest.approx(np.sqrt(10.0) * SIGMA, rel=0.15)
+
+
+@pytest.mark.parametrize("memory", [0.1, 4.0])
+def test_noise_gives_uniform_p_values_however_long_it_remembers(memory: float) -> None:
+    channels = columns("sweep", 2_000, 0.018)
+    found = covariates(channels)
+    lowest = []
+    for trial in range(30):
+        residual = autoregressive(np.random.default_rng(trial), found.samples, memory, SIGMA)
+        location = locate(make_series(residual, SIGMA, found), np.random.default_rng(trial), surrogates=99)
+        lowest.append(min(entry.p_value for entry in location.mismatch))
+    # binomial bounds at three standard deviations
+    for level in (0.05, 0.2, 0.5):
+        share = float(np.mean(np.array(lowest) <= level))
+        assert abs(share - level) < 3.0 * np.sqrt(level * (1.0 - level) / 30.0) + 0.02
+
+
+def test_what_calibration_can_explain_is_not_counted() -> None:
+    found, _ = bench("sweep")
+    rng = np.random.default_rng(3)
+    load = found.values["load"]
+    after = found.values["time"] > 30.0
+    path = load_path(make_series(load, SIGMA, found))
+    residual = 4.0 * SIGMA * after * load + SIGMA * rng.standard_normal(found.samples)
+    residual -= path @ np.linalg.lstsq(path, residual, rcond=None)[0]
+    location = locate(make_series(residual, SIGMA, found), rng, nuisance=path, surrogates=199)
+    assert location.mismatch[0].covariate == "time"
+    assert min(abs(instant - 30.0) for instant in location.changes_s) < 0.5
+
+
+def test_intervals_and_range_show_where() -> None:
+    found, _ = bench("sweep")
+    rng = np.random.default_rng(5)
+    time = found.values["time"]
+    patch = np.exp(-(((found.values["motor_angle"] - 0.3) / 0.05) ** 2))
+    residual = 6.0 * SIGMA * patch + SIGMA * rng.standard_normal(found.samples)
+    location = locate(make_series(residual, SIGMA, found), rng, surrogates=99)
+    first = location.mismatch[0]
+    assert first.covariate in ("motor_angle", "joint_angle")
+    assert 0.1 < first.low < 0.3 < first.high < 0.5
+    inside = np.zeros(found.samples, dtype=bool)
+    for begin, end in first.intervals_s:
+        inside |= (time >= begin) & (time <= end)
+    assert float(np.sum(patch[inside] ** 2)) > 0.5 * float(np.sum(patch**2))
+    assert float(np.mean(inside)) < 0.5
+
+
+def test_changes_are_found_to_the_sample_and_not_in_noise() -> None:
+    rng = np.random.default_rng(9)
+    load = np.sin(np.arange(6_000) / 90.0)
+    regressors = np.column_stack((np.ones(6_000), load))
+    noise = autoregressive(rng, 6_000, 5.0, 1.0)
+    assert len(segment(noise, regressors).changes) == 0
+    found = segment(noise + 3.0 * (np.arange(6_000) > 4_321) * load, regressors)
+    assert found.changes == pytest.approx([4_321], abs=30)
+    assert found.coefficients[1, 1] - found.coefficients[0, 1] == pytest.approx(3.0, abs=0.3)
+
+
+def test_thinning_keeps_means_and_recordings_apart() -> None:
+    found, _ = bench("sweep")
+    series = make_series(np.arange(found.samples, dtype=np.float64), SIGMA, found)
+    small = thin(series, limit=500)
+    assert small.series.samples == 500
+    assert small.series.residual[0] == pytest.approx(4.5)
+    assert small.series.sigma[0] == pytest.approx(SIGMA / np.sqrt(10.0))
+    assert small.group[-1] == 499
+
+
+def test_a_residual_of_another_length_is_refused() -> None:
+    with pytest.raises(InputError, match="same samples"):
+        make_series(np.zeros(5), SIGMA, bench("sweep")[0])
