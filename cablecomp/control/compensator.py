@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 from cablecomp.config import JointConfig
 from cablecomp.control.command import FULL, Command, Feed, Reference
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
-from cablecomp.control.shaping import Bump, LoadAhead, Slope
+from cablecomp.control.shaping import Ahead, Bump, Slope
 from cablecomp.errors import InputError
 from cablecomp.signals import NAN, Estimate, Sample
 
@@ -25,8 +25,8 @@ class ObserverLike(Protocol):
     def step(self, sample: Sample) -> Estimate:
         """Take a sample in."""
 
-    def peek(self, sample: Sample) -> Estimate:
-        """Say what would be, commit nothing."""
+    def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
+        """Say what the deflection would be, commit nothing."""
 
     def step_inverse(self, sample: Sample) -> Estimate:
         """Take a sample in, the load being found from both encoders."""
@@ -37,12 +37,14 @@ class Gains(NamedTuple):
 
     load_filter_Hz: float
     load_lead_s: float
+    follow_filter_Hz: float
+    follow_lead_s: float
     joint_feedback_per_s: float
     force_feedback_per_s: float
     motor_integral_per_s: float
 
 
-DEFAULT_GAINS = Gains(20.0, 0.0, 0.0, 4.0, 10.0)
+DEFAULT_GAINS = Gains(10.0, 0.0, 10.0, 0.0, 0.0, 2.0, 10.0)
 """Slow and safe for a stiff, light joint; `design_loop` gives the joint's own."""
 
 
@@ -84,10 +86,10 @@ class Compensator:
         self.ratio = ratio_of(config)
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
-        self.load = LoadAhead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
+        self.load = Ahead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
         self.bump = Bump(options.blend_s, period_s)
         self.deflection_slope = Slope(options.velocity_filter_Hz, period_s)
-        self.joint_slope = Slope(options.velocity_filter_Hz, period_s)
+        self.follow = Ahead(self.gains.follow_filter_Hz, self.gains.follow_lead_s, period_s)
         self.motor_trim_rad = 0.0
         self.joint_trim_rad = 0.0
         self.force_trim_Nm = 0.0
@@ -115,7 +117,7 @@ class Compensator:
         """Start control anew where the motor stands; the observer keeps its history."""
         self.load.reset()
         self.deflection_slope.reset()
-        self.joint_slope.reset()
+        self.follow.reset()
         self.motor_trim_rad = self.joint_trim_rad = self.force_trim_Nm = 0.0
         self.target_rad, self._velocity, self._reference, self._switch = NAN, 0.0, None, True
 
@@ -166,16 +168,9 @@ class Compensator:
     def _deflection(self, sample: Sample, reference: Reference, load: float) -> float:
         if self._linear is not None and self.options.feed_forward is FeedForward.LINEAR:
             return load / self._linear
-        ahead = Sample(
-            sample.time_s + self.period_s,
-            sample.motor_position_rad + self._velocity * self.period_s,
-            load,
-            NAN,
-            sample.motor_torque_Nm,
-            sample.temperature_degC,
-            sample.other,
-        )
-        return self.observer.peek(ahead).deflection_rad
+        period = self.period_s
+        motor = sample.motor_position_rad + self._velocity * period
+        return self.observer.peek_deflection(sample.time_s + period, motor, load)
 
     def _joint_feedback(self, error: float) -> None:
         if error == error:
@@ -196,14 +191,15 @@ class Compensator:
     def _force(self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate) -> Command:
         measured = sample.joint_position_rad
         joint = measured if isfinite(measured) else estimate.joint_position_rad
-        joint_velocity = self.joint_slope.step(joint)
+        followed = self.follow.step(joint)
+        joint_velocity = self.follow.rate
         wanted_Nm = self._wanted_torque(reference, joint, joint_velocity)
         if not feed.held:
             self._force_feedback(wanted_Nm - estimate.joint_torque_Nm)
             asked = wanted_Nm + self.force_trim_Nm
             self.deflection_used_rad = self._deflection(sample, reference, asked)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
-        wanted = (joint + joint_velocity * self.period_s - used) / self.ratio
+        wanted = (followed - used) / self.ratio
         velocity = (joint_velocity - self.deflection_slope.step(used)) / self.ratio
         torque = self._torque(velocity, 0.0, wanted_Nm)
         return self._command(sample, reference, wanted, velocity, torque, used, estimate)

@@ -39,8 +39,11 @@ class _Frozen(BaseModel):
 class MotorModel(_Frozen):
     """Motor and drive as seen at the input pulley, for torque feed-forward and for the design of gains.
 
-    Drive: motor torque = `stiffness (target - q_in) + damping (target velocity - dq_in/dt) + feed-forward`,
-    within `delay_s` of the command; `output_inertia_kgm2` is all that turns with the output pulley.
+    Drive: motor torque = `stiffness (target - q_in) + damping (target velocity - dq_in/dt) +
+    feed-forward`, within `delay_s` of the command; `output_inertia_kgm2` is all that turns with the
+    output pulley. For the design alone: `structural_damping`, the ratio that the link's swing on the
+    cable has by itself (hysteresis left out), and `contact_damping_s`, damping over stiffness of what
+    the joint touches.
     """
 
     inertia_kgm2: Positive = 2e-4
@@ -52,6 +55,8 @@ class MotorModel(_Frozen):
     delay_s: NonNegative = 1e-3
     output_inertia_kgm2: Positive = 6e-4
     output_viscous_Nms_per_rad: NonNegative = 0.0
+    structural_damping: NonNegative = 0.01
+    contact_damping_s: NonNegative = 1e-3
 
 
 class CompensatorOptions(_Frozen):
@@ -60,6 +65,7 @@ class CompensatorOptions(_Frozen):
     `load`: "sensor" = the torque sensor's reading, filtered and extrapolated; "reference" = the load that the
     reference states; "both" = the reference's, corrected by the filtered difference to the sensor's.
     `load_filter_Hz`, `load_lead_s`: expected load = `(1 + s lead) / (1 + s / (2 pi f))^2` of the reading.
+    `follow_*`: the same filter on the joint position that force and impedance mode follow.
     `joint_feedback_per_s`: integral gain on the joint encoder's error, 0 = no feedback.
     `force_feedback_per_s`: the same on the torque error. `motor_integral_per_s`: the same on the motor
     encoder's own error (all contestants alike). `torque_from`: where force and impedance mode know the joint
@@ -72,6 +78,8 @@ class CompensatorOptions(_Frozen):
     torque_from: Literal["encoders", "motor_torque", "sensor"] = "encoders"
     load_filter_Hz: Positive | None = None
     load_lead_s: NonNegative | None = None
+    follow_filter_Hz: Positive | None = None
+    follow_lead_s: NonNegative | None = None
     joint_feedback_per_s: NonNegative | None = 0.0
     joint_feedback_limit_rad: Positive = 0.05
     force_feedback_per_s: NonNegative | None = None

@@ -7,11 +7,13 @@ from math import exp, pi
 from cablecomp.errors import InputError
 
 
-class LoadAhead:
-    """Expected load: `(1 + s lead) / (1 + s tau)^2` of the reading, tau = 1/(2 pi f), exact for a held input.
+class Ahead:
+    """Expected value of a signal: `(1 + s lead) / (1 + s tau)^2` of the reading, tau = 1/(2 pi f),
+    exact for a held input.
 
-    `rate` is the filtered rate of change (Nm/s). A constant comes through as it is, a ramp of rate r late by
-    `(2 tau - lead) r`: with lead = 2 tau + latency a ramp is foreseen over the loop's latency.
+    `rate` is the filtered rate of change per second. A constant comes through as it is, a ramp of rate
+    r late by `(2 tau - lead) r`: with lead = 2 tau + latency a ramp is foreseen over the loop's
+    latency.
     """
 
     __slots__ = ("_a", "_lead", "_tau", "first", "rate", "second", "started")
@@ -27,12 +29,12 @@ class LoadAhead:
         self.first = self.second = self.rate = 0.0
         self.started = False
 
-    def step(self, load_Nm: float) -> float:
-        """Take a reading (Nm), give the expected load (Nm)."""
+    def step(self, reading: float) -> float:
+        """Take a reading, give the expected value."""
         if not self.started:
-            self.first = self.second = load_Nm
+            self.first = self.second = reading
             self.started = True
-        self.first += self._a * (load_Nm - self.first)
+        self.first += self._a * (reading - self.first)
         self.second += self._a * (self.first - self.second)
         self.rate = (self.first - self.second) / self._tau
         return self.second + self._lead * self.rate

@@ -85,6 +85,15 @@ class Observer:
         self._check(st.peek_one(*self._kernel(), self._row, self._out, self._spare), sample.time_s)
         return self._estimate(sample, NAN, NAN)
 
+    def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
+        """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the last sample."""
+        row = self._row
+        row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_LOAD] = time_s, motor_position_rad, joint_torque_Nm
+        status = st.peek_one(*self._kernel(), row, self._out, self._spare)
+        if status != o.STATUS_OK:
+            self._check(status, time_s)
+        return float(self._out[st.OUT_JOINT]) - self._ratio * motor_position_rad
+
     def run(self, columns: Mapping[str, NDArray[np.float64]], bounds: bool = False) -> dict[str, NDArray[np.float64]]:
         """Step through a block of samples given as canonical channels; returns the estimates as columns.
 
