@@ -41,7 +41,7 @@ def alternate_blocks(
     """Cut recordings into an even number of alternating training and held-out blocks.
 
     Each block holds about two reversals of the load (of `direction`: -1, 0, +1 per sample) if the recording
-    has enough of them, so that either half has seen loading and unloading; there are 8 to 40 blocks in all
+    has enough of them, so that either half has seen loading and unloading; there are 16 to 40 blocks in all
     (`count` fixes it). `guard`: samples left out on either side of a border. A recording alone is cut into
     at least 4 blocks if it has 40 samples or more.
 
@@ -50,7 +50,7 @@ def alternate_blocks(
     if samples < 40:
         raise InputError(f"judging needs 40 samples or more, found {samples}; record longer")
     turns = np.flatnonzero(np.diff(direction) != 0.0)
-    wanted = count if count is not None else int(np.clip(len(turns) // 2, 8, 40))
+    wanted = count if count is not None else int(np.clip(len(turns) // 2, 16, 40))
     wanted = max(2 * ((wanted + 1) // 2), 2)
     bounds = np.append(starts, samples)
     block = np.zeros(samples, dtype=np.int64)

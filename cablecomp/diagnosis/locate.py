@@ -151,7 +151,7 @@ def locate(
         for answer in ranked
     )
     ratio = float(np.mean((series.residual / series.sigma) ** 2))
-    excess = float(np.sqrt(max(0.0, np.mean(series.residual**2 - series.sigma**2))))
+    excess = float(np.sqrt(max(0.0, float(np.mean(series.residual**2 - series.sigma**2)))))
     times = ground.series.covariates.values["time"][pieces.changes]
     return Location(mismatch, excess, ratio, tuple(float(t) for t in times))
 
