@@ -1,6 +1,16 @@
 """Physics beyond the thesis's drive: one file per effect, found by name."""
 
 from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.effects.catalogue import catalogue, extend, register, with_effects
+from cablecomp.effects.catalogue import catalogue, extend, load_effects, register, with_effects
 
-__all__ = ["Change", "Effect", "Parameter", "catalogue", "extend", "register", "term", "with_effects"]
+__all__ = [
+    "Change",
+    "Effect",
+    "Parameter",
+    "catalogue",
+    "extend",
+    "load_effects",
+    "register",
+    "term",
+    "with_effects",
+]

@@ -99,6 +99,11 @@ def wrap_deflection(config: JointConfig) -> float:
     return total
 
 
+def wrap_compliance(config: JointConfig) -> float:
+    """T0/(EA mu_eff) per R T0 [rad/(N m)]: the thesis's unit of deflection over that of load."""
+    return wrap_deflection(config) / pretension_moment(config)
+
+
 @dataclass(frozen=True)
 class Change:
     """What one effect does to the drive; every default is neutral."""

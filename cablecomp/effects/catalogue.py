@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import importlib.util
 import math
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,29 @@ def register(effect: Effect) -> None:
     if effect.id in catalogue() and catalogue()[effect.id] is not effect:
         raise InputError(f"effect `{effect.id}` exists already; give yours another id")
     _registered[effect.id] = effect
+
+
+def load_effects(path: Path) -> tuple[str, ...]:
+    """Run a Python file of the user's and register every `Effect` that it defines; returns their ids.
+
+    Raises InputError if the file cannot be read or run, or defines no effect of its own.
+    """
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: is no Python file; give one that defines an `Effect`")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a user's file may raise
+        raise InputError(f"{path}: does not run ({type(error).__name__}: {error}); mend it") from None
+    found = {v.id: v for v in vars(module).values() if isinstance(v, Effect)}
+    if not found:
+        raise InputError(f"{path}: defines no effect; add `EFFECT = Effect(...)`")
+    for effect in found.values():
+        register(effect)
+    return tuple(found)
 
 
 @cache
@@ -69,7 +94,9 @@ def extend(config: JointConfig) -> Extension | None:
     if not config.effect:
         return None
     known = sorted(((_look_up(entry.id), entry) for entry in config.effect), key=lambda pair: pair[0].rank)
-    changes = [effect.change(_values(effect, entry, config), config) for effect, entry in known]
+    changes = [_change(effect, _values(effect, entry, config), config) for effect, entry in known]
+    if sum(c.play_share > 0.0 for c in changes) > 1:
+        raise InputError(f"{config.name}: effect `strand_friction` is given twice; one is accepted")
     return Extension(
         terms=tuple(t for change in changes for t in change.terms),
         law=_law(changes, config),
@@ -85,6 +112,14 @@ def extend(config: JointConfig) -> Extension | None:
 def is_bounded(config: JointConfig) -> bool:
     """True if all effects of the configuration preserve the order that guaranteed bounds rest on."""
     return all(_look_up(entry.id).bounded for entry in config.effect)
+
+
+def _change(effect: Effect, values: Mapping[str, float], config: JointConfig) -> Change:
+    """What the effect changes; nothing at all where every value that says how much is neutral."""
+    amounts = [p for p in effect.parameters if not p.shape]
+    if amounts and all(values[p.name] == p.neutral for p in amounts):
+        return Change()
+    return effect.change(values, config)
 
 
 def _look_up(name: str) -> Effect:

@@ -37,7 +37,7 @@ def _accelerate(c: Any, p: Any, s: Any) -> None:
             s[SPEED], s[SPEED_OLD], s[STEP] = speed, speed, h
         return
     b0, b1, b2 = 1.0, -1.0, 0.0
-    if h <= 2.0 * s[STEP]:  # beyond, two-step differences lose their stability
+    if h <= 5.0 * s[STEP]:  # after a longer gap, two-step differences would carry the old motion too far
         w = h / s[STEP]
         b0, b1, b2 = (1.0 + 2.0 * w) / (1.0 + w), -(1.0 + w), w * w / (1.0 + w)
     speed = (b0 * x + b1 * s[ANGLE] + b2 * s[ANGLE_OLD]) / h

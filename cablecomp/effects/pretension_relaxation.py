@@ -41,7 +41,7 @@ EFFECT = Effect(
             "-",
             0.0,
             1e-4,
-            0.2,
+            0.3,
             "a, loss per factor e of time",
             log=True,
             minimum=-0.5,

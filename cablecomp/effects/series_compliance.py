@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term, zero_load_compliance
+from cablecomp.effects.base import Change, Effect, Parameter, term, wrap_compliance
 from cablecomp.mechanics.layout import X_LOAD, X_MOMENT, X_READING
 
 
@@ -30,10 +30,12 @@ EFFECT = Effect(
             "compliance_rad_per_Nm",
             "rad/(N m)",
             0.0,
-            0.0,
-            100.0,
-            "added compliance",
-            scale=zero_load_compliance,
+            1e-4,
+            3.0,
+            "c_s, added compliance",
+            log=True,
+            scale=wrap_compliance,
+            minimum=0.0,
         ),
     ),
     acts_through=("load",),

@@ -33,7 +33,7 @@ EFFECT = Effect(
             "fraction",
             "-",
             0.0,
-            1e-3,
+            1e-4,
             0.9,
             "f, share of the cross-section lost",
             log=True,
