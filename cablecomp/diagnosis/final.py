@@ -1,0 +1,109 @@
+"""The last fit: every coordinate free, shapes included; values with their uncertainties, dependence counted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cablecomp.config import EffectEntry, JointConfig
+from cablecomp.diagnosis.blocks import Layout
+from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of, sensitivities, solve
+from cablecomp.diagnosis.forms import PHASE, Form
+from cablecomp.diagnosis.selection import free_shapes
+from cablecomp.identification.smoothing import FloatArray
+
+SMALL_SAMPLE = 1.15  # what a sandwich of some twenty blocks underestimates
+
+
+@dataclass(frozen=True)
+class Value:
+    """A fitted value with its 1-sigma uncertainty, both in the parameter's unit."""
+
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Final:
+    """The final model: configuration with calibrated values and effects, uncertainties, residual of
+    every row (rad).
+    """
+
+    config: JointConfig
+    model: Model
+    calibration: Mapping[str, Value]
+    effects: tuple[tuple[Form, EffectEntry, Mapping[str, Value]], ...]
+    residual_rad: FloatArray
+    at_bound: tuple[str, ...]
+
+
+def finish(problem: Problem, model: Model, layout: Layout) -> Final:
+    """Free all shapes, fit to all rows, and work out the uncertainties."""
+    forms, z = free_shapes(model)
+    mask = layout.heldout | layout.training
+    found = solve(problem, forms, z, mask, None, None, iterations=6, refresh=2)
+    if found is None:
+        forms, found = model.forms, model
+    J = sensitivities(problem, forms, found.z, found.residual)
+    found = replace(found, J=J)
+    covariance = sandwich(problem, found, layout)
+    n = len(problem.parameters)
+    calibration = {
+        p.name: Value(p.value(float(v)), abs(p.slope(float(v))) * float(np.sqrt(covariance[k, k])))
+        for k, (p, v) in enumerate(zip(problem.parameters, found.c, strict=True))
+    }
+    effects = []
+    for form, x in zip(forms, found.x, strict=True):
+        own = covariance[n : n + form.size, n : n + form.size]
+        effects.append((form, form.entry(list(x)), _values(form, x, own)))
+        n += form.size
+    config = problem.joint(found.c, found.entries())
+    edge = tuple(
+        p.name
+        for p, v in zip(problem.parameters, found.c, strict=True)
+        if min(float(v) - p.low, p.high - float(v)) < 1e-3 * (p.high - p.low)
+    )
+    return Final(config, found, calibration, tuple(effects), found.residual * problem.sigma * INFLATION, edge)
+
+
+def sandwich(problem: Problem, model: Model, layout: Layout) -> FloatArray:
+    """Covariance of z: curvature of the cost, with the scatter of the gradient between blocks
+    (dependence inside blocks kept).
+    """
+    mask = layout.heldout | layout.training
+    prior = prior_of(problem, model.forms)
+    J, r = model.J[mask], model.residual[mask]
+    A = J.T @ J + np.diag(prior)
+    scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    inverse = np.linalg.pinv(A / np.outer(scale, scale), rcond=1e-11) / np.outer(scale, scale)
+    block = layout.block[mask]
+    scores = np.stack([J[block == b].T @ r[block == b] for b in np.unique(block)])
+    scores -= scores.mean(axis=0)
+    count = len(scores)
+    meat = scores.T @ scores * count / max(1, count - 1) + np.diag(prior)
+    white = J.T @ J / INFLATION**2 + np.diag(prior)
+    by_block, by_noise = inverse @ meat @ inverse, inverse @ white @ inverse
+    grow = np.sqrt(np.maximum(np.diag(by_noise) / np.maximum(np.diag(by_block), 1e-300), 1.0))
+    return by_block * np.outer(grow, grow) * SMALL_SAMPLE**2
+
+
+def _values(form: Form, x: FloatArray, covariance: FloatArray) -> dict[str, Value]:
+    """Parameters of one effect with their sd, by the slope of each with every coordinate."""
+    entry = form.entry(list(x)).parameters
+    found = {}
+    for name in [p.name for p in form.effect.parameters]:
+        if not isinstance(entry.get(name), float):
+            continue
+        slope = np.zeros(len(x))
+        for k in range(len(x)):
+            moved = x.copy()
+            moved[k] += 1e-4
+            other = form.entry(list(moved)).parameters[name]
+            change = other - entry[name]
+            if name == PHASE:
+                change = (change + np.pi) % (2.0 * np.pi) - np.pi
+            slope[k] = change / 1e-4
+        found[name] = Value(entry[name], float(np.sqrt(max(slope @ covariance @ slope, 0.0))))
+    return found

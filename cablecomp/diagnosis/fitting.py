@@ -1,0 +1,236 @@
+"""Joint fits of calibration and effects: Gauss-Newton with a kept Jacobian, on the rows that a mask leaves.
+
+z holds the calibration coordinates c (in units of their tolerance, prior sd 1) and the coordinates of
+the effects. Minimised is sum over training rows of ((measured - predicted)/(sigma f))^2 + sum (c/prior
+sd)^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cablecomp.config import EffectEntry, JointConfig
+from cablecomp.diagnosis.forms import Form
+from cablecomp.errors import InputError
+from cablecomp.identification.misfit import Prepared, predicted
+from cablecomp.identification.parameters import OFFSET, Parameter, with_values
+from cablecomp.identification.smoothing import FloatArray
+
+Mask = np.ndarray[tuple[int], np.dtype[np.bool_]]
+INFLATION = 3.0  # noise that passes through friction remembers: some ten samples count as one
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Recordings to be explained, in weighted form; `simulations` counts the work."""
+
+    config: JointConfig
+    parameters: tuple[Parameter, ...]
+    parts: tuple[Prepared, ...]
+    measured: FloatArray
+    sigma: FloatArray
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of all recordings together."""
+        return len(self.measured)
+
+    def values(self, c: FloatArray) -> dict[str, float]:
+        """Calibration values by name."""
+        return {p.name: p.value(float(v)) for p, v in zip(self.parameters, c, strict=True)}
+
+    def joint(self, c: FloatArray, entries: Sequence[EffectEntry] = ()) -> JointConfig:
+        """The configuration at calibration coordinates c, with these effects beside its own."""
+        config = with_values(self.config, self.values(c))
+        return config.model_copy(update={"effect": (*config.effect, *entries)}) if entries else config
+
+    def predict(self, config: JointConfig) -> FloatArray:
+        """Predicted reading of the joint encoder, all recordings one after the other."""
+        offset = config.sensors.joint_position_offset_rad
+        return np.concatenate([predicted(config, part)[part.first :] for part in self.parts]) + offset
+
+    def residual(self, config: JointConfig) -> FloatArray:
+        """Measured minus predicted, over the noise with its memory: the weighted residual."""
+        return (self.measured - self.predict(config)) / (self.sigma * INFLATION)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A fitted model: effects with their coordinates, calibration, and the weighted residual of every row.
+
+    `J` is the weighted sensitivity (minus the derivative of the residual) by all coordinates z = [c,
+    x_1, x_2, ...].
+    """
+
+    forms: tuple[Form, ...]
+    c: FloatArray
+    x: tuple[FloatArray, ...]
+    residual: FloatArray
+    J: FloatArray
+
+    @property
+    def z(self) -> FloatArray:
+        """All coordinates."""
+        return np.concatenate([self.c, *self.x])
+
+    def entries(self) -> tuple[EffectEntry, ...]:
+        """The effects as configuration entries."""
+        return tuple(f.entry(list(x)) for f, x in zip(self.forms, self.x, strict=True))
+
+    @property
+    def name(self) -> str:
+        """Names of the effects, joined."""
+        return "+".join(f.name for f in self.forms) or "calibrated drive"
+
+
+def evaluate(problem: Problem, forms: Sequence[Form], z: FloatArray) -> FloatArray | None:
+    """Weighted residual at z; None where the joint cannot follow."""
+    c, xs = split(problem, forms, z)
+    entries = [f.entry(list(x)) for f, x in zip(forms, xs, strict=True)]
+    try:
+        found = problem.residual(problem.joint(c, entries))
+    except InputError:
+        return None
+    return found if np.all(np.isfinite(found)) else None
+
+
+def split(
+    problem: Problem, forms: Sequence[Form], z: FloatArray
+) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Calibration and effect coordinates of z."""
+    n = len(problem.parameters)
+    xs = []
+    for form in forms:
+        xs.append(z[n : n + form.size])
+        n += form.size
+    return z[: len(problem.parameters)], tuple(xs)
+
+
+def bounds_of(problem: Problem, forms: Sequence[Form]) -> tuple[FloatArray, FloatArray]:
+    """Bounds of z."""
+    low = [np.array([p.low for p in problem.parameters])]
+    high = [np.array([p.high for p in problem.parameters])]
+    for form in forms:
+        a, b = form.bounds()
+        low.append(a)
+        high.append(b)
+    return np.concatenate(low), np.concatenate(high)
+
+
+def prior_of(problem: Problem, forms: Sequence[Form]) -> FloatArray:
+    """Inverse prior variance of z (effects: none)."""
+    own = [1.0 / p.prior_sd**2 for p in problem.parameters]
+    return np.array(own + [0.0] * sum(f.size for f in forms))
+
+
+def cost(residual: FloatArray, z: FloatArray, prior: FloatArray, mask: Mask) -> float:
+    """What a fit minimises."""
+    return float(residual[mask] @ residual[mask] + prior @ z**2)
+
+
+def sensitivities(problem: Problem, forms: Sequence[Form], z: FloatArray, base: FloatArray) -> FloatArray:
+    """J by forward differences (a hundredth of a tolerance, a twentieth of an effect's unit)."""
+    J = np.zeros((problem.rows, len(z)))
+    low, high = bounds_of(problem, forms)
+    n = len(problem.parameters)
+    for k in range(len(z)):
+        if k < n and problem.parameters[k].name == OFFSET:
+            J[:, k] = problem.parameters[k].unit / (problem.sigma * INFLATION)
+            continue
+        step = 0.01 if k < n else 0.05
+        if z[k] + step > high[k]:
+            step = -step
+        moved = z.copy()
+        moved[k] += step
+        found = evaluate(problem, forms, moved)
+        if found is not None:
+            J[:, k] = (base - found) / step
+    return J
+
+
+def solve(
+    problem: Problem,
+    forms: Sequence[Form],
+    z: FloatArray,
+    mask: Mask,
+    J: FloatArray | None = None,
+    residual: FloatArray | None = None,
+    iterations: int = 6,
+    refresh: int = 0,
+) -> Model | None:
+    """Fit from z on the rows of `mask`; J is renewed by differences in the first `refresh` iterations,
+    else by Broyden's rule.
+
+    Returns None if the joint cannot follow the start.
+    """
+    prior, (low, high) = prior_of(problem, forms), bounds_of(problem, forms)
+    z = np.clip(z, low, high)
+    r = evaluate(problem, forms, z) if residual is None else residual
+    if r is None:
+        return None
+    now = cost(r, z, prior, mask)
+    for k in range(iterations):
+        if J is None or k < refresh:
+            J = sensitivities(problem, forms, z, r)
+        step = bounded_step(J[mask], r[mask], z, prior, low, high)
+        size, better = 1.0, None
+        for _ in range(3):
+            trial = np.clip(z + size * step, low, high)
+            found = evaluate(problem, forms, trial)
+            if found is not None:
+                moved = trial - z
+                if float(moved @ moved) > 0.0:
+                    J = J + np.outer((r - found) - J @ moved, moved) / float(moved @ moved)
+                reached = cost(found, trial, prior, mask)
+                if reached < now:
+                    better = (trial, found, reached)
+                    break
+            size *= 0.3
+        if better is None:
+            break
+        gain = now - better[2]
+        z, r, now = better
+        if gain < 1e-4 * now:
+            break
+    if J is None:
+        J = sensitivities(problem, forms, z, r)
+    c, xs = split(problem, forms, z)
+    return Model(tuple(forms), c, xs, r, J)
+
+
+def bounded_step(
+    J: FloatArray, r: FloatArray, z: FloatArray, prior: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Gauss-Newton step with bounds: coordinates that would leave are held at their bound, the rest
+    solved again.
+    """
+    A = J.T @ J + np.diag(prior)
+    g = J.T @ r - prior * z
+    scale = np.sqrt(np.maximum(np.diag(A), 1e-12))
+    free = np.ones(len(z), dtype=bool)
+    step = np.zeros(len(z))
+    for _ in range(len(z)):
+        inner = A[np.ix_(free, free)] / np.outer(scale[free], scale[free])
+        inner += 1e-9 * np.eye(int(free.sum()))
+        rest = g[free] - A[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(inner, rest / scale[free]) / scale[free]
+        out = free & ((z + step < low - 1e-12) | (z + step > high + 1e-12))
+        if not np.any(out):
+            break
+        step[out] = np.where(z[out] + step[out] < low[out], low[out] - z[out], high[out] - z[out])
+        free &= ~out
+    return step
+
+
+def refit(problem: Problem, model: Model, mask: Mask, iterations: int = 4) -> Model:
+    """The same model fitted to other rows, starting with the Jacobian it has."""
+    found = solve(problem, model.forms, model.z, mask, model.J, model.residual, iterations)
+    return model if found is None else found
+
+
+def rescale(model: Model, forms: Sequence[Form]) -> Model:
+    """The model with the forms' units replaced (coordinates follow)."""
+    return replace(model, forms=tuple(forms))

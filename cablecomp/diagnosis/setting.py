@@ -1,0 +1,176 @@
+"""From recordings and a configuration to a fitting problem: rows, noise, blocks, the calibrated drive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.blocks import Layout, alternate_blocks
+from cablecomp.diagnosis.covariates import Covariates, covariates, join
+from cablecomp.diagnosis.fitting import Model, Problem, evaluate, solve
+from cablecomp.diagnosis.forms import Surroundings
+from cablecomp.errors import InputError
+from cablecomp.identification.misfit import Prepared, groups_for, prepare
+from cablecomp.identification.noise import channel_noise
+from cablecomp.identification.parameters import OFFSET, Parameter, free_parameters
+from cablecomp.identification.smoothing import FloatArray
+from cablecomp.observer import Observer
+
+ROWS = 5000  # of all recordings together, after averaging
+NEEDED = ("time_s", "motor_position_rad", "joint_position_rad")
+Columns = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Everything that the diagnosis of some recordings starts from."""
+
+    problem: Problem
+    covariates: Covariates
+    layout: Layout
+    around: Surroundings
+    nominal: Model
+    calibrated: Model
+    floor_rad: float
+
+
+def set_up(
+    config: JointConfig, recordings: Sequence[Columns], rng: np.random.Generator, rows: int = ROWS
+) -> Setting:
+    """Average the recordings to `rows` rows, weigh them by their noise, and calibrate the drive within
+    its tolerances.
+
+    Raises InputError if a channel is missing or the joint cannot follow a recording.
+    """
+    for columns in recordings:
+        for name in NEEDED:
+            if name not in columns:
+                raise InputError(
+                    f"channel `{name}` is missing; diagnosis needs {', '.join(NEEDED)} and a load"
+                )
+    group = groups_for(recordings, rows)
+    parts = tuple(prepare(c, config, group, 0.0) for c in recordings)
+    views = join([covariates(_with_load(part.columns, config)) for part in parts])
+    problem = Problem(
+        config,
+        _parameters(config),
+        parts,
+        np.concatenate([p.columns["joint_position_rad"] for p in parts]),
+        np.concatenate([p.sigma_rad for p in parts]),
+    )
+    guard = max(2, len(problem.measured) // 1000)
+    layout = alternate_blocks(views.starts, problem.rows, views.values["load_direction"], guard)
+    nominal = _start(problem)
+    floor = _floor(problem, parts, config, rng)
+    problem = replace(problem, sigma=problem.sigma * floor / float(np.sqrt(np.mean(problem.sigma**2))))
+    nominal = _start(problem)
+    mask = layout.heldout | layout.training
+    calibrated = solve(problem, (), nominal.z, mask, None, None, iterations=8, refresh=3)
+    if calibrated is None:
+        raise InputError(f"{config.name}: the joint cannot follow the recording with its nominal parameters")
+    return Setting(problem, views, layout, _around(recordings), nominal, calibrated, floor)
+
+
+def _parameters(config: JointConfig) -> tuple[Parameter, ...]:
+    names = [k for k, s in config.tolerance.items() if s > 0.0]
+    return free_parameters(config, [*names, *([] if OFFSET in names else [OFFSET])])
+
+
+def _start(problem: Problem) -> Model:
+    """The nominal joint with the best offset of its encoder."""
+    z = np.zeros(len(problem.parameters))
+    try:
+        predicted = problem.predict(problem.joint(z))
+    except InputError as error:
+        raise InputError(
+            f"{problem.config.name}: the nominal joint cannot follow the recording: {error}"
+        ) from None
+    for k, p in enumerate(problem.parameters):
+        if p.name == OFFSET:
+            z[k] = float(np.mean(problem.measured - predicted)) / p.unit
+    residual = evaluate(problem, (), z)
+    if residual is None:
+        raise InputError(f"{problem.config.name}: the nominal joint cannot follow the recording")
+    return Model((), z, (), residual, np.zeros((problem.rows, len(z))))
+
+
+def _floor(
+    problem: Problem, parts: Sequence[Prepared], config: JointConfig, rng: np.random.Generator
+) -> float:
+    """RMS that noise alone leaves: the joint encoder's own, and what noisy inputs do to the prediction
+    (friction rectifies noise, so this is simulated, with noise added once more).
+    """
+    own, moved = [], []
+    for part in parts:
+        noisy = dict(part.columns)
+        own.append(
+            _sigma(
+                config.sensors.joint_position_noise_rad,
+                config.sensors.joint_position_resolution_rad,
+                part,
+                "joint_position_rad",
+            )
+        )
+        for name, noise, step in (
+            (
+                "motor_position_rad",
+                config.sensors.motor_position_noise_rad,
+                config.sensors.motor_position_resolution_rad,
+            ),
+            (
+                "joint_torque_Nm",
+                config.sensors.joint_torque_noise_Nm,
+                config.sensors.joint_torque_resolution_Nm,
+            ),
+            (
+                "motor_torque_Nm",
+                config.sensors.motor_torque_noise_Nm,
+                config.sensors.motor_torque_resolution_Nm,
+            ),
+        ):
+            if name in noisy:
+                sigma = _sigma(noise, step, part, name)
+                noisy[name] = noisy[name] + sigma * rng.standard_normal(len(noisy[name]))
+        try:
+            a = Observer(config).run(part.columns)["joint_position_rad"]
+            b = Observer(config).run(noisy)["joint_position_rad"]
+            moved.append(float(np.std(b - a)))
+        except InputError:  # noise alone can ask for what an edge-of-slack joint cannot give
+            moved.append(0.0)
+    return float(np.sqrt(np.mean(np.square(own)) + np.mean(np.square(moved))))
+
+
+def _sigma(noise: float | None, resolution: float | None, part: Prepared, name: str) -> float:
+    """1-sigma of a channel's group means; white noise averages, quantisation of a resting signal does not."""
+    if noise is None and resolution is None:
+        return float(channel_noise(part.columns["time_s"], part.columns[name]).sigma)
+    white, step = noise or 0.0, (resolution or 0.0) / np.sqrt(12.0)
+    if white > step:
+        return float(np.hypot(white, step) / np.sqrt(part.group))
+    return float(np.hypot(white / np.sqrt(part.group), step / np.sqrt(min(part.group, 3))))
+
+
+def _with_load(columns: Columns, config: JointConfig) -> dict[str, FloatArray]:
+    """The columns with the load that the observer uses under the name of the joint torque."""
+    found = dict(columns)
+    if config.observer.load == "motor_torque":
+        ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))
+        found["joint_torque_Nm"] = -columns["motor_torque_Nm"] / ratio
+    return found
+
+
+def _around(recordings: Sequence[Columns]) -> Surroundings:
+    times = [c["time_s"] for c in recordings]
+    warm = [c["temperature_degC"] for c in recordings if "temperature_degC" in c]
+    mean = spread = 0.0
+    if len(warm) == len(recordings) and all(np.all(np.isfinite(w)) for w in warm):
+        joined = np.concatenate(warm)
+        mean, spread = float(np.mean(joined)), float(np.ptp(joined))
+    common = set.intersection(*({n for n in c if n.startswith("other_")} for c in recordings))
+    varying = [n for n in sorted(common) if any(float(np.ptp(c[n])) > 0.0 for c in recordings)]
+    first = min(float(t[0]) for t in times)
+    last = max(float(t[-1]) for t in times)
+    return Surroundings(first, last, mean, spread, tuple(varying))
