@@ -132,6 +132,16 @@ class JointLoop:
         """After the stop: observe and record, command nothing."""
         self._cycle(now_s, None)
 
+    def close(self) -> None:
+        """Keep the observer's state, finish the logs."""
+        save = getattr(self.setup.compensator.observer, "save", None)
+        try:
+            if save is not None and self._folder is not None and self.log is not None:
+                save(self._folder / "observer.snapshot")
+        finally:
+            if self.log is not None:
+                self.log.close()
+
     # ---- inside ----------------------------------------------------------------------------------
 
     def _here(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
@@ -85,6 +86,11 @@ class Loop:
         self._last_tick: Tick | None = None
         self._asked_to_stop = ""
         self._ticks = 0
+
+    @property
+    def since_s(self) -> float:
+        """Time since control began (0 before), as of the last tick."""
+        return max(self._last_begin - self._armed_s, 0.0) if self.stage is Stage.RUNNING else 0.0
 
     def ask_to_stop(self, why: str) -> None:
         """End the run at the next tick, safely; may be called from another thread or a signal handler."""
@@ -267,11 +273,11 @@ class Loop:
                 self.stop_reason = self.stop_reason or "ended by an error"
                 self.events.add(self._last_begin, "", f"stop: {self.stop_reason}")
         finally:
-            for joint in self.joints:
-                if joint.log is not None:
-                    joint.log.close()
-            self.events.close()
-            self.link.close()
+            with ExitStack() as all_of_them:
+                all_of_them.callback(self.link.close)
+                all_of_them.callback(self.events.close)
+                for joint in self.joints:
+                    all_of_them.callback(joint.close)
 
 
 def _folder_of(folder: Path, setup: JointSetup, count: int) -> Path:
