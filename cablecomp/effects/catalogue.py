@@ -7,6 +7,7 @@ import importlib
 import importlib.util
 import math
 import pkgutil
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -36,10 +37,11 @@ def load_effects(path: Path) -> tuple[str, ...]:
 
     Raises InputError if the file cannot be read or run, or defines no effect of its own.
     """
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    spec = importlib.util.spec_from_file_location(f"cablecomp_user_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path}: is no Python file; give one that defines an `Effect`")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # the compiler looks its functions' globals up by the module's name
     try:
         spec.loader.exec_module(module)
     except InputError:

@@ -1,0 +1,76 @@
+"""Joints, excitations and typical parameter values that the tests of the effects share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.config import JointConfig, load_joint, parse_joint
+from cablecomp.effects import catalogue, with_effects
+from cablecomp.observer import Observer
+
+Floats = NDArray[np.float64]
+Columns = dict[str, Floats]
+CONFIGS = Path(__file__).parents[2] / "configs" / "joints"
+
+
+def joint(name: str = "snow-closed-rig", **stage: float) -> JointConfig:
+    """A shipped joint, with stage values changed."""
+    data = load_joint(CONFIGS / f"{name}.toml").model_dump(by_alias=True)
+    data["drive"]["stage"] = tuple({**part, **stage} for part in data["drive"]["stage"])
+    return parse_joint(data, "changed")
+
+
+def typical(name: str, config: JointConfig) -> dict[str, Any]:
+    """Parameter values amid the prior range, so that the effect clearly acts within a second or two."""
+    values: dict[str, Any] = {}
+    effect = catalogue()[name]
+    for parameter in effect.parameters:
+        low, high = parameter.bounds(config)
+        values[parameter.name] = np.sqrt(low * high) if parameter.log else 0.25 * low + 0.75 * high
+        if parameter.name == "time_s":
+            values[parameter.name] = 0.7
+    return values | dict.fromkeys(effect.texts, "other_neighbour_Nm")
+
+
+def neutral(name: str) -> dict[str, Any]:
+    """The values that switch the effect off."""
+    effect = catalogue()[name]
+    return {**effect.neutral(), **dict.fromkeys(effect.texts, "other_neighbour_Nm")}
+
+
+def excitation(config: JointConfig, samples: int = 400, moving: bool = True) -> Columns:
+    """Two seconds of changing load with a hold, the motor turning if `moving`; all channels in use."""
+    time = np.linspace(0.0, 2.0, samples)
+    stage = config.drive.stage[-1]
+    ratio = np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage])
+    unit = 0.5 * stage.output_radius_m * stage.pretension_N
+    load = (
+        unit * np.sin(7.0 * np.minimum(time, 1.2) + 4.0 * np.maximum(time - 1.4, 0.0)) * np.exp(-0.3 * time)
+    )
+    return {
+        "time_s": time,
+        "motor_position_rad": 0.4 / ratio * np.sin(2.6 * time) if moving else np.zeros(samples),
+        "joint_torque_Nm": load,
+        "temperature_degC": 20.0 + 4.0 * np.sin(2.0 * time),
+        "other_neighbour_Nm": unit * np.cos(5.0 * time),
+    }
+
+
+def run(config: JointConfig, columns: Columns, *effects: tuple[str, Mapping[str, Any]]) -> Columns:
+    """Estimates of an observer of the joint with these effects and no others."""
+    return Observer(with_effects(config, effects)).run(columns)
+
+
+def still(time: Floats, load: Floats, motor: Floats | float = 0.0, **more: Floats) -> Columns:
+    """Channels of a recording with a given load."""
+    return {
+        "time_s": time,
+        "motor_position_rad": np.zeros_like(time) + motor,
+        "joint_torque_Nm": load,
+        **more,
+    }

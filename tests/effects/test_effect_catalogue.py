@@ -1,0 +1,150 @@
+"""Effects in a configuration: found by name, checked key by key, put together in a fixed order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from effect_cases import excitation, joint, neutral, run, typical
+
+from cablecomp.config import EffectEntry
+from cablecomp.effects import catalogue, extend, with_effects
+from cablecomp.effects.catalogue import acts_through, is_bounded, other_channels
+from cablecomp.errors import InputError
+
+BEARING = {"torque_Nm": 0.1, "load_coefficient": 0.01, "presliding_rad": 1e-4}
+LEAK = {"channel": "other_neighbour_Nm", "load_coefficient": 0.2}
+
+
+def refusal(*effects: tuple[str, dict[str, Any]]) -> str:
+    with pytest.raises(InputError) as caught:
+        extend(with_effects(joint(), effects))
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_an_unknown_id_is_answered_with_the_nearest() -> None:
+    assert "did you mean `bearing_friction`" in refusal(("bearing_frction", BEARING))
+    assert "known are" in refusal(("zzz", {}))
+
+
+def test_an_unknown_or_missing_key_is_named() -> None:
+    assert "unknown key `effect.torque`" in refusal(("bearing_friction", {**BEARING, "torque": 1.0}))
+    assert "lacks key `torque_Nm`" in refusal(
+        ("bearing_friction", {k: v for k, v in BEARING.items() if k != "torque_Nm"})
+    )
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "much", True, None, [1.0]])
+def test_only_finite_numbers_are_taken(value: object) -> None:
+    text = refusal(("bearing_friction", {**BEARING, "torque_Nm": value}))
+    assert "`effect.torque_Nm`" in text
+    assert "finite number" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "value"),
+    [
+        ("bearing_friction", "torque_Nm", -1e-6),
+        ("bearing_friction", "presliding_rad", 0.0),
+        ("pretension_relaxation", "time_constant_s", 0.0),
+        ("pretension_relaxation", "fraction", 0.9),
+        ("nonlinear_cable", "stiffening", 1.2),
+        ("strand_friction", "yield_N", 0.0),
+        ("strand_break", "fraction", 1.0),
+        ("position_dependent_friction", "amplitude", -1.0),
+        ("pressure_dependent_friction", "exponent", 1.0),
+        ("pulley_runout", "eccentricity_m", 0.5),
+        ("inertial_load", "inertia_kgm2", -1.0),
+        ("series_compliance", "compliance_rad_per_Nm", -1.0),
+        ("termination_backlash", "gap_rad", -0.1),
+        ("clock_skew", "delay_s", 3.0),
+    ],
+)
+def test_values_that_a_law_cannot_take_are_refused(name: str, key: str, value: float) -> None:
+    text = refusal((name, {**typical(name, joint()), key: value}))
+    assert f"`effect.{key}` is {value!r}" in text
+    assert "is accepted" in text
+
+
+def test_the_channel_of_crosstalk_must_be_a_further_channel() -> None:
+    assert "`other_<name>` is accepted" in refusal(("crosstalk", {**LEAK, "channel": "motor_current_A"}))
+    assert "`other_<name>` is accepted" in refusal(("crosstalk", {**LEAK, "channel": 7}))
+    assert "lacks key `channel`" in refusal(("crosstalk", {"load_coefficient": 0.1}))
+    many = [("crosstalk", {**LEAK, "channel": f"other_{k}"}) for k in range(5)]
+    assert "one channel too many" in refusal(*many)
+
+
+def test_two_strand_frictions_make_no_sense() -> None:
+    strand = ("strand_friction", {"fraction": 0.1, "yield_N": 1.0})
+    assert "given twice" in refusal(strand, strand)
+
+
+def test_with_effects_changes_the_effects_alone() -> None:
+    config = joint()
+    rich = with_effects(config, [("bearing_friction", BEARING), ("crosstalk", LEAK)])
+    assert config.effect == ()
+    assert [e.id for e in rich.effect] == ["bearing_friction", "crosstalk"]
+    assert rich.effect[0].parameters == BEARING
+    assert rich.drive is config.drive
+    assert rich.effect[0] == EffectEntry.model_validate({"id": "bearing_friction", **BEARING})
+    assert with_effects(rich, []) == config
+    assert other_channels(rich) == ["other_neighbour_Nm"]
+
+
+def test_the_order_in_the_configuration_does_not_matter() -> None:
+    config = joint()
+    columns = excitation(config, 300)
+    names = (
+        "clock_skew",
+        "pulley_runout",
+        "termination_backlash",
+        "bearing_friction",
+        "crosstalk",
+        "gravity_load",
+    )
+    effects = [(name, typical(name, config)) for name in names]
+    ahead = run(config, columns, *effects)["joint_position_rad"]
+    back = run(config, columns, *effects[::-1])["joint_position_rad"]
+    assert ahead == pytest.approx(back, abs=1e-12)
+
+
+def test_effects_at_their_neutral_value_cost_nothing() -> None:
+    config = joint()
+    found = extend(
+        with_effects(config, [(name, neutral(name)) for name in catalogue() if name != "strand_friction"])
+    )
+    assert found is not None
+    assert found.terms == ()
+    assert found.extra_length_m == 0.0
+
+
+def test_covariates_of_crosstalk_name_its_channel() -> None:
+    rich = with_effects(joint(), [("crosstalk", LEAK), ("clock_skew", {"delay_s": 0.0})])
+    assert acts_through(rich.effect[0]) == ("other:neighbour_Nm",)
+    assert acts_through(rich.effect[1]) == ("velocity",)
+
+
+def test_bounds_are_promised_only_where_order_is_preserved() -> None:
+    config = joint()
+    assert is_bounded(with_effects(config, [("series_compliance", {"compliance_rad_per_Nm": 1e-3})]))
+    assert not is_bounded(with_effects(config, [("bearing_friction", BEARING)]))
+
+
+@pytest.mark.parametrize("name", sorted(set(catalogue()) - {"routing_friction", "viscous_slip"}))
+def test_a_vanishing_value_changes_vanishingly(name: str) -> None:
+    """The plain drive is nested: no jump between switched off and hardly there.
+
+    Two have laws of their own about it: a guide adds its length, viscous slip the grain of its grid.
+    """
+    config = joint()
+    columns = excitation(config, 300)
+    values = typical(name, config)
+    for parameter in catalogue()[name].parameters:
+        if not parameter.shape:
+            values[parameter.name] = 1e-9 * parameter.bounds(config)[1]
+    plain = run(config, columns)["deflection_rad"]
+    slight = run(config, columns, (name, values))["deflection_rad"]
+    assert np.abs(slight - plain).max() < 1e-5 * np.ptp(plain)

@@ -1,0 +1,170 @@
+"""Friction that depends on tension or on place: the cone law in new variables, against direct integration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from effect_cases import excitation, joint, run, still
+from scipy.integrate import quad, solve_ivp
+
+from cablecomp.config import JointConfig
+
+Law = Callable[[float, float], float]  # mu at (tension ratio, angle from the departure point)
+
+
+def unloading(config: JointConfig, samples: int = 80) -> dict[str, np.ndarray]:
+    """An open circuit's load goes from 0 to half of slack: monotone, so every wrap holds one slip zone."""
+    time = np.linspace(0.0, 1.0, samples)
+    unit = config.drive.stage[0].output_radius_m * config.drive.stage[0].pretension_N
+    return still(time, -0.5 * unit * time)
+
+
+def stretch(law: Law, tau: float, wrap: float) -> float:
+    """int (T/T0 - 1) dθ over a wrap whose tension rises from tau inward by dT/dθ = mu T, up to T0."""
+
+    def slope(angle: float, state: np.ndarray) -> list[float]:
+        return [law(state[0], angle) * state[0], state[0] - 1.0]
+
+    def at_rest(angle: float, state: np.ndarray) -> float:
+        return float(state[0] - 1.0)
+
+    at_rest.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(slope, (0.0, wrap), [tau, 0.0], rtol=1e-11, atol=1e-13, events=at_rest)
+    assert found.t_events[0].size == 1
+    return float(found.y[1, -1])
+
+
+def expected_deflection(config: JointConfig, load: float, output: Law, inner: Law) -> float:
+    stage = config.drive.stage[0]
+    tau = 1.0 + load / (stage.output_radius_m * stage.pretension_N)
+    total = stage.free_length_m * (tau - 1.0)
+    total += stage.output_radius_m * stretch(output, tau, stage.wrap_output_rad)
+    total += stage.input_radius_m * stretch(inner, tau, stage.wrap_input_rad)
+    return total * stage.pretension_N / stage.EA_N / stage.output_radius_m
+
+
+@pytest.mark.parametrize("exponent", [-0.4, 1.0 / 3.0, 0.8])
+def test_friction_that_falls_with_pressure(exponent: float) -> None:
+    config = joint("snow-open-rig")
+    stage = config.drive.stage[0]
+    columns = unloading(config)
+    found = run(config, columns, ("pressure_dependent_friction", {"exponent": exponent}))["deflection_rad"]
+    for k in (20, 50, 79):
+        expected = expected_deflection(
+            config,
+            columns["joint_torque_Nm"][k],
+            lambda tau, _: stage.mu_output * tau**-exponent,
+            lambda tau, _: stage.mu_input * tau**-exponent,
+        )
+        assert found[k] == pytest.approx(expected, rel=1e-7)
+
+
+def test_pressure_dependence_in_a_full_loop_against_a_grid() -> None:
+    """Nested reversals on one pulley: grid points that slip in turn, mu by their own tension."""
+    config = joint("snow-open-rig", input_radius_m=1e-6, free_length_m=1e-6, wrap_output_rad=9.0)
+    stage = config.drive.stage[0]
+    unit = stage.output_radius_m * stage.pretension_N
+    turns = np.array([0.0, -0.5, -0.1, -0.35, -0.2, -0.6, 0.0])
+    load = unit * np.interp(np.linspace(0.0, 6.0, 241), np.arange(7.0), turns)
+    time = np.arange(241.0)
+    n = 0.5
+    q = run(config, still(time, load), ("pressure_dependent_friction", {"exponent": n}))["deflection_rad"]
+    points = 6000
+    step = stage.wrap_output_rad / points
+    w = np.zeros(points + 1)  # (tau^n - 1)/n at every grid point, the free end first
+    for value in load:
+        w[0] = ((1.0 + value / unit) ** n - 1.0) / n
+        reach = stage.mu_output * step * np.arange(points + 1)
+        w = np.clip(w, w[0] - reach, w[0] + reach)
+    tau = (1.0 + n * w) ** (1.0 / n)
+    expected = np.trapezoid(tau - 1.0, dx=step) * stage.pretension_N / stage.EA_N
+    assert q[-1] == pytest.approx(expected, rel=1e-3)
+    assert abs(q[-1]) > 1e-5
+
+
+def test_friction_that_depends_on_the_place_in_the_groove() -> None:
+    """The place at s from the departure point is the one that the cable leaves at joint angle q - s."""
+    config = joint("snow-open-rig", wrap_output_rad=25.0)
+    stage = config.drive.stage[0]
+    amplitude, phase = 0.7, 0.9
+    columns = unloading(config)
+    values = {"amplitude": amplitude, "phase_rad": phase}
+    found = run(config, columns, ("position_dependent_friction", values))["deflection_rad"]
+    for k in (20, 50, 79):
+        here = found[k]  # input locked: joint angle = deflection
+        expected = expected_deflection(
+            config,
+            columns["joint_torque_Nm"][k],
+            lambda _, s, here=here: stage.mu_output * (1.0 + amplitude * math.cos(here - s - phase)),
+            lambda *_: stage.mu_input,
+        )
+        assert found[k] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_other_cable_sees_the_groove_the_other_way_round() -> None:
+    """Closed circuit, mirrored: reversing load, motion and phase reverses the joint exactly."""
+    config = joint()
+    columns = excitation(config)
+    mirrored = columns | {k: -columns[k] for k in ("motor_position_rad", "joint_torque_Nm")}
+    ahead = run(config, columns, ("position_dependent_friction", {"amplitude": 0.8, "phase_rad": 0.5}))
+    back = run(config, mirrored, ("position_dependent_friction", {"amplitude": 0.8, "phase_rad": -0.5}))
+    assert back["deflection_rad"] == pytest.approx(-ahead["deflection_rad"], abs=1e-10)
+    assert back["tension_l_N"] == pytest.approx(ahead["tension_h_N"], rel=1e-8)
+
+
+def test_loops_are_narrow_where_the_groove_is_rough() -> None:
+    """mu larger near q = 0 than near q = pi: the loop's width tells where the joint stands."""
+    config = joint(wrap_output_rad=12.0, wrap_input_rad=12.0)
+    time = np.linspace(0.0, 1.0, 400)
+    values = {"amplitude": 0.9, "phase_rad": 0.0}
+
+    def width(motor: float) -> float:
+        load = np.concatenate([np.zeros(100), 1.2 * np.sin(np.linspace(0.0, 4.0 * np.pi, 300))])
+        turn = motor * np.minimum(time / time[100], 1.0)
+        q = run(config, still(time, load, motor=turn), ("position_dependent_friction", values))[
+            "deflection_rad"
+        ]
+        return float(abs(np.trapezoid(q[250:], load[250:])))
+
+    assert width(0.0) < 0.85 * width(math.pi)
+
+
+def test_exponent_and_place_act_together() -> None:
+    """Both factors multiply: on a groove of constant roughness 1 + a the coefficient is just mu (1 + a)."""
+    config = joint("snow-open-rig")
+    stage = config.drive.stage[0]
+    columns = unloading(config)
+    both = run(
+        config,
+        columns,
+        ("pressure_dependent_friction", {"exponent": 0.3}),
+        ("position_dependent_friction", {"amplitude": 0.5, "phase_rad": 0.2}),
+    )["deflection_rad"]
+    k = 60
+    expected = expected_deflection(
+        config,
+        columns["joint_torque_Nm"][k],
+        lambda tau, s: stage.mu_output * tau**-0.3 * (1.0 + 0.5 * math.cos(both[k] - s - 0.2)),
+        lambda tau, _: stage.mu_input * tau**-0.3,
+    )
+    assert both[k] == pytest.approx(expected, rel=1e-6)
+
+
+def test_closed_circuit_tensions_with_pressure_dependence() -> None:
+    """Nearly tangent closed circuit: both wraps' stretches cancel, each integrated on its own."""
+    config = joint(free_length_m=1e-9)
+    stage = config.drive.stage[0]
+    n = 0.5
+    time = np.linspace(0.0, 1.0, 60)
+    unit = stage.output_radius_m * stage.pretension_N
+    found = run(config, still(time, 0.8 * unit * time), ("pressure_dependent_friction", {"exponent": n}))
+    tau_h, tau_l = (found[key][-1] / stage.pretension_N for key in ("tension_h_N", "tension_l_N"))
+    assert tau_h - tau_l == pytest.approx(0.8, rel=1e-9)
+
+    def wrap(tau: float) -> float:  # int (T - T0)/T0 d theta = int (T - T0)/T0 dT/(mu(T) T)
+        return float(quad(lambda t: (t - 1.0) * t ** (n - 1.0), 1.0, tau, epsrel=1e-12)[0])
+
+    assert wrap(tau_h) == pytest.approx(wrap(tau_l), rel=2e-3)  # l winds off a little, h on

@@ -1,0 +1,186 @@
+"""Effects in the load path: the cables feel the measured moment less what the effect takes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import Columns, Floats, excitation, joint, run, still
+
+from cablecomp.config import JointConfig
+
+JOINTS = ("snow-closed-rig", "tendon-finger", "snow-open-rig", "two-stage-series")
+
+
+def fed_with(config: JointConfig, columns: Columns, load: Floats) -> Floats:
+    """Joint angle of the plain drive under another load."""
+    return run(config, {**columns, "joint_torque_Nm": load})["joint_position_rad"]
+
+
+def unit(config: JointConfig) -> float:
+    return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_crosstalk_is_the_other_channel_in_the_load(name: str) -> None:
+    config = joint(name)
+    columns = excitation(config)
+    effect = ("crosstalk", {"channel": "other_neighbour_Nm", "load_coefficient": 0.3})
+    found = run(config, columns, effect)["joint_position_rad"]
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] + 0.3 * columns["other_neighbour_Nm"])
+    assert found == pytest.approx(expected, abs=1e-11)
+
+
+def test_two_neighbours_are_told_apart() -> None:
+    config = joint()
+    columns = excitation(config)
+    columns["other_wrist_Nm"] = columns["joint_torque_Nm"] ** 2
+    found = run(
+        config,
+        columns,
+        ("crosstalk", {"channel": "other_wrist_Nm", "load_coefficient": 0.2}),
+        ("crosstalk", {"channel": "other_neighbour_Nm", "load_coefficient": -0.1}),
+    )["joint_position_rad"]
+    load = columns["joint_torque_Nm"] + 0.2 * columns["other_wrist_Nm"] - 0.1 * columns["other_neighbour_Nm"]
+    assert found == pytest.approx(fed_with(config, columns, load), abs=1e-11)
+
+
+def test_a_missing_reading_of_the_neighbour_is_no_load() -> None:
+    config = joint()
+    columns = excitation(config)
+    columns["other_neighbour_Nm"] = np.full(len(columns["time_s"]), np.nan)
+    effect = ("crosstalk", {"channel": "other_neighbour_Nm", "load_coefficient": 0.3})
+    assert run(config, columns, effect)["joint_position_rad"] == pytest.approx(
+        run(config, columns)["joint_position_rad"], abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_gravity_turns_with_the_joint(name: str) -> None:
+    config = joint(name)
+    columns = excitation(config)
+    weight = 0.4 * unit(config)
+    found = run(config, columns, ("gravity_load", {"moment_Nm": weight, "phase_rad": 0.7}))[
+        "joint_position_rad"
+    ]
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] - weight * np.sin(found + 0.7))
+    assert found == pytest.approx(expected, abs=1e-10)
+
+
+def second_differences(time: Floats, q: Floats) -> Floats:
+    """Acceleration by the two-step backward formula, twice, even steps; zero for the first two samples."""
+    h = time[1] - time[0]
+    v = np.zeros_like(q)
+    v[0] = v[1] = (q[1] - q[0]) / h
+    a = np.zeros_like(q)
+    for n in range(2, len(q)):
+        v[n] = (1.5 * q[n] - 2.0 * q[n - 1] + 0.5 * q[n - 2]) / h
+        a[n] = (1.5 * v[n] - 2.0 * v[n - 1] + 0.5 * v[n - 2]) / h
+    return a
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_inertia_takes_mass_times_acceleration(name: str) -> None:
+    config = joint(name)
+    columns = excitation(config)
+    inertia = 0.02 * unit(config)
+    found = run(config, columns, ("inertial_load", {"inertia_kgm2": inertia}))["joint_position_rad"]
+    load = columns["joint_torque_Nm"] - inertia * second_differences(columns["time_s"], found)
+    assert found == pytest.approx(fed_with(config, columns, load), abs=1e-9)
+
+
+def moved_motor(samples: int) -> Columns:
+    time = np.linspace(0.0, 1.0, samples)
+    return still(time, np.zeros(samples), motor=0.3 * np.sin(9.0 * time) ** 3)
+
+
+def test_inertia_converges_with_the_square_of_the_step() -> None:
+    config = joint("tendon-finger")
+    effect = ("inertial_load", {"inertia_kgm2": 2e-4})
+    counts = (801, 1601, 3201)
+    q = [run(config, moved_motor(n), effect)["joint_position_rad"][:: (n - 1) // 200] for n in counts]
+    assert np.abs(q[0] - q[1]).max() / np.abs(q[1] - q[2]).max() == pytest.approx(4.0, rel=0.25)
+
+
+def test_inertia_swings_on_the_free_span() -> None:
+    """Resonance of J on the free spans, 2 EA R^2/L: amplification 1/(1 - (w/w0)^2) of a small load."""
+    config = joint("tendon-finger", mu_output=50.0, mu_input=50.0)  # no slip: the free span alone
+    stage = config.drive.stage[0]
+    stiffness = 2.0 * stage.EA_N * stage.output_radius_m**2 / stage.free_length_m
+    inertia = 1e-3
+    natural = np.sqrt(stiffness / inertia)
+    drive = 0.5 * natural
+    time = np.linspace(0.0, 24.0 * 2.0 * np.pi / natural, 4801)
+    load = 1e-3 * np.sin(drive * time) * np.clip(time / time[-1] * 2.0, 0.0, 1.0)
+    q = run(config, still(time, load), ("inertial_load", {"inertia_kgm2": inertia}))["joint_position_rad"]
+    tail = time > 0.6 * time[-1]
+    assert np.abs(q[tail]).max() == pytest.approx(1e-3 / stiffness / (1.0 - 0.25), rel=0.02)
+
+
+def test_inertia_takes_uneven_steps_and_repeated_times() -> None:
+    config = joint("tendon-finger")
+    effect = ("inertial_load", {"inertia_kgm2": 2e-4})
+    even = moved_motor(8001)
+    rng = np.random.default_rng(5)
+    keep = np.sort(np.append(rng.choice(np.arange(1, 8000), 5600, replace=False), [0, 8000]))
+    uneven = {key: value[keep] for key, value in even.items()}
+    repeated = {key: np.repeat(value[:1000], 2) for key, value in even.items()}
+    reference = run(config, even, effect)["joint_position_rad"]
+    scale = np.abs(reference - even["motor_position_rad"] * 0.75).max()
+    assert run(config, uneven, effect)["joint_position_rad"] == pytest.approx(
+        reference[keep], abs=0.02 * scale
+    )
+    assert run(config, repeated, effect)["joint_position_rad"][::2] == pytest.approx(
+        reference[:1000], abs=1e-7
+    )
+
+
+def test_even_motion_from_the_start_makes_no_jerk() -> None:
+    config = joint("tendon-finger")
+    time = np.linspace(0.0, 1.0, 501)
+    columns = still(time, np.zeros(501), motor=0.8 * time)
+    q = run(config, columns, ("inertial_load", {"inertia_kgm2": 0.01}))["joint_position_rad"]
+    assert q == pytest.approx(0.75 * 0.8 * time, abs=1e-9)
+
+
+def presliding(q: Floats, start: float, width: float) -> Floats:
+    """State z of one elasto-plastic element that follows the angle, -1 <= z <= 1."""
+    z, states = 0.0, []
+    for moved in np.diff(q, prepend=start):
+        z = min(max(z + moved / width, -1.0), 1.0)
+        states.append(z)
+    return np.array(states)
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-3])
+@pytest.mark.parametrize("name", ["snow-closed-rig", "tendon-finger", "two-stage-series"])
+def test_bearing_friction_holds_back(name: str, width: float) -> None:
+    config = joint(name)
+    columns = excitation(config)
+    torque = 0.05 * unit(config)
+    values = {"torque_Nm": torque, "load_coefficient": 0.0, "presliding_rad": width}
+    found = run(config, columns, ("bearing_friction", values))["joint_position_rad"]
+    load = columns["joint_torque_Nm"] - torque * presliding(found, 0.0, width)
+    expected = fed_with(config, columns, load)
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_bearing_friction_grows_with_its_load() -> None:
+    config = joint("snow-open-rig")
+    columns = excitation(config)
+    values = {"torque_Nm": 0.0, "load_coefficient": 0.08, "presliding_rad": 1e-4}
+    found = run(config, columns, ("bearing_friction", values))
+    radial = config.drive.stage[0].output_radius_m * found["tension_h_N"]
+    load = columns["joint_torque_Nm"] - 0.08 * radial * presliding(found["joint_position_rad"], 0.0, 1e-4)
+    assert found["joint_position_rad"] == pytest.approx(fed_with(config, columns, load), abs=1e-9)
+
+
+def test_a_locked_joint_with_bearing_friction_lets_go_after_twice_the_torque() -> None:
+    """Tell-tale: a step of 2 tau_b in the load path at each reversal, whatever the wraps do."""
+    config = joint()
+    torque = 0.1
+    time = np.linspace(0.0, 1.0, 2001)
+    load = 1.5 - 1.5 * np.abs(2.0 * time - 1.0)
+    values = {"torque_Nm": torque, "load_coefficient": 0.0, "presliding_rad": 1e-9}
+    q = run(config, still(time, load), ("bearing_friction", values))["deflection_rad"]
+    back = np.flatnonzero((time > 0.5) & (q < q.max() - 1e-8))[0]
+    assert load.max() - load[back] == pytest.approx(2.0 * torque, abs=0.01)

@@ -1,0 +1,118 @@
+"""Effects between the pulley and its encoder: memoryless readings, and clocks that disagree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import excitation, joint, run, still
+
+from cablecomp.effects import with_effects
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
+
+JOINTS = ("snow-closed-rig", "snow-open-rig", "two-stage-series")
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_series_compliance_adds_in_proportion(name: str) -> None:
+    config = joint(name)
+    columns = excitation(config)
+    plain = run(config, columns)
+    found = run(config, columns, ("series_compliance", {"compliance_rad_per_Nm": 3e-3}))
+    expected = plain["deflection_rad"] + 3e-3 * columns["joint_torque_Nm"]
+    assert found["deflection_rad"] == pytest.approx(expected, abs=1e-12)
+    assert found["tension_h_N"] == pytest.approx(plain["tension_h_N"], rel=1e-12)
+
+
+def test_compliance_and_clearance_see_what_passes_the_load_path() -> None:
+    """A moment that enters beside the torque channel bends the mount as well."""
+    config = joint()
+    columns = excitation(config)
+    leak = ("crosstalk", {"channel": "other_neighbour_Nm", "load_coefficient": 0.5})
+    path = columns["joint_torque_Nm"] + 0.5 * columns["other_neighbour_Nm"]
+    without = run(config, columns, leak)["deflection_rad"]
+    bent = run(config, columns, ("series_compliance", {"compliance_rad_per_Nm": 1e-3}), leak)[
+        "deflection_rad"
+    ]
+    loose = run(config, columns, ("termination_backlash", {"gap_rad": 2e-3}), leak)["deflection_rad"]
+    far = np.abs(path) > 0.05
+    assert bent - without == pytest.approx(1e-3 * path, abs=1e-12)
+    assert (loose - without)[far] == pytest.approx(1e-3 * np.sign(path)[far], abs=1e-9)
+
+
+def test_backlash_jumps_by_its_gap_at_zero_load() -> None:
+    config = joint()
+    time = np.linspace(0.0, 1.0, 801)
+    columns = still(time, np.sin(12.0 * time))
+    step = run(config, columns, ("termination_backlash", {"gap_rad": 5e-4}))["deflection_rad"]
+    step -= run(config, columns)["deflection_rad"]
+    load = columns["joint_torque_Nm"]
+    unit = config.drive.stage[0].output_radius_m * config.drive.stage[0].pretension_N
+    assert step[load > 0.02 * unit] == pytest.approx(2.5e-4, rel=1e-6)
+    assert step[load < -0.02 * unit] == pytest.approx(-2.5e-4, rel=1e-6)
+    assert np.all(np.diff(step[np.argsort(load)]) >= -1e-15)
+
+
+def late(columns: dict[str, np.ndarray], q: np.ndarray, delay: float) -> np.ndarray:
+    return np.interp(columns["time_s"] - delay, columns["time_s"], q)
+
+
+@pytest.mark.parametrize("delay", [1e-4, 0.004, 0.0503, 0.9])
+def test_clock_skew_shifts_the_time_axis(delay: float) -> None:
+    config = joint()
+    uneven = np.cumsum(np.random.default_rng(3).uniform(0.0, 2.0 * 2.0 / 900, 900))
+    columns = still(uneven, np.sin(5.0 * uneven), motor=0.4 * np.sin(2.6 * uneven))
+    q = run(config, columns)["joint_position_rad"]
+    found = run(config, columns, ("clock_skew", {"delay_s": delay}))["joint_position_rad"]
+    # the past is kept at steps of a 200th of the delay: straight lines over these
+    assert found == pytest.approx(late(columns, q, delay), abs=2e-5 * delay / 0.05 * np.ptp(q))
+
+
+def test_a_late_encoder_is_exact_where_every_sample_is_kept() -> None:
+    config = joint()
+    columns = excitation(config, 300)
+    q = run(config, columns)["joint_position_rad"]
+    found = run(config, columns, ("clock_skew", {"delay_s": 0.031}))["joint_position_rad"]
+    assert found == pytest.approx(late(columns, q, 0.031), abs=1e-12)
+
+
+def test_an_early_encoder_is_met_by_going_straight_on() -> None:
+    config = joint()
+    time = np.linspace(0.0, 1.0, 400)
+    columns = still(time, np.zeros(400), motor=0.7 * time)
+    found = run(config, columns, ("clock_skew", {"delay_s": -0.02}))["joint_position_rad"]
+    assert found[30:] == pytest.approx(0.7 * (time[30:] + 0.02), abs=1e-12)
+    smooth = excitation(config, 2000)
+    q = run(config, smooth)["joint_position_rad"]
+    error = run(config, smooth, ("clock_skew", {"delay_s": -0.01}))["joint_position_rad"] - late(
+        smooth, q, -0.01
+    )
+    acceleration = np.abs(np.gradient(np.gradient(q, smooth["time_s"]), smooth["time_s"])).max()
+    assert np.abs(error[20:-20]).max() <= 1.1 * acceleration * 0.01**2
+
+
+def test_a_resting_joint_does_not_show_its_clock() -> None:
+    config = joint()
+    time = np.linspace(0.0, 1.0, 200)
+    load = np.minimum(5.0 * time, 1.0)
+    found = run(config, still(time, load), ("clock_skew", {"delay_s": 0.05}))["joint_position_rad"]
+    plain = run(config, still(time, load))["joint_position_rad"]
+    assert found[time > 0.3] == pytest.approx(plain[time > 0.3], abs=1e-14)
+    assert np.abs(found - plain)[time < 0.2].max() > 1e-5
+
+
+def test_late_readings_contain_what_the_other_effects_add() -> None:
+    config = joint()
+    columns = excitation(config, 300)
+    mount = ("series_compliance", {"compliance_rad_per_Nm": 5e-3})
+    q = run(config, columns, mount)["joint_position_rad"]
+    found = run(config, columns, ("clock_skew", {"delay_s": 0.02}), mount)["joint_position_rad"]
+    assert found == pytest.approx(late(columns, q, 0.02), abs=1e-12)
+
+
+def test_samples_of_one_instant_replace_each_other() -> None:
+    config = with_effects(joint(), [("clock_skew", {"delay_s": 0.01})])
+    observer = Observer(config)
+    for time in (0.0, 0.01, 0.01, 0.01, 0.02):
+        last = observer.step(Sample(time, 0.1 * time, 0.0))
+    assert last.joint_position_rad == pytest.approx(0.001, abs=1e-12)
