@@ -190,13 +190,17 @@ def other_channels(config: JointConfig) -> list[str]:
     return names
 
 
-def _law(changes: Sequence[Change], config: JointConfig) -> Floats:
-    """Law tables for the output drums of chain h and l and for all other places."""
+def _law(changes: Sequence[Change], config: JointConfig) -> Floats | None:
+    """Law tables for the output drums of chain h and l and for all other places.
+
+    None where terms are all that is added: the kernel then runs the plain drive's own, quicker code.
+    """
     by_tension = [c.tension_factor for c in changes if c.tension_factor is not None]
     by_angle = [c.joint_angle_factor for c in changes if c.joint_angle_factor is not None]
     stiffening = sum(c.stiffening for c in changes)
     if not by_tension and not by_angle and stiffening == 0.0:
-        return np.stack([plain_law()] * 3)
+        inside = any(c.play_share or c.guide_angle or c.viscous_Ns_per_m_rad for c in changes)
+        return np.stack([plain_law()] * 3) if inside else None
     stage = config.drive.stage[-1]
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
     tables = []
