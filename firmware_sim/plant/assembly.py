@@ -182,8 +182,10 @@ def assemble_joint(build: Build, motor_rad: float, travel_rad: float, resolution
             tail.damping_Nms_per_rad,
         )
         couplings[k]["gap"] = tail.gap_rad
+        # the same loss as the damper gives at a depth of 1e-4 rad
+        couplings[k]["flank_loss"] = tail.damping_Nms_per_rad / (tail.stiffness_Nm_per_rad * 1e-4)
     drive = make_drive(build.cables, build.shafts, couplings, build.surround, nodes)
-    spacing = min(min(fine_spacing(s, resolution, 0.0)) for s in build.stages)
+    spacing = min(min(fine_spacing(s, resolution)) for s in build.stages)
     return Joint(drive, build.readout, build.output, load_shaft, spacing, build.clock_delay_s)
 
 
@@ -238,7 +240,8 @@ def _mesh_cable(build: Build, k: int, travel_rad: float, resolution: Resolution)
     c["A"] = on_out
     travel_m = 1.05 * travel_rad * stage.input_radius_m * _speed(build, stage) + 0.02 * stage.output_radius_m
     arcs = (on_out, stage.free_length_m + float(c["guide_arc_m"]), on_in)
-    return element_lengths(stage, arcs, travel_m, resolution)
+    guide_mu = float(c["guide_mu_per_m"] * c["guide_arc_m"])
+    return element_lengths(stage, arcs, travel_m, resolution, guide_mu)
 
 
 def _speed(build: Build, stage: StageConfig) -> float:

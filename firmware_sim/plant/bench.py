@@ -43,6 +43,8 @@ class PlantRun:
     Signs: joint torque is the external moment on the output pulley, motor torque what the motor applies to
     the input pulley, both along +q; tensions are those of the free span (h at the output and at the input
     drum). `pulley_position_rad`, `motor_true_rad` and `load_path_Nm` are what no sensor sees.
+    `failures` counts the steps in which some point kept going to and fro at the edge of sliding; there end
+    forces settled to 1e-3 T0 only.
     """
 
     time_s: Floats

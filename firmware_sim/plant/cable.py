@@ -15,6 +15,23 @@ from typing import Any
 from firmware_sim.plant.jit import njit
 from firmware_sim.plant.records import FREE, GUIDE, IN, OUT, Nodes
 
+STIFFEST = math.log(6.0)  # a stiffening cable gets no stiffer than six times EA
+
+
+@njit
+def guess_tension(c: Any, nodes: Nodes) -> None:
+    """Tension at the first guess of a step: a taut element counts as taut even if the guess presses it
+    together."""
+    y, l0, tension, slope = nodes.y, nodes.l0, nodes.tension, nodes.slope
+    if c.stiffening != 0.0:
+        refresh_tension(c, nodes)
+        return
+    for e in range(c.first, c.first + c.count - 1):
+        strain = (y[e + 1] - y[e]) / l0[e] - 1.0 - c.eigenstrain
+        rate = c.EA if strain > 0.0 or slope[e] * l0[e] > 0.5 * c.EA else c.EA * c.slack_ratio
+        tension[e] = rate * strain
+        slope[e] = rate / l0[e]
+
 
 @njit
 def refresh_tension(c: Any, nodes: Nodes) -> None:
@@ -38,9 +55,12 @@ def refresh_tension(c: Any, nodes: Nodes) -> None:
     for e in range(c.first, c.first + c.count - 1):
         strain = (y[e + 1] - y[e]) / l0[e] - 1.0 - c.eigenstrain
         if strain > zero:
-            growth = min(b * (EA / T0 * strain - 1.0), 30.0)
-            tension[e] = T0 * (1.0 + math.expm1(growth) / b)
-            slope[e] = EA * math.exp(growth) / l0[e]
+            growth = b * (EA / T0 * strain - 1.0)
+            beyond = max(growth - STIFFEST, 0.0)  # straight from there on
+            growth -= beyond
+            rate = math.exp(growth)
+            tension[e] = T0 * (1.0 + math.expm1(growth) / b + rate * beyond / b)
+            slope[e] = EA * rate / l0[e]
         else:
             tension[e] = weak * (strain - zero)
             slope[e] = weak / l0[e]
@@ -155,11 +175,12 @@ def solve_cable(c: Any, nodes: Nodes) -> float:
 
 
 @njit
-def move_nodes(c: Any, nodes: Nodes, dY: float, dA: float) -> None:
-    """Apply the solved change for given changes of path length and of arc on the output drum."""
+def move_nodes(c: Any, nodes: Nodes, dY: float, dA: float, share: float) -> None:
+    """Apply the solved change, or a share of it, for given changes of path length and of arc on the output
+    drum."""
     y, al, be, ga = nodes.y, nodes.alpha, nodes.beta, nodes.gamma
     for i in range(c.first + 1, c.first + c.count):
-        y[i] += al[i] + be[i] * dY + ga[i] * dA
+        y[i] += share * al[i] + be[i] * dY + ga[i] * dA
 
 
 @njit
@@ -185,20 +206,25 @@ def update_modes(c: Any, nodes: Nodes, tolerance: float, rush: bool) -> int:
     changed = 0
     shift_Y, shift_A = c.Y - c.Y_old, c.A - c.A_old
     first, last = c.first, c.first + c.count - 1
-    changed += _sweep(c, nodes, c.i_out, first, -1, 0.0, tolerance, rush)
-    changed += _sweep(c, nodes, c.i_in, last, 1, shift_Y, tolerance, rush)
+    changed += _sweep(nodes, c.i_out, first, -1, 0.0, tolerance, rush)
+    changed += _sweep(nodes, c.i_in, last, 1, shift_Y, tolerance, rush)
     if c.guide_mu_per_m > 0.0:
-        for i in range(c.i_out + 1, c.i_in):
-            if nodes.where[i] == GUIDE:
-                changed += _set_mode(nodes, i, nodes.tension[i - 1], nodes.tension[i], shift_A, tolerance)
+        low, high = c.i_out + 1, c.i_in - 1
+        while low <= high and nodes.where[low] != GUIDE:
+            low += 1
+        while high >= low and nodes.where[high] != GUIDE:
+            high -= 1
+        if low <= high:
+            middle = (low + high) // 2
+            changed += _sweep(nodes, low, middle + 1, 1, shift_A, tolerance, rush)
+            changed += _sweep(nodes, high, middle, -1, shift_A, tolerance, rush)
     return changed
 
 
 @njit
-def _sweep(
-    c: Any, nodes: Nodes, start: int, end: int, step: int, shift: float, tolerance: float, rush: bool
-) -> int:
-    """Modes of one drum, from its departure point inwards."""
+def _sweep(nodes: Nodes, start: int, end: int, step: int, shift: float, tolerance: float, rush: bool) -> int:
+    """Modes from a free end inwards: a drum from its departure point, a guide from either end to its
+    middle."""
     changed = 0
     carrying = False
     carried = 0.0

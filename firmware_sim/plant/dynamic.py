@@ -83,7 +83,7 @@ class LinkSpec:
     viscous_Nms_per_rad: float = 0.0
     wall_rad: float | None = None
     wall_stiffness_Nm_per_rad: float = 500.0
-    wall_damping_Nms_per_rad: float = 0.5
+    wall_loss_s_per_rad: float = 0.5
 
     @classmethod
     def for_joint(cls, config: PlantConfig) -> LinkSpec:
@@ -184,6 +184,10 @@ class Plant:
         rotor["coulomb_Nm"] = self.motor.coulomb_Nm
         rotor["presliding"] = max(self.motor.presliding_rad, 1e-7)
         pulley["inertia"] += 0.02 * self.link.inertia_kgm2
+        for shaft in build.shafts[1 : build.output]:
+            shaft["inertia"] = (
+                0.02 * self.motor.rotor_inertia_kgm2
+            )  # so that slack cables leave it determined
         soft = self.sensors.joint_torque_compliance_rad_per_Nm + build.extra_compliance
         stiffness = 1.0 / max(soft, STIFFEST_COUPLING)
         damping = 0.04 * math.sqrt(stiffness * self.link.inertia_kgm2)
@@ -210,7 +214,7 @@ class Plant:
         end = self._joint.drive.shafts[self._joint.load_shaft]
         end["wall_at"] = math.inf if position_rad is None else position_rad
         end["wall_stiffness"] = 0.0 if position_rad is None else self.link.wall_stiffness_Nm_per_rad
-        end["wall_damping"] = self.link.wall_damping_Nms_per_rad
+        end["wall_loss"] = self.link.wall_loss_s_per_rad
 
     @property
     def holding_torque_Nm(self) -> float:

@@ -1,8 +1,16 @@
-"""The plant's numba decorator: compiled code is cached on disk beside the sources."""
+"""The plant's numba decorator.
+
+Machine code is kept on disk in a folder named after a digest of all of the plant's sources: numba by itself
+watches only the file that a function stands in, and would go on using code compiled from an older version
+of its callees.
+"""
 
 from __future__ import annotations
 
+import os
+import zlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -10,7 +18,35 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+def _digest() -> str:
+    crc = 0
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        crc = zlib.crc32(path.read_bytes(), zlib.crc32(path.name.encode(), crc))
+    return f"{crc:08x}"
+
+
+def _root() -> Path:
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        if os.environ.get(name):
+            return Path(os.environ[name])
+    return Path.home() / ".cache"
+
+
+CODE_FOLDER = _root() / "firmware_sim" / _digest()
+
+
+def is_compiled() -> bool:
+    """Whether machine code of these very sources lies on disk; if not, the first run compiles for some
+    seconds."""
+    return any(CODE_FOLDER.rglob("*.nbi"))
+
+
 def njit(function: F) -> F:
-    """Compile to machine code on first call and cache it; IEEE arithmetic, no reordering."""
-    compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    """Compile to machine code on first call and keep it; IEEE arithmetic, no reordering."""
+    usual = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CODE_FOLDER)
+    try:
+        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    finally:
+        numba.config.CACHE_DIR = usual
     return compiled

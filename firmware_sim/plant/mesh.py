@@ -40,24 +40,39 @@ NORMAL = Resolution()
 FINE = Resolution(friction_step=0.007, spacings_per_step=0.5, max_nodes=20000)
 
 
-def fine_spacing(stage: StageConfig, resolution: Resolution, guide_arc_m: float) -> tuple[float, float]:
+def fine_spacing(stage: StageConfig, resolution: Resolution, with_guide: bool = False) -> tuple[float, float]:
     """Spacing wanted near the output and near the input drum, m.
 
     A share of the friction length R/mu, from 0.01 to 0.2 rad of contact, never more than what lets one point
     touch two bodies.
     """
-    apart = 0.9 * stage.free_length_m * (0.5 if guide_arc_m > 0 else 1.0)
-    guide = guide_arc_m / 8 if guide_arc_m > 0 else math.inf
-    out = resolution.friction_step * stage.output_radius_m / stage.mu_output
-    inner = resolution.friction_step * stage.input_radius_m / stage.mu_input
-    out, inner = max(out, 0.01 * stage.output_radius_m), max(inner, 0.01 * stage.input_radius_m)
-    out = min(out, 0.2 * stage.output_radius_m, apart, max(guide, 0.1 * out))
-    inner = min(inner, 0.2 * stage.input_radius_m, apart, max(guide, 0.1 * inner))
-    return out, inner
+    apart = 0.9 * stage.free_length_m * (0.5 if with_guide else 1.0)
+
+    def spacing(radius: float, mu: float) -> float:
+        return min(max(resolution.friction_step / mu, 0.01), 0.2) * radius
+
+    out = spacing(stage.output_radius_m, stage.mu_output)
+    inner = spacing(stage.input_radius_m, stage.mu_input)
+    return min(out, apart), min(inner, apart)
+
+
+def guide_spacing(arc_m: float, friction_angle: float, drums_m: float, free_m: float, step: float) -> float:
+    """Spacing wanted on a guide, m: 2.5 friction steps a point.
+
+    A guide may do with a single point, since the friction of all that lies on it adds up to its own; what
+    is lost is where on the guide it acts, which hardly counts for a guide much shorter than the free
+    length.
+    """
+    share = min(max(2.5 * step / max(friction_angle, 1e-9), 1 / 16), 1.0)
+    return min(max(arc_m * share, 0.1 * drums_m, 0.004 * free_m), drums_m)
 
 
 def element_lengths(
-    stage: StageConfig, arcs: tuple[float, float, float], travel_m: float, resolution: Resolution
+    stage: StageConfig,
+    arcs: tuple[float, float, float],
+    travel_m: float,
+    resolution: Resolution,
+    guide_mu: float = 0.0,
 ) -> Floats:
     """Stretched element lengths from termination to termination.
 
@@ -67,12 +82,15 @@ def element_lengths(
     """
     on_out, span, on_in = arcs
     guide = span - stage.free_length_m
-    fine_out, fine_in = fine_spacing(stage, resolution, guide)
+    fine_out, fine_in = fine_spacing(stage, resolution, guide > 0)
     total = on_out + span + on_in
     edges = [(-math.inf, on_out + travel_m, fine_out), (total - on_in - travel_m, math.inf, fine_in)]
     if guide > 0:
         middle = on_out + 0.5 * stage.free_length_m
-        edges.append((middle - travel_m, middle + guide + travel_m, min(fine_out, fine_in)))
+        spacing = guide_spacing(
+            guide, guide_mu, min(fine_out, fine_in), stage.free_length_m, resolution.friction_step
+        )
+        edges.append((middle - travel_m, middle + guide + travel_m, spacing))
 
     def wanted(p: float) -> float:
         return min(fine + resolution.growth * max(low - p, p - high, 0.0) for low, high, fine in edges)

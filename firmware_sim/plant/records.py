@@ -102,7 +102,7 @@ SHAFT = np.dtype(
         ("spring_Nm", "f8"),  # saturation torque of a parallel spring
         ("spring_rate", "f8"),  # N·m/rad
         ("wall_stiffness", "f8"),
-        ("wall_damping", "f8"),
+        ("wall_loss", "f8"),  # s/rad
         ("wall_at", "f8"),
         ("preload_Nm", "f8"),  # constant torque along +q, scaled by the pretension factor
         ("external_Nm", "f8"),
@@ -120,6 +120,7 @@ COUPLING = np.dtype(
         ("stiffness", "f8"),
         ("damping", "f8"),
         ("gap", "f8"),  # rad, total clearance
+        ("flank_loss", "f8"),  # s/rad, of flanks with clearance
         ("torque_Nm", "f8"),  # result: on shaft a, along +q
     ]
 )

@@ -45,7 +45,7 @@ def shaft_torque(s: Any, preload_factor: float) -> float:
     s.contact_Nm = 0.0
     depth = s.q - s.wall_at
     if s.wall_stiffness > 0.0 and depth > 0.0:
-        s.contact_Nm = -max(s.wall_stiffness * depth + s.wall_damping * s.v, 0.0)
+        s.contact_Nm = -s.wall_stiffness * depth * max(1.0 + s.wall_loss * s.v, 0.0)
     torque += s.contact_Nm
     s.load_Nm = torque
     torque += s.preload_Nm
@@ -60,7 +60,8 @@ def shaft_slope(s: Any, rate: float) -> float:
     if s.spring_Nm > 0.0:
         slope += s.spring_rate / math.cosh(s.spring_rate * s.q / s.spring_Nm) ** 2
     if s.contact_Nm < 0.0:
-        slope += s.wall_stiffness + s.wall_damping * rate
+        gain = 1.0 + s.wall_loss * s.v
+        slope += s.wall_stiffness * (gain + (s.q - s.wall_at) * s.wall_loss * rate)
     return slope
 
 
@@ -114,19 +115,31 @@ def settle_bearing(s: Any) -> None:
 
 @njit
 def coupling_torque(k: Any, twist: float, rate: float) -> float:
-    """Torque on shaft a of a spring and damper that b turns by `twist`, with the clearance `gap` in
-    between."""
-    free = 0.5 * k.gap
-    if abs(twist) <= free and k.gap > 0.0:
+    """Torque on shaft a of a spring and damper that b turns by `twist`.
+
+    With clearance the flanks press by k δ (1 + λ δ̇), δ their depth, which begins without a jump (Hunt,
+    Crossley 1975), and never pull.
+    """
+    if k.gap <= 0.0:
+        torque: float = k.stiffness * twist + k.damping * rate
+        return torque
+    depth = abs(twist) - 0.5 * k.gap
+    if depth <= 0.0:
         return 0.0
-    torque: float = k.stiffness * (twist - math.copysign(free, twist)) + k.damping * rate
-    return torque
+    side = math.copysign(1.0, twist)
+    pressed: float = side * k.stiffness * depth * max(1.0 + side * rate * k.flank_loss, 0.0)
+    return pressed
 
 
 @njit
-def coupling_slope(k: Any, twist: float, rate: float) -> float:
-    """Derivative of `coupling_torque` by the twist, with rate = dv/dq."""
-    if abs(twist) <= 0.5 * k.gap and k.gap > 0.0:
+def coupling_slope(k: Any, twist: float, rate: float, turn: float) -> float:
+    """Derivative of `coupling_torque` by the twist, with turn = dv/dq."""
+    if k.gap <= 0.0:
+        slope: float = k.stiffness + k.damping * turn
+        return slope
+    depth = abs(twist) - 0.5 * k.gap
+    gain = 1.0 + math.copysign(1.0, twist) * rate * k.flank_loss
+    if depth <= 0.0 or gain <= 0.0:
         return 0.0
-    slope: float = k.stiffness + k.damping * rate
-    return slope
+    pressed: float = k.stiffness * (gain + depth * k.flank_loss * turn)
+    return pressed

@@ -91,7 +91,7 @@ def test_live_and_bench_plant_are_one_drive() -> None:
 
 
 def test_link_rests_against_the_wall() -> None:
-    link = LinkSpec(0.01, wall_rad=0.1, wall_stiffness_Nm_per_rad=300.0, wall_damping_Nms_per_rad=3.0)
+    link = LinkSpec(0.01, wall_rad=0.1, wall_stiffness_Nm_per_rad=300.0, wall_loss_s_per_rad=3.0)
     plant = Plant(joint(), MOTOR, link)
     readings = None
     for _ in range(3000):
