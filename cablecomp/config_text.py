@@ -10,7 +10,7 @@ from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 
 
-def joint_toml(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
+def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
     """TOML text of a joint; keys that stand at their default of None are left out, floats keep every
     digit."""
     data = config.model_dump(by_alias=True, exclude_none=True)
@@ -32,7 +32,7 @@ def joint_toml(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
 def write_joint(path: Path, config: JointConfig, comments: tuple[str, ...] = ()) -> None:
     """Write a joint configuration; raises InputError if the place does not take it."""
     try:
-        path.write_text(joint_toml(config, comments), encoding="utf-8")
+        path.write_text(joint_text(config, comments), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
 

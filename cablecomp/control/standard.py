@@ -73,10 +73,11 @@ def calibration_protocol(config: JointConfig, share: float = 0.8) -> Protocol:
 
 
 def reaching_protocol(
-    config: JointConfig, seed: int, duration_s: float = 30.0, share: float = 0.75
+    config: JointConfig, seed: int, duration_s: float = 30.0, share: float = 0.75, pace: float = 1.0
 ) -> Protocol:
-    """Reaching motions with a load that changes meanwhile, drawn from `seed`; every reach takes 2 to 4
-    s, some are followed by a rest.
+    """Reaching motions with a load that changes meanwhile, drawn from `seed`.
+
+    Every reach takes 2 to 4 s over `pace`; some are followed by a rest. The last one leads back to zero.
     """
     s = span_of(config, share)
     rng = np.random.default_rng(seed)
@@ -84,15 +85,14 @@ def reaching_protocol(
     segments: list[Segment] = []
     total = 0.0
     while total < duration_s - 3.0:
-        time = float(rng.uniform(2.0, 4.0))
+        time = float(rng.uniform(2.0, 4.0)) / pace
         position = float(rng.uniform(s.low_rad, s.high_rad))
-        segments.append(
-            Ramp(duration_s=time, position_rad=position, load_Nm=float(rng.uniform(lowest, s.load_Nm)))
-        )
+        load = float(rng.uniform(lowest, s.load_Nm))
+        segments.append(Ramp(duration_s=time, position_rad=position, load_Nm=load))
         total += time
         if rng.random() < 0.3:
-            segments.append(Hold(duration_s=0.8))
-            total += 0.8
+            segments.append(Hold(duration_s=0.8 / pace))
+            total += 0.8 / pace
     segments.append(Ramp(duration_s=3.0, position_rad=0.0, load_Nm=0.0))
     return Protocol(name=f"reaching-{seed}", segment=tuple(segments), note="unseen motions with load changes")
 

@@ -9,7 +9,6 @@ from typing import Final, NamedTuple
 from cablecomp.control.options import HealthOptions
 from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import (
-    CHANNELS,
     JOINT_POSITION,
     JOINT_TORQUE,
     MOTOR_POSITION,
@@ -146,10 +145,11 @@ class Sustained:
 
 
 class Health:
-    """Watches one joint. `needs_torque`, `needs_joint`: channels that the feed-forward lives on.
+    """Watches one joint. `needs_torque`, `needs_joint`: channels that the feed-forward lives on;
+    `others`: places of the further channels that the observer reads, in its order.
 
-    Motor position, joint torque, joint position are held at their last plausible value; all else passes as it
-    came.
+    Motor position, joint torque, joint position are held at their last plausible value; all else passes
+    as it came.
     """
 
     def __init__(
@@ -160,6 +160,7 @@ class Health:
         *,
         needs_torque: bool = True,
         needs_joint: bool = False,
+        others: tuple[int, ...] = (),
     ) -> None:
         o = options
         limit = inf if o.torque_max_Nm is None else o.torque_max_Nm
@@ -171,6 +172,7 @@ class Health:
         self._fresh_s = fresh_s
         self._needs_torque = needs_torque
         self._needs_joint = needs_joint
+        self._others = others
         self._residual = Sustained(o.confirm_s)
         self._mismatch = Sustained(o.confirm_s)
         self._lags = Sustained(o.confirm_s)
@@ -216,7 +218,7 @@ class Health:
             self.joint.value,
             values[MOTOR_TORQUE],
             values[TEMPERATURE],
-            tuple(values[len(CHANNELS) :]) if readings.others else (),
+            tuple([values[place] for place in self._others]) if self._others else (),
         )
         joint_ok = has_joint and not self._bad_joint and joint_age <= fresh
         fatal = bool(flags & MOTOR_LAGS)

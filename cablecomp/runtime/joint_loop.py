@@ -15,7 +15,7 @@ from cablecomp.control.compensator import Compensator
 from cablecomp.control.degrade import NORMAL, DegradeState, DegradeTimes, Phase, degrade, feed_of
 from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gate_names
 from cablecomp.links.link import Link
-from cablecomp.links.records import DriveState, MotorCommand, Request
+from cablecomp.links.records import CHANNELS, DriveState, MotorCommand, Request
 from cablecomp.runtime.health import Checked, Health, health_names
 from cablecomp.runtime.log import EventLog, JointLog
 from cablecomp.signals import Estimate, Sample
@@ -91,7 +91,7 @@ class JointLoop:
         self._flags = 0
         self._gate_flags = 0
         self._offset = setup.config.sensors.joint_position_offset_rad
-        self._last_reference = Reference()
+        self._last_reference = setup.reference(0.0)
 
     @property
     def ready(self) -> bool:
@@ -182,7 +182,7 @@ class JointLoop:
         self.view = View(
             s.name, now_s, self.degraded.phase, sample, estimate, command, reference, checked.flags
         )
-        self._record(sample, estimate, command, reference, checked)
+        self._record(sample, estimate, command, checked, since_s is not None)
         self._last_reference = reference
 
     def _judge(self, checked: Checked, now_s: float, period_s: float) -> None:
@@ -243,26 +243,28 @@ class JointLoop:
             tally.torque_count += 1
 
     def _record(
-        self, sample: Sample, estimate: Estimate, command: Command, reference: Reference, checked: Checked
+        self, sample: Sample, estimate: Estimate, command: Command, checked: Checked, controlled: bool
     ) -> None:
         if self._folder is None:
             return
         if self.log is None:
             comments = (f"cablecomp run, joint {self.setup.name}, configuration joint.toml",)
             self.log = JointLog(self._folder, sample, self.readings.others, comments)
-        sent, state = self._sent, self.degraded
+        sent, state, wanted = self._sent, self.degraded, self._last_reference
         self.log.append(
             sample,
             estimate,
             self._offset,
+            self.readings.values[len(CHANNELS) :],
             (
                 sample.time_s,
+                controlled,
                 state.phase,
                 state.weight,
                 checked.flags,
                 sent.flags,
-                reference.joint_position_rad,
-                reference.joint_torque_Nm,
+                wanted.joint_position_rad,
+                wanted.joint_torque_Nm,
                 sent.motor_position_rad,
                 sent.motor_velocity_rad_s,
                 sent.motor_torque_Nm,

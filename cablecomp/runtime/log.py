@@ -32,6 +32,7 @@ PREDICTION: Final = (
 
 CYCLE: Final = (
     "time_s",
+    "controlled",
     "phase",
     "weight",
     "health",
@@ -47,8 +48,9 @@ CYCLE: Final = (
     "load_age_s",
     "step_s",
 )
-"""Columns of `cycles.csv`: what was asked, what was sent, how old the data were, what was wrong (bits), how
-long it took."""
+"""Columns of `cycles.csv`: whether under control, what was asked for at that instant, what was sent,
+how old the data were, what was wrong (bits), how long it took.
+"""
 
 
 class TableLog:
@@ -140,8 +142,17 @@ class JointLog:
         """Samples recorded so far."""
         return self._recorder.rows
 
-    def append(self, sample: Sample, estimate: Estimate, offset_rad: float, cycle: Sequence[float]) -> None:
-        """One cycle: the sample as the observer took it, what it said, and a row of `CYCLE`."""
+    def append(
+        self,
+        sample: Sample,
+        estimate: Estimate,
+        offset_rad: float,
+        others: Sequence[float],
+        cycle: Sequence[float],
+    ) -> None:
+        """One cycle: the sample as the observer took it, what it said, further channels, and a row of
+        `CYCLE`.
+        """
         row = [sample.time_s, sample.motor_position_rad]
         if self._joint:
             row.append(sample.joint_position_rad)
@@ -150,7 +161,7 @@ class JointLog:
         if self._motor:
             row.append(sample.motor_torque_Nm)
         row.append(sample.temperature_degC)
-        row += sample.other
+        row += others
         self._recorder.append(row)
         e = estimate
         residual = sample.joint_position_rad - e.joint_position_rad - offset_rad

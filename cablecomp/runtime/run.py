@@ -20,6 +20,7 @@ from cablecomp.control.options import CompensatorOptions, ControlConfig, Control
 from cablecomp.control.protocol import Protocol
 from cablecomp.errors import InputError
 from cablecomp.links.link import BusLink, Link
+from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import Mode
 from cablecomp.links.schema import JointEnds, LinkConfig
 from cablecomp.observer import Observer
@@ -173,7 +174,8 @@ def run_joints(
     chosen = control.model_copy(update={"compensator": first.options.model_copy(update={"mode": mode})})
     gains = design_loop(first.config, link.rate_Hz, chosen).gains
     period = 1.0 / link.rate_Hz
-    setups = tuple(_setup(c, mode, link, control, protocol, gains, period, options) for c in contestants)
+    bus: Link = BusLink(link)
+    setups = tuple(_setup(c, mode, bus, control, protocol, gains, period, options) for c in contestants)
     if options.out is not None:
         _prepare(options.out, setups)
     duration = protocol.duration_s if options.duration_s is None else options.duration_s
@@ -181,7 +183,6 @@ def run_joints(
     clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
     timing = LoopOptions(duration, mode=_drive_mode(link, first.place), policy=policy)
     truths = TruthTally([c.name for c in contestants])
-    bus: Link = BusLink(link)
 
     def after(tick: Tick, stage: Stage) -> None:
         if simulation is not None:
@@ -204,6 +205,29 @@ def run_joints(
     if options.out is not None:
         (options.out / "run.json").write_text(json.dumps(found.as_dict(), indent=1) + "\n", encoding="utf-8")
     return found
+
+
+def matched(link: LinkConfig, control: ControlConfig, *, own_link: bool) -> tuple[LinkConfig, ControlConfig]:
+    """Link and control file that say the same of the drive's stiffness and damping.
+
+    `own_link`: the link is the user's, and what it states holds; else it takes over what the control
+    file states.
+    """
+    motor = link.joint[0].motor
+    if motor is None or motor.mode != "impedance":
+        return link, control
+    if own_link and motor.stiffness_Nm_per_rad > 0.0:
+        own = {
+            "stiffness_Nm_per_rad": motor.stiffness_Nm_per_rad,
+            "damping_Nms_per_rad": motor.damping_Nms_per_rad or control.motor.damping_Nms_per_rad,
+        }
+        return link, control.model_copy(update={"motor": control.motor.model_copy(update=own)})
+    gains = {
+        "stiffness_Nm_per_rad": control.motor.stiffness_Nm_per_rad,
+        "damping_Nms_per_rad": control.motor.damping_Nms_per_rad,
+    }
+    ends = link.joint[0].model_copy(update={"motor": motor.model_copy(update=gains)})
+    return link.model_copy(update={"joint": (ends, *link.joint[1:])}), control
 
 
 def same_joint(link: LinkConfig, names: Sequence[str]) -> LinkConfig:
@@ -230,13 +254,14 @@ def times_of(link: LinkConfig, period_s: float) -> DegradeTimes:
 def _setup(
     c: Contestant,
     mode: ControlMode,
-    link: LinkConfig,
+    bus: Link,
     control: ControlConfig,
     protocol: Protocol,
     gains: Gains,
     period: float,
     options: RunOptions,
 ) -> JointSetup:
+    link = bus.config
     if not 0 <= c.place < len(link.joint):
         raise InputError(
             f"link `{link.name}` has {len(link.joint)} joints; joint {c.place + 1} is not among them"
@@ -251,11 +276,28 @@ def _setup(
     compensator = Compensator(config, chosen, period, observer, gains=gains, motor=control.motor)
     times = times_of(link, period)
     sensor = config.observer.load == "joint_torque"
-    health = Health(control.health, ratio_of(config), times.fresh_s, needs_torque=sensor, needs_joint=both)
+    health = Health(
+        control.health,
+        ratio_of(config),
+        times.fresh_s,
+        needs_torque=sensor,
+        needs_joint=both,
+        others=_places(bus.joints[c.place], observer.channels),
+    )
     limits = GateLimits.of(c.config.limits, age_s=times.motor_stop_s)
     return JointSetup(
         c.place, c.name, config, compensator, health, limits, times, _references(protocol, force)
     )
+
+
+def _places(readings: JointReadings, channels: Sequence[str]) -> tuple[int, ...]:
+    missing = [name for name in channels if name not in readings.others]
+    if missing:
+        raise InputError(
+            f"joint `{readings.name}`: an effect reads `{missing[0]}`, which is not on this link; "
+            "add the channel to a device's messages"
+        )
+    return tuple(readings.index(name) for name in channels)
 
 
 def observed(config: JointConfig, options: CompensatorOptions) -> JointConfig:

@@ -1,0 +1,96 @@
+"""Starts simulated joints for the command line: where cablecomp's wishes become firmware_sim's."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from cablecomp.config import read_toml
+from cablecomp.control.options import MotorModel
+from cablecomp.errors import InputError
+from cablecomp.links.schema import CanBus, LinkConfig
+from cablecomp.links.schema_devices import CanSimpleDevice, MitDevice
+from cablecomp.runtime.simulated import Simulation, SimulationWish
+from firmware_sim.build import BenchConfig
+from firmware_sim.errors import SimError
+from firmware_sim.faults import parse_fault
+from firmware_sim.firmware import DriveConfig
+from firmware_sim.hosted import HostedJoints, HostedSpec
+from firmware_sim.plant import LinkSpec, MotorSpec
+from firmware_sim.plant.errors import PlantError
+
+
+def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
+    """Simulated joints of a configuration behind the wish's link; raises InputError for a bus that it
+    cannot sit on.
+    """
+    data = read_toml(joint)
+    motor = wish.control.motor
+    torque = float(data.get("limits", {}).get("motor_torque_max_Nm", math.nan))
+    torque = torque if torque == torque else 20.0 * motor.stiffness_Nm_per_rad * 0.01 + 1.0
+    travel = _travel(data)
+    try:
+        spec = HostedSpec(
+            data,
+            _bus(wish.link),
+            _bench(wish, torque),
+            _motor(motor, torque),
+            LinkSpec(motor.output_inertia_kgm2, 0.0, 0.0, motor.output_viscous_Nms_per_rad),
+            seed=wish.seed,
+            off_nominal_seed=wish.seed if wish.off_nominal else None,
+            travel_rad=travel,
+            faults=tuple(parse_fault(text, wish.seed + k) for k, text in enumerate(wish.faults)),
+        )
+        return HostedJoints(spec)
+    except (SimError, PlantError) as error:
+        raise InputError(f"simulated joint: {error}") from None
+
+
+def _motor(motor: MotorModel, torque: float) -> MotorSpec:
+    return MotorSpec(
+        motor.inertia_kgm2,
+        torque,
+        motor.viscous_Nms_per_rad,
+        motor.coulomb_Nm,
+        current_bandwidth_Hz=motor.torque_bandwidth_Hz,
+    )
+
+
+def _bench(wish: SimulationWish, torque: float) -> BenchConfig:
+    ends = wish.link.joint[0]
+    if ends.motor is None:
+        raise InputError(f"joint `{ends.name}` has no motor on this link; add [joint.motor]")
+    if ends.motor.gear_ratio != 1.0 or ends.motor.sign != 1 or ends.motor.position_offset_rad != 0.0:
+        raise InputError(
+            "--sim: the simulated drive sits at the input pulley; leave gear_ratio, sign and offset out"
+        )
+    device = wish.link.device_of(ends.motor)
+    drive = DriveConfig(torque_limit_Nm=torque)
+    if isinstance(device, MitDevice):
+        reply = 0 if ends.motor.reply_id is None else ends.motor.reply_id
+        return BenchConfig(
+            protocol="mit", joints=wish.joints, model=device.model or "AK80-9", reply_id=reply, drive=drive
+        )
+    protocol = "odrive" if isinstance(device, CanSimpleDevice) else "dbc"
+    return BenchConfig(protocol=protocol, joints=wish.joints, drive=drive)
+
+
+def _bus(link: LinkConfig) -> str:
+    bus = link.bus
+    if isinstance(bus, CanBus) and bus.interface == "virtual":
+        return f"virtual:{bus.channel}"
+    if isinstance(bus, CanBus) and bus.interface == "udp_multicast":
+        port = bus.options.get("port")
+        return f"udp_multicast:{bus.channel}" + (f":{port}" if port is not None else "")
+    raise InputError(
+        f"--sim: link `{link.name}` is not on a virtual or udp_multicast bus; "
+        "start `python -m firmware_sim` on the other end of that line instead"
+    )
+
+
+def _travel(data: dict[str, object]) -> float:
+    limits = data.get("limits")
+    table = limits if isinstance(limits, dict) else {}
+    ends = [table.get("motor_position_min_rad"), table.get("motor_position_max_rad")]
+    known = [abs(float(v)) for v in ends if isinstance(v, int | float)]
+    return max([*known, 1.0])

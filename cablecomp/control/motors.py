@@ -1,0 +1,48 @@
+"""A motor and a link that suit a joint, where no control file says which there are."""
+
+from __future__ import annotations
+
+from math import pi, prod
+
+from cablecomp.config import JointConfig
+from cablecomp.control.options import ControlConfig, HealthOptions, MotorModel
+from cablecomp.control.stiffness import greatest_load, stiffness_range
+
+_LINK_HZ = 110.0
+_DRIVE_HZ = 95.0
+_DAMPING = 0.8
+
+
+def control_for(config: JointConfig) -> ControlConfig:
+    """A control file made up: a link that swings at 110 Hz on the unloaded cable, a drive whose own
+    loop has 95 Hz.
+
+    Good for simulation and for a first look at a design; for hardware, state the real values.
+    """
+    ratio = prod(s.input_radius_m / s.output_radius_m for s in config.drive.stage)
+    stiffness = stiffness_range(config, samples=80)
+    inertia = stiffness.zero_Nm_per_rad / (2.0 * pi * _LINK_HZ) ** 2
+    rotor = 2.0 * inertia * ratio**2
+    swing = 2.0 * pi * _DRIVE_HZ
+    load = greatest_load(config)
+    limit = config.limits.motor_torque_max_Nm
+    torque = 3.0 * ratio * load if limit is None else limit
+    motor = MotorModel(
+        inertia_kgm2=rotor,
+        viscous_Nms_per_rad=0.02 * rotor * swing,
+        coulomb_Nm=0.005 * torque,
+        stiffness_Nm_per_rad=rotor * swing**2,
+        damping_Nms_per_rad=2.0 * _DAMPING * rotor * swing,
+        output_inertia_kgm2=inertia,
+        output_viscous_Nms_per_rad=0.005 * inertia * 2.0 * pi * _LINK_HZ,
+    )
+    widest = float(abs(stiffness.deflection_rad).max())
+    health = HealthOptions(
+        motor_rate_rad_s=60.0 / min(ratio, 1.0),
+        torque_rate_Nm_s=1000.0 * load,
+        torque_max_Nm=2.0 * load,
+        joint_residual_rad=2.0 * widest,
+        torque_mismatch_Nm=0.5 * load,
+        lead_rad=max(0.2, 20.0 * widest / ratio),
+    )
+    return ControlConfig(motor=motor, health=health)

@@ -1,0 +1,70 @@
+"""What the pages of a run are drawn from: its tables, read back and thinned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from cablecomp.recording.reader import read_all
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RunData:
+    """Columns of one joint's recording, prediction and cycles, at most `points` rows, one to one."""
+
+    recording: dict[str, Floats]
+    prediction: dict[str, Floats]
+    cycles: dict[str, Floats]
+
+    @property
+    def controlled(self) -> NDArray[np.bool_]:
+        """Rows under control, from half a second after it began."""
+        time, on = self.recording["time_s"], self.cycles["controlled"] > 0.0
+        if not np.any(on):
+            return np.asarray(on, dtype=np.bool_)
+        return np.asarray(on & (time > time[np.argmax(on)] + 0.5), dtype=np.bool_)
+
+    @property
+    def time_s(self) -> Floats:
+        """Time since control began."""
+        time, on = self.recording["time_s"], self.cycles["controlled"] > 0.0
+        return np.asarray(time - (time[np.argmax(on)] if np.any(on) else time[0]), dtype=np.float64)
+
+    def column(self, name: str) -> Floats:
+        """A column of recording, cycles or prediction, NaN where it is not there."""
+        for table in (self.recording, self.cycles, self.prediction):
+            if name in table:
+                return table[name]
+        return np.full(len(self.recording["time_s"]), np.nan)
+
+    def error_rad(self, offset_rad: float = 0.0) -> Floats:
+        """Joint encoder less what was asked for at that instant."""
+        return np.asarray(
+            self.column("joint_position_rad") - offset_rad - self.cycles["reference_position_rad"],
+            dtype=np.float64,
+        )
+
+
+def load_run(folder: Path, points: int = 6000) -> RunData:
+    """Read what a run left in a joint's folder."""
+    recording = read_all(folder / "recording.csv").columns
+    step = max(1, len(recording["time_s"]) // points)
+    return RunData(
+        {name: values[::step] for name, values in recording.items()},
+        _columns(folder / "prediction.csv", step),
+        _columns(folder / "cycles.csv", step),
+    )
+
+
+def _columns(path: Path, step: int) -> dict[str, Floats]:
+    table = pl.read_csv(path, infer_schema_length=None)
+    return {
+        name: np.asarray(table[name].cast(pl.Float64).fill_null(np.nan).to_numpy()[::step], dtype=np.float64)
+        for name in table.columns
+    }

@@ -1,0 +1,168 @@
+"""`report.html` of a run: what was asked, what the joint did, what the observer said, how time and data
+were kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from plotly.subplots import make_subplots
+
+from cablecomp.report import page, style
+from cablecomp.report.page import Fact, Section
+from cablecomp.report.run_data import Floats, RunData, load_run
+from cablecomp.runtime.run import JointResult, RunReport
+
+TIME = style.label("time", "s")
+
+
+def write_run_page(report: RunReport, config_text: str) -> Path:
+    """Write the page beside the run's files and return its path."""
+    assert report.folder is not None
+    path = report.folder / "report.html"
+    path.write_text(run_page(report, config_text), encoding="utf-8")
+    return path
+
+
+def run_page(report: RunReport, config_text: str) -> str:
+    """The page of one run as HTML that opens offline."""
+    names = ", ".join(joint.name for joint in report.joints)
+    lead = f"{report.timing.ticks} ticks at {report.timing.asked_Hz:g} Hz; ended: {report.stop_reason}."
+    return page.page(f"Run: {names}", lead, _sections(report, config_text))
+
+
+def run_facts(joint: JointResult) -> list[Fact]:
+    """Cards of one joint."""
+    true = "" if np.isnan(joint.true_position_rad) else f"true: {_angle(joint.true_position_rad)}"
+    facts = [
+        Fact("joint position error, RMS", _angle(joint.position_rad), true),
+        Fact("prediction residual, RMS", _angle(joint.residual_rad), "joint encoder less prediction"),
+        Fact("deflection, RMS", _angle(joint.deflection_rad), "what the motor has to make up for"),
+    ]
+    if not np.isnan(joint.torque_Nm):
+        true = "" if np.isnan(joint.true_torque_Nm) else f"true: {page.number(joint.true_torque_Nm, 'N·m')}"
+        facts.append(Fact("joint torque error, RMS", page.number(joint.torque_Nm, "N·m"), true))
+    stopped = joint.phases.get("stopped", 0)
+    tone: page.Tone = "bad" if stopped else "good"
+    trouble = sum(n for phase, n in joint.phases.items() if phase != "normal")
+    facts.append(Fact("cycles with stale data", str(trouble), f"of {sum(joint.phases.values())}", tone))
+    return facts
+
+
+def position_figure(data: RunData) -> Any:
+    """Asked and measured joint position, error, load, over time."""
+    fig = stack([0.45, 0.3, 0.25], 640)
+    time = data.time_s
+    curve(fig, time, data.cycles["reference_position_rad"], "asked", style.BASELINE, 1)
+    curve(fig, time, data.column("joint_position_rad"), "measured", style.MEASURED, 1)
+    curve(fig, time, 1e3 * data.error_rad(), "error", style.RESIDUAL, 2)
+    curve(fig, time, data.column("joint_torque_Nm"), "load", style.LOAD, 3)
+    style.axes(fig, "", style.label("joint position", "rad"), row=1, col=1)
+    style.axes(fig, "", style.label("error", "mrad"), row=2, col=1)
+    style.axes(fig, TIME, style.label("load", "N·m"), row=3, col=1)
+    error = np.abs(1e3 * data.error_rad()[data.controlled])
+    if len(error):
+        top = 1.15 * float(np.nanmax(error)) + 1e-6
+        fig.update_yaxes(range=[-top, top], row=2, col=1)
+    return fig
+
+
+def deflection_figure(data: RunData) -> Any:
+    """Predicted deflection with its bounds, what the motor made up for, residual."""
+    fig = stack([0.62, 0.38], 520)
+    time, p = data.time_s, data.prediction
+    low, high = 1e3 * p["deflection_low_rad"], 1e3 * p["deflection_high_rad"]
+    if np.any(np.isfinite(low)):
+        edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
+        fig.add_scatter(x=time, y=high, showlegend=False, row=1, col=1, **edge)
+        fig.add_scatter(
+            x=time,
+            y=low,
+            name="guaranteed bounds",
+            fill="tonexty",
+            fillcolor=style.BOUNDS,
+            row=1,
+            col=1,
+            **edge,
+        )
+    curve(fig, time, 1e3 * (p["deflection_rad"] + p["residual_rad"]), "measured", style.MEASURED, 1)
+    curve(fig, time, 1e3 * p["deflection_rad"], "predicted", style.PREDICTED, 1)
+    curve(fig, time, 1e3 * data.cycles["deflection_ahead_rad"], "made up for", style.CABLE_L, 1)
+    curve(fig, time, 1e3 * p["residual_rad"], "residual", style.RESIDUAL, 2)
+    style.axes(fig, "", style.label("deflection", "mrad"), row=1, col=1)
+    style.axes(fig, TIME, style.label("residual", "mrad"), row=2, col=1)
+    return fig
+
+
+def tension_figure(data: RunData) -> Any:
+    """Tensions of the output stage's cables, and the load-deflection loop beside them."""
+    fig = make_subplots(rows=1, cols=2, horizontal_spacing=0.12)
+    fig.update_layout(template=style.template(), height=380)
+    p = data.prediction
+    curve(fig, data.time_s, p["tension_h_N"], "cable h", style.CABLE_H, 1)
+    curve(fig, data.time_s, p["tension_l_N"], "cable l", style.CABLE_L, 1)
+    load = data.column("joint_torque_Nm")
+    fig.add_scatter(
+        x=1e3 * p["deflection_rad"],
+        y=load,
+        mode="lines",
+        name="loop",
+        line={"color": style.PREDICTED, "width": 1},
+        row=1,
+        col=2,
+    )
+    style.axes(fig, TIME, style.label("tension", "N"), row=1, col=1)
+    style.axes(fig, style.label("deflection", "mrad"), style.label("load", "N·m"), row=1, col=2)
+    return fig
+
+
+def stack(heights: list[float], height: int) -> Any:
+    """Plots one above the other over one time axis."""
+    fig = make_subplots(
+        rows=len(heights), cols=1, shared_xaxes=True, row_heights=heights, vertical_spacing=0.05
+    )
+    fig.update_layout(template=style.template(), height=height, hovermode="x")
+    return fig
+
+
+def curve(fig: Any, x: Floats, y: Floats, name: str, colour: str, row: int, width: float = 1.3) -> None:
+    """One line, if it has any number in it."""
+    if np.any(np.isfinite(y)):
+        fig.add_scatter(
+            x=np.round(x, 5),
+            y=y.astype(np.float32),
+            mode="lines",
+            name=name,
+            line={"color": colour, "width": width},
+            row=row,
+            col=1,
+        )
+
+
+def timing_section(report: RunReport) -> Section:
+    """How time and data were kept."""
+    return Section("Timing and data", page.table(("what", "how"), report.timing.rows()))
+
+
+def _sections(report: RunReport, config_text: str) -> Iterator[Section]:
+    for joint in report.joints:
+        yield Section(joint.name, page.facts(run_facts(joint)))
+        folder = report.folder
+        if folder is None:
+            continue
+        data = load_run(folder if len(report.joints) == 1 else folder / joint.name)
+        yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
+        yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data)))
+        yield Section(f"{joint.name}: cables", page.figure(tension_figure(data)))
+    yield timing_section(report)
+    if report.events:
+        rows = [(round(t, 4), j, w) for t, j, w in report.events]
+        yield Section("Events", page.table(("time / s", "joint", "what"), rows))
+    yield Section("Configuration", page.fold("joint.toml", page.code(config_text)))
+
+
+def _angle(value: float) -> str:
+    return page.number(1e3 * value, "mrad")
