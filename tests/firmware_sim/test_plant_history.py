@@ -99,3 +99,34 @@ def test_turning_the_pulley_erases_a_bump_where_the_sheet_says() -> None:
     whole = (math.log(peak) - math.log(held)) / mu
     expected = np.maximum(0.5 * (whole + turn), 0.0)  # (2-72), and gone at the general form of (2-74)
     assert np.max(np.abs(corner - expected)) < 0.02
+
+
+def test_efficiency_of_a_stroke_after_a_load_reversal_meets_its_limit() -> None:
+    """(2-118): loss over work is M/(R EA) while cable leaves a drum at T_h that was stored at T_l."""
+    config = joint(
+        input_radius_m=0.04, mu_output=0.15, mu_input=0.15, wrap_output_rad=20.0, wrap_input_rad=20.0
+    )
+    s = config.stages[0]
+    moment = 0.4 * s.output_radius_m * s.pretension_N
+    load = np.concatenate([course(0.0, -moment), np.full(1499, -moment), course(-moment, moment)])
+    load = np.concatenate([load, np.full(600, moment)])
+    there, back = np.linspace(0.0, 6.0, 1500), np.linspace(6.0, 3.6, 601)
+    motor = np.concatenate([np.zeros(200), there, np.full(200, 6.0), back])
+    run = simulate(config, clock(load), motor, load)
+    stroke = slice(len(load) - 600, len(load))
+    put_in = np.trapezoid(run.motor_torque_Nm[stroke], run.motor_position_rad[stroke])
+    taken_out = -np.trapezoid(run.joint_torque_Nm[stroke], run.joint_position_rad[stroke])
+    assert put_in > taken_out > 0
+    assert 1 - taken_out / put_in == pytest.approx(moment / (s.output_radius_m * s.EA_N), rel=5e-3)
+
+
+def test_a_closed_load_cycle_never_gives_work_back() -> None:
+    config = joint()
+    t = np.arange(0, 12, 0.01)
+    motor, load = 1.2 * np.sin(2 * math.pi * t / 3), 1.5 * np.sin(2 * math.pi * t / 4 + 0.7)
+    run = simulate(config, t, motor, load)
+    power = run.motor_torque_Nm * np.gradient(run.motor_position_rad, t) + load * np.gradient(
+        run.joint_position_rad, t
+    )
+    # the course repeats every 12 s; what it takes beyond that is lost in friction
+    assert np.trapezoid(power, t) > 0
