@@ -121,6 +121,8 @@ class Change:
     play_share: float = 0.0
     play_yield_N: float = 0.0
     viscous_Ns_per_m_rad: float = 0.0
+    moves_pretension: bool = False
+    """Set where a term writes the pretension factors: what lies on the drums then has to follow."""
 
 
 @dataclass(frozen=True)

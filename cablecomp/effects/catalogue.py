@@ -199,7 +199,9 @@ def _law(changes: Sequence[Change], config: JointConfig) -> Floats | None:
     by_angle = [c.joint_angle_factor for c in changes if c.joint_angle_factor is not None]
     stiffening = sum(c.stiffening for c in changes)
     if not by_tension and not by_angle and stiffening == 0.0:
-        inside = any(c.play_share or c.guide_angle or c.viscous_Ns_per_m_rad for c in changes)
+        inside = any(
+            c.play_share or c.guide_angle or c.viscous_Ns_per_m_rad or c.moves_pretension for c in changes
+        )
         return np.stack([plain_law()] * 3) if inside else None
     stage = config.drive.stage[-1]
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0

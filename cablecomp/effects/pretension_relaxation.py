@@ -25,7 +25,7 @@ def _relax(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_relax(values["fraction"], values["time_constant_s"]))
+    return Change(terms=_relax(values["fraction"], values["time_constant_s"]), moves_pretension=True)
 
 
 EFFECT = Effect(

@@ -24,7 +24,8 @@ def _expand(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_expand(values["coefficient_per_K"], values["reference_degC"]))
+    terms = _expand(values["coefficient_per_K"], values["reference_degC"])
+    return Change(terms=terms, moves_pretension=True)
 
 
 def _per_strain(config: JointConfig) -> float:
