@@ -1,0 +1,19 @@
+"""Concealment: joints drawn with physics hidden in them, recordings in the open, the truth under a seal."""
+
+from firmware_sim.concealment.experiment import run_experiment
+from firmware_sim.concealment.generate import generate
+from firmware_sim.concealment.plan import KINDS, assignment
+from firmware_sim.concealment.seal import SEALED, digest, open_truth
+from firmware_sim.concealment.trial import Trial, draw_trial
+
+__all__ = [
+    "KINDS",
+    "SEALED",
+    "Trial",
+    "assignment",
+    "digest",
+    "draw_trial",
+    "generate",
+    "open_truth",
+    "run_experiment",
+]

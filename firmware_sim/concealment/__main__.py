@@ -1,0 +1,59 @@
+"""`python -m firmware_sim.concealment`: write blind trials, or run an experiment on a sealed joint.
+
+Trials: `--trials N --seed S --out DIR [--kind KIND] [--workers W]`; progress is printed as `written K of N`,
+then `sha256 HEX`. Experiment: `experiment --sealed FILE --trial K --protocol FILE --out FILE [--seed S]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from firmware_sim.concealment.experiment import run_experiment
+from firmware_sim.concealment.generate import generate
+from firmware_sim.concealment.plan import KINDS
+from firmware_sim.plant import PlantError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status: 0, or 2 for bad input (one line on stderr)."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return _experiment(given[1:]) if given[:1] == ["experiment"] else _trials(given)
+    except PlantError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+def _trials(given: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m firmware_sim.concealment", description=__doc__)
+    parser.add_argument("--trials", type=int, required=True)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--kind", choices=("mixed", *KINDS), default="mixed")
+    parser.add_argument("--workers", type=int, default=2)
+    a = parser.parse_args(given)
+
+    def tell(done: int, total: int) -> None:
+        print(f"written {done} of {total}", flush=True)
+
+    print(f"sha256 {generate(a.trials, a.seed, a.out, a.kind, a.workers, tell)}", flush=True)
+    return 0
+
+
+def _experiment(given: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m firmware_sim.concealment experiment")
+    parser.add_argument("--sealed", type=Path, required=True)
+    parser.add_argument("--trial", type=int, required=True)
+    parser.add_argument("--protocol", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seed", type=int, default=0)
+    a = parser.parse_args(given)
+    print(run_experiment(a.sealed, a.trial, a.protocol, a.out, a.seed))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

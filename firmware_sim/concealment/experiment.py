@@ -1,0 +1,76 @@
+"""Running a proposed experiment on a sealed joint: a further recording, and nothing else comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from firmware_sim.concealment.courses import Course, draw_neighbour, draw_temperature
+from firmware_sim.concealment.joints import DrawnJoint
+from firmware_sim.concealment.measures import PlainDrive
+from firmware_sim.concealment.protocol import sample_protocol
+from firmware_sim.concealment.seal import open_truth
+from firmware_sim.concealment.sensors import read_sensors
+from firmware_sim.concealment.sizes import run_course
+from firmware_sim.concealment.suspects import Scene
+from firmware_sim.concealment.trial import PAUSE_S
+from firmware_sim.concealment.writing import write_recording
+from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantError, StageConfig
+
+_LONGEST_S = 1200.0
+
+
+def run_experiment(sealed: Path, number: int, protocol: Path, out: Path, seed: int = 0) -> Path:
+    """Play a protocol on the sealed joint of a trial and write the recording that its sensors make.
+
+    The position reference is followed by the motor as if the drive were rigid. Temperature and neighbour go
+    their own way meanwhile, as they do from day to day. The clock goes on from the trial's recordings.
+    Raises PlantError for an unknown trial, a protocol that is none or too long, or one that the joint cannot
+    follow.
+    """
+    truths = open_truth(sealed)
+    if number not in truths:
+        raise PlantError(f"{sealed}: holds no trial {number}; it holds {min(truths)} to {max(truths)}")
+    truth = truths[number]
+    rng = np.random.default_rng([seed, 11, number])
+    joint = sealed_joint(truth)
+    time, position, load = sample_protocol(protocol)
+    if time[-1] > _LONGEST_S:
+        raise PlantError(f"{protocol}: takes {time[-1]:.0f} s; at most {_LONGEST_S:.0f} s are accepted")
+    start = float(np.ceil(truth["duration_s"][-1] + PAUSE_S))
+    course = Course(
+        "experiment",
+        time + start,
+        position / joint.true.ratio,
+        load,
+        draw_temperature(rng, time, 6.0),
+        draw_neighbour(rng, time, joint.load_Nm),
+    )
+    effects = [EffectSpec(e["id"], _numbers(e["parameters"])) for e in truth["effects"]]
+    run = run_course(Scene(joint, course, PlainDrive(**truth["plain"])), effects, NORMAL)
+    write_recording(out, read_sensors(rng, run, joint, course, bool(truth["neighbour"])))
+    return out
+
+
+def sealed_joint(truth: Mapping[str, Any]) -> DrawnJoint:
+    """The joint of a truth."""
+
+    def drive(values: Mapping[str, float]) -> PlantConfig:
+        return PlantConfig("blind-joint", truth["circuit"], (StageConfig(**values),))
+
+    return DrawnJoint(
+        drive(truth["true"]),
+        drive(truth["nominal"]),
+        truth["tolerance"],
+        truth["load_Nm"],
+        truth["travel_rad"],
+        truth["offset_rad"],
+        truth["sensors"],
+    )
+
+
+def _numbers(parameters: Mapping[str, Any]) -> dict[str, float]:
+    return {k: float(v) for k, v in parameters.items() if not isinstance(v, str)}

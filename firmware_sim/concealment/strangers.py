@@ -1,0 +1,98 @@
+"""Effects outside of any catalogue: physics that a diagnosis must locate and describe, and not name.
+
+Left out on purpose are those effects of the plant that are a catalogue effect in other words (a neighbour
+that bends the frame, an eccentric input pulley, a cable climbing its groove, a flexible link, which is a
+series compliance first), and one that no channel used here shows (cogging of the motor torque).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from firmware_sim.concealment.suspects import ANY, TURNING, Scene, Shape, Suspect, _angle, _sign
+
+
+def _ageing(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape({"reversals": float(rng.uniform(3.0, 12.0))}, {"gain": 1.0}, 2.0, 3.0)
+
+
+def _warm_friction(rng: np.random.Generator, scene: Scene) -> Shape:
+    reach = max(float(np.max(np.abs(scene.course.temperature_degC - 20.0))), 1e-3)
+    return Shape({"reference_degC": 20.0}, {"coefficient_per_K": _sign(rng) / reach}, 1.0, 0.8)
+
+
+def _seal(rng: np.random.Generator, scene: Scene) -> Shape:
+    p = scene.plain
+    first = p.loop_rad / p.compliance / max(p.speed_rms, 1e-9)
+    return Shape({}, {"coefficient_Nms_per_rad": 1.0}, first, 100.0 * first)
+
+
+def _harness(rng: np.random.Generator, scene: Scene) -> Shape:
+    p = scene.plain
+    steep = float(rng.uniform(3.0, 6.0)) / scene.joint.travel_rad
+    return Shape(
+        {},
+        {"saturation_Nm": 1.0, "stiffness_Nm_per_rad": steep},
+        p.loop_rad / p.compliance,
+        0.5 * scene.joint.load_Nm,
+    )
+
+
+def _creep(rng: np.random.Generator, scene: Scene) -> Shape:
+    first = 1.5 * scene.plain.loop_rad / scene.plain.load_rms
+    return Shape(
+        {"time_constant_s": float(rng.uniform(0.8, 5.0))}, {"compliance_rad_per_Nm": 1.0}, first, 50 * first
+    )
+
+
+def _bottoming(rng: np.random.Generator, scene: Scene) -> Shape:
+    saturation = float(rng.uniform(0.1, 0.3)) * scene.joint.load_Nm
+    first = scene.plain.loop_rad / saturation
+    return Shape({"saturation_Nm": saturation}, {"compliance_rad_per_Nm": 1.0}, first, 50.0 * first)
+
+
+def _joint_ripple(rng: np.random.Generator, scene: Scene) -> Shape:
+    order = float(rng.integers(4, 11))
+    return Shape(
+        {"order": order, "phase_rad": _angle(rng)}, {"amplitude_rad": 1.0}, 1.5 * scene.plain.loop_rad, 0.1
+    )
+
+
+def _motor_ripple(rng: np.random.Generator, scene: Scene) -> Shape:
+    order = float(rng.integers(5, 12))
+    ratio = scene.joint.true.ratio
+    first = 1.5 * scene.plain.loop_rad / ratio
+    return Shape({"order": order, "phase_rad": _angle(rng)}, {"amplitude_rad": 1.0}, first, 0.1)
+
+
+def _bent_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
+    load = scene.joint.load_Nm
+    first = 2.0 * scene.plain.loop_rad / scene.plain.compliance / load**2
+    return Shape({}, {"coefficient_per_Nm": _sign(rng)}, first, 0.4 / load)
+
+
+def _lazy_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
+    width = float(rng.uniform(0.1, 0.3)) * scene.joint.load_Nm
+    first = scene.plain.loop_rad / scene.plain.compliance / width
+    return Shape({"width_Nm": width}, {"fraction": 1.0}, first, 0.9)
+
+
+def _drifting_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
+    swing = max(float(np.std(scene.course.temperature_degC)), 1e-3)
+    first = scene.plain.loop_rad / scene.plain.compliance / swing
+    return Shape({"reference_degC": 20.0}, {"coefficient_Nm_per_K": _sign(rng)}, first, 100.0 * first)
+
+
+STRANGERS = (
+    Suspect("friction_ageing", ANY, _ageing),
+    Suspect("friction_temperature", ANY, _warm_friction, warm=True),
+    Suspect("joint_viscous_friction", TURNING, _seal),
+    Suspect("parallel_spring", TURNING, _harness),
+    Suspect("creeping_mount", ANY, _creep),
+    Suspect("stiffening_mount", ANY, _bottoming),
+    Suspect("joint_encoder_ripple", TURNING, _joint_ripple),
+    Suspect("motor_encoder_ripple", TURNING, _motor_ripple),
+    Suspect("torque_sensor_quadratic", ANY, _bent_sensor),
+    Suspect("torque_sensor_hysteresis", ANY, _lazy_sensor),
+    Suspect("torque_sensor_drift", ANY, _drifting_sensor, warm=True),
+)
