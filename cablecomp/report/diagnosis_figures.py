@@ -96,7 +96,7 @@ def overlay(view: RecordingView, intervals: Sequence[Sequence[float]]) -> Any:
     _curve(fig, x, view.covariates["load"][keep], "load", style.LOAD, 1.3, row=3)
     for begin, end in list(intervals)[:40]:
         fig.add_vrect(x0=begin, x1=end, fillcolor=style.translucent(BEFORE, 0.10), line_width=0, row=2, col=1)
-    for begin, end in _stretches(view):
+    for begin, end in _stretches(view) if view.heldout.mean() < 0.8 else ():
         fig.add_vrect(x0=begin, x1=end, fillcolor=_HELD, line_width=0, row=1, col=1)
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
     style.axes(fig, "", style.label("residual", small.unit), row=2, col=1)
@@ -175,7 +175,7 @@ def along(views: Sequence[RecordingView], covariate: str, noise_rad: float) -> A
         [view.covariates.get("load_direction", np.zeros(len(view.measured_rad))) for view in views]
     )
     unit = _unit(before)
-    fig = style.figure(390)
+    fig = style.figure(420, margin={"l": 64, "r": 24, "t": 74, "b": 52})
     fig.add_hrect(
         y0=-noise_rad * unit.factor,
         y1=noise_rad * unit.factor,

@@ -12,7 +12,7 @@ import numpy as np
 
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report import page, style
-from cablecomp.report.diagnosis_tables import angle, calibration, interval, numbers, title, with_sd
+from cablecomp.report.diagnosis_tables import angle, calibration, interval, known, numbers, title, with_sd
 from cablecomp.report.diagnosis_view import DiagnosisView, EffectNote, RecordingView
 from cablecomp.report.page import Fact, Section, Tone
 
@@ -54,7 +54,7 @@ def _sections(view: DiagnosisView) -> Iterator[Section]:
     if result.get("missing_physics"):
         yield Section("What was missing", "".join(_missing(view)))
     remainder = result.get("remainder") or {}
-    if remainder.get("structured") or view.law:
+    if result["verdict"] == "unexplained" or remainder.get("structured") or view.law:
         yield _unexplained(view, remainder)
     if result.get("mismatch"):
         yield _where(view)
@@ -89,7 +89,7 @@ def _facts(view: DiagnosisView) -> Iterator[Fact]:
     remark = " + ".join(title(view, entry["effect"]) for entry in missing)
     yield Fact("Verdict", verdict, remark, tone)
     if missing:
-        sure = min(float(entry["confidence"]) for entry in missing)
+        sure = min(known(entry["confidence"]) for entry in missing)
         yield Fact("Confidence in the name", f"{100.0 * sure:.0f} %", "calibrated on blind trials")
     before, after = result["baseline"], result["augmented"]
     yield Fact("Held-out RMSE before", angle(before["heldout_rmse_rad"]), "calibrated drive")
@@ -118,22 +118,22 @@ def _missing(view: DiagnosisView) -> Iterator[str]:
         yield page.paragraph(entry.get("statement") or note.statement)
         if note.equation:
             yield f'<div class="equation">{escape(note.equation)}</div>'
-        rows = [
-            (
-                name,
-                with_sd(float(value["value"]), float(value["sd"])),
-                note.units.get(name, ""),
-                interval(float(value["value"]), float(value["sd"])),
-            )
-            for name, value in entry["parameters"].items()
-        ]
+        rows = [_parameter(name, value, note) for name, value in entry["parameters"].items()]
         yield page.table(("parameter", "value", "unit", "95 % interval"), rows)
-        gain, sure = 100.0 * float(entry["heldout_gain"]), 100.0 * float(entry["confidence"])
+        gain, sure = 100.0 * known(entry["heldout_gain"]), 100.0 * known(entry["confidence"])
         source = f" Source: {note.source}." if note.source else ""
         yield page.paragraph(
             f"Removes {gain:.1f} % of the calibrated drive's held-out mean square; probability that the name "
             f"is right: {sure:.0f} %.{source}"
         )
+
+
+def _parameter(name: str, entry: Any, note: EffectNote) -> tuple[str, str, str, str]:
+    """A row of the table of fitted values; a text (such as a channel's name) stands as it is."""
+    if not isinstance(entry, Mapping):
+        return name, str(entry), "", ""
+    value, sd = known(entry["value"]), known(entry.get("sd"))
+    return name, with_sd(value, sd), note.units.get(name, ""), interval(value, sd)
 
 
 def _unexplained(view: DiagnosisView, remainder: Mapping[str, Any]) -> Section:
@@ -193,7 +193,7 @@ def _overlays(view: DiagnosisView) -> Section:
     first = shown[0]
     body = page.figure(
         figures.overlay(first, intervals),
-        f"{first.name}. Above, shaded violet: held-out stretches. "
+        f"{first.name}. Above, shaded violet: held-out stretches (if not all of it is). "
         "Middle, shaded orange: where the mismatch sits.",
     )
     body += page.figure(figures.loops(first), "The loop measured (broad), before (left) and after (right).")

@@ -26,6 +26,11 @@ def angle(value_rad: float) -> str:
     return page.number(value_rad * unit.factor, unit.unit)
 
 
+def known(value: float | None) -> float:
+    """Return a number of diagnosis.json, NaN where it holds none."""
+    return float("nan") if value is None else float(value)
+
+
 def with_sd(value: float, sd: float) -> str:
     """Value with as many decimals as its standard deviation has, and that one with two digits."""
     if not (np.isfinite(sd) and sd > 0.0):
@@ -39,7 +44,9 @@ def with_sd(value: float, sd: float) -> str:
 
 
 def interval(value: float, sd: float) -> str:
-    """Return the 95 % interval of a value."""
+    """Return the 95 % interval of a value, a dash if its uncertainty is not known."""
+    if not np.isfinite(sd):
+        return "–"
     return f"{page.number(value - 1.96 * sd, digits=4)} … {page.number(value + 1.96 * sd, digits=4)}"
 
 
@@ -88,11 +95,11 @@ def _ratio(result: Mapping[str, Any], key: str) -> str:
     return f"{float(result['baseline'][key]) / after:.2f}" if after > 0.0 else "–"
 
 
-def calibration(entries: Mapping[str, Mapping[str, float]]) -> str:
+def calibration(entries: Mapping[str, Mapping[str, float | None]]) -> str:
     """Return nominal and calibrated values side by side."""
     rows = []
     for name, entry in entries.items():
-        nominal, value, sd = entry["nominal"], entry["value"], entry["sd"]
-        change = f"{100.0 * (value / nominal - 1.0):+.1f} %" if nominal else "–"
+        nominal, value, sd = (known(entry.get(key)) for key in ("nominal", "value", "sd"))
+        change = f"{100.0 * (value / nominal - 1.0):+.1f} %" if np.isfinite(nominal) and nominal else "–"
         rows.append((name, page.number(nominal, digits=5), with_sd(value, sd), change.replace("-", "−")))
     return page.table(("parameter", "nominal", "calibrated", "change"), rows)

@@ -81,7 +81,7 @@ def example(samples: int = 6_000, verdict: str = "explained") -> DiagnosisView:
         ],
         "next_experiment": {
             "why": "A ramp to 4 N·m at two rates separates the two by 9 standard deviations.",
-            "protocol": "motor hold 0 rad\nload ramp 0 -> 4 N·m in 2 s\nload hold 5 s\nload ramp 0 N·m in 20 s",
+            "protocol": "load ramp 0 -> 4 N·m in 2 s\nload hold 5 s\nload ramp 0 N·m in 20 s",
         },
         "remainder": {
             "rmse_rad": 4e-6,
