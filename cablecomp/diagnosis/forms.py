@@ -195,6 +195,11 @@ class FreedForm(Form):
             values.append(at * math.exp(0.5 * v) if p.log else at + 0.05 * (high - low) * v)
         return tuple(values)
 
+    def fixed_shapes(self, x: Sequence[float]) -> Form:
+        """The form with its shapes fixed where x has them."""
+        held = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return Form(**(held | {"point": self.shape_values(x)}))
+
     def entry(self, x: Sequence[float], point: Sequence[float] | None = None) -> EffectEntry:
         """The configuration entry at coordinates x."""
         first = self.size - len(self.shapes)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cablecomp.diagnosis.blocks import Layout
 from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, refit, solve
-from cablecomp.diagnosis.forms import Form, freed
+from cablecomp.diagnosis.forms import Form, FreedForm, freed
 from cablecomp.diagnosis.judge import Score, Verdict, compare, judge
 from cablecomp.diagnosis.screening import Guess, Probe, Progress, best_guesses, fit_guess, probe_all, refine
 from cablecomp.identification.smoothing import FloatArray
@@ -22,6 +22,8 @@ CLOSE = 0.5  # of the best one's gain, below which a hypothesis is not fitted ca
 LEVEL = 0.01  # of a false support, all hypotheses together
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
+NOISE = 1.25  # mean square over the floor at which nothing is left to explain
+SURE = 3.0  # standard errors of lead beyond which a rival is refuted
 
 
 @dataclass(frozen=True)
@@ -83,23 +85,22 @@ def select(
         probes = probe_all(problem, current, left, progress)
         first_probes = first_probes or probes
         folds, asked = _fit_folds(problem, current, current_fold, probes, layout, progress)
-        verdict = judge(
-            current_fold.residual_rad,
-            {k: f.residual_rad for k, f in folds.items()},
-            both,
-            rng,
-            level=0.01,
-            least_gain=0.02,
-        )
-        best = verdict.best
-        rivals = () if best is None else _rivals(best, verdict, folds, both, rng)
+        verdict = _judged(current_fold, folds, both, rng)
+        models: dict[str, Model] = {}
+        for score in _front_runners(verdict):
+            progress(f"fitting {score.name} with its shapes free", 0.9)
+            models[score.name], folds[score.name] = _polish(problem, folds[score.name], layout)
+        if models:
+            verdict = _judged(current_fold, folds, both, rng)
+        best = next((s for s in verdict.scores if s.supported and s.name in models), None)
+        rivals = () if best is None else _rivals(best, verdict, folds, models, problem, both, rng)
         rounds.append(Round(current.name, verdict, asked, folds, rivals))
         if best is None:
             break
         current, current_fold = models[best.name], folds[best.name]
         if number > 0:
             current, current_fold = _without(problem, current, current_fold, layout, rng)
-        if _at_noise(current_fold, problem, layout):
+        if _at_noise(current, layout):
             break
     return Selection(baseline, current_fold, current, base, tuple(rounds), layout, first_probes)
 
@@ -179,17 +180,40 @@ def _shifted(base: Model, fitted: Model) -> Model:
 
 
 def _polish(problem: Problem, fold: Fold, layout: Layout) -> tuple[Model, Fold]:
-    """Free the shapes of the effects in both halves, and fit all rows from the better half's solution."""
+    """Free the shapes of the effects: fit all rows, then either half.
+
+    Instants of events are the exception: the halves take them from all rows, for an event inside a held-out block
+    cannot be placed without it.
+    """
+    masks = (layout.training, layout.heldout)
+    both = layout.heldout | layout.training
+    start = min(fold.models, key=lambda m: float(m.residual[both] @ m.residual[both]))
+    forms, z = free_shapes(start)
+    whole = solve(problem, forms, z, both, None, None, iterations=9, refresh=3)
+    whole = start if whole is None else whole
     halves = []
-    for model, mask in zip(fold.models, (layout.training, layout.heldout), strict=True):
-        forms, z = free_shapes(model)
+    for model, mask in zip(fold.models, masks, strict=True):
+        forms, z = _placed(problem, whole) if _has_instant(whole) else free_shapes(model)
         found = solve(problem, forms, z, mask, None, None, iterations=9, refresh=3)
         halves.append(model if found is None else found)
-    a, b = halves
-    mask = layout.heldout | layout.training
-    better = min(halves, key=lambda m: float(m.residual[mask] @ m.residual[mask]))
-    whole = solve(problem, better.forms, better.z, mask, None, None, iterations=6, refresh=2)
-    return better if whole is None else whole, _fold(problem, a, b, layout)
+    return whole, _fold(problem, halves[0], halves[1], layout)
+
+
+def _has_instant(model: Model) -> bool:
+    return any(p.name == "time_s" for f in model.forms for p in f.shapes)
+
+
+def _placed(problem: Problem, model: Model) -> tuple[tuple[Form, ...], FloatArray]:
+    """The model with the instants of its events taken as known."""
+    forms: list[Form] = []
+    xs: list[FloatArray] = []
+    for form, x in zip(model.forms, model.x, strict=True):
+        if isinstance(form, FreedForm) and [p.name for p in form.shapes] == ["time_s"]:
+            x = x[: form.size - 1]
+            form = form.fixed_shapes(model.x[len(forms)])
+        forms.append(form)
+        xs.append(x)
+    return tuple(forms), np.concatenate([model.c, *xs])
 
 
 def free_shapes(model: Model) -> tuple[tuple[Form, ...], FloatArray]:
@@ -223,16 +247,29 @@ def _without(
 
 
 def _rivals(
-    best: Score, verdict: Verdict, folds: Mapping[str, Fold], both: Layout, rng: np.random.Generator
+    best: Score,
+    verdict: Verdict,
+    folds: Mapping[str, Fold],
+    models: Mapping[str, Model],
+    problem: Problem,
+    both: Layout,
+    rng: np.random.Generator,
 ) -> tuple[tuple[str, float], ...]:
-    """Supported hypotheses over which the best one's lead is not beyond doubt."""
+    """Supported hypotheses over which the best one's lead is beyond doubt neither on held-out rows nor with all rows fitted.
+
+    The second comparison is for events: one that falls into a held-out block cannot be placed by the other half.
+    """
+    unit = problem.sigma * INFLATION
     found = []
     for score in verdict.scores:
         if score.name == best.name or not score.supported:
             continue
-        lead = compare(folds[score.name].residual_rad, folds[best.name].residual_rad, both, rng)
-        if lead.z < 3.0:
-            found.append((score.name, float(lead.z)))
+        z = float(compare(folds[score.name].residual_rad, folds[best.name].residual_rad, both, rng).z)
+        if score.name in models:
+            whole = compare(models[score.name].residual * unit, models[best.name].residual * unit, both, rng)
+            z = max(z, float(whole.z))
+        if z < SURE:
+            found.append((score.name, z))
     return tuple(found)
 
 
@@ -242,6 +279,6 @@ def confidence(rivals: Sequence[tuple[str, float]]) -> float:
     return 1.0 / (1.0 + 2.0 * doubt) if rivals else 0.99
 
 
-def _at_noise(fold: Fold, problem: Problem, layout: Layout) -> bool:
+def _at_noise(model: Model, layout: Layout) -> bool:
     kept = layout.heldout | layout.training
-    return float(np.mean((fold.residual_rad[kept] / problem.sigma[kept]) ** 2)) < 1.15
+    return float(np.mean((model.residual[kept] * INFLATION) ** 2)) < NOISE

@@ -11,7 +11,7 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 from cablecomp.mechanics.layout import X_LOAD, X_MOMENT, X_READING
 
 # Moment, as a share of R T0, within which the clearance is crossed: a step that is smooth can be fitted.
-TRANSITION = 0.002
+TRANSITION = 0.0005
 
 
 @term(parameters=2)
@@ -28,7 +28,7 @@ EFFECT = Effect(
     id="termination_backlash",
     statement="A hub key, pin or crimp has clearance: the joint falls from one flank to the other where "
     "the load changes sign.",
-    equation="q_out = q_drive + (b/2) tanh(M/(0.002 R T0)), M the moment in the load path: sgn M with a "
+    equation="q_out = q_drive + (b/2) tanh(M/(0.0005 R T0)), M the moment in the load path: sgn M with a "
     "narrow transition",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",

@@ -62,10 +62,10 @@ def circuit_solve(
         tension = S[q + o.Q_REFERENCE] * S[q + o.Q_T0] + pull
         if tension <= floor:
             return x, 0.0, o.STATUS_SLACK
-        for _ in range(60):
+        for iteration in range(60):
             theta, slope, _ = chain_eval(P, I, S, J, L, G, first_h, count, tension, x_in, x)
             new = rigid + theta
-            if abs(new - x) <= 1e-11:
+            if abs(new - x) <= (1e-11 if iteration < 12 else 1e-9):
                 return new, slope / radius, o.STATUS_OK
             x = new
         return x, slope / radius, o.STATUS_DIVERGED

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import stacks
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
 from cablecomp.mechanics.jit import njit
 from cablecomp.mechanics.pointer import call_term
+from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import Floats, Ints
 
 
@@ -27,7 +27,7 @@ def run_terms(P: Floats, I: Ints, S: Floats) -> None:
 
 @njit
 def _distribute(I: Ints, S: Floats) -> None:
-    """Hand the terms' pretension factors to all cables, their lengths and stiffness factors to those at the joint."""
+    """Hand the terms' lengths and stiffness factors to the cables at the joint (pretension factors: at commits)."""
     x = I[o.S_CONTEXT]
     last = I[o.N_CIRCUITS] - 1
     for ic in range(last + 1):
@@ -37,7 +37,8 @@ def _distribute(I: Ints, S: Floats) -> None:
             first = I[h] if chain == 0 else I[h + o.C_FIRST_L]
             for j in range(count):
                 q = I[o.S_CABLE] + o.CABLE_STATE * (first + j)
-                S[q + o.Q_T0] = S[x + o.X_PRETENSION_H + chain]
+                if S[x + o.X_FIRST] != 0.0:
+                    S[q + o.Q_T0] = S[x + o.X_PRETENSION_H + chain]
                 if ic == last and j == count - 1:
                     S[q + o.Q_EA] = S[x + o.X_STIFFNESS_H + chain]
                     S[q + o.Q_OFFSET] = S[x + o.X_LENGTH_H + chain]
@@ -89,6 +90,11 @@ def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) ->
                 S[x + o.X_MOMENT_SLOPE], S[x + o.X_LENGTH_H], S[x + o.X_LENGTH_L]
             )  # fmt: skip
             joint, compliance, status = _solve_all(P, I, S, J, L, G, moment)
+            if status == o.STATUS_SLACK and load > moment:
+                # a trial moment that no open circuit can take (a first guess of the acceleration): nearer to the load
+                low = max(low, moment)
+                moment = 0.5 * (moment + load)
+                continue
             if status != o.STATUS_OK:
                 break
             moved = abs(joint - S[x + o.X_JOINT])
@@ -133,6 +139,18 @@ def advance(
 
 
 @njit
+def _follow_pretension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
+    """Let the pretension of all cables follow the terms' factors; the next sample finds it."""
+    x = I[o.S_CONTEXT]
+    for ic in range(I[o.N_CIRCUITS]):
+        h = o.HEADER + o.CIRCUIT * ic
+        for chain in range(1 + I[h + o.C_CLOSED]):
+            first = I[h] if chain == 0 else I[h + o.C_FIRST_L]
+            for j in range(I[h + o.C_COUNT]):
+                retension(P, I, S, J, L, G, first + j, S[x + o.X_PRETENSION_H + chain])
+
+
+@njit
 def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
     """Make the solved sample the state."""
     x = I[o.S_CONTEXT]
@@ -142,33 +160,10 @@ def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -
         S[x + o.X_COMMIT] = 0.0
     for ic in range(I[o.N_CIRCUITS]):
         circuit_commit(P, I, S, J, L, G, ic)
+    if I[o.N_TERMS] > 0:
+        _follow_pretension(P, I, S, J, L, G)
     S[x + o.X_MOTOR_OLD] = S[x + o.X_MOTOR]
     S[x + o.X_LOAD_OLD] = S[x + o.X_LOAD]
     S[x + o.X_JOINT_OLDER] = S[x + o.X_JOINT_OLD]
     S[x + o.X_JOINT_OLD] = S[x + o.X_JOINT]
     S[x + o.X_FIRST] = 0.0
-
-
-@njit
-def joint_run(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, inputs: Floats, outputs: Floats
-) -> tuple[int, int]:
-    """Step through rows of inputs (time, motor angle, load, temperature, others...); outputs: joint angle, reading, T_h, T_l, motor-side tensions.
-
-    Returns (number of rows done, status of the row that stopped it).
-    """
-    x = I[o.S_CONTEXT]
-    G = stacks(I, S)
-    for k in range(inputs.shape[0]):
-        advance(P, I, S, inputs[k, 0], inputs[k, 1], inputs[k, 2], inputs[k, 3])
-        for j in range(inputs.shape[1] - 4):
-            S[x + o.X_OTHER + j] = inputs[k, 4 + j]
-        status = joint_solve(P, I, S, J, L, G)
-        if status != o.STATUS_OK:
-            return k, status
-        joint_commit(P, I, S, J, L, G)
-        outputs[k, 0] = S[x + o.X_JOINT]
-        outputs[k, 1] = S[x + o.X_JOINT] + S[x + o.X_READING]
-        outputs[k, 2] = S[x + o.X_TENSION_H]
-        outputs[k, 3] = S[x + o.X_TENSION_L]
-    return inputs.shape[0], o.STATUS_OK

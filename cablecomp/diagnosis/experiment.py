@@ -1,0 +1,138 @@
+"""The next experiment: the excitation, within the joint's limits, that sets two fitted models apart best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.control.protocol import (
+    AngleSweep,
+    Hold,
+    NestedReversals,
+    Protocol,
+    Ramp,
+    RatePair,
+    SineSweep,
+    Unload,
+    Wait,
+)
+from cablecomp.diagnosis.covariates import Covariates
+from cablecomp.errors import InputError
+from cablecomp.identification.smoothing import FloatArray
+from cablecomp.observer import Observer
+
+STEPS = 2500
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A protocol, why it is proposed, and by how much it sets the models apart (RMS in noise floors)."""
+
+    protocol: Protocol
+    why: str
+    separation: float
+
+
+def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
+    """Protocols inside the configuration's limits, or inside what the recordings have shown where no limit is stated."""
+    load = float(np.max(np.abs(seen.values["load"])))
+    if config.limits.joint_torque_max_Nm is not None:
+        load = config.limits.joint_torque_max_Nm
+    angle = seen.values.get("joint_angle", seen.values["motor_angle"])
+    low, high = float(np.min(angle)), float(np.max(angle))
+    if config.limits.joint_position_min_rad is not None:
+        low = config.limits.joint_position_min_rad
+    if config.limits.joint_position_max_rad is not None:
+        high = config.limits.joint_position_max_rad
+    load = max(load, 1e-6)
+    travel = max(high - low, 0.02)
+    middle, rate = 0.5 * (low + high), load / 4.0
+    start = {"start_position_rad": middle}
+    return [
+        Protocol(name="ramp and hold", segment=(
+            Ramp(duration_s=0.5, load_Nm=load), Hold(duration_s=15.0), Ramp(duration_s=0.5, load_Nm=0.0),
+            Hold(duration_s=15.0), Ramp(duration_s=8.0, load_Nm=-load), Hold(duration_s=10.0), Unload(rate_Nm_s=rate),
+        ), **start),
+        Protocol(name="rate pair", segment=(
+            RatePair(amplitude=load, rates=(load / 10.0, load * 2.0), dwell_s=2.0),
+        ), **start),
+        Protocol(name="nested reversals", segment=(
+            NestedReversals(peaks=(load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load, load), rate=rate),
+        ), **start),
+        Protocol(name="nested reversals at two places", segment=(
+            NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
+            Ramp(duration_s=4.0, position_rad=low + 0.1 * travel),
+            NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
+            Ramp(duration_s=4.0, position_rad=high - 0.1 * travel),
+            NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
+        ), **start),
+        Protocol(name="angle sweeps under three loads", segment=tuple(
+            AngleSweep(from_rad=low + 0.05 * travel, to_rad=high - 0.05 * travel, speed_rad_s=travel / 3.0, load_Nm=v,
+                       load_rate_Nm_s=rate, cycles=2)
+            for v in (0.0, 0.8 * load, -0.8 * load)
+        ), **start),
+        Protocol(name="small and large swings through zero", segment=(
+            NestedReversals(peaks=(0.05 * load, -0.05 * load, 0.1 * load, -0.1 * load, load, -load), rate=rate, dwell_s=1.0),
+        ), **start),
+        Protocol(name="fast motion, load at rest", segment=(
+            SineSweep(channel="position", amplitude=0.4 * travel, from_Hz=0.2, to_Hz=2.0, duration_s=20.0),
+        ), **start),
+        Protocol(name="wait for the temperature", segment=(
+            Ramp(duration_s=4.0, load_Nm=0.8 * load), Wait(duration_s=30.0, why="let the temperature change"),
+            NestedReversals(peaks=(load, -load), rate=rate),
+        ), **start),
+    ]  # fmt: skip
+
+
+def best_experiment(
+    models: Sequence[JointConfig], seen: Covariates, floor_rad: float, temperature_degC: float
+) -> Experiment | None:
+    """Simulate all fitted models over the candidate protocols; the one that sets the closest two farthest apart wins.
+
+    What a constant, a drift in load and in position could explain of a difference is not counted. None if no protocol can be followed.
+    """
+    found: list[Experiment] = []
+    for protocol in candidates(models[0], seen):
+        readings = _readings(models, protocol, temperature_degC)
+        if readings is None:
+            continue
+        worst = min(
+            _apart(readings[i], readings[j], readings[-1])
+            for i in range(len(models))
+            for j in range(i)
+        ) / floor_rad
+        why = f"`{protocol.name}` sets the candidate models apart by {worst:.1f} noise floors (RMS), more than any other tried"
+        found.append(Experiment(protocol, why, worst))
+    return max(found, key=lambda e: e.separation, default=None)
+
+
+def _readings(models: Sequence[JointConfig], protocol: Protocol, temperature: float) -> list[FloatArray] | None:
+    time = np.linspace(0.0, protocol.duration_s, STEPS)
+    references = [protocol.reference(float(t)) for t in time]
+    stages = models[0].drive.stage
+    ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in stages]))
+    columns = {
+        "time_s": time,
+        "motor_position_rad": np.array([r.joint_position_rad for r in references]) / ratio,
+        "joint_torque_Nm": np.array([r.joint_torque_Nm for r in references]),
+        "temperature_degC": temperature + 3.0 * time / max(float(time[-1]), 1.0),
+    }
+    columns["motor_torque_Nm"] = -ratio * columns["joint_torque_Nm"]
+    found = []
+    for model in models:
+        own = columns | {name: np.zeros(STEPS) for name in Observer(model).channels}
+        try:
+            found.append(Observer(model).run(own)["joint_position_rad"])
+        except InputError:
+            return None
+    return [*found, columns["joint_torque_Nm"]]
+
+
+def _apart(a: FloatArray, b: FloatArray, load: FloatArray) -> float:
+    basis = np.column_stack((np.ones_like(load), load))
+    difference = a - b
+    coefficients, *_ = np.linalg.lstsq(basis, difference, rcond=None)
+    return float(np.sqrt(np.mean((difference - basis @ coefficients) ** 2)))

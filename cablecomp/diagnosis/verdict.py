@@ -1,0 +1,91 @@
+"""What the evidence amounts to: consistent, recalibrate, explained or unexplained; what is named, and how surely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cablecomp.diagnosis.final import Final
+from cablecomp.diagnosis.fitting import INFLATION, Model
+from cablecomp.diagnosis.judge import compare
+from cablecomp.diagnosis.locate import Location
+from cablecomp.diagnosis.selection import Selection, all_rows, confidence
+from cablecomp.diagnosis.setting import Setting
+from cablecomp.identification.smoothing import FloatArray
+
+LEFT = 0.1  # share of the mismatch's energy beyond noise that a named effect may leave over
+STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
+WEAK = 3.0  # sds below which a fitted amplitude is no finding
+NEARLY_SURE = 0.9
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Verdict and the names it rests on.
+
+    `named`: indices into `Final.effects` with confidence; `tied`: groups of names the data cannot separate, with the reason.
+    """
+
+    verdict: str
+    named: tuple[tuple[int, float], ...]
+    tied: tuple[tuple[tuple[str, ...], str], ...]
+    excess_before: float
+    excess_after: float
+
+
+def energy(residual_rad: FloatArray, setting: Setting) -> float:
+    """Mean square over the noise floor's."""
+    kept = setting.layout.heldout | setting.layout.training
+    return float(np.mean((residual_rad[kept] / setting.problem.sigma[kept]) ** 2))
+
+
+def weigh(
+    setting: Setting, selection: Selection, final: Final, before: Location, rng: np.random.Generator
+) -> Findings:
+    """Weigh the rounds of the selection: an effect is named only if held-out data support it, no rival is left, and what
+    it leaves over is noise."""
+    start = energy(selection.baseline.residual_rad, setting)
+    whole = float(np.mean((selection.model.residual * INFLATION) ** 2))
+    end = min(energy(selection.final.residual_rad, setting), whole)
+    excess, left = max(start - 1.0, 0.0), max(end - 1.0, 0.0)
+    accepted = [r for r in selection.rounds if r.verdict.best is not None]
+    if not final.effects:
+        located = bool(before.significant(0.01)) and start > STRUCTURED
+        if located:
+            return Findings("unexplained", (), (), excess, excess)
+        return Findings(_plain(setting, selection, rng), (), (), excess, excess)
+    tied, named = [], []
+    for k, (form, entry, values) in enumerate(final.effects):
+        rivals: Sequence[tuple[str, float]] = next(
+            (r.rivals for r in accepted if r.verdict.best is not None and r.verdict.best.name == form.name), ()
+        )
+        sure = confidence(rivals)
+        main = form.amplitudes[0].name
+        if abs(values[main].value) < WEAK * values[main].sd:
+            continue
+        if sure < NEARLY_SURE:
+            names = (entry.id, *(n.partition(":")[0] for n, _ in rivals))
+            tied.append((tuple(dict.fromkeys(names)), _reason(rivals)))
+        else:
+            named.append((k, sure))
+    leftover = left > max(LEFT * excess, 0.6)
+    if leftover:
+        return Findings("unexplained", (), tuple(tied), excess, left)
+    if not named and not tied:
+        return Findings(_plain(setting, selection, rng), (), (), excess, left)
+    return Findings("explained", tuple(named), tuple(tied), excess, left)
+
+
+def _reason(rivals: Sequence[tuple[str, float]]) -> str:
+    leads = ", ".join(f"{name} by {z:.1f} standard errors" for name, z in rivals)
+    return f"predictions on held-out data coincide: the best one leads {leads}; {3:.0f} are asked for"
+
+
+def _plain(setting: Setting, selection: Selection, rng: np.random.Generator) -> str:
+    """Nothing missing: were the nominal parameters good enough?"""
+    unit = setting.problem.sigma * INFLATION
+    nominal: Model = setting.nominal
+    gain = compare(nominal.residual * unit, selection.baseline.residual_rad, all_rows(selection.layout), rng)
+    return "recalibrate" if gain.z > gain.margin and gain.heldout_gain > 0.1 else "consistent"
