@@ -47,14 +47,14 @@ def test_noise_gives_uniform_p_values_however_long_it_remembers(memory: float) -
     channels = columns("sweep", 2_000, 0.018)
     found = covariates(channels)
     lowest = []
-    for trial in range(30):
+    for trial in range(24):
         residual = autoregressive(np.random.default_rng(trial), found.samples, memory, SIGMA)
         location = locate(make_series(residual, SIGMA, found), np.random.default_rng(trial), surrogates=99)
         lowest.append(min(entry.p_value for entry in location.mismatch))
     # binomial bounds at three standard deviations
     for level in (0.05, 0.2, 0.5):
         share = float(np.mean(np.array(lowest) <= level))
-        assert abs(share - level) < 3.0 * np.sqrt(level * (1.0 - level) / 30.0) + 0.02
+        assert abs(share - level) < 3.0 * np.sqrt(level * (1.0 - level) / 24.0) + 0.02
 
 
 def test_what_calibration_can_explain_is_not_counted() -> None:

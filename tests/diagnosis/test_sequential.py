@@ -23,10 +23,10 @@ def run(residual: FloatArray, config: WatchConfig) -> tuple[WatchState, list[Ala
 @pytest.mark.parametrize("memory", [0.1, 5.0, 20.0])
 def test_false_alarms_are_rarer_than_stated(memory: float) -> None:
     count, length, between = 0, 60_000, 20.0
-    for trial in range(6):
+    for trial in range(5):
         noise = autoregressive(np.random.default_rng(trial), length, memory, SIGMA)
         count += len(run(noise, WatchConfig(between, 4_000))[1])
-    expected = 6 * length * STEP_S / between  # 18
+    expected = 5 * length * STEP_S / between  # 15
     assert count <= expected
 
 

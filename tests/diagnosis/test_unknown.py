@@ -97,7 +97,7 @@ def test_an_event_is_dated() -> None:
 
 def test_noise_has_no_law_and_no_pattern() -> None:
     given = recording("sweep")[1]
-    for trial in range(3):
+    for trial in range(2):
         rng = np.random.default_rng(trial)
         residual = SIGMA * rng.standard_normal(given.samples) + autoregressive(
             rng, given.samples, 40.0, SIGMA
