@@ -108,6 +108,8 @@ def start_build(config: PlantConfig, dynamic: bool) -> Build:
     cables = np.zeros(len(plan), dtype=CABLE)
     for record, (index, side, shaft_in, shaft_out) in zip(cables, plan, strict=True):
         stage = stages[index]
+        # EA_N is stiffness per length of cable in place, as a bench measures it; T = EA (l/l0 − 1) counts
+        # from the unstressed length, on which the same cable shows EA_N − T0.
         values = {
             "shaft_out": shaft_out,
             "shaft_in": shaft_in,

@@ -24,10 +24,10 @@ from firmware_sim.plant.network import (
     OTHER,
     TEMPERATURE,
     TIME,
-    advance,
 )
 from firmware_sim.plant.readout import read_out
 from firmware_sim.plant.records import Drive, Floats
+from firmware_sim.plant.stepping import advance
 
 RAMP_STEP_S = 1e4  # so slow that neither inertia nor viscosity acts
 ROOM_TEMPERATURE_DEGC = 20.0

@@ -132,5 +132,6 @@ def _stage(table: Any) -> StageConfig:
 def _effect(table: Any) -> EffectSpec:
     if not isinstance(table, Mapping) or "id" not in table:
         raise PlantError("effect: a table with a key `id` is accepted")
-    parameters = {key: value for key, value in table.items() if key != "id"}
+    # `channel` names a column of a recording; the plant has one further channel and needs no name for it
+    parameters = {key: value for key, value in table.items() if key not in ("id", "channel")}
     return EffectSpec(str(table["id"]), parameters)

@@ -39,9 +39,9 @@ from firmware_sim.plant.network import (
     OTHER,
     TEMPERATURE,
     TIME,
-    advance,
 )
 from firmware_sim.plant.sensors import SensorSpec
+from firmware_sim.plant.stepping import advance
 
 MAX_STEP_S = 1e-3
 STIFFEST_COUPLING = 1e-5  # rad/(N·m), where the configuration gives the torque sensor no compliance

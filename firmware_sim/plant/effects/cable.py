@@ -30,8 +30,8 @@ def _strand(build: Build, p: Mapping[str, float]) -> None:
 
 STRAND_FRICTION = EffectKind(
     "strand_friction",
-    "The free span holds a lumped extension that follows the tension only outside a play: "
-    "e = fraction · L/EA · play(T − T0), radius yield_N.",
+    "The free span holds a lumped extension that follows the tension only outside a play: e = fraction · "
+    "L/EA · play(T − T0), radius yield_N.",
     (
         Parameter("fraction", "extra stretch over elastic stretch of the free span", low=0.0, high=10.0),
         Parameter("yield_N", "radius of the play in tension", low=0.0),
@@ -48,9 +48,8 @@ def _relaxation(build: Build, p: Mapping[str, float]) -> None:
 
 PRETENSION_RELAXATION = EffectKind(
     "pretension_relaxation",
-    "Every element creeps: its unstressed length grows so that T0(t) = T0 (1 − a ln(1 + t/t_c)), t from the"
-    " recording's "
-    "first sample; in an open circuit the preload falls by that factor.",
+    "Every element creeps: its unstressed length grows so that T0(t) = T0 (1 − a ln(1 + t/t_c)), t from "
+    "the recording's first sample; in an open circuit the preload falls by that factor.",
     (
         Parameter("fraction", "a", low=-0.5, high=0.5),
         Parameter("time_constant_s", "t_c", 10.0, 1e-3),
@@ -67,9 +66,9 @@ def _thermal(build: Build, p: Mapping[str, float]) -> None:
 
 THERMAL_PRETENSION = EffectKind(
     "thermal_pretension",
-    "Every element takes a thermal strain against the frame so that T0(ϑ) = T0 (1 + k (ϑ − ϑ_ref)); in an "
-    "open circuit "
-    "the preload follows that factor.",
+    "Every element takes the same thermal strain against the frame, so that what sticks gains T0 k (ϑ − "
+    "ϑ_ref) everywhere: T0(ϑ) = T0 (1 + k (ϑ − ϑ_ref)); in an open circuit the preload follows that "
+    "factor.",
     (
         Parameter("coefficient_per_K", "k", low=-0.2, high=0.2),
         Parameter("reference_degC", "ϑ_ref", 20.0),
@@ -87,8 +86,8 @@ def _slip(build: Build, p: Mapping[str, float]) -> None:
 CLAMP_SLIP = EffectKind(
     "clamp_slip",
     "Cable h gains length at once. The clamp sits at the tensioner in the free span, so that the step "
-    "reaches the joint; "
-    "with behind_wrap = 1 it is the output termination, whose wrap holds most of the step back.",
+    "reaches the joint; with behind_wrap = 1 it is the output termination, whose wrap holds most of the "
+    "step back.",
     (
         Parameter("slip_m", "length released", low=0.0, high=0.1),
         Parameter("time_s", "when"),

@@ -15,8 +15,8 @@ def _routing(build: Build, p: Mapping[str, float]) -> None:
 
 ROUTING_FRICTION = EffectKind(
     "routing_friction",
-    "A fixed guide in the middle of the free span of every cable: its material points stick to it or slide "
-    "at mu T per radian.",
+    "A fixed guide in the middle of the free span of every cable: its material points stick to it or "
+    "slide at mu T per radian.",
     (
         Parameter("mu_angle", "mu Θ of the guide, the log of the greatest tension ratio", low=0.0, high=8.0),
         Parameter(
@@ -65,8 +65,7 @@ def _position(build: Build, p: Mapping[str, float]) -> None:
 POSITION_DEPENDENT_FRICTION = EffectKind(
     "position_dependent_friction",
     "The output drum's groove is rougher in places: the point at which the cable departs when the joint "
-    "stands at q has "
-    "mu = mu0 (1 + a cos(q − φ)).",
+    "stands at q has mu = mu0 (1 + a cos(q − φ)).",
     (
         Parameter("amplitude", "a", low=-0.98, high=0.98),
         Parameter("phase_rad", "φ", 0.0),

@@ -18,8 +18,7 @@ def _bearing(build: Build, p: Mapping[str, float]) -> None:
 BEARING_FRICTION = EffectKind(
     "bearing_friction",
     "The output bearing holds back with up to τ_b = torque_Nm + load_coefficient R (T_h + T_l): a spring "
-    "that yields, "
-    "stretched by presliding_rad when it does.",
+    "that yields, stretched by presliding_rad when it does.",
     (
         Parameter("torque_Nm", "friction torque without load", low=0.0),
         Parameter("load_coefficient", "growth with the radial load", 0.0, 0.0, 1.0),
@@ -112,9 +111,8 @@ def _tip(build: Build, p: Mapping[str, float]) -> None:
 
 TIP_LINK = EffectKind(
     "tip_link",
-    "The link is flexible: a second inertia behind a spring and damper swings between load and pulley; the "
-    "joint encoder "
-    "sits on the far side.",
+    "The link is flexible: a second inertia behind a spring and damper swings between load and pulley; "
+    "the joint encoder sits on the far side.",
     (
         Parameter("inertia_kgm2", "inertia of the far part", low=0.0),
         Parameter("stiffness_Nm_per_rad", "stiffness of the link", low=1e-6),

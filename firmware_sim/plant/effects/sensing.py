@@ -45,8 +45,7 @@ def _backlash(build: Build, p: Mapping[str, float]) -> None:
 TERMINATION_BACKLASH = EffectKind(
     "termination_backlash",
     "A key or crimp has clearance b: the joint lies at +b/2 or −b/2 by the sign of the moment in the load "
-    "path, and stays "
-    "where it lay while there is none.",
+    "path, and stays where it lay while there is none.",
     (Parameter("gap_rad", "b, total clearance", low=0.0, high=0.5),),
     ("load",),
     _backlash,

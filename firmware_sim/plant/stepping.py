@@ -1,0 +1,223 @@
+"""Compiled time stepping: the iteration of one step, its commitment, and second tries with shorter steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from firmware_sim.plant.cable import (
+    carry_along,
+    find_contacts,
+    guess_tension,
+    lumped_extension,
+    lumped_slope,
+    move_nodes,
+    refresh_tension,
+    solve_cable,
+    update_modes,
+)
+from firmware_sim.plant.jit import njit
+from firmware_sim.plant.network import (
+    MOTOR_ANGLE,
+    TEMPERATURE,
+    TIME,
+    apply_surroundings,
+    assemble,
+    place_cable,
+    pretension_factor,
+    solve_small,
+)
+from firmware_sim.plant.records import Drive, Floats
+from firmware_sim.plant.shafts import bdf, settle_bearing, update_bearing
+
+MAX_ITERATIONS = 400
+RUSH_ITERATIONS = 12  # so many with the rush of `update_modes`, so many without, and so on
+WHOLE_ITERATIONS = 50  # so many whole steps, then so many shortened ones, which end going to and fro
+CONTACT_ITERATIONS = 25  # then contacts are kept: where slack cable leaves a drum may have no answer
+TRIES = 4
+LOOSE = 1e-3
+
+
+@njit
+def begin_step(drive: Drive, u: Floats, h: float) -> None:
+    """Shift the histories, predict the free shafts, and carry the cables along."""
+    nodes = drive.nodes
+    nodes.old[:] = nodes.y
+    for k in range(len(drive.shafts)):
+        s = drive.shafts[k]
+        s.q_2, s.q_1, s.v_2, s.v_1 = s.q_1, s.q, s.v_1, s.v
+        s.q += s.v * h
+    predict_turn(drive, u)
+    for k in range(len(drive.cables)):
+        c = drive.cables[k]
+        c.A_old, c.Y_old = c.A, c.Y
+        place_cable(c, drive.shafts[c.shaft_out].q, drive.shafts[c.shaft_in].q)
+        carry_along(c, nodes, c.Y - c.Y_old, c.A - c.A_old)
+        guess_tension(c, nodes)
+
+
+@njit
+def predict_turn(drive: Drive, u: Floats) -> None:
+    """Where the motor's angle is given: hand its unforeseen turn on as if rigid, which keeps cables taut."""
+    if drive.shafts[0].prescribed == 0:
+        return
+    ahead = drive.rhs
+    ahead[:] = 0.0
+    ahead[0] = u[MOTOR_ANGLE] - drive.shafts[0].q
+    for k in range(len(drive.cables) - 1, -1, -1):
+        c = drive.cables[k]
+        ahead[c.shaft_out] = ahead[c.shaft_in] * c.r / c.R
+    for k in range(len(drive.couplings)):
+        ahead[drive.couplings[k].b] = ahead[drive.couplings[k].a]
+    for k in range(len(drive.shafts)):
+        drive.shafts[k].q += ahead[k]
+
+
+@njit
+def all_finite(g: Floats, n: int) -> bool:
+    """Whether the first n values are finite."""
+    total = 0.0
+    for k in range(n):
+        total += abs(g[k])
+    return total < 1e12
+
+
+@njit
+def advance_cable(
+    c: Any, drive: Drive, step_out: float, step_in: float, share: float, rush: bool
+) -> tuple[float, int]:
+    """Move one cable with its shafts; returns the change of its end forces over T0 and of its modes."""
+    excess = lumped_extension(c, c.T_out) - c.ext
+    slope = lumped_slope(c, c.T_out)
+    turn = c.lead_out * step_out + c.lead_in * step_in
+    dT = share * c.dT_out + c.dT_out_dY * (turn - share * excess) + c.dT_out_dA * c.lead_out * step_out
+    dT /= 1.0 + c.dT_out_dY * slope
+    c.ext += share * excess + slope * dT
+    A, Y, T_out, T_in = c.A, c.Y, c.T_out, c.T_in
+    place_cable(c, drive.shafts[c.shaft_out].q, drive.shafts[c.shaft_in].q)
+    move_nodes(c, drive.nodes, c.Y - Y, c.A - A, share)
+    refresh_tension(c, drive.nodes)
+    c.T_out, c.T_in = drive.nodes.tension[c.i_out], drive.nodes.tension[c.i_in - 1]
+    changed = update_modes(c, drive.nodes, c.force_tol, rush)
+    return max(abs(c.T_out - T_out), abs(c.T_in - T_in)) / (c.T0 * share), changed
+
+
+@njit
+def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
+    """One implicit step of length h to the inputs u; False if the iteration did not settle.
+
+    With `loose` > 0, end forces that still move by less than that share of T0 pass, and are counted: a
+    point at the very edge of sliding may go to and fro without end.
+    """
+    p = drive.surround[0]
+    b0, b1, b2 = bdf(h, p.h_prev)
+    factor = apply_surroundings(drive, u)
+    begin_step(drive, u, h)
+    J, g, n = drive.matrix, drive.rhs, len(drive.shafts)
+    moved = np.inf
+    for iteration in range(MAX_ITERATIONS):
+        p.iterations += 1
+        for k in range(len(drive.cables)):
+            if iteration < CONTACT_ITERATIONS:
+                find_contacts(drive.cables[k], drive.nodes, h)
+            solve_cable(drive.cables[k], drive.nodes)
+        assemble(drive, h, b0, b1, b2, factor)
+        for k in range(n):
+            if drive.shafts[k].prescribed == 1:
+                J[k, :] = 0.0
+                J[k, k], g[k] = 1.0, 0.0
+        solve_small(J, g, n)
+        share = 1.0 if (iteration // WHOLE_ITERATIONS) % 2 == 0 else 0.6
+        rush = iteration % (2 * RUSH_ITERATIONS) < RUSH_ITERATIONS
+        changed, moved = 0, 0.0
+        for k in range(n):
+            g[k] *= share
+            drive.shafts[k].q += g[k]
+            changed += update_bearing(drive.shafts[k])
+        for k in range(len(drive.cables)):
+            c = drive.cables[k]
+            change, modes = advance_cable(c, drive, g[c.shaft_out], g[c.shaft_in], share, rush)
+            moved = max(moved, change)
+            changed += modes
+        if not (moved < 1e12 and all_finite(g, n)):
+            return False
+        if changed == 0 and moved < 1e-8:
+            return True
+    if moved < loose:
+        p.failures += 1
+        return True
+    return False
+
+
+@njit
+def finish_step(drive: Drive, u: Floats, h: float) -> None:
+    """Commit what depends on the step's end: rates, bearing anchors, cable plays, count of load reversals."""
+    p = drive.surround[0]
+    b0, b1, b2 = bdf(h, p.h_prev)
+    factor = pretension_factor(p, u[TIME], u[TEMPERATURE])
+    assemble(drive, h, b0, b1, b2, factor)
+    for k in range(len(drive.shafts)):
+        settle_bearing(drive.shafts[k])
+    for k in range(len(drive.cables)):
+        c = drive.cables[k]
+        c.play = min(max(c.play, c.T_out - c.play_yield), c.T_out + c.play_yield)
+    load = drive.shafts[p.load_shaft].external_Nm
+    swing = 0.05 * drive.cables[0].T0 * drive.cables[0].R
+    if (load - p.load_turn) * p.load_direction > 0.0:
+        p.load_turn = load
+    elif abs(load - p.load_turn) > swing:
+        p.reversals += 1.0 if p.load_direction != 0.0 else 0.0
+        p.load_direction = 1.0 if load > p.load_turn else -1.0
+        p.load_turn = load
+    p.h_prev = h
+
+
+@njit
+def save_state(drive: Drive, nodes_y: Floats) -> None:
+    """Keep the state for a second try."""
+    nodes_y[:] = drive.nodes.y
+    drive.nodes.saved_mode[:] = drive.nodes.mode
+    drive.saved_cables[:] = drive.cables
+    drive.saved_shafts[:] = drive.shafts
+    drive.saved_couplings[:] = drive.couplings
+    drive.saved_surround[:] = drive.surround
+
+
+@njit
+def restore_state(drive: Drive, nodes_y: Floats) -> None:
+    """Back to what `save_state` kept, but for the counters."""
+    iterations, failures = drive.surround[0].iterations, drive.surround[0].failures
+    drive.nodes.y[:] = nodes_y
+    drive.nodes.mode[:] = drive.nodes.saved_mode
+    drive.cables[:] = drive.saved_cables
+    drive.shafts[:] = drive.saved_shafts
+    drive.couplings[:] = drive.saved_couplings
+    drive.surround[:] = drive.saved_surround
+    drive.surround[0].iterations, drive.surround[0].failures = iterations, failures
+    for k in range(len(drive.cables)):
+        refresh_tension(drive.cables[k], drive.nodes)
+
+
+@njit
+def advance(drive: Drive, u0: Floats, u1: Floats, h: float, parts: int) -> bool:
+    """Go from inputs u0 to u1 in `parts` equal steps, or in more where the iteration asks for it."""
+    y_kept = np.empty_like(drive.nodes.y)
+    save_state(drive, y_kept)
+    u = np.empty_like(u1)
+    pieces = max(parts, 1)
+    for attempt in range(TRIES):
+        loose = LOOSE if attempt == TRIES - 1 else 0.0
+        done = True
+        for j in range(pieces):
+            share = (j + 1.0) / pieces
+            u[:] = u0 + share * (u1 - u0)
+            done = solve_step(drive, u, h / pieces, loose)
+            if not done:
+                break
+            finish_step(drive, u, h / pieces)
+        if done:
+            return True
+        restore_state(drive, y_kept)
+        pieces *= 2
+    return False
