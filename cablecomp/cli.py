@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from cablecomp.cli_analysis import register
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.design import design_loop
@@ -43,6 +44,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 console = Console()
+register(app)
 
 Config = Annotated[Path, typer.Option("--config", help="joint configuration (TOML)")]
 Control = Annotated[
@@ -86,7 +88,7 @@ def run(
     """
     joint = load_joint(config)
     wanted = _control(control, joint)
-    bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=link is not None)
+    bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=not sim)
     if link is None and not sim:
         raise InputError("--link is missing; give a link file, or --sim for a simulated joint")
     if comparison:
