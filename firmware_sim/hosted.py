@@ -90,6 +90,7 @@ class HostedJoints:
 
         self.bench = make_bench(spec.bench, make, open_port(spec.bus, None, None), spec.faults)
         self._thread: BenchThread | None = None
+        self._periods = 0
 
     def set_load(self, number: int, torque_Nm: float) -> None:
         """External torque on the link of joint `number`, along +q_out, from now on."""
@@ -100,12 +101,15 @@ class HostedJoints:
         self.plants[number].plant.set_wall(position_rad)
 
     def advance(self) -> None:
-        """Stepped time: hear what was sent; each joint takes one sample period for its command."""
+        """Stepped time, one sample period a call: each joint steps for its command; one that heard none
+        (lost on the way, or none was sent) goes on all the same.
+        """
         self.bench.pump()
-
-    def advance_to(self, now_s: float) -> None:
-        """Host's time: hear what was sent, answer it, and go on to `now_s`, commands or not."""
-        self.bench.tick(now_s)
+        self._periods += 1
+        for joint in self.bench.joints:
+            due = self._periods * joint.timing.sample_s
+            if joint.time_s < due - 0.5 * joint.timing.sample_s:
+                self.bench.port.send(joint.advance_to(due), due)
 
     def truth(self, number: int) -> Truth:
         """What joint `number` really does, at the end of its last step."""

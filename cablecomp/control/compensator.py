@@ -55,6 +55,12 @@ def gains_of(options: CompensatorOptions, designed: Gains = DEFAULT_GAINS) -> Ga
     )
 
 
+def given_gains(options: CompensatorOptions) -> Gains | None:
+    """The options' own gains, if they state all of them: nothing is left to be designed."""
+    found = [getattr(options, name) for name in Gains._fields]
+    return None if any(value is None for value in found) else Gains(*found)
+
+
 def ratio_of(config: JointConfig) -> float:
     """Joint angle per motor angle of the rigid drive: N = product of r/R over the stages."""
     return prod(s.input_radius_m / s.output_radius_m for s in config.drive.stage)

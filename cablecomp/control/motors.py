@@ -11,6 +11,8 @@ from cablecomp.control.stiffness import greatest_load, stiffness_range
 _LINK_HZ = 110.0
 _DRIVE_HZ = 95.0
 _DAMPING = 0.8
+_SHAKE = 0.1
+_STIFFEST = 3000.0  # Nm/rad: about what drives can be told
 
 
 def control_for(config: JointConfig) -> ControlConfig:
@@ -23,10 +25,16 @@ def control_for(config: JointConfig) -> ControlConfig:
     stiffness = stiffness_range(config, samples=80)
     inertia = stiffness.zero_Nm_per_rad / (2.0 * pi * _LINK_HZ) ** 2
     rotor = 2.0 * inertia * ratio**2
-    swing = 2.0 * pi * _DRIVE_HZ
     load = greatest_load(config)
     limit = config.limits.motor_torque_max_Nm
     torque = 3.0 * ratio * load if limit is None else limit
+    swing = 2.0 * pi * _DRIVE_HZ
+    step = config.sensors.motor_position_resolution_rad
+    if step is not None and step > 0.0:
+        # one count of a coarse encoder, seen through the drive's velocity filter, must not shake the motor
+        most = _SHAKE * torque / (step * 2.0 * pi * MotorModel().velocity_bandwidth_Hz)
+        swing = min(swing, most / (2.0 * _DAMPING * rotor))
+    rotor = min(rotor, _STIFFEST / swing**2)
     motor = MotorModel(
         inertia_kgm2=rotor,
         viscous_Nms_per_rad=0.02 * rotor * swing,

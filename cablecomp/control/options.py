@@ -52,6 +52,7 @@ class MotorModel(_Frozen):
     stiffness_Nm_per_rad: Positive = 60.0
     damping_Nms_per_rad: Positive = 0.16
     torque_bandwidth_Hz: Positive = 1000.0
+    velocity_bandwidth_Hz: Positive = 150.0
     delay_s: NonNegative = 1e-3
     output_inertia_kgm2: Positive = 6e-4
     output_viscous_Nms_per_rad: NonNegative = 0.0

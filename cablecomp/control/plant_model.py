@@ -38,15 +38,19 @@ def joint_model(
     c = 2.0 * m.structural_damping * sqrt(k * J)
     b = m.output_viscous_Nms_per_rad + m.contact_damping_s * e
     w = 2.0 * pi * m.torque_bandwidth_Hz
-    F = np.array([-n * k, -n * c, k, c, 0.0])  # states: q_in, w, q_out, v, tau
-    A = np.zeros((5, 5))
+    v = 2.0 * pi * m.velocity_bandwidth_Hz
+    F = np.array(
+        [-n * k, -n * c, k, c, 0.0, 0.0]
+    )  # states: q_in, w, q_out, dq_out, tau, w as the drive knows it
+    A = np.zeros((6, 6))
     A[0, 1] = A[2, 3] = 1.0
-    A[1] = n * F / Jm + np.array([0.0, -m.viscous_Nms_per_rad / Jm, 0.0, 0.0, 1.0 / Jm])
-    A[3] = -F / J + np.array([0.0, 0.0, -e / J, -b / J, 0.0])
-    A[4] = -w * np.array([m.stiffness_Nm_per_rad, m.damping_Nms_per_rad, 0.0, 0.0, 1.0])
-    B = np.zeros((5, 3))
+    A[1] = n * F / Jm + np.array([0.0, -m.viscous_Nms_per_rad / Jm, 0.0, 0.0, 1.0 / Jm, 0.0])
+    A[3] = -F / J + np.array([0.0, 0.0, -e / J, -b / J, 0.0, 0.0])
+    A[4] = -w * np.array([m.stiffness_Nm_per_rad, 0.0, 0.0, 0.0, 1.0, m.damping_Nms_per_rad])
+    A[5] = np.array([0.0, v, 0.0, 0.0, 0.0, -v])
+    B = np.zeros((6, 3))
     B[4] = w * np.array([m.stiffness_Nm_per_rad, m.damping_Nms_per_rad, 1.0])
-    C = np.vstack([F, [0.0, 0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0]])
+    C = np.vstack([F, np.eye(6)[2], np.eye(6)[0]])
     sampled = control.c2d(control.ss(A, B, C, np.zeros((3, 3))), period_s, method="zoh")
     return delayed(sampled, round(m.delay_s / period_s))
 

@@ -12,7 +12,7 @@ from typing import Any
 from cablecomp.config import JointConfig
 from cablecomp.config_text import write_joint
 from cablecomp.control.command import Reference
-from cablecomp.control.compensator import Compensator, Gains, ratio_of
+from cablecomp.control.compensator import Compensator, Gains, given_gains, ratio_of
 from cablecomp.control.degrade import DegradeTimes
 from cablecomp.control.design import design_loop
 from cablecomp.control.gate import GateLimits
@@ -172,7 +172,8 @@ def run_joints(
     first = contestants[0]
     mode = ControlMode.FORCE if protocol.mode == "force" else first.options.mode
     chosen = control.model_copy(update={"compensator": first.options.model_copy(update={"mode": mode})})
-    gains = design_loop(first.config, link.rate_Hz, chosen).gains
+    given = given_gains(chosen.compensator)
+    gains = design_loop(first.config, link.rate_Hz, chosen).gains if given is None else given
     period = 1.0 / link.rate_Hz
     bus: Link = BusLink(link)
     setups = tuple(_setup(c, mode, bus, control, protocol, gains, period, options) for c in contestants)

@@ -35,9 +35,6 @@ class Simulation(Protocol):
     def advance(self) -> None:
         """Stepped time: take one period for the commands that were sent."""
 
-    def advance_to(self, now_s: float) -> None:
-        """The run's time: hear what was sent, go on to `now_s`, commands or not."""
-
     def truth(self, number: int) -> TruthLike:
         """What a joint really does, at the end of its last step."""
 

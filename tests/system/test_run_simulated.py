@@ -1,0 +1,194 @@
+"""The whole loop against the simulated joint: what a run leaves behind, how well it does, and that
+nothing shared makes it so.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from cablecomp import cli
+from cablecomp.cli_simulation import start_simulation
+from cablecomp.config import load_joint
+from cablecomp.control.options import ControlMode, FeedForward, load_control
+from cablecomp.control.protocol import parse_protocol
+from cablecomp.control.standard import force_protocol
+from cablecomp.links.schema import load_link
+from cablecomp.observer import Observer
+from cablecomp.recording.reader import open_recording
+from cablecomp.report.replay_page import write_replay
+from cablecomp.runtime.clock import Tick
+from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.run import RunOptions, RunReport, matched, run_joint
+from cablecomp.runtime.simulated import SimulationWish
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+JOINT = CONFIGS / "joints/wrist-capstan.toml"
+CONTROL = CONFIGS / "control/wrist-capstan.toml"
+LINK = CONFIGS / "links/wrist-virtual.toml"
+
+
+GAINS = {
+    "load_filter_Hz": 18.6,
+    "load_lead_s": 0.0,
+    "follow_filter_Hz": 18.6,
+    "follow_lead_s": 0.0171,
+    "joint_feedback_per_s": 0.0,
+    "force_feedback_per_s": 16.0,
+    "motor_integral_per_s": 65.0,
+}
+"""What `cablecomp design` gives for this joint; stated, so that each test need not design anew."""
+
+REACH = parse_protocol(
+    {
+        "schema": 1,
+        "name": "reach",
+        "segment": [
+            {"kind": "ramp", "position_rad": 0.4, "load_Nm": 1.2, "duration_s": 1.5},
+            {"kind": "ramp", "position_rad": -0.2, "load_Nm": -0.8, "duration_s": 2.0},
+        ],
+    },
+    "test",
+)
+
+
+def simulated_run(
+    out: Path | None, duration_s: float, mode: ControlMode = ControlMode.POSITION, **changes: object
+) -> RunReport:
+    """A run in stepped time on a joint exactly as configured."""
+    joint, control = load_joint(JOINT), load_control(CONTROL)
+    options = control.compensator.model_copy(update={**GAINS, "mode": mode, **changes})
+    link, control = matched(
+        load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
+    )
+    protocol = force_protocol(joint, 5, 8.0) if mode is ControlMode.FORCE else REACH
+    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
+    if mode is ControlMode.FORCE:
+        simulation.set_wall(1, 0.0)
+    try:
+        return run_joint(joint, link, control, protocol, RunOptions(duration_s, True, out), simulation)
+    finally:
+        simulation.close()
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> RunReport:
+    return simulated_run(tmp_path_factory.mktemp("run"), 3.0)
+
+
+def test_the_joint_follows_far_better_than_the_motor_alone(finished: RunReport) -> None:
+    alone = simulated_run(None, 3.0, feed_forward=FeedForward.NONE)
+    assert alone.joints[0].true_position_rad > 15.0 * finished.joints[0].true_position_rad
+
+
+def test_replay_gives_the_predictions_back_bit_for_bit(finished: RunReport, tmp_path: Path) -> None:
+    assert finished.folder is not None
+    config = load_joint(finished.folder / "joint.toml")
+    write_replay(
+        open_recording(finished.folder / "recording.csv"), config, Observer(config), tmp_path / "replay"
+    )
+    live = pl.read_csv(finished.folder / "prediction.csv", infer_schema_length=None)
+    again = pl.read_csv(tmp_path / "replay" / "prediction.csv", infer_schema_length=None)
+    assert live.columns == again.columns
+    for name in live.columns:
+        a, b = (t[name].cast(pl.Float64).fill_null(np.nan).to_numpy() for t in (live, again))
+        assert a.tobytes() == b.tobytes(), name
+
+
+def test_every_cycle_is_recorded_once(finished: RunReport) -> None:
+    assert finished.folder is not None
+    recording = pl.read_csv(finished.folder / "recording.csv", comment_prefix="#")
+    cycles = pl.read_csv(finished.folder / "cycles.csv", infer_schema_length=None)
+    assert len(recording) == len(cycles)
+    assert np.array_equal(recording["time_s"], cycles["time_s"])
+    assert int(cycles["controlled"].sum()) == finished.joints[0].cycles
+    steps = np.diff(recording["time_s"].to_numpy())
+    assert np.allclose(steps, 1e-3)
+
+
+def test_the_snapshot_goes_on_where_the_run_ended(finished: RunReport) -> None:
+    assert finished.folder is not None
+    config = load_joint(finished.folder / "joint.toml")
+    taken_up, replayed = Observer(config), Observer(config)
+    taken_up.load(finished.folder / "observer.snapshot")
+    blocks = open_recording(finished.folder / "recording.csv").blocks()
+    for block in blocks:
+        replayed.run(block.columns)
+    assert taken_up.snapshot() == replayed.snapshot()
+
+
+def test_the_run_says_how_time_and_data_were_kept(finished: RunReport) -> None:
+    assert finished.folder is not None
+    said = json.loads((finished.folder / "run.json").read_text())
+    assert said["stop_reason"] == "time is over"
+    timing = said["timing"]
+    assert timing["ticks"] > 3000
+    assert timing["skipped"] == 0
+    assert timing["lost_frames"] == 0
+    assert len(timing["policy"]) == 3
+    assert timing["step"]["p50_s"] < timing["step"]["p99_s"] <= timing["step"]["max_s"]
+
+
+def test_force_is_made_without_a_torque_sensor(tmp_path: Path) -> None:
+    report = simulated_run(tmp_path, 5.0, ControlMode.FORCE)
+    cycles = pl.read_csv(tmp_path / "cycles.csv", infer_schema_length=None)
+    asked = cycles["reference_torque_Nm"].to_numpy()
+    assert report.joints[0].true_torque_Nm < 0.03 * (asked.max() - asked.min())
+
+
+def test_impedance_yields_by_its_stiffness() -> None:
+    """At rest under a steady load M the joint stands off its reference by M/K, the motor answering from
+    both encoders.
+    """
+    joint, control = load_joint(JOINT), load_control(CONTROL)
+    options = control.compensator.model_copy(
+        update={
+            **GAINS,
+            "mode": ControlMode.IMPEDANCE,
+            "impedance_stiffness_Nm_per_rad": 8.0,
+            "impedance_damping_Nms_per_rad": 0.3,
+        }
+    )
+    link, control = matched(
+        load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
+    )
+    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
+    simulation.set_load(1, 0.4)
+    quiet = parse_protocol(
+        {"schema": 1, "name": "rest", "segment": [{"kind": "hold", "duration_s": 3.0}]}, "test"
+    )
+    angles: list[float] = []
+
+    def watch(loop: Loop, tick: Tick) -> None:
+        if loop.stage is Stage.RUNNING:
+            angles.append(simulation.truth(1).joint_position_rad)
+
+    try:
+        run_joint(joint, link, control, quiet, RunOptions(None, True), simulation, watch)
+    finally:
+        simulation.close()
+    moved = float(np.mean(angles[-500:]))
+    assert moved == pytest.approx(0.4 / 8.0, rel=0.05)
+
+
+def test_the_command_line_runs_and_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [
+        "run",
+        "--config",
+        str(JOINT),
+        "--control",
+        str(CONTROL),
+        "--sim",
+        "--fast",
+        "--duration",
+        "0.5",
+    ]
+    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
+    assert "report.html" in capsys.readouterr().out.replace("\n", "")
+    page = (tmp_path / "report.html").read_text()
+    assert "https://" not in page.split("<script>")[0]
+    assert "prediction residual" in page
