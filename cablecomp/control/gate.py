@@ -97,9 +97,10 @@ def gate(
 ) -> SafeCommand:
     """Pass a command within the limits, cut to them where it is not.
 
-    Not finite or stale: the command before is repeated with no velocity and no torque, and the flags hold a
-    bit of `MUST_STOP`. Otherwise position is cut by magnitude, by distance from where the motor is, by rate;
-    velocity and torque by magnitude, torque by rate. `age_s` is the age of `motor_position_rad`.
+    Not finite or stale: the command before is repeated with no velocity and no torque, and the flags
+    hold a bit of `MUST_STOP`. Otherwise position is cut by rate, by distance from where the motor is
+    (which may overrule the rate: it only takes force away), and last by magnitude; velocity and torque
+    by magnitude, torque by rate. `age_s` is the age of `motor_position_rad`.
     """
     q, v, tau = command.motor_position_rad, command.motor_velocity_rad_s, command.motor_torque_Nm
     if not isfinite(q + v + tau + motor_position_rad):
@@ -107,19 +108,17 @@ def gate(
     if not age_s <= limits.age_s:
         return SafeCommand(before.motor_position_rad, 0.0, 0.0, STALE)
     flags = 0
-    held = min(max(q, limits.position_min_rad), limits.position_max_rad)
-    if held != q:
-        flags |= POSITION_LIMITED
+    lead, last = limits.lead_max_rad, before.motor_position_rad
     step = limits.position_rate_rad_s * period_s
-    last = before.motor_position_rad
-    q = min(max(held, last - step), last + step)
-    if q != held:
+    even = min(max(q, last - step), last + step)
+    if even != q:
         flags |= RATE_LIMITED
-    lead = limits.lead_max_rad
-    near = min(max(q, motor_position_rad - lead), motor_position_rad + lead)
-    if near != q:
+    near = min(max(even, motor_position_rad - lead), motor_position_rad + lead)
+    if near != even:
         flags |= FAR_FROM_MOTOR
-        q = near
+    q = min(max(near, limits.position_min_rad), limits.position_max_rad)
+    if q != near:
+        flags |= POSITION_LIMITED
     slow = min(max(v, -limits.velocity_max_rad_s), limits.velocity_max_rad_s)
     if slow != v:
         flags |= VELOCITY_LIMITED
@@ -127,7 +126,7 @@ def gate(
     if weak != tau:
         flags |= TORQUE_LIMITED
     step = limits.torque_rate_Nm_s * period_s
-    even = min(max(weak, before.motor_torque_Nm - step), before.motor_torque_Nm + step)
-    if even != weak:
+    gradual = min(max(weak, before.motor_torque_Nm - step), before.motor_torque_Nm + step)
+    if gradual != weak:
         flags |= RATE_LIMITED
-    return SafeCommand(q, slow, even, flags)
+    return SafeCommand(q, slow, gradual, flags)

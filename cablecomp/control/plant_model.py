@@ -69,10 +69,10 @@ def delayed(system: Any, samples: int) -> Any:
 
 def ahead_filter(filter_Hz: float, lead_s: float, period_s: float) -> Any:
     """`shaping.Ahead` as a system: from a reading to (expected value, its rate)."""
-    tau = 1.0 / (2.0 * pi * filter_Hz)
-    a = 1.0 - exp(-period_s / tau)
+    kept = exp(-2.0 * pi * filter_Hz * period_s)
+    a, lag = 1.0 - kept, period_s * kept / (1.0 - kept)
     first, second = np.array([1.0 - a, 0.0]), np.array([a * (1.0 - a), 1.0 - a])
-    rate, rate_given = (first - second) / tau, (a - a * a) / tau
+    rate, rate_given = (first - second) / lag, (a - a * a) / lag
     A, B = np.vstack([first, second]), np.array([[a], [a * a]])
     C, D = np.vstack([second + lead_s * rate, rate]), np.array([[a * a + lead_s * rate_given], [rate_given]])
     return control.ss(A, B, C, D, period_s)

@@ -12,15 +12,16 @@ class Ahead:
     exact for a held input.
 
     `rate` is the filtered rate of change per second. A constant comes through as it is, a ramp of rate
-    r late by `(2 tau - lead) r`: with lead = 2 tau + latency a ramp is foreseen over the loop's
-    latency.
+    r late by `(2 stage_lag_s - lead) r`, stage_lag_s = tau for periods well below it: with lead = 2
+    stage_lag_s + latency a ramp is foreseen over the loop's latency.
     """
 
-    __slots__ = ("_a", "_lead", "_tau", "first", "rate", "second", "started")
+    __slots__ = ("_a", "_lead", "first", "rate", "second", "stage_lag_s", "started")
 
     def __init__(self, filter_Hz: float, lead_s: float, period_s: float) -> None:
-        self._tau = 1.0 / (2.0 * pi * filter_Hz)
-        self._a = -exp(-period_s / self._tau) + 1.0
+        kept = exp(-2.0 * pi * filter_Hz * period_s)
+        self._a = 1.0 - kept
+        self.stage_lag_s = period_s * kept / self._a
         self._lead = lead_s
         self.reset()
 
@@ -36,7 +37,7 @@ class Ahead:
             self.started = True
         self.first += self._a * (reading - self.first)
         self.second += self._a * (self.first - self.second)
-        self.rate = (self.first - self.second) / self._tau
+        self.rate = (self.first - self.second) / self.stage_lag_s
         return self.second + self._lead * self.rate
 
 

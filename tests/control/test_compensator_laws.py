@@ -1,0 +1,194 @@
+"""The compensator on a drive whose deflection is known in closed form: exact feed-forward, no steps,
+feedback that settles.
+"""
+
+from __future__ import annotations
+
+from math import nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cablecomp.config import load_joint
+from cablecomp.control.command import FULL, Feed, Reference
+from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains, ratio_of
+from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
+from cablecomp.control.shaping import Ahead, Bump, Slope
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+from cablecomp.signals import NAN, Estimate, Sample
+
+JOINT = load_joint(Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml")
+N = ratio_of(JOINT)
+T = 1e-3
+K = 200.0
+GAINS = Gains(20.0, 0.0, 20.0, 0.0, 0.0, 5.0, 0.0)
+
+
+class Spring:
+    """A drive that is a plain spring of K Nm/rad: deflection = load/K."""
+
+    def step(self, sample: Sample) -> Estimate:
+        return self._at(sample, sample.joint_torque_Nm)
+
+    def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
+        return joint_torque_Nm / K
+
+    def step_inverse(self, sample: Sample) -> Estimate:
+        return self._at(sample, K * (sample.joint_position_rad - N * sample.motor_position_rad))
+
+    def _at(self, sample: Sample, load: float) -> Estimate:
+        d = load / K
+        return Estimate(sample.time_s, d, NAN, NAN, N * sample.motor_position_rad + d, load, 60.0, 60.0)
+
+
+def controller(gains: Gains = GAINS, **options: object) -> Compensator:
+    chosen = CompensatorOptions.model_validate({"blend_s": 0.05, **options})
+    return Compensator(JOINT, chosen, T, Spring(), gains=gains, motor=MotorModel(coulomb_Nm=0.0))
+
+
+def sample(k: int, motor: float = 0.0, load: float = 0.0, joint: float = nan) -> Sample:
+    return Sample(k * T, motor, load, joint, -N * load)
+
+
+def test_a_steady_load_is_made_up_for_exactly() -> None:
+    c = controller()
+    for k in range(400):
+        command = c.step(sample(k, load=1.5), Reference(0.3))
+    assert command.motor_position_rad == pytest.approx((0.3 - 1.5 / K) / N, abs=1e-12)
+    assert command.motor_torque_Nm == pytest.approx(-N * 1.5, abs=1e-9)
+
+
+def test_with_the_motor_there_the_joint_stands_where_it_is_wanted() -> None:
+    c = controller()
+    for k in range(400):
+        command = c.step(sample(k, load=-0.8), Reference(0.2))
+    assert N * command.motor_position_rad + (-0.8) / K == pytest.approx(0.2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"), [("none", 0.0), ("linear", 1.0 / 150.0), ("observer", 1.0 / K)]
+)
+def test_what_is_made_up_for_depends_on_the_kind(kind: str, expected: float) -> None:
+    c = controller(feed_forward=kind, linear_stiffness_Nm_per_rad=150.0)
+    for k in range(400):
+        command = c.step(sample(k, load=1.0), Reference(0.0))
+    assert command.deflection_ahead_rad == pytest.approx(expected, abs=1e-9)
+
+
+def test_enabling_and_disabling_costs_no_step() -> None:
+    c = controller()
+    targets = []
+    for k in range(600):
+        if k == 200:
+            c.disable()
+        if k == 400:
+            c.enable()
+        targets.append(c.step(sample(k, load=1.5), Reference(0.1)).motor_position_rad)
+    steps = np.abs(np.diff(targets))[150:]
+    whole = 1.5 / K / N
+    assert steps.max() < 1.6 * whole * T / 0.05  # 1.5 / blend time is the steepest of the blend
+    assert targets[-1] == pytest.approx((0.1 - 1.5 / K) / N, abs=1e-9)
+    assert targets[390] == pytest.approx(0.1 / N, abs=1e-9)
+
+
+def test_control_begins_where_the_motor_stands() -> None:
+    c = controller()
+    first = c.step(sample(0, motor=0.7), Reference(-0.4))
+    assert first.motor_position_rad == pytest.approx(0.7)
+
+
+def test_held_feed_forward_stays_and_a_weight_scales_it() -> None:
+    c = controller()
+    for k in range(300):
+        c.step(sample(k, load=1.0), Reference(0.0))
+    held = c.step(sample(300, load=-2.0), Reference(0.0), Feed(1.0, True))
+    assert held.deflection_ahead_rad == pytest.approx(1.0 / K, rel=1e-6)
+    faded = c.step(sample(301, load=-2.0), Reference(0.0), Feed(0.25, True))
+    assert faded.deflection_ahead_rad == pytest.approx(0.25 / K, rel=1e-6)
+
+
+def test_feedback_on_the_joint_encoder_takes_off_what_the_model_misses() -> None:
+    """An encoder error of 1 mrad that no model knows of is integrated away with the gain as the rate."""
+    c = controller(joint_feedback_per_s=20.0)
+    motor = 0.0
+    errors = []
+    for k in range(1000):
+        joint = N * motor + 1e-3
+        errors.append(0.1 - joint)
+        motor = c.step(sample(k, motor, 0.0, joint), Reference(0.1)).motor_position_rad
+    assert abs(errors[-1]) < 1e-8
+    assert errors[300] / errors[200] == pytest.approx(np.exp(-20.0 * 0.1), rel=0.05)
+
+
+def test_an_encoder_that_is_not_to_be_trusted_moves_nothing() -> None:
+    c = controller(joint_feedback_per_s=20.0)
+    for k in range(100):
+        c.step(sample(k, 0.0, 0.0, 0.5), Reference(0.0), FULL, joint_ok=False)
+        c.step(sample(k, 0.0, 0.0, nan), Reference(0.0))
+    assert c.joint_trim_rad == 0.0
+
+
+def test_force_mode_makes_the_torque_that_is_wanted_against_a_held_output() -> None:
+    c = controller(mode="force")
+    motor = 0.0
+    for k in range(3000):
+        motor = c.step(sample(k, motor, nan, 0.2), Reference(joint_torque_Nm=-0.9)).motor_position_rad
+    assert K * (0.2 - N * motor) == pytest.approx(-0.9, abs=1e-5)
+
+
+def test_impedance_wants_a_load_in_proportion_to_the_position_error() -> None:
+    c = controller(mode="impedance", impedance_stiffness_Nm_per_rad=5.0, impedance_damping_Nms_per_rad=0.0)
+    motor = 0.1 / N
+    for k in range(3000):
+        motor = c.step(sample(k, motor, nan, 0.1), Reference(0.3)).motor_position_rad
+    assert K * (0.1 - N * motor) == pytest.approx(-5.0 * (0.3 - 0.1), abs=1e-5)
+
+
+def test_on_the_observer_peek_and_step_agree() -> None:
+    """The deflection foreseen for a load is the one found when that load comes."""
+    observer = Observer(JOINT)
+    loads = 1.2 * np.sin(np.linspace(0.0, 7.0, 200))
+    for k, load in enumerate(loads[:-1]):
+        observer.step(sample(k, 0.01 * k, float(load)))
+        foreseen = observer.peek_deflection((k + 1) * T, 0.01 * (k + 1), float(loads[k + 1]))
+        before = observer.snapshot()
+        found = observer.copy().step(sample(k + 1, 0.01 * (k + 1), float(loads[k + 1])))
+        assert found.deflection_rad == foreseen
+        assert observer.snapshot() == before
+
+
+def test_a_ramp_is_foreseen_over_the_lead() -> None:
+    lead = 0.012
+    ahead = Ahead(30.0, lead, T)
+    out = [ahead.step(3.0 * k * T) for k in range(2000)]
+    assert out[-1] - 3.0 * 1999 * T == pytest.approx(3.0 * (lead - 2.0 * ahead.stage_lag_s), abs=1e-9)
+    assert ahead.rate == pytest.approx(3.0, rel=1e-9)
+    assert ahead.stage_lag_s == pytest.approx(1.0 / (2.0 * np.pi * 30.0), abs=0.6 * T)
+
+
+def test_bump_and_slope() -> None:
+    bump = Bump(0.1, T)
+    bump.start(2.0)
+    values = [bump.step() for _ in range(120)]
+    assert values[0] == 2.0
+    assert values[50] == pytest.approx(1.0)
+    assert values[100:] == [0.0] * 20
+    slope = Slope(100.0, T)
+    for k in range(100):
+        rate = slope.step(5.0 * k * T)
+    assert rate == pytest.approx(5.0, rel=1e-6)
+
+
+def test_gains_are_the_options_own_where_stated() -> None:
+    assert gains_of(CompensatorOptions(load_filter_Hz=7.0), GAINS) == GAINS._replace(load_filter_Hz=7.0)
+    assert given_gains(CompensatorOptions()) is None
+    assert given_gains(CompensatorOptions.model_validate(GAINS._asdict())) == GAINS
+
+
+def test_nonsense_is_refused() -> None:
+    with pytest.raises(InputError, match="period_s"):
+        Compensator(JOINT, CompensatorOptions(), 0.0, Spring())
+    with pytest.raises(ValueError, match="linear_stiffness_Nm_per_rad"):
+        CompensatorOptions(mode=ControlMode.POSITION, feed_forward=FeedForward.LINEAR)
