@@ -1,0 +1,185 @@
+"""Loop design: the linear model against its parts, margins that hold, hysteresis as a describing
+function, the drive in python-control.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from cablecomp.config import load_joint
+from cablecomp.control.design import LoopDesign, design_loop
+from cablecomp.control.margins import grid_for, highest_gain, modulus_for
+from cablecomp.control.options import ControlConfig, MotorModel, load_control
+from cablecomp.control.plant_model import (
+    ahead_filter,
+    integrator,
+    joint_model,
+    load_path,
+    pick,
+    response,
+    stable_when_closed,
+)
+from cablecomp.control.shaping import Ahead, Slope
+from cablecomp.control.stiffness import Hysteresis, stiffness_range, to_nlsys
+from cablecomp.errors import InputError
+from cablecomp.mechanics.design import design_sheet
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+JOINT = load_joint(CONFIGS / "joints/wrist-capstan.toml")
+WANTED = load_control(CONFIGS / "control/wrist-capstan.toml")
+T = 1e-3
+
+
+@pytest.fixture(scope="module")
+def design() -> LoopDesign:
+    free = WANTED.compensator.model_copy(update={"joint_feedback_per_s": None})
+    return design_loop(JOINT, 1000.0, WANTED.model_copy(update={"compensator": free}))
+
+
+def test_the_stiffness_range_begins_at_the_free_spans_alone() -> None:
+    found = stiffness_range(JOINT)
+    sheet = design_sheet(JOINT)
+    stage = JOINT.drive.stage[0]
+    spans = 2.0 * stage.EA_N * stage.output_radius_m**2 / stage.free_length_m
+    assert found.high_Nm_per_rad == pytest.approx(spans, rel=1e-6)
+    assert found.low_Nm_per_rad < found.secant_Nm_per_rad < found.zero_Nm_per_rad
+    assert sheet is not None
+
+
+def test_filter_and_path_of_the_model_are_the_compensator_s_own() -> None:
+    """The state space gives, step by step, what the running code gives."""
+    rng = np.random.default_rng(1)
+    readings = rng.standard_normal(60).cumsum()
+    ahead, slope = Ahead(25.0, 0.004, T), Slope(60.0, T)
+    ahead.started = slope.started = True
+    compliance, ratio = 1.0 / 180.0, 1.0 / 3.0
+    motor = MotorModel(viscous_Nms_per_rad=2e-3)
+    times = np.arange(60) * T
+    filtered = control.forced_response(ahead_filter(25.0, 0.004, T), times, readings).outputs
+    path = control.forced_response(
+        load_path(motor, ratio, compliance, 25.0, 0.004, 60.0, T), times, readings
+    ).outputs
+    for k, reading in enumerate(readings):
+        expected = ahead.step(float(reading))
+        bend = compliance * expected
+        rate = slope.step(bend)
+        assert filtered[:, k] == pytest.approx([expected, ahead.rate], rel=1e-9, abs=1e-9)
+        torque = -ratio * expected - 2e-3 * rate / ratio
+        assert path[:, k] == pytest.approx([-bend / ratio, -rate / ratio, torque], rel=1e-9, abs=1e-9)
+
+
+def test_the_joint_model_rests_where_statics_say() -> None:
+    """Motor target q*, output held by a contact k_e: q_out = k N q_in/(k + k_e), M = -k_e q_out."""
+    k, contact, n = 200.0, 500.0, 1.0 / 3.0
+    model = joint_model(WANTED.motor, n, k, T, contact)
+    steady = np.real(response(model, np.array([1.0 + 1e-12j]))[0])
+    load, joint, motor = steady[:, 0]
+    assert joint == pytest.approx(k * n * motor / (k + contact), rel=1e-6)
+    assert load == pytest.approx(-contact * joint, rel=1e-6)
+    pull = n * load  # the cable's on the motor, balanced by the drive's spring
+    assert motor == pytest.approx(1.0 + pull / WANTED.motor.stiffness_Nm_per_rad, rel=1e-6)
+
+
+def test_every_loop_is_stable_and_keeps_its_distance_over_the_whole_range(design: LoopDesign) -> None:
+    least = modulus_for(WANTED.gain_margin, WANTED.phase_margin_deg)
+    assert {loop.name for loop in design.loops} >= {
+        "load feed-forward",
+        "motor trim",
+        "joint feedback",
+        "force feedback",
+    }
+    for loop in design.loops:
+        assert len(loop.margins) == 5
+        for margin in loop.margins:
+            assert margin.stable, (loop.name, margin)
+            assert margin.modulus_margin >= least - 1e-3, (loop.name, margin)
+            assert margin.gain_margin >= WANTED.gain_margin - 0.01
+            assert margin.phase_margin_deg >= WANTED.phase_margin_deg - 0.5
+
+
+def test_a_quicker_filter_would_break_the_margins(design: LoopDesign) -> None:
+    quick = WANTED.compensator.model_copy(update={"load_filter_Hz": 80.0, "load_lead_s": 0.004})
+    found = design_loop(JOINT, 1000.0, WANTED.model_copy(update={"compensator": quick}))
+    assert any("load feed-forward" in line for line in found.warnings)
+    assert not any("load feed-forward" in line for line in design.warnings)
+
+
+def test_compensation_is_whole_at_rest_and_gone_at_high_frequency(design: LoopDesign) -> None:
+    error = np.array(design.compensation_error)
+    hertz = np.array(design.compensation_Hz)
+    assert error[0] < 0.02
+    assert np.interp(200.0, hertz, error) == pytest.approx(1.0, abs=0.1)
+
+
+def test_more_gain_than_the_greatest_does_not_hold() -> None:
+    grid = grid_for(T)
+    plant = pick(joint_model(WANTED.motor, 1.0 / 3.0, 200.0, T), [2], [0])
+
+    def loops(gain: float) -> list[object]:
+        return [plant * integrator(gain, 1.0, T)]
+
+    gain = highest_gain(loops, 0.1, 1000.0, 0.6, grid)
+    z = np.exp(1j * grid * T)
+    assert np.min(np.abs(1.0 + np.squeeze(response(loops(gain)[0], z)))) == pytest.approx(0.6, abs=0.02)
+    assert stable_when_closed(loops(gain)[0])
+    assert highest_gain(loops, 1e5, 1e6, 0.6, grid) == 0.0
+
+
+def test_the_describing_function_is_the_free_span_for_small_swings_and_softens() -> None:
+    hysteresis = Hysteresis(JOINT)
+    stage = JOINT.drive.stage[0]
+    spans = 2.0 * stage.EA_N * stage.output_radius_m**2 / stage.free_length_m
+    values = np.asarray(control.describing_function(hysteresis, np.array([1e-6, 1e-4, 1e-3, 5e-3])))
+    assert values[0].real == pytest.approx(spans, rel=2e-3)
+    assert abs(values[0].imag) < 1e-3 * spans
+    assert np.all(np.diff(values.real) < 0.0)
+    assert np.all(np.diff(values.imag) > 0.0)  # the loop's loss grows with amplitude
+
+
+def test_the_describing_function_s_loss_is_the_area_of_the_loop() -> None:
+    """Im N = area/(pi A^2), the loop walked with the same observer, load over deflection."""
+    amplitude = 3e-3
+    hysteresis = Hysteresis(JOINT)
+    phase = 2.0 * np.pi * np.arange(1, 3 * 400 + 1) / 400
+    angles = amplitude * np.sin(phase)
+    hysteresis.reset()
+    loads = np.array([hysteresis(float(a)) for a in angles])[-401:]
+    turned = angles[-401:]
+    area = float(np.sum(0.5 * (loads[1:] + loads[:-1]) * np.diff(turned)))
+    expected = area / (np.pi * amplitude**2)
+    assert hysteresis.describing_function(amplitude).imag == pytest.approx(expected, rel=0.03)
+
+
+def test_no_limit_cycle_where_the_feed_forward_damps(design: LoopDesign) -> None:
+    limit = design.limit_cycle
+    assert limit.found == ()
+    assert limit.margin > 0.0
+    assert all(loss > 0.0 for loss in limit.loss_factor)
+    assert limit.loss_factor[-1] > limit.loss_factor[0]  # the hysteresis takes more out of larger swings
+
+
+def test_the_drive_in_python_control_is_the_observer() -> None:
+    system = to_nlsys(JOINT, T)
+    times = np.arange(150) * T
+    motor, load = 0.5 * np.sin(9.0 * times), 1.1 * np.sin(31.0 * times)
+    found = control.input_output_response(system, times, np.vstack([motor, load]), system.params["start"])
+    observer = Observer(JOINT)
+    observer.step(Sample(0.0, 0.0, 0.0, 0.0, 0.0, 20.0))
+    for k in range(150):
+        expected = observer.step(Sample(float(times[k]) + T, float(motor[k]), float(load[k]), 0.0, 0.0, 20.0))
+        assert found.outputs[0, k] == pytest.approx(expected.joint_position_rad, abs=1e-14)
+        assert found.outputs[2, k] == pytest.approx(expected.tension_h_N, abs=1e-10)
+
+
+def test_a_drive_that_cannot_be_stable_is_refused() -> None:
+    bad = ControlConfig(motor=MotorModel(damping_Nms_per_rad=30.0, inertia_kgm2=1e-4))
+    with pytest.raises(InputError, match="unstable"):
+        design_loop(JOINT, 1000.0, bad)
+    with pytest.raises(InputError, match="rate"):
+        design_loop(JOINT, 0.0)
