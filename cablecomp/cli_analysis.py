@@ -1,8 +1,8 @@
-"""The command line's analysis half: replay, info, identify, diagnose, prove; builds objects and calls them."""
+"""The command line's analysis half: replay, info, identify, diagnose; builds objects and calls them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import inf
 from pathlib import Path
@@ -48,8 +48,12 @@ def announce_compilation() -> None:
 def replay(
     recording: Annotated[Path, typer.Argument(help="recording (CSV, gzip CSV, Parquet, MCAP)")],
     config: Config,
-    out: Annotated[Path, typer.Option(help="folder for prediction.csv, replay.json, report.html")] = Path("replay"),
-    bounds: Annotated[bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")] = True,
+    out: Annotated[Path, typer.Option(help="folder for prediction.csv, replay.json, report.html")] = Path(
+        "replay"
+    ),
+    bounds: Annotated[
+        bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
+    ] = True,
 ) -> None:
     """Stream a recording through the observer that the controller runs; compare with what was measured."""
     joint, source = load_joint(config), open_recording(recording)
@@ -61,7 +65,9 @@ def replay(
     table = Table(show_header=False, box=None)
     if summary.rmse_rad is not None:
         table.add_row("prediction error, RMS", f"{1e3 * summary.rmse_rad:.5g} mrad")
-        table.add_row("best straight line, RMS", f"{1e3 * (summary.baseline_linear_rmse_rad or 0.0):.5g} mrad")
+        table.add_row(
+            "best straight line, RMS", f"{1e3 * (summary.baseline_linear_rmse_rad or 0.0):.5g} mrad"
+        )
     table.add_row("samples", f"{summary.samples:,}")
     console.print(table)
     console.print(f"report: {out / 'report.html'}")
@@ -69,7 +75,9 @@ def replay(
 
 def info(
     config: Config,
-    load: Annotated[float | None, typer.Option(help="worst load on the joint, N m (the configuration's limit if absent)")] = None,
+    load: Annotated[
+        float | None, typer.Option(help="worst load on the joint, N m (the configuration's limit if absent)")
+    ] = None,
     figures: Annotated[Path | None, typer.Option(help="folder for the theory figures of this joint")] = None,
 ) -> None:
     """The design sheet of a joint: stiffness, hysteresis, pretension, wrap, efficiency."""
@@ -85,7 +93,9 @@ def identify(
     sensor_stiffness: Annotated[
         float, typer.Option(help="stiffness of torque sensor and coupling, N m/rad (App. A.3)")
     ] = inf,
-    narrow: Annotated[bool, typer.Option("--narrow", help="tensions of nearly tangent pulleys (App. C)")] = False,
+    narrow: Annotated[
+        bool, typer.Option("--narrow", help="tensions of nearly tangent pulleys (App. C)")
+    ] = False,
 ) -> None:
     """True and acting coefficient of friction from a bench recording, the thesis's way."""
     joint = load_joint(config)
@@ -104,7 +114,9 @@ def diagnose_recordings(
         Path, typer.Option(help="folder for diagnosis.json, report.html, joint.augmented.toml")
     ] = Path("diagnosis"),
     seed: Annotated[int, typer.Option(help="of surrogates and resampling")] = 0,
-    effects: Annotated[list[Path] | None, typer.Option(help="Python file that registers an effect of your own")] = None,
+    effects: Annotated[
+        list[Path] | None, typer.Option(help="Python file that registers an effect of your own")
+    ] = None,
 ) -> None:
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
     for path in effects or ():
@@ -124,7 +136,7 @@ def diagnose_recordings(
 
 
 @contextmanager
-def _hypothesis_bar() -> Iterator[object]:
+def _hypothesis_bar() -> Iterator[Callable[[str, float], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
@@ -147,7 +159,9 @@ def _show(found: Diagnosis) -> None:
         table.add_row("cannot be told apart", f"{', '.join(tied['effects'])}: {tied['why']}")
     if result["mismatch"]:
         first = result["mismatch"][0]
-        table.add_row("located in", f"{first['covariate']} (share {first['share']:.2f}, p = {first['p_value']:.3g})")
+        table.add_row(
+            "located in", f"{first['covariate']} (share {first['share']:.2f}, p = {first['p_value']:.3g})"
+        )
     table.add_row("noise floor", f"{1e3 * result['noise_floor_rad']:.4g} mrad")
     table.add_row("held-out RMSE, calibrated", f"{1e3 * result['baseline']['heldout_rmse_rad']:.4g} mrad")
     table.add_row("held-out RMSE, augmented", f"{1e3 * result['augmented']['heldout_rmse_rad']:.4g} mrad")

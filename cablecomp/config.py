@@ -80,7 +80,7 @@ class ObserverOptions(_Frozen):
 
 
 class Limits(_Frozen):
-    """What joint and motor may be asked for; used by the last gate, by `plan_erase` and by proposed experiments."""
+    """What joint and motor may be asked for; used by the gate, by `plan_erase`, by proposed experiments."""
 
     joint_torque_max_Nm: Positive | None = None
     motor_torque_max_Nm: Positive | None = None
@@ -118,7 +118,10 @@ class JointConfig(_Frozen):
 
 
 def load_joint(path: Path) -> JointConfig:
-    """Read a joint configuration; raises InputError with one line that names file, key, what was found, what is accepted."""
+    """Read a joint configuration.
+
+    Raises InputError with one line that names file, key, what was found, what is accepted.
+    """
     return parse_joint(read_toml(path), str(path))
 
 

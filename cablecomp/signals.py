@@ -26,9 +26,10 @@ class Sample(NamedTuple):
 class Estimate(NamedTuple):
     """What the observer says of one instant.
 
-    `deflection_rad` = predicted q_out - (product of r/R) q_in, `deflection_low_rad`/`deflection_high_rad` contain the true
-    value for every admissible initial history (NaN where no guarantee exists); `joint_position_rad` is what the
-    joint encoder should read; tensions are those of the output stage's cables at the output pulley (l is NaN in an open circuit).
+    `deflection_rad` = predicted q_out - (product of r/R) q_in, `deflection_low_rad`/`deflection_high_rad`
+    contain the true value for every admissible initial history (NaN where no guarantee exists);
+    `joint_position_rad` is what the joint encoder should read; tensions are those of the output stage's
+    cables at the output pulley (l is NaN in an open circuit).
     """
 
     time_s: float

@@ -1,4 +1,4 @@
-"""Checks everything, in order, and stops at the first that fails: format, lint, types, import contracts, tests."""
+"""Checks everything, in order: format, lint, types, import contracts, tests; stops at the first failure."""
 
 from __future__ import annotations
 

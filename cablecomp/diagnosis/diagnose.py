@@ -57,8 +57,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find out what physics the configuration lacks to explain the recordings (name -> canonical channels).
 
-    `progress` is told the hypothesis under test and the share done. Raises InputError for recordings that lack a channel
-    or that the nominal joint cannot follow.
+    `progress` is told the hypothesis under test and the share done. Raises InputError for recordings that
+    lack a channel or that the nominal joint cannot follow.
     """
     rng = np.random.default_rng(seed)
     progress("calibrating the drive", 0.0)
@@ -74,16 +74,20 @@ def diagnose(
     findings = weigh(setting, selection, final, first, rng)
     named = [k for k, _ in findings.named]
     explained = findings.verdict == "explained"
-    mismatch, after, kept = selection.baseline.residual_rad, selection.baseline.residual_rad, setting.calibrated.c
+    mismatch = after = selection.baseline.residual_rad
+    kept = setting.calibrated.c
     augmented = setting.problem.joint(kept)
     location = first
     if explained:
-        # with the effect known, the mismatch is what the rest of the fitted model leaves: no parameter covers it up
+        # with the effect known, the mismatch is what the rest of the fitted model leaves:
+        # no parameter covers it up
         bare = final.config.model_copy(update={"effect": config.effect})
         mismatch = setting.problem.measured - setting.problem.predict(bare)
         after = selection.final.residual_rad
         series = make_series(mismatch, setting.problem.sigma, setting.covariates)
-        location = _through_effects(locate(series, rng, np.ones((setting.problem.rows, 1))), series, final, findings)
+        location = _through_effects(
+            locate(series, rng, np.ones((setting.problem.rows, 1))), series, final, findings
+        )
         augmented = final.config
     if explained and not named:  # tied: the model predicts, but no name is given
         augmented = final.config
@@ -102,14 +106,20 @@ def diagnose(
 
 
 def _through_effects(found: Location, series: Series, final: Final, findings: Findings) -> Location:
-    """Rank first what the named effects act through, as far as the data show it there; an event is placed at its instant."""
+    """Rank first what the named effects act through, as far as the data show it there.
+
+    An event is placed at its instant.
+    """
     order: list[str] = []
     entries = {m.covariate: m for m in found.mismatch}
     for k, _ in findings.named:
         form, entry, _ = final.effects[k]
         channel = form.fixed.get("channel")
-        names = [f"other:{str(channel).removeprefix('other_')}"] if channel else list(form.effect.acts_through)
-        order += [n for n in names if n in entries and entries[n].p_value < 0.05]
+        names = (
+            [f"other:{str(channel).removeprefix('other_')}"] if channel else list(form.effect.acts_through)
+        )
+        names = [n for n in names if n in entries]
+        order += [n for n in names if entries[n].p_value < 0.05] or names[:1]
         instant = entry.parameters.get("time_s")
         if isinstance(instant, float) and "time" in entries:
             time = series.covariates.values["time"]
@@ -117,7 +127,12 @@ def _through_effects(found: Location, series: Series, final: Final, findings: Fi
             share = float(np.sum(series.residual[after] ** 2) / np.sum(series.residual**2))
             end = float(time.max())
             entries["time"] = replace(
-                entries["time"], share=share, low=instant, high=end, intervals_s=((instant, end),), how="from one instant on"
+                entries["time"],
+                share=share,
+                low=instant,
+                high=end,
+                intervals_s=((instant, end),),
+                how="from one instant on",
             )
             order.insert(0, "time")
     ranked = [entries[n] for n in dict.fromkeys(order)]
@@ -125,7 +140,9 @@ def _through_effects(found: Location, series: Series, final: Final, findings: Fi
     return replace(found, mismatch=tuple(ranked))
 
 
-def _experiment(setting: Setting, selection: Selection, findings: Findings, final: Final) -> Experiment | None:
+def _experiment(
+    setting: Setting, selection: Selection, findings: Findings, final: Final
+) -> Experiment | None:
     """Where effects are tied, what would separate them."""
     if not findings.tied:
         return None
@@ -143,8 +160,10 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
     problem = d.setting.problem
     kept = d.setting.layout.heldout | d.setting.layout.training
     base, after = d.selection.baseline.residual_rad, d.after_rad
-    whole = d.final.residual_rad if d.findings.verdict == "explained" else d.setting.calibrated.residual * (
-        problem.sigma * INFLATION
+    whole = (
+        d.final.residual_rad
+        if d.findings.verdict == "explained"
+        else d.setting.calibrated.residual * (problem.sigma * INFLATION)
     )
     gain = 1.0 - float(np.mean(after[kept] ** 2) / np.mean(base[kept] ** 2))
     left = d.remainder.significant(0.01)
@@ -161,34 +180,41 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
             "heldout_gain": gain if len(d.findings.named) == 1 else _share_of(d, form.name),
             "confidence": sure,
         })  # fmt: skip
-    return _finite({
-        "schema": 1,
-        "recordings": list(d.names),
-        "verdict": d.findings.verdict,
-        "noise_floor_rad": d.setting.floor_rad,
-        "nominal": {"rmse_rad": _rms(d.setting.nominal.residual[kept] * (problem.sigma * INFLATION)[kept])},
-        "baseline": {
-            "rmse_rad": _rms((d.setting.calibrated.residual * problem.sigma * INFLATION)[kept]),
-            "heldout_rmse_rad": _rms(base[kept]),
-        },
-        "augmented": {"rmse_rad": _rms(whole[kept]), "heldout_rmse_rad": _rms(after[kept])},
-        "calibration": _calibration(d),
-        "mismatch": [m.entry() for m in d.location.mismatch],
-        "missing_physics": sorted(named, key=lambda m: -m["heldout_gain"]),
-        "not_excluded": [{"effects": list(names), "why": why} for names, why in d.findings.tied],
-        "next_experiment": None
-        if d.experiment is None
-        else {"why": d.experiment.why, "protocol": d.experiment.protocol.to_toml()},
-        "remainder": {
-            "rmse_rad": _rms(after[kept]),
-            "structured": structured,
-            "description": d.description.text if d.description else (left[0].how if structured else "noise"),
-            "equation": d.description.law.equation if d.description and d.description.law else None,
-        },
-        "hypotheses": _hypotheses(d.selection),
-        "could_be_unseen": _unseen(d) if d.findings.verdict in ("consistent", "recalibrate") else [],
-        "warnings": [f"{name} ended on its bound" for name in d.final.at_bound],
-    })  # type: ignore[no-any-return]
+    report: dict[str, Any] = _finite(
+        {
+            "schema": 1,
+            "recordings": list(d.names),
+            "verdict": d.findings.verdict,
+            "noise_floor_rad": d.setting.floor_rad,
+            "nominal": {
+                "rmse_rad": _rms(d.setting.nominal.residual[kept] * (problem.sigma * INFLATION)[kept])
+            },
+            "baseline": {
+                "rmse_rad": _rms((d.setting.calibrated.residual * problem.sigma * INFLATION)[kept]),
+                "heldout_rmse_rad": _rms(base[kept]),
+            },
+            "augmented": {"rmse_rad": _rms(whole[kept]), "heldout_rmse_rad": _rms(after[kept])},
+            "calibration": _calibration(d),
+            "mismatch": [m.entry() for m in d.location.mismatch],
+            "missing_physics": sorted(named, key=lambda m: -m["heldout_gain"]),
+            "not_excluded": [{"effects": list(names), "why": why} for names, why in d.findings.tied],
+            "next_experiment": None
+            if d.experiment is None
+            else {"why": d.experiment.why, "protocol": d.experiment.protocol.to_toml()},
+            "remainder": {
+                "rmse_rad": _rms(after[kept]),
+                "structured": structured,
+                "description": d.description.text
+                if d.description
+                else (left[0].how if structured else "noise"),
+                "equation": d.description.law.equation if d.description and d.description.law else None,
+            },
+            "hypotheses": _hypotheses(d.selection),
+            "could_be_unseen": _unseen(d) if d.findings.verdict in ("consistent", "recalibrate") else [],
+            "warnings": [f"{name} ended on its bound" for name in d.final.at_bound],
+        }
+    )
+    return report
 
 
 def _share_of(d: Diagnosis, name: str) -> float:
@@ -219,13 +245,18 @@ def _hypotheses(selection: Selection) -> list[dict[str, Any]]:
             row: dict[str, Any] = {"beside": round_.base, "effect": name, "linear_drop": drop}
             if name in round_.folds:
                 s = round_.verdict.of(name)
-                row |= {"heldout_gain": s.heldout_gain, "z": s.z, "margin": s.margin, "supported": s.supported}
+                row |= {
+                    "heldout_gain": s.heldout_gain,
+                    "z": s.z,
+                    "margin": s.margin,
+                    "supported": s.supported,
+                }
             found.append(row)
     return found
 
 
 def _unseen(d: Diagnosis) -> list[dict[str, Any]]:
-    """How large each effect could still be without having shown: three standard deviations of its amplitude."""
+    """How large each effect could be without having shown: three standard deviations of its amplitude."""
     rows = d.setting.problem.rows / INFLATION**2
     found = []
     for group in d.selection.probes:
@@ -240,7 +271,9 @@ def _unseen(d: Diagnosis) -> list[dict[str, Any]]:
 def write_diagnosis(d: Diagnosis, out: Path) -> None:
     """Write `diagnosis.json`, `joint.augmented.toml`, and `next_experiment.toml` where one is proposed."""
     (out / "diagnosis.json").write_text(json.dumps(report_json(d), indent=1) + "\n")
-    (out / "joint.augmented.toml").write_text(joint_text(d.config, ("calibrated values and effects found by the diagnosis",)))
+    (out / "joint.augmented.toml").write_text(
+        joint_text(d.config, ("calibrated values and effects found by the diagnosis",))
+    )
     if d.experiment is not None:
         (out / "next_experiment.toml").write_text(d.experiment.protocol.to_toml())
 
@@ -260,4 +293,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(v) for v in value]
     return value
-

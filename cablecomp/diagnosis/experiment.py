@@ -37,7 +37,7 @@ class Experiment:
 
 
 def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
-    """Protocols inside the configuration's limits, or inside what the recordings have shown where no limit is stated."""
+    """Protocols inside the configuration's limits; where it states none, inside those of the recordings."""
     load = float(np.max(np.abs(seen.values["load"])))
     if config.limits.joint_torque_max_Nm is not None:
         load = config.limits.joint_torque_max_Nm
@@ -54,13 +54,16 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
     return [
         Protocol(name="ramp and hold", segment=(
             Ramp(duration_s=0.5, load_Nm=load), Hold(duration_s=15.0), Ramp(duration_s=0.5, load_Nm=0.0),
-            Hold(duration_s=15.0), Ramp(duration_s=8.0, load_Nm=-load), Hold(duration_s=10.0), Unload(rate_Nm_s=rate),
+            Hold(duration_s=15.0), Ramp(duration_s=8.0, load_Nm=-load), Hold(duration_s=10.0),
+            Unload(rate_Nm_s=rate),
         ), **start),
         Protocol(name="rate pair", segment=(
             RatePair(amplitude=load, rates=(load / 10.0, load * 2.0), dwell_s=2.0),
         ), **start),
         Protocol(name="nested reversals", segment=(
-            NestedReversals(peaks=(load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load, load), rate=rate),
+            NestedReversals(
+                peaks=(load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load, load), rate=rate
+            ),
         ), **start),
         Protocol(name="nested reversals at two places", segment=(
             NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
@@ -70,12 +73,17 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
             NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
         ), **start),
         Protocol(name="angle sweeps under three loads", segment=tuple(
-            AngleSweep(from_rad=low + 0.05 * travel, to_rad=high - 0.05 * travel, speed_rad_s=travel / 3.0, load_Nm=v,
-                       load_rate_Nm_s=rate, cycles=2)
+            AngleSweep(
+                from_rad=low + 0.05 * travel, to_rad=high - 0.05 * travel, speed_rad_s=travel / 3.0,
+                load_Nm=v, load_rate_Nm_s=rate, cycles=2,
+            )
             for v in (0.0, 0.8 * load, -0.8 * load)
         ), **start),
         Protocol(name="small and large swings through zero", segment=(
-            NestedReversals(peaks=(0.05 * load, -0.05 * load, 0.1 * load, -0.1 * load, load, -load), rate=rate, dwell_s=1.0),
+            NestedReversals(
+                peaks=(0.05 * load, -0.05 * load, 0.1 * load, -0.1 * load, load, -load),
+                rate=rate, dwell_s=1.0,
+            ),
         ), **start),
         Protocol(name="fast motion, load at rest", segment=(
             SineSweep(channel="position", amplitude=0.4 * travel, from_Hz=0.2, to_Hz=2.0, duration_s=20.0),
@@ -90,26 +98,31 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
 def best_experiment(
     models: Sequence[JointConfig], seen: Covariates, floor_rad: float, temperature_degC: float
 ) -> Experiment | None:
-    """Simulate all fitted models over the candidate protocols; the one that sets the closest two farthest apart wins.
+    """Simulate all fitted models over the candidates; what sets the closest two farthest apart wins.
 
-    What a constant, a drift in load and in position could explain of a difference is not counted. None if no protocol can be followed.
+    What a constant, a drift in load and in position could explain of a difference is not counted. None if no
+    protocol can be followed.
     """
     found: list[Experiment] = []
     for protocol in candidates(models[0], seen):
         readings = _readings(models, protocol, temperature_degC)
         if readings is None:
             continue
-        worst = min(
-            _apart(readings[i], readings[j], readings[-1])
-            for i in range(len(models))
-            for j in range(i)
-        ) / floor_rad
-        why = f"`{protocol.name}` sets the candidate models apart by {worst:.1f} noise floors (RMS), more than any other tried"
+        worst = (
+            min(_apart(readings[i], readings[j], readings[-1]) for i in range(len(models)) for j in range(i))
+            / floor_rad
+        )
+        why = (
+            f"`{protocol.name}` sets the candidate models apart by {worst:.1f} noise floors (RMS), "
+            "more than any other tried"
+        )
         found.append(Experiment(protocol, why, worst))
     return max(found, key=lambda e: e.separation, default=None)
 
 
-def _readings(models: Sequence[JointConfig], protocol: Protocol, temperature: float) -> list[FloatArray] | None:
+def _readings(
+    models: Sequence[JointConfig], protocol: Protocol, temperature: float
+) -> list[FloatArray] | None:
     time = np.linspace(0.0, protocol.duration_s, STEPS)
     references = [protocol.reference(float(t)) for t in time]
     stages = models[0].drive.stage

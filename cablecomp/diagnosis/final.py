@@ -1,7 +1,8 @@
-"""The last fit: every coordinate free, shapes included; values with their uncertainties, dependence counted."""
+"""The last fit: every coordinate free, shapes too; values with their uncertainties, dependence counted."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -86,7 +87,8 @@ def sandwich(problem: Problem, model: Model, layout: Layout) -> FloatArray:
     white = J.T @ J / INFLATION**2 + np.diag(prior)
     by_block, by_noise = inverse @ meat @ inverse, inverse @ white @ inverse
     grow = np.sqrt(np.maximum(np.diag(by_noise) / np.maximum(np.diag(by_block), 1e-300), 1.0))
-    return by_block * np.outer(grow, grow) * SMALL_SAMPLE**2
+    covariance: FloatArray = by_block * np.outer(grow, grow) * SMALL_SAMPLE**2
+    return covariance
 
 
 def _values(form: Form, x: FloatArray, covariance: FloatArray) -> dict[str, Value]:
@@ -105,5 +107,6 @@ def _values(form: Form, x: FloatArray, covariance: FloatArray) -> dict[str, Valu
             if name == PHASE:
                 change = (change + np.pi) % (2.0 * np.pi) - np.pi
             slope[k] = change / 1e-4
-        found[name] = Value(entry[name], float(np.sqrt(max(slope @ covariance @ slope, 0.0))))
+        variance = float(slope @ covariance @ slope)
+        found[name] = Value(entry[name], math.sqrt(max(variance, 0.0)))
     return found

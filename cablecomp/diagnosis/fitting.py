@@ -134,7 +134,7 @@ def cost(residual: FloatArray, z: FloatArray, prior: FloatArray, mask: Mask) -> 
 def sensitivities(problem: Problem, forms: Sequence[Form], z: FloatArray, base: FloatArray) -> FloatArray:
     """J by forward differences (a hundredth of a tolerance, a twentieth of an effect's unit)."""
     J = np.zeros((problem.rows, len(z)))
-    low, high = bounds_of(problem, forms)
+    _, high = bounds_of(problem, forms)
     n = len(problem.parameters)
     for k in range(len(z)):
         if k < n and problem.parameters[k].name == OFFSET:

@@ -65,7 +65,7 @@ class Form:
         return len(self.amplitudes) + int(self.phase)
 
     def entry(self, x: Sequence[float], point: Sequence[float] | None = None) -> EffectEntry:
-        """The configuration entry at coordinates x (and other shape values than the grid point's, if given)."""
+        """The configuration entry at coordinates x (and other shape values than its own, if given)."""
         values: dict[str, float | str] = dict(self.fixed)
         shape = self.point if point is None else point
         values |= {p.name: self._inside(p, v) for p, v in zip(self.shapes, shape, strict=True)}
@@ -145,7 +145,7 @@ def forms_of(effect: Effect, config: JointConfig, around: Surroundings) -> list[
 
 
 def all_forms(config: JointConfig, around: Surroundings) -> list[list[Form]]:
-    """Hypotheses of every effect that the configuration does not hold already, grouped by effect and channel."""
+    """Hypotheses of every effect that the configuration does not hold yet, grouped by effect and channel."""
     groups: dict[str, list[Form]] = {}
     held = {entry.id for entry in config.effect}
     for effect in catalogue().values():

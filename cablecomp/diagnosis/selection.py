@@ -38,7 +38,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Round:
-    """One step of the selection: what was asked, what was fitted, and the judgement against the model before."""
+    """One step of the selection: what was asked, what was fitted, the judgement against the model before."""
 
     base: str
     verdict: Verdict
@@ -107,7 +107,12 @@ def select(
 
 def _judged(base: Fold, folds: Mapping[str, Fold], both: Layout, rng: np.random.Generator) -> Verdict:
     return judge(
-        base.residual_rad, {k: f.residual_rad for k, f in folds.items()}, both, rng, LEVEL, least_gain=LEAST_GAIN
+        base.residual_rad,
+        {k: f.residual_rad for k, f in folds.items()},
+        both,
+        rng,
+        LEVEL,
+        least_gain=LEAST_GAIN,
     )
 
 
@@ -175,15 +180,15 @@ def _fit_folds(
 
 
 def _shifted(base: Model, fitted: Model) -> Model:
-    """The half's own model, with the sensitivities of the one fitted to all rows where it has no better ones."""
+    """The half's own model, with the sensitivities of the one fitted to all rows where it has none better."""
     return Model(fitted.forms, fitted.c, fitted.x, fitted.residual, base.J if fitted.J is None else fitted.J)
 
 
 def _polish(problem: Problem, fold: Fold, layout: Layout) -> tuple[Model, Fold]:
     """Free the shapes of the effects: fit all rows, then either half.
 
-    Instants of events are the exception: the halves take them from all rows, for an event inside a held-out block
-    cannot be placed without it.
+    Instants of events are the exception: the halves take them from all rows, for an event inside a held-out
+    block cannot be placed without it.
     """
     masks = (layout.training, layout.heldout)
     both = layout.heldout | layout.training
@@ -210,7 +215,7 @@ def _placed(problem: Problem, model: Model) -> tuple[tuple[Form, ...], FloatArra
     for form, x in zip(model.forms, model.x, strict=True):
         if isinstance(form, FreedForm) and [p.name for p in form.shapes] == ["time_s"]:
             x = x[: form.size - 1]
-            form = form.fixed_shapes(model.x[len(forms)])
+            form = form.fixed_shapes(model.x[len(forms)].tolist())
         forms.append(form)
         xs.append(x)
     return tuple(forms), np.concatenate([model.c, *xs])
@@ -255,9 +260,10 @@ def _rivals(
     both: Layout,
     rng: np.random.Generator,
 ) -> tuple[tuple[str, float], ...]:
-    """Supported hypotheses over which the best one's lead is beyond doubt neither on held-out rows nor with all rows fitted.
+    """Supported hypotheses over which the best one's lead is not beyond doubt.
 
-    The second comparison is for events: one that falls into a held-out block cannot be placed by the other half.
+    Neither on held-out rows nor with all rows fitted; the second comparison is for events: one that falls
+    into a held-out block cannot be placed by the other half.
     """
     unit = problem.sigma * INFLATION
     found = []

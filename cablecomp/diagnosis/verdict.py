@@ -1,4 +1,4 @@
-"""What the evidence amounts to: consistent, recalibrate, explained or unexplained; what is named, and how surely."""
+"""What the evidence amounts to: consistent, recalibrate, explained, unexplained; names, and how surely."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ NEARLY_SURE = 0.9
 class Findings:
     """Verdict and the names it rests on.
 
-    `named`: indices into `Final.effects` with confidence; `tied`: groups of names the data cannot separate, with the reason.
+    `named`: indices into `Final.effects` with confidence; `tied`: groups of names the data cannot separate,
+    with the reason.
     """
 
     verdict: str
@@ -44,8 +45,10 @@ def energy(residual_rad: FloatArray, setting: Setting) -> float:
 def weigh(
     setting: Setting, selection: Selection, final: Final, before: Location, rng: np.random.Generator
 ) -> Findings:
-    """Weigh the rounds of the selection: an effect is named only if held-out data support it, no rival is left, and what
-    it leaves over is noise."""
+    """Weigh the rounds of the selection.
+
+    An effect is named only if held-out data support it, no rival is left, and what it leaves over is noise.
+    """
     start = energy(selection.baseline.residual_rad, setting)
     whole = float(np.mean((selection.model.residual * INFLATION) ** 2))
     end = min(energy(selection.final.residual_rad, setting), whole)
@@ -59,7 +62,8 @@ def weigh(
     tied, named = [], []
     for k, (form, entry, values) in enumerate(final.effects):
         rivals: Sequence[tuple[str, float]] = next(
-            (r.rivals for r in accepted if r.verdict.best is not None and r.verdict.best.name == form.name), ()
+            (r.rivals for r in accepted if r.verdict.best is not None and r.verdict.best.name == form.name),
+            (),
         )
         sure = confidence(rivals)
         main = form.amplitudes[0].name

@@ -109,7 +109,8 @@ def _parameter(config: JointConfig, name: str) -> Parameter:
         return _additive(name, nominal, config.tolerance.get(name), 1e-3)
     raise InputError(
         f"calibration: `{name}` is no parameter; accepted are keys of [[drive.stage]] "
-        f"({', '.join(_STAGE_KEYS)}), .N for one stage, sensor offsets, joint_torque_gain, effect.ID.PARAMETER"
+        f"({', '.join(_STAGE_KEYS)}), .N for one stage, sensor offsets, joint_torque_gain, "
+        "effect.ID.PARAMETER"
     )
 
 
