@@ -71,16 +71,22 @@ class EffectEntry(_Frozen):
 
 
 class ObserverOptions(_Frozen):
-    """How the observer runs: input filter (causal, 0 = off), memory, load source."""
+    """How the observer runs: input filter (causal, 0 = off), memory, load source.
+
+    For guaranteed bounds: the least and the greatest T/T0 that any cable has borne since it was pretensioned
+    (None = unknown).
+    """
 
     input_filter_Hz: NonNegative = 0.0
     max_pieces: Annotated[int, Field(ge=16, le=4096)] = 192
     merge_tolerance: Positive = 1e-6
     load: Literal["joint_torque", "motor_torque", "both_encoders"] = "joint_torque"
+    past_tension_min: Annotated[float, Field(gt=0, le=1)] | None = None
+    past_tension_max: Annotated[float, Field(ge=1, allow_inf_nan=False)] | None = None
 
 
 class Limits(_Frozen):
-    """What joint and motor may be asked for; used by the gate, by `plan_erase`, by proposed experiments."""
+    """What joint and motor may be asked for; used by the last gate, by `plan_erase` and by proposed experiments."""
 
     joint_torque_max_Nm: Positive | None = None
     motor_torque_max_Nm: Positive | None = None
@@ -118,10 +124,7 @@ class JointConfig(_Frozen):
 
 
 def load_joint(path: Path) -> JointConfig:
-    """Read a joint configuration.
-
-    Raises InputError with one line that names file, key, what was found, what is accepted.
-    """
+    """Read a joint configuration; raises InputError with one line that names file, key, what was found, what is accepted."""
     return parse_joint(read_toml(path), str(path))
 
 

@@ -1,5 +1,69 @@
+"""Guaranteed bounds when nothing is known of the load history before the start."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from cablecomp.mechanics.assemble import Model
+from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.start import joint_start
+from cablecomp.observer.bounded_run import run_bounded
+from cablecomp.observer.bounds_circuit import bounds_step
+from cablecomp.observer.bounds_kernel import (
+    W_PAST_HIGH,
+    W_PAST_LOW,
+    W_STEEP,
+    bounds_size,
+    sides_start,
+    steepest,
+)
+
+Kernel: TypeAlias = tuple[Any, ...]
+EXTREME = 30.0  # |ln(T/T0)| beyond anything
+
+
 class BoundPair:
-    def __init__(self, model): pass
-    def start(self, t, m): pass
-    def step(self, S): return float("nan"), float("nan")
-    def states(self): return []
+    """The lowest and the highest history that friction admits, led beside an observer's own.
+
+    After `start`, `step` follows each committed step of the observer and says between which joint angles [rad] the true
+    one lies, whatever was done to the joint before the start (any profile with |du/ds| <= mu on every wrap, tensions in
+    balance with the load). `past` = least and greatest T/T0 that any cable has borne since it was pretensioned, where
+    that is known. NaN where no guarantee can be given (so little is known that the angles themselves are open).
+    """
+
+    def __init__(self, model: Model, past: tuple[float | None, float | None] = (None, None)) -> None:
+        self._model = model
+        low, high = past
+        self._low = (model.S.copy(), model.J.copy())
+        self._up = (model.S.copy(), model.J.copy())
+        self.numbers: Floats = np.zeros(bounds_size(model.I))
+        self.numbers[W_STEEP] = steepest(model.L)
+        self.numbers[W_PAST_LOW] = -EXTREME if low is None else math.log(low)
+        self.numbers[W_PAST_HIGH] = EXTREME if high is None else math.log(high)
+
+    def start(self, time_s: float, motor: float) -> None:
+        """Know nothing but the position of the motor [rad]."""
+        m = self._model
+        for S, J in (self._low, self._up):
+            joint_start(m.P, m.I, S, J, m.L, time_s, motor, 0.0)
+        sides_start(m.P, m.I, m.L, self.numbers, *self._low, *self._up)
+
+    def step(self, S_nominal: Floats) -> tuple[float, float]:
+        """Follow a step that the observer's own state has just committed: lowest and highest joint angle [rad]."""
+        m = self._model
+        low, high = bounds_step(m.P, m.I, m.L, S_nominal, self.numbers, *self._low, *self._up)
+        return float(low), float(high)
+
+    def run(
+        self, kernel: Kernel, rows: Floats, outs: Floats, spare: Floats, inverse: bool, interval: Floats
+    ) -> tuple[int, int]:
+        """Step the observer's own state and the bounds through rows of readings; `interval` gets lowest and highest joint
+        angle. With `inverse` each load is found from both encoders. Returns rows done and the status that stopped it."""
+        return run_bounded(*kernel, rows, outs, spare, inverse, self.numbers, *self._low, *self._up, interval)
+
+    def states(self) -> list[tuple[Floats, Ints]]:
+        """The two histories, for a snapshot (with `numbers`)."""
+        return [self._low, self._up]

@@ -15,7 +15,7 @@ from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
-from cablecomp.mechanics.profile import ROWS, Floats, V, Y
+from cablecomp.mechanics.profile import ROWS, Floats, Ints, V, Y
 from cablecomp.mechanics.start import joint_start
 from cablecomp.mechanics.tables import tau_of_v
 from cablecomp.observer import stepper as st
@@ -62,7 +62,7 @@ class Observer:
         self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
         self._ratio = _rigid_ratio(config)
         self._last_time = -np.inf
-        self._bounds = BoundPair(self.model) if bounds and is_bounded(config) else None
+        self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
 
     # --- the three ways to use it ---------------------------------------------------------------------------------
 
@@ -105,11 +105,8 @@ class Observer:
         high = np.full(len(rows), NAN)
         if len(rows) and not np.isfinite(self._last_time):
             self._start(rows[0, st.IN_TIME], rows[0, st.IN_MOTOR])
-        if self._bounds is not None and bounds or self.config.observer.load == "both_encoders":
-            self._run_slowly(rows, outs, low, high)
-        else:
-            done, status = st.run_block(*self._kernel(), rows, outs)
-            self._check(status, rows[min(done, len(rows) - 1), st.IN_TIME], done)
+        done, status = self._run_rows(rows, outs, low, high)
+        self._check(status, rows[min(done, len(rows) - 1), st.IN_TIME], done)
         if len(rows):
             self._last_time = float(rows[-1, st.IN_TIME])
         offset = self._ratio * rows[:, st.IN_MOTOR]
@@ -143,17 +140,11 @@ class Observer:
 
     def snapshot(self) -> bytes:
         """The whole state as a small, versioned, checksummed block of bytes."""
-        states = [(self._S, self._J)]
-        if self._bounds is not None:
-            states += self._bounds.states()
-        return pack(self.config, self.model.I, states, self._F, self._last_time)
+        return pack(self.config, self.model.I, *self._parts(), self._last_time)
 
     def restore(self, data: bytes) -> None:
         """Take up a state from `snapshot`; raises InputError if it is damaged or belongs to another joint."""
-        states = [(self._S, self._J)]
-        if self._bounds is not None:
-            states += self._bounds.states()
-        self._last_time = unpack(data, self.config, self.model.I, states, self._F)
+        self._last_time = unpack(data, self.config, self.model.I, *self._parts())
 
     def save(self, path: Path) -> None:
         """Write the snapshot to a file, atomically: a power cut leaves the old file or the new one."""
@@ -240,6 +231,18 @@ class Observer:
         model = self.model
         return model.P, model.I, self._S, self._J, model.L, self._F  # type: ignore[return-value]
 
+    def _bound_pair(self) -> BoundPair:
+        options = self.config.observer
+        return BoundPair(self.model, (options.past_tension_min, options.past_tension_max))
+
+    def _parts(self) -> tuple[list[tuple[Floats, Ints]], list[Floats]]:
+        """All that makes up the state: histories, further numbers."""
+        states, numbers = [(self._S, self._J)], [self._F]
+        if self._bounds is not None:
+            states += self._bounds.states()
+            numbers.append(self._bounds.numbers)
+        return states, numbers
+
     def _start(self, time_s: float, motor: float) -> None:
         m = self.model
         joint_start(m.P, m.I, self._S, self._J, m.L, time_s, motor, 0.0)
@@ -280,18 +283,18 @@ class Observer:
             rows[:, st.IN_OTHER + k] = _need(columns, name)
         return rows
 
-    def _run_slowly(self, rows: Floats, outs: Floats, low: Floats, high: Floats) -> None:
-        """Sample by sample: where bounds or the inverse are wanted as well."""
-        for k, row in enumerate(rows):
-            self._row[:] = row
-            if self.config.observer.load == "both_encoders":
-                self._solve_load()
-            status = st.step_one(*self._kernel(), self._row, outs[k])
-            self._check(status, row[st.IN_TIME], k)
-            if self._bounds is not None:
-                shift = outs[k, st.OUT_JOINT] - outs[k, st.OUT_DRIVE] - self._ratio * row[st.IN_MOTOR]
-                a, b = self._bounds.step(self._S)
-                low[k], high[k] = a + shift, b + shift
+    def _run_rows(self, rows: Floats, outs: Floats, low: Floats, high: Floats) -> tuple[int, int]:
+        """Run a block by the compiled loop that does what is wanted; returns rows done and the last status."""
+        inverse = self.config.observer.load == "both_encoders"
+        if self._bounds is None:
+            if inverse:
+                return st.run_inverse(*self._kernel(), rows, outs, self._spare)
+            return st.run_block(*self._kernel(), rows, outs)
+        interval = np.empty((len(rows), 2))
+        answer = self._bounds.run(self._kernel(), rows, outs, self._spare, inverse, interval)
+        shift = outs[:, st.OUT_JOINT] - outs[:, st.OUT_DRIVE] - self._ratio * rows[:, st.IN_MOTOR]
+        low[:], high[:] = interval[:, 0] + shift, interval[:, 1] + shift
+        return answer
 
     def _solve_load(self) -> None:
         status = st.find_load(*self._kernel(), self._row, self._out, self._spare)

@@ -18,10 +18,10 @@ VERSION = 1
 State = tuple[Floats, Ints]
 
 
-def pack(config: JointConfig, I: Ints, states: Sequence[State], options: Floats, last_time: float) -> bytes:
-    """Serialise the states (scalars whole, profiles as far as they are used)."""
+def pack(config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats], last_time: float) -> bytes:
+    """Serialise the states (scalars whole, profiles as far as they are used) and further numbers."""
     parts = [MAGIC, struct.pack("<HH", VERSION, len(states)), _joint_key(config), struct.pack("<d", last_time)]
-    parts.append(options.tobytes())
+    parts += [row.tobytes() for row in numbers]
     for S, J in states:
         parts += [J.astype("<i8").tobytes(), S[: I[o.S_PROFILE]].tobytes()]
         parts += [np.ascontiguousarray(_used(I, S, J, wrap)).tobytes() for wrap in range(len(J))]
@@ -29,7 +29,7 @@ def pack(config: JointConfig, I: Ints, states: Sequence[State], options: Floats,
     return body + hashlib.sha256(body).digest()
 
 
-def unpack(data: bytes, config: JointConfig, I: Ints, states: Sequence[State], options: Floats) -> float:
+def unpack(data: bytes, config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats]) -> float:
     """Fill the states from a snapshot and return the time of its last sample; nothing is touched unless all of it is sound."""
     body, digest = data[:-32], data[-32:]
     if len(data) < 60 or not body.startswith(MAGIC):
@@ -45,8 +45,9 @@ def unpack(data: bytes, config: JointConfig, I: Ints, states: Sequence[State], o
         raise InputError(f"snapshot: holds {count} histories, this observer {len(states)}; open it with the same `bounds`")
     (last_time,) = struct.unpack_from("<d", body, 28)
     place = 36
-    options[:] = np.frombuffer(body, "<f8", len(options), place)
-    place += 8 * len(options)
+    for row in numbers:
+        row[:] = np.frombuffer(body, "<f8", len(row), place)
+        place += 8 * len(row)
     small = int(I[o.S_PROFILE])
     for S, J in states:
         J[:] = np.frombuffer(body, "<i8", len(J), place)

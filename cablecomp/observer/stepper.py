@@ -135,3 +135,17 @@ def find_load(
             return o.STATUS_OK
         load = new
     return o.STATUS_OK
+
+
+@njit
+def run_inverse(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats, spare: Floats
+) -> tuple[int, int]:
+    """As `run_block`, with every row's load found from both encoders."""
+    for k in range(rows.shape[0]):
+        status = find_load(P, I, S, J, L, F, rows[k], outs[k], spare)
+        if status == o.STATUS_OK:
+            status = step_one(P, I, S, J, L, F, rows[k], outs[k])
+        if status != o.STATUS_OK:
+            return k, status
+    return rows.shape[0], o.STATUS_OK

@@ -1,0 +1,58 @@
+"""Joints and runs that the observer's tests share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.config import JointConfig, parse_joint
+from cablecomp.observer import Observer
+
+Array = NDArray[np.float64]
+
+STAGE: dict[str, Any] = {
+    "output_radius_m": 0.04,
+    "input_radius_m": 0.015,
+    "free_length_m": 0.08,
+    "EA_N": 25000.0,
+    "pretension_N": 60.0,
+    "mu_output": 0.12,
+    "mu_input": 0.18,
+    "wrap_output_rad": 10.0,
+    "wrap_input_rad": 12.0,
+}
+
+
+def joint(circuit: str = "closed", *stages: dict[str, Any], **sections: Any) -> JointConfig:
+    """A joint of these stages, each given as what differs from `STAGE`; effectively exact (no merging above 1e-13)."""
+    arrangement = sections.pop("arrangement", "series")
+    observer = {"merge_tolerance": 1e-13, "max_pieces": 1024, **sections.pop("observer", {})}
+    drive = {
+        "circuit": circuit,
+        "arrangement": arrangement,
+        "stage": [{**STAGE, **s} for s in stages or ({},)],
+    }
+    return parse_joint(
+        {"schema": 1, "name": "test joint", "drive": drive, "observer": observer, **sections}, "test"
+    )
+
+
+def pull_unit(config: JointConfig) -> float:
+    """R T0 of the output stage [N m]."""
+    stage = config.drive.stage[-1]
+    return stage.output_radius_m * stage.pretension_N
+
+
+def knots(values: Sequence[float], per_segment: int = 12) -> Array:
+    """Straight segments through the given values."""
+    places = np.arange(len(values))
+    return np.interp(np.linspace(0, len(values) - 1, (len(values) - 1) * per_segment + 1), places, values)
+
+
+def run(observer: Observer, load: Array, motor: Array, start: float = 0.0) -> dict[str, Array]:
+    """Run an observer through loads [N m] and motor angles [rad], 1 ms apart."""
+    time = start + 1e-3 * np.arange(len(load))
+    return observer.run({"time_s": time, "motor_position_rad": motor, "joint_torque_Nm": load}, bounds=True)
