@@ -1,0 +1,25 @@
+"""Real-time hysteresis compensator for cable-driven joints: the public names."""
+
+from cablecomp.config import JointConfig, load_joint, parse_joint
+from cablecomp.control.command import Command, Reference
+from cablecomp.control.compensator import Compensator
+from cablecomp.errors import CablecompError, DeviceError, InputError, InternalError
+from cablecomp.observer import Observer, WrapProfile
+from cablecomp.signals import Estimate, Sample
+
+__all__ = [
+    "CablecompError",
+    "Command",
+    "Compensator",
+    "DeviceError",
+    "Estimate",
+    "InputError",
+    "InternalError",
+    "JointConfig",
+    "Observer",
+    "Reference",
+    "Sample",
+    "WrapProfile",
+    "load_joint",
+    "parse_joint",
+]
