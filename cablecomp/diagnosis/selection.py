@@ -231,7 +231,7 @@ def free_shapes(model: Model) -> tuple[tuple[Form, ...], FloatArray]:
 def _without(
     problem: Problem, model: Model, fold: Fold, layout: Layout, rng: np.random.Generator
 ) -> tuple[Model, Fold]:
-    """Drop an earlier effect where held-out data do not miss it."""
+    """Drop an earlier effect where held-out data do not miss it, or where the rest explains them down to noise."""
     both = all_rows(layout)
     for k in range(len(model.forms) - 1):
         forms = tuple(f for j, f in enumerate(model.forms) if j != k)
@@ -246,7 +246,7 @@ def _without(
             continue
         smaller_fold = fold_of(problem, smaller, layout)
         lead = compare(smaller_fold.residual_rad, fold.residual_rad, both, rng)
-        if lead.z < 2.0:
+        if lead.z < 2.0 or _at_noise(smaller, layout):
             return smaller, smaller_fold
     return model, fold
 
