@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cablecomp.config import read_toml
 from cablecomp.control.options import MotorModel
-from cablecomp.errors import InputError
+from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.schema import CanBus, LinkConfig
 from cablecomp.links.schema_devices import CanSimpleDevice, MitDevice
 from cablecomp.runtime.simulated import Simulation, SimulationWish
@@ -41,9 +41,19 @@ def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
             travel_rad=travel,
             faults=tuple(parse_fault(text, wish.seed + k) for k, text in enumerate(wish.faults)),
         )
-        return HostedJoints(spec)
+        return _Joints(spec)
     except (SimError, PlantError) as error:
         raise InputError(f"simulated joint: {error}") from None
+
+
+class _Joints(HostedJoints):
+    """Simulated joints whose own end (a drum run empty, no equilibrium) is a device's error to the run."""
+
+    def advance(self) -> None:
+        try:
+            super().advance()
+        except (SimError, PlantError) as error:
+            raise DeviceError(f"simulated joint: {error}") from None
 
 
 def _motor(motor: MotorModel, torque: float) -> MotorSpec:

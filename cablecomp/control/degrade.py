@@ -78,6 +78,8 @@ def degrade(
             return NORMAL
         weight = state.weight + period_s / times.recover_s
         return NORMAL if weight >= 1.0 else DegradeState(Phase.RECOVERING, weight, age)
+    if state.phase not in (Phase.NORMAL, Phase.RECOVERING):
+        age = max(age, state.age_s + period_s)  # data that keep coming, but keep being old, are no better
     if not (motor_age_s <= times.motor_stop_s and age < times.stop_s):
         return DegradeState(Phase.STOPPED, 0.0, age)
     if age <= times.hold_s:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
+import control
 import numpy as np
 from numpy.typing import NDArray
 
-import control
 from cablecomp.config import JointConfig
 from cablecomp.control.compensator import Gains
 from cablecomp.control.options import MotorModel

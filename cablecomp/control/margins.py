@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
+import control
 import numpy as np
 from numpy.typing import NDArray
 
-import control
 from cablecomp.control.plant_model import response, stable_when_closed
 
 

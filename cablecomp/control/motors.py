@@ -35,10 +35,11 @@ def control_for(config: JointConfig) -> ControlConfig:
         most = _SHAKE * torque / (step * 2.0 * pi * MotorModel().velocity_bandwidth_Hz)
         swing = min(swing, most / (2.0 * _DAMPING * rotor))
     rotor = min(rotor, _STIFFEST / swing**2)
+    coulomb = 0.005 * torque
     motor = MotorModel(
         inertia_kgm2=rotor,
         viscous_Nms_per_rad=0.02 * rotor * swing,
-        coulomb_Nm=0.005 * torque,
+        coulomb_Nm=coulomb,
         stiffness_Nm_per_rad=rotor * swing**2,
         damping_Nms_per_rad=2.0 * _DAMPING * rotor * swing,
         output_inertia_kgm2=inertia,
@@ -51,6 +52,8 @@ def control_for(config: JointConfig) -> ControlConfig:
         torque_max_Nm=2.0 * load,
         joint_residual_rad=2.0 * widest,
         torque_mismatch_Nm=0.5 * load,
+        stuck_rad=20.0 * coulomb / (rotor * swing**2) + 50.0 * (step or 0.0) + 0.002,
+        shake_Nm=0.15 * load,
         lead_rad=max(0.2, 20.0 * widest / ratio),
     )
     return ControlConfig(motor=motor, health=health)

@@ -6,10 +6,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from cablecomp.config import explain, read_toml
-from cablecomp.errors import InputError
+from cablecomp.config import read_toml, validated
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -104,9 +103,11 @@ class HealthOptions(_Frozen):
     """What is plausible: greatest rates of change, greatest difference between what agrees in a healthy
     joint.
 
-    `joint_residual_rad`: measured less predicted joint position; `torque_mismatch_Nm`: torque sensor against
-    motor torque over the drive's ratio; `lead_rad`: motor target against motor position; each must last
-    `confirm_s`. None = not watched.
+    `joint_residual_rad`: measured less predicted joint position; `torque_mismatch_Nm`: torque sensor
+    against motor torque over the drive's ratio; `lead_rad`: motor target against motor position; each
+    must last `confirm_s`. `stuck_rad`: how far the motor target may move while the motor encoder shows
+    no change. `shake_Nm`: RMS of the load's quick part (above 10 Hz), for a fifth of `confirm_s`:
+    feed-forward that has come to shake the link is let go of. None = not watched.
     """
 
     motor_rate_rad_s: Positive = 60.0
@@ -116,8 +117,9 @@ class HealthOptions(_Frozen):
     joint_residual_rad: Positive | None = None
     torque_mismatch_Nm: Positive | None = None
     lead_rad: Positive | None = 0.3
+    stuck_rad: Positive | None = None
+    shake_Nm: Positive | None = None
     confirm_s: Positive = 0.1
-    confirm_samples: Annotated[int, Field(ge=1)] = 20
     unanswered: Annotated[int, Field(ge=1)] = 50
 
 
@@ -141,7 +143,4 @@ def load_control(path: Path) -> ControlConfig:
 
 def parse_control(data: dict[str, Any], where: str) -> ControlConfig:
     """Validate a control file already read; `where` names it in errors."""
-    try:
-        return ControlConfig.model_validate(data)
-    except ValidationError as error:
-        raise InputError(f"{where}: {explain(error)}") from None
+    return validated(ControlConfig, data, where)

@@ -12,10 +12,10 @@ from __future__ import annotations
 from math import exp, pi, sqrt
 from typing import Any
 
+import control
 import numpy as np
 from numpy.typing import NDArray
 
-import control
 from cablecomp.control.options import MotorModel
 
 LOAD, JOINT, MOTOR = range(3)

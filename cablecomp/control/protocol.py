@@ -19,9 +19,9 @@ from bisect import bisect_right
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from cablecomp.config import Limits, explain, read_toml
+from cablecomp.config import Limits, read_toml, validated
 from cablecomp.control.command import Reference
 from cablecomp.control.segments import Knot, Piece, line, sweep
 from cablecomp.errors import InputError
@@ -301,10 +301,7 @@ def load_protocol(path: Path) -> Protocol:
 
 def parse_protocol(data: dict[str, Any], where: str) -> Protocol:
     """Validate a protocol already read; `where` names it in errors."""
-    try:
-        return Protocol.model_validate(data)
-    except ValidationError as error:
-        raise InputError(f"{where}: {explain(error)}") from None
+    return validated(Protocol, data, where)
 
 
 def _toml(value: Any) -> str:

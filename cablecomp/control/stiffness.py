@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import control
 import numpy as np
 from numpy.typing import NDArray
 
-import control
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer

@@ -1,33 +1,37 @@
-"""Whether what came from the wire can be true: every channel against its own past, and channels against each
-other."""
+"""Whether what came from the wire can be true: every channel against its own past, and channels against
+each other.
+"""
 
 from __future__ import annotations
 
-from math import exp, inf, isfinite, nan
+from math import exp, inf, nan
 from typing import Final, NamedTuple
 
 from cablecomp.control.options import HealthOptions
 from cablecomp.links.readings import JointReadings
-from cablecomp.links.records import (
-    JOINT_POSITION,
-    JOINT_TORQUE,
-    MOTOR_POSITION,
-    MOTOR_TORQUE,
-    TEMPERATURE,
-)
+from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE, TEMPERATURE
+from cablecomp.runtime.channel import Channel, Latency, Shaking, Sustained
 from cablecomp.signals import Sample
 
-MOTOR_STALE: Final = 1
-TORQUE_STALE: Final = 2
-JOINT_STALE: Final = 4
-MOTOR_JUMP: Final = 8
-TORQUE_JUMP: Final = 16
-JOINT_JUMP: Final = 32
-TORQUE_SATURATED: Final = 64
-JOINT_RESIDUAL: Final = 128
-TORQUE_MISMATCH: Final = 256
-MOTOR_LAGS: Final = 512
-UNANSWERED: Final = 1024
+(
+    MOTOR_STALE,
+    TORQUE_STALE,
+    JOINT_STALE,
+    MOTOR_JUMP,
+    TORQUE_JUMP,
+    JOINT_JUMP,
+    TORQUE_SATURATED,
+    JOINT_RESIDUAL,
+    TORQUE_MISMATCH,
+    MOTOR_LAGS,
+    UNANSWERED,
+    LATE,
+    SHAKES,
+    MOTOR_STUCK,
+    JOINT_STUCK,
+    ENCODERS_DISAGREE,
+) = (1 << bit for bit in range(16))
+FATAL: Final = MOTOR_LAGS | MOTOR_STUCK | ENCODERS_DISAGREE
 
 _WORDS: Final = (
     "motor position is stale",
@@ -41,7 +45,15 @@ _WORDS: Final = (
     "torque sensor disagrees with motor torque",
     "motor does not follow",
     "drive does not answer",
+    "sensor data come late",
+    "load shakes",
+    "motor encoder is stuck",
+    "joint encoder is stuck",
+    "encoders disagree",
 )
+_FAR = 5.0  # times the joint residual's limit: no joint moves there in a few samples
+_FAR_S = 0.003
+_STILL_S = 0.008
 
 
 def health_names(flags: int) -> tuple[str, ...]:
@@ -49,67 +61,12 @@ def health_names(flags: int) -> tuple[str, ...]:
     return tuple(word for bit, word in enumerate(_WORDS) if flags >> bit & 1)
 
 
-class Channel:
-    """One channel: the last plausible value, when it came, and whether newer ones had to be turned down.
-
-    A value is plausible if it is finite, within `most`, and moved no faster than `rate` since the value
-    before. After one that is not, values are turned down until they agree with the last plausible one again.
-    """
-
-    __slots__ = (
-        "_floor",
-        "_hold_s",
-        "_most",
-        "_rate",
-        "_raw",
-        "_raw_s",
-        "arrived_s",
-        "refused",
-        "seen",
-        "suspect",
-        "value",
-    )
-
-    def __init__(self, rate: float, floor: float, hold_s: float, most: float = inf) -> None:
-        self._rate = rate
-        self._floor = floor
-        self._hold_s = hold_s
-        self._most = most
-        self._raw = self._raw_s = nan
-        self.value = nan
-        self.arrived_s = -inf
-        self.seen = 0
-        self.refused = 0
-        self.suspect = False
-
-    def take(self, value: float, arrived_s: float) -> bool:
-        """Judge one new value that came at `arrived_s`; False = turned down."""
-        raw, dt = self._raw, arrived_s - self._raw_s
-        self._raw, self._raw_s = value, arrived_s
-        if not -self._most < value < self._most:
-            self.refused += 1
-            self.suspect = self.suspect or not isfinite(value)
-            return False
-        if raw == raw:
-            if self.suspect:
-                ok = abs(value - self.value) <= self._rate * self._hold_s + self._floor
-            else:
-                ok = abs(value - raw) <= self._rate * dt + self._floor
-            if not ok:
-                self.suspect = True
-                self.refused += 1
-                return False
-        self.suspect = False
-        self.value, self.arrived_s = value, arrived_s
-        return True
-
-
 class Checked(NamedTuple):
-    """What a check gives: the sample for the observer, ages in s, what is wrong, and whether control may live
-    on it.
+    """What a check gives: the sample for the observer, ages in s, what is wrong, and whether control
+    may live on it.
 
-    `sample` holds the last plausible values, `ready` that all needed ones have come at least once; `joint_ok`
-    = the joint encoder may be used for feedback; `fatal` = stop now.
+    `sample` holds the last plausible values, `ready` that all needed ones have come at least once;
+    `joint_ok` = the joint encoder may be used for feedback; `fatal` = stop now.
     """
 
     sample: Sample
@@ -119,29 +76,6 @@ class Checked(NamedTuple):
     ready: bool
     joint_ok: bool
     fatal: bool
-
-
-class Sustained:
-    """A condition that counts once it has lasted `for_s`; `age_s` = for how long it has counted (0 = it does
-    not)."""
-
-    __slots__ = ("_for_s", "_since", "age_s")
-
-    def __init__(self, for_s: float) -> None:
-        self._for_s = for_s
-        self._since = inf
-        self.age_s = 0.0
-
-    def step(self, condition: bool, now_s: float) -> bool:
-        """Whether the condition has held since `for_s` ago."""
-        if not condition:
-            self._since = inf
-            self.age_s = 0.0
-            return False
-        if self._since == inf:
-            self._since = now_s
-        self.age_s = max(now_s - self._since - self._for_s, 0.0)
-        return now_s - self._since >= self._for_s
 
 
 class Health:
@@ -167,6 +101,8 @@ class Health:
         self.motor = Channel(o.motor_rate_rad_s, 0.002, fresh_s)
         self.joint = Channel(o.joint_rate_rad_s, 0.002, fresh_s)
         self.torque = Channel(o.torque_rate_Nm_s, 0.05, fresh_s, limit)
+        self.latency = Latency()
+        self.shaking = Shaking()
         self._o = o
         self._ratio = ratio
         self._fresh_s = fresh_s
@@ -174,36 +110,44 @@ class Health:
         self._needs_joint = needs_joint
         self._others = others
         self._residual = Sustained(o.confirm_s)
+        self._far = Sustained(_FAR_S)
         self._mismatch = Sustained(o.confirm_s)
         self._lags = Sustained(o.confirm_s)
+        self._shakes = Sustained(0.2 * o.confirm_s)
         self._mean_mismatch = 0.0
+        self._motor_changed_s = nan
+        self._target_then = nan
         self._last_s = nan
-        self._bad_joint = False
 
     def check(
         self, readings: JointReadings, now_s: float, predicted_rad: float = nan, target_rad: float = nan
     ) -> Checked:
-        """One cycle. `predicted_rad`: joint position that the observer said last; `target_rad`: motor target
-        sent last."""
-        values, arrived, updates = readings.values, readings.arrived_s, readings.updates
-        flags = self._take(values, arrived, updates)
+        """One cycle. `predicted_rad`: joint position that the observer said last; `target_rad`: motor
+        target sent last.
+        """
+        values, updates = readings.values, readings.updates
+        flags = self._take(values, readings.arrived_s, updates)
+        late = self.latency.take(readings.arrived_s[JOINT_TORQUE], readings.device_s[JOINT_TORQUE])
         motor_age = now_s - self.motor.arrived_s
-        torque_age = now_s - self.torque.arrived_s
-        joint_age = now_s - self.joint.arrived_s
-        flags |= self._compare(values, now_s, predicted_rad, target_rad)
-        has_joint, has_torque = self.joint.value == self.joint.value, self.torque.value == self.torque.value
+        torque_age = now_s - self.torque.arrived_s + late
+        joint_age = now_s - self.joint.arrived_s + late
         fresh = self._fresh_s
+        has_joint, has_torque = self.joint.value == self.joint.value, self.torque.value == self.torque.value
         if motor_age > fresh:
             flags |= MOTOR_STALE
         if has_torque and torque_age > fresh:
-            flags |= TORQUE_STALE
+            flags |= LATE if late > fresh else TORQUE_STALE
         if has_joint and joint_age > fresh:
-            flags |= JOINT_STALE
+            flags |= LATE if late > fresh else JOINT_STALE
         if readings.unanswered > self._o.unanswered:
             flags |= UNANSWERED
-        load_age = 0.0
+        flags |= self._encoders(now_s, predicted_rad, target_rad)
+        flags |= self._torques(values[MOTOR_TORQUE], now_s)
+        self._last_s = now_s
+        joint_bad = bool(flags & (JOINT_RESIDUAL | JOINT_STUCK))
+        load_age = self._shakes.age_s
         if self._needs_torque:
-            load_age = max(torque_age, self._mismatch.age_s)
+            load_age = max(load_age, torque_age, self._mismatch.age_s)
         if self._needs_joint:
             load_age = max(load_age, joint_age, self._residual.age_s)
         ready = (
@@ -220,9 +164,8 @@ class Health:
             values[TEMPERATURE],
             tuple([values[place] for place in self._others]) if self._others else (),
         )
-        joint_ok = has_joint and not self._bad_joint and joint_age <= fresh
-        fatal = bool(flags & MOTOR_LAGS)
-        return Checked(sample, motor_age, load_age, flags, ready, joint_ok, fatal)
+        joint_ok = has_joint and not joint_bad and joint_age <= fresh
+        return Checked(sample, motor_age, load_age, flags, ready, joint_ok, bool(flags & FATAL))
 
     def _take(self, values: list[float], arrived: list[float], updates: list[int]) -> int:
         flags = 0
@@ -241,20 +184,47 @@ class Health:
             flags |= TORQUE_SATURATED
         return flags
 
-    def _compare(self, values: list[float], now_s: float, predicted_rad: float, target_rad: float) -> int:
+    def _encoders(self, now_s: float, predicted_rad: float, target_rad: float) -> int:
         o, flags = self._o, 0
-        if o.joint_residual_rad is not None:
-            off = abs(self.joint.value - predicted_rad) > o.joint_residual_rad
-            self._bad_joint = self._residual.step(off, now_s)
-            flags |= JOINT_RESIDUAL if self._bad_joint else 0
-        if o.torque_mismatch_Nm is not None and values[MOTOR_TORQUE] == values[MOTOR_TORQUE]:
-            mismatch = self.torque.value + values[MOTOR_TORQUE] / self._ratio
+        limit = o.joint_residual_rad
+        if limit is not None and not self.joint.suspect:
+            residual = abs(self.joint.value - predicted_rad)
+            if self._residual.step(residual > limit, now_s):
+                flags |= JOINT_RESIDUAL
+            if self._far.step(residual > _FAR * limit, now_s):
+                flags |= self._who_is_stuck(now_s)
+        if o.stuck_rad is not None and target_rad == target_rad:
+            if self.motor.changed_s != self._motor_changed_s or self._target_then != self._target_then:
+                self._motor_changed_s, self._target_then = self.motor.changed_s, target_rad
+            elif (
+                abs(target_rad - self._target_then) > o.stuck_rad
+                and self.motor.arrived_s > self._motor_changed_s
+            ):
+                flags |= MOTOR_STUCK
+        if o.lead_rad is not None and self._lags.step(abs(target_rad - self.motor.value) > o.lead_rad, now_s):
+            flags |= MOTOR_LAGS
+        return flags
+
+    def _who_is_stuck(self, now_s: float) -> int:
+        """Joint and prediction are far apart: the encoder whose reading does not change at all is the
+        one that lies.
+        """
+        motor_still = now_s - self.motor.changed_s > _STILL_S
+        joint_still = now_s - self.joint.changed_s > _STILL_S
+        if motor_still != joint_still:
+            return MOTOR_STUCK if motor_still else JOINT_STUCK
+        return ENCODERS_DISAGREE
+
+    def _torques(self, motor_torque: float, now_s: float) -> int:
+        o, flags = self._o, 0
+        torque = self.torque.value
+        if o.torque_mismatch_Nm is not None and motor_torque == motor_torque:
+            mismatch = torque + motor_torque / self._ratio
             if mismatch == mismatch:
                 dt = now_s - self._last_s if self._last_s == self._last_s else 0.0
                 self._mean_mismatch += (1.0 - exp(-dt / o.confirm_s)) * (mismatch - self._mean_mismatch)
             off = abs(self._mean_mismatch) > o.torque_mismatch_Nm
             flags |= TORQUE_MISMATCH if self._mismatch.step(off, now_s) else 0
-        self._last_s = now_s
-        if o.lead_rad is not None and self._lags.step(abs(target_rad - self.motor.value) > o.lead_rad, now_s):
-            flags |= MOTOR_LAGS
+        if o.shake_Nm is not None and self._shakes.step(self.shaking.step(torque, now_s) > o.shake_Nm, now_s):
+            flags |= SHAKES
         return flags

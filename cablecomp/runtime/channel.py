@@ -1,0 +1,147 @@
+"""One channel against its own past: plausible or not, still or moving, late or on time, quiet or shaking."""
+
+from __future__ import annotations
+
+from math import exp, inf, isfinite, nan, pi, sqrt
+
+
+class Channel:
+    """The last plausible value of a channel, when it came, and whether newer ones had to be turned down.
+
+    A value is plausible if it is finite, within `most`, and moved no faster than `rate` since the value
+    before. After one that is not, values are turned down until they agree with the last plausible one
+    again. `changed_s`: when it last changed.
+    """
+
+    __slots__ = (
+        "_floor",
+        "_hold_s",
+        "_most",
+        "_rate",
+        "_raw",
+        "_raw_s",
+        "arrived_s",
+        "changed_s",
+        "refused",
+        "seen",
+        "suspect",
+        "value",
+    )
+
+    def __init__(self, rate: float, floor: float, hold_s: float, most: float = inf) -> None:
+        self._rate = rate
+        self._floor = floor
+        self._hold_s = hold_s
+        self._most = most
+        self._raw = self._raw_s = nan
+        self.value = nan
+        self.arrived_s = -inf
+        self.changed_s = -inf
+        self.seen = 0
+        self.refused = 0
+        self.suspect = False
+
+    def take(self, value: float, arrived_s: float) -> bool:
+        """Judge one new value that came at `arrived_s`; False = turned down."""
+        raw, dt = self._raw, arrived_s - self._raw_s
+        self._raw, self._raw_s = value, arrived_s
+        if not -self._most < value < self._most:
+            self.refused += 1
+            self.suspect = self.suspect or not isfinite(value)
+            return False
+        if raw == raw:
+            if self.suspect:
+                ok = abs(value - self.value) <= self._rate * self._hold_s + self._floor
+            else:
+                ok = abs(value - raw) <= self._rate * dt + self._floor
+            if not ok:
+                self.suspect = True
+                self.refused += 1
+                return False
+        self.suspect = False
+        if value != self.value:
+            self.changed_s = arrived_s
+        self.value, self.arrived_s = value, arrived_s
+        return True
+
+
+class Sustained:
+    """A condition that counts once it has lasted `for_s`; `age_s` = for how long it has counted (0 = it
+    does not).
+    """
+
+    __slots__ = ("_for_s", "_since", "age_s")
+
+    def __init__(self, for_s: float) -> None:
+        self._for_s = for_s
+        self._since = inf
+        self.age_s = 0.0
+
+    def step(self, condition: bool, now_s: float) -> bool:
+        """Whether the condition has held since `for_s` ago."""
+        if not condition:
+            self._since = inf
+            self.age_s = 0.0
+            return False
+        if self._since == inf:
+            self._since = now_s
+        lasted = now_s - self._since
+        self.age_s = max(lasted - self._for_s, 0.0)
+        return lasted >= self._for_s
+
+
+class Latency:
+    """How much later than usual a device's samples come, from its own time stamps: `excess_s` over the
+    least seen.
+
+    The least is let up by 200 ppm, more than clocks drift; a device that starts afresh starts a new least.
+    """
+
+    __slots__ = ("_device_s", "_least_s", "excess_s")
+
+    def __init__(self) -> None:
+        self._device_s = nan
+        self._least_s = nan
+        self.excess_s = 0.0
+
+    def take(self, arrived_s: float, device_s: float) -> float:
+        """Take a sample's arrival and its stamp (both s, each by its own clock); stamps seen before
+        change nothing.
+        """
+        if device_s != device_s or device_s == self._device_s:
+            return self.excess_s
+        late = arrived_s - device_s
+        if not device_s > self._device_s:
+            self._least_s = late
+        else:
+            self._least_s = min(self._least_s + 2e-4 * (device_s - self._device_s), late)
+        self._device_s = device_s
+        self.excess_s = late - self._least_s
+        return self.excess_s
+
+
+class Shaking:
+    """Root mean square of what is quick in a signal: the signal less its slow part (10 Hz), averaged
+    over 30 ms.
+    """
+
+    __slots__ = ("_mean", "_now_s", "_slow", "rms")
+
+    def __init__(self) -> None:
+        self._slow = nan
+        self._mean = 0.0
+        self._now_s = nan
+        self.rms = 0.0
+
+    def step(self, value: float, now_s: float) -> float:
+        """Take a value; NaN is left out."""
+        if value != value:
+            return self.rms
+        if self._slow != self._slow:
+            self._slow, self._now_s = value, now_s
+        dt = now_s - self._now_s
+        self._now_s = now_s
+        self._slow += (1.0 - exp(-2.0 * pi * 10.0 * dt)) * (value - self._slow)
+        self._mean += (1.0 - exp(-dt / 0.03)) * ((value - self._slow) ** 2 - self._mean)
+        self.rms = sqrt(self._mean)
+        return self.rms
