@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -13,6 +14,7 @@ from cablecomp.errors import InputError
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+M = TypeVar("M", bound=BaseModel)
 
 
 class _Frozen(BaseModel):
@@ -86,7 +88,7 @@ class ObserverOptions(_Frozen):
 
 
 class Limits(_Frozen):
-    """What joint and motor may be asked for; used by the last gate, by `plan_erase` and by proposed experiments."""
+    """What joint and motor may be asked for; used by the gate, by `plan_erase`, by proposed experiments."""
 
     joint_torque_max_Nm: Positive | None = None
     motor_torque_max_Nm: Positive | None = None
@@ -124,7 +126,10 @@ class JointConfig(_Frozen):
 
 
 def load_joint(path: Path) -> JointConfig:
-    """Read a joint configuration; raises InputError with one line that names file, key, what was found, what is accepted."""
+    """Read a joint configuration.
+
+    Raises InputError with one line that names file, key, what was found, what is accepted.
+    """
     return parse_joint(read_toml(path), str(path))
 
 
@@ -143,8 +148,13 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def parse_joint(data: dict[str, Any], where: str) -> JointConfig:
     """Validate a configuration already read; `where` names it in errors."""
+    return validated(JointConfig, data, where)
+
+
+def validated(kind: type[M], data: Mapping[str, Any], where: str) -> M:
+    """Data as a frozen model; raises InputError with one line that starts with `where`."""
     try:
-        return JointConfig.model_validate(data)
+        return kind.model_validate(data)
     except ValidationError as error:
         raise InputError(f"{where}: {explain(error)}") from None
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from cablecomp.config import explain, read_toml
+from cablecomp.config import read_toml, validated
 from cablecomp.errors import InputError
 from cablecomp.links.schema_devices import (
     CanSimpleDevice,
@@ -181,7 +181,4 @@ def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkC
     """Validate a link already read; `where` names it in errors, relative paths start at `folder`."""
     if "folder" in data:
         raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
-    try:
-        return LinkConfig.model_validate({**_tuples(data), "folder": folder})
-    except ValidationError as error:
-        raise InputError(f"{where}: {explain(error)}") from None
+    return validated(LinkConfig, {**_tuples(data), "folder": folder}, where)

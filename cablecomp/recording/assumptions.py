@@ -5,24 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Final
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, Stage
 
 _LOAD: Final = {
     "joint_torque": "The load is the measured joint torque",
     "motor_torque": "The load is inferred from the measured motor torque and the drive's transmission",
     "both_encoders": "The load is inferred from both encoders, so the joint position is an input, not a test",
 }
-_PARAMETERS: Final = (
-    "output_radius_m",
-    "input_radius_m",
-    "free_length_m",
-    "EA_N",
-    "pretension_N",
-    "mu_output",
-    "mu_input",
-    "wrap_output_rad",
-    "wrap_input_rad",
-)
+_PARAMETERS: Final = tuple(name for name, field in Stage.model_fields.items() if field.is_required())
 
 
 def assumptions(config: JointConfig, channels: Collection[str] = ()) -> tuple[str, ...]:

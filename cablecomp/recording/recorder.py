@@ -1,4 +1,4 @@
-"""The live recorder: samples are appended at the loop's rate, another thread formats and writes them."""
+"""Rows of numbers to a CSV file: appended at the loop's rate, formatted and written by another thread."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import numpy as np
 
@@ -17,27 +18,27 @@ from cablecomp.recording.table import FloatArray
 from cablecomp.recording.writer import CsvWriter, check_canonical
 
 
-class Recorder:
-    """Appends samples to a canonical CSV recording.
+class TableLog:
+    """Appends rows of floats to a CSV file.
 
     `append` copies one row into a buffer, without waiting for the disk; each full buffer (`rows_per_write`,
     1 s at 1 kHz by default) is formatted and flushed to the operating system by another thread. `close`
     writes the rest; it also happens at the end of a `with` block, on an unhandled exception and at the
-    interpreter's exit. If the process is killed, the file holds every full buffer. A row must be
-    finite in all channels but `temperature_degC` and `other_*`: the recorder writes what it is given (NaN as
-    an empty cell), and reading refuses empty cells elsewhere.
+    interpreter's exit. If the process is killed, the file holds every full buffer. `header` is the order of
+    the columns in the file, if another than that of the rows. DeviceError if the file cannot be opened.
     """
 
     def __init__(
         self,
         path: Path | str,
-        channels: Sequence[str],
+        columns: Sequence[str],
         comments: Iterable[str] = (),
         rows_per_write: int = 1000,
+        header: Sequence[str] | None = None,
     ) -> None:
         self.path = Path(path)
-        self.channels = tuple(channels)
-        self._store = _Store(self.path, self.channels, tuple(comments), rows_per_write)
+        writer = _opened(self.path, columns if header is None else header, comments)
+        self._store = _Store(writer, tuple(columns), rows_per_write)
         self._finish = weakref.finalize(self, self._store.finish)  # also runs at the interpreter's exit
 
     @property
@@ -46,7 +47,7 @@ class Recorder:
         return self._store.rows
 
     def append(self, row: Sequence[float]) -> None:
-        """Take in one sample: values in the order of `channels`."""
+        """Take in one row: values in the order of the columns."""
         self._store.append(row)
 
     def flush(self) -> None:
@@ -58,11 +59,9 @@ class Recorder:
         self._finish()
         failure = self._store.failure
         if failure is not None:
-            raise DeviceError(
-                f"{self.path}: the recording is incomplete ({failure.strerror}); free some space"
-            )
+            raise DeviceError(f"{self.path}: is incomplete ({failure.strerror}); free some space")
 
-    def __enter__(self) -> Recorder:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -71,24 +70,46 @@ class Recorder:
         self.close()
 
 
-class _Store:
-    """Buffer, queue and writing thread of a recorder."""
+class Recorder(TableLog):
+    """Appends samples to a canonical CSV recording.
 
-    def __init__(self, path: Path, channels: tuple[str, ...], comments: tuple[str, ...], rows: int) -> None:
-        names = check_canonical(channels)
+    A row must be finite in all channels but `temperature_degC` and `other_*`: the recorder writes what it is
+    given (NaN as an empty cell), and reading refuses empty cells elsewhere.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        channels: Sequence[str],
+        comments: Iterable[str] = (),
+        rows_per_write: int = 1000,
+    ) -> None:
+        self.channels = tuple(channels)
+        super().__init__(path, channels, comments, rows_per_write, check_canonical(channels))
+
+
+def _opened(path: Path, header: Sequence[str], comments: Iterable[str]) -> CsvWriter:
+    try:
+        writer = CsvWriter(path, tuple(header), tuple(comments))
+        writer.flush()
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+    return writer
+
+
+class _Store:
+    """Buffer, queue and writing thread of a log."""
+
+    def __init__(self, writer: CsvWriter, columns: tuple[str, ...], rows: int) -> None:
         self.rows = 0
         self.failure: OSError | None = None
-        self._channels = channels
-        self._shape = (rows, len(channels))
+        self._writer = writer
+        self._columns = columns
+        self._shape = (rows, len(columns))
         self._buffer: FloatArray = np.empty(self._shape)
         self._filled = 0
         self._queue: queue.SimpleQueue[FloatArray | None] = queue.SimpleQueue()
-        try:
-            self._writer = CsvWriter(path, names, comments)
-            self._writer.flush()
-        except OSError as error:
-            raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
-        self._thread = threading.Thread(target=self._drain, name="recorder", daemon=True)
+        self._thread = threading.Thread(target=self._drain, name="table log", daemon=True)
         self._thread.start()
 
     def append(self, row: Sequence[float]) -> None:
@@ -115,7 +136,7 @@ class _Store:
         self._guarded(self._writer.close)
 
     def _write(self, block: FloatArray) -> None:
-        self._writer.write({name: block[:, k] for k, name in enumerate(self._channels)})
+        self._writer.write({name: block[:, k] for k, name in enumerate(self._columns)})
         self._writer.flush()
 
     def _guarded(self, action: Callable[[], None]) -> None:

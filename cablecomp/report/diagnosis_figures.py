@@ -9,6 +9,7 @@ import numpy as np
 from plotly.subplots import make_subplots
 from scipy.signal import welch
 
+from cablecomp.diagnosis.covariates import UNITS
 from cablecomp.report import style
 from cablecomp.report.diagnosis_view import FloatArray, Hypothesis, RecordingView
 from cablecomp.report.replay_figures import Scale, scale
@@ -19,18 +20,6 @@ _MEASURED: Final = style.translucent(style.MEASURED, 0.45)
 _HELD: Final = "rgba(107, 79, 187, 0.08)"
 _TIME: Final = style.label("time", "s")
 _MOST_POINTS: Final = 4_000
-_UNITS: Final[Mapping[str, str]] = {
-    "time": "s",
-    "load": "N·m",
-    "load_rate": "N·m/s",
-    "dwell": "s",
-    "reversal": "N·m",
-    "motor_angle": "rad",
-    "joint_angle": "rad",
-    "velocity": "rad/s",
-    "acceleration": "rad/s²",
-    "temperature": "°C",
-}
 _WORDS: Final[Mapping[str, str]] = {
     "load_direction": "direction of the load",
     "load_rate": "rate of the load",
@@ -50,7 +39,7 @@ def words(covariate: str) -> str:
 
 def unit_of(covariate: str) -> str:
     """Return a covariate's unit."""
-    return _UNITS.get(covariate, "")
+    return UNITS.get(covariate, "")
 
 
 def shares(mismatch: Sequence[Mapping[str, Any]]) -> Any:
@@ -90,10 +79,10 @@ def overlay(view: RecordingView, intervals: Sequence[Sequence[float]]) -> Any:
         (view.before_rad, "before", BEFORE, 1.3),
         (view.after_rad, "after", AFTER, 1.5),
     ):
-        _curve(fig, x, ((values - view.rigid_rad) * unit.factor)[keep], name, colour, width, row=1)
-    _curve(fig, x, (view.residual_before * small.factor)[keep], "residual before", BEFORE, 1.0, row=2)
-    _curve(fig, x, (view.residual_after * small.factor)[keep], "residual after", AFTER, 1.0, row=2)
-    _curve(fig, x, view.covariates["load"][keep], "load", style.LOAD, 1.3, row=3)
+        style.curve(fig, x, ((values - view.rigid_rad) * unit.factor)[keep], name, colour, width, row=1)
+    style.curve(fig, x, (view.residual_before * small.factor)[keep], "residual before", BEFORE, 1.0, row=2)
+    style.curve(fig, x, (view.residual_after * small.factor)[keep], "residual after", AFTER, 1.0, row=2)
+    style.curve(fig, x, view.covariates["load"][keep], "load", style.LOAD, 1.3, row=3)
     for begin, end in list(intervals)[:40]:
         fig.add_vrect(x0=begin, x1=end, fillcolor=style.translucent(BEFORE, 0.10), line_width=0, row=2, col=1)
     for begin, end in _stretches(view) if view.heldout.mean() < 0.8 else ():
@@ -116,9 +105,9 @@ def loops(view: RecordingView) -> Any:
         ((view.before_rad, "before", BEFORE), (view.after_rad, "after", AFTER)), start=1
     ):
         measured = (deflection * unit.factor)[keep]
-        _curve(fig, load, measured, "measured", _MEASURED, 3.0, row=1, col=column, legend=column == 1)
+        style.curve(fig, load, measured, "measured", _MEASURED, 3.0, row=1, col=column, legend=column == 1)
         predicted = ((values - view.rigid_rad) * unit.factor)[keep]
-        _curve(fig, load, predicted, name, colour, 1.3, row=1, col=column)
+        style.curve(fig, load, predicted, name, colour, 1.3, row=1, col=column)
         style.axes(
             fig,
             style.label("load", "N·m"),
@@ -217,10 +206,10 @@ def spectra(views: Sequence[RecordingView], noise_rad: float) -> Any:
     ):
         frequency, power = welch(residual, 1.0 / step, nperseg=size)
         used = frequency > 0.0
-        _curve(fig, frequency[used], np.sqrt(power[used]), name, colour, 1.5)
+        style.curve(fig, frequency[used], np.sqrt(power[used]), name, colour, 1.5)
     floor = noise_rad * np.sqrt(2.0 * step)
-    _curve(fig, np.array([1.0 / (size * step), 0.5 / step]), np.array([floor, floor]), "noise floor, white",
-           style.MUTED, 1.2, dash="dash")  # fmt: skip
+    ends = np.array([1.0 / (size * step), 0.5 / step])
+    style.curve(fig, ends, np.full(2, floor), "noise floor, white", style.MUTED, 1.2, dash="dash")
     fig.update_xaxes(type="log")
     fig.update_yaxes(type="log", exponentformat="power")
     return style.axes(fig, style.label("frequency", "Hz"), style.label("residual", "rad/√Hz"))
@@ -246,33 +235,6 @@ def hypotheses(entries: Sequence[Hypothesis]) -> Any:
     fig.update_xaxes(range=[max(-30.0, 1.1 * lowest), 104])
     fig.update_layout(bargap=0.3)
     return style.axes(fig, style.label("held-out mean square removed", "%"), "")
-
-
-def _curve(
-    fig: Any,
-    x: FloatArray,
-    y: FloatArray,
-    name: str,
-    colour: str,
-    width: float,
-    dash: str = "solid",
-    legend: bool = True,
-    row: int | None = None,
-    col: int | None = None,
-) -> None:
-    place = {} if row is None else {"row": row, "col": col if col is not None else 1}
-    fig.add_scatter(
-        x=_rounded(x), y=_rounded(y), name=name, mode="lines", showlegend=legend,
-        line={"color": colour, "width": width, "dash": dash}, **place,
-    )  # fmt: skip
-
-
-def _rounded(values: FloatArray) -> FloatArray:
-    """Six significant digits of the range are plenty for a screen and keep the page small."""
-    spread = float(np.max(np.abs(values))) if len(values) else 0.0
-    if not np.isfinite(spread) or spread <= 0.0:
-        return values
-    return np.asarray(np.round(values, int(max(0, 6 - np.floor(np.log10(spread))))), dtype=np.float64)
 
 
 def _thin(view: RecordingView) -> slice:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
@@ -56,11 +55,11 @@ def over_time(display: Display, summary: ReplaySummary) -> Any:
             x=time, y=_small(low * unit.factor), name="guaranteed bounds",
             fill="tonexty", fillcolor=style.BOUNDS, row=1, col=1, **edge,
         )  # fmt: skip
-    _curve(fig, time, rows["deflection_measured_rad"] * unit.factor, "measured", _MEASURED, 3.2, row=1)
-    _curve(fig, time, rows["deflection_rad"] * unit.factor, "predicted", style.PREDICTED, 1.4, row=1)
+    style.curve(fig, time, rows["deflection_measured_rad"] * unit.factor, "measured", _MEASURED, 3.2, row=1)
+    style.curve(fig, time, rows["deflection_rad"] * unit.factor, "predicted", style.PREDICTED, 1.4, row=1)
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
     if loaded:
-        _curve(fig, time, rows["load_Nm"], "load", style.LOAD, 1.3, row=2)
+        style.curve(fig, time, rows["load_Nm"], "load", style.LOAD, 1.3, row=2)
         _mark_instants(fig, summary.snapshots)
         style.axes(fig, "", style.label("load", "N·m"), row=2, col=1)
     fig.update_xaxes(title_text=_TIME, row=2 if loaded else 1, col=1)
@@ -73,13 +72,13 @@ def loop(display: Display, summary: ReplaySummary) -> Any:
     rows, unit = display.rows, scale(summary.deflection_range_rad)
     fig = style.figure(460)
     load, measured = rows["load_Nm"], rows["deflection_measured_rad"]
-    _curve(fig, load, measured * unit.factor, "measured", _MEASURED, 3.0)
+    style.curve(fig, load, measured * unit.factor, "measured", _MEASURED, 3.0)
     slope, offset = summary.baseline_linear_slope_rad_per_Nm, summary.baseline_linear_offset_rad
     if slope is not None and offset is not None:
         ends = np.array([np.nanmin(load), np.nanmax(load)])
         line = (offset + slope * ends) * unit.factor
-        _curve(fig, ends, line, "best straight line", style.BASELINE, 1.6, dash="dash")
-    _curve(fig, load, rows["deflection_rad"] * unit.factor, "predicted", style.PREDICTED, 1.3)
+        style.curve(fig, ends, line, "best straight line", style.BASELINE, 1.6, dash="dash")
+    style.curve(fig, load, rows["deflection_rad"] * unit.factor, "predicted", style.PREDICTED, 1.3)
     return style.axes(fig, style.label("load", "N·m"), style.label("deflection", unit.unit))
 
 
@@ -88,7 +87,7 @@ def residual_over_time(display: Display) -> Any:
     rows = display.rows
     unit = scale(float(np.nanmax(np.abs(rows["residual_rad"]))))
     fig = style.figure(320)
-    _curve(fig, rows["time_s"], rows["residual_rad"] * unit.factor, "residual", style.RESIDUAL, 1.1)
+    style.curve(fig, rows["time_s"], rows["residual_rad"] * unit.factor, "residual", style.RESIDUAL, 1.1)
     fig.update_layout(showlegend=False)
     return style.axes(fig, _TIME, style.label("measured − predicted", unit.unit))
 
@@ -113,7 +112,7 @@ def histogram(display: Display) -> Any:
         x = np.linspace(centres[first], centres[last - 1], 200)
         width = float(centres[1] - centres[0])
         bell = 100.0 * width / (sd * math.sqrt(2.0 * math.pi)) * np.exp(-0.5 * np.square((x - mean) / sd))
-        _curve(fig, x, bell, "normal curve", style.MEASURED, 1.4, dash="dot")
+        style.curve(fig, x, bell, "normal curve", style.MEASURED, 1.4, dash="dot")
     return style.axes(fig, style.label("residual", unit.unit), style.label("share of samples", "%"))
 
 
@@ -126,7 +125,7 @@ def spectra(display: Display) -> Any:
     ):
         if density is not None:
             keep = _log_spaced(density.frequency_Hz)
-            _curve(fig, density.frequency_Hz[keep], density.amplitude[keep] * 1e6, name, colour, 1.4)
+            style.curve(fig, density.frequency_Hz[keep], density.amplitude[keep] * 1e6, name, colour, 1.4)
     fig.update_xaxes(type="log", dtick=1)
     fig.update_yaxes(type="log", dtick=1, exponentformat="power")
     return style.axes(fig, style.label("frequency", "Hz"), style.label("density", "µrad/√Hz"))
@@ -140,9 +139,9 @@ def tensions(display: Display) -> Any:
         if display.has(f"tension_{cable}_measured_N"):
             faint = style.translucent(colour, 0.35)
             measured = rows[f"tension_{cable}_measured_N"]
-            _curve(fig, rows["time_s"], measured, f"{cable}, measured", faint, 3.2)
+            style.curve(fig, rows["time_s"], measured, f"{cable}, measured", faint, 3.2)
         if display.has(f"tension_{cable}_N"):
-            _curve(fig, rows["time_s"], rows[f"tension_{cable}_N"], f"{cable}, predicted", colour, 1.3)
+            style.curve(fig, rows["time_s"], rows[f"tension_{cable}_N"], f"{cable}, predicted", colour, 1.3)
     return style.axes(fig, _TIME, style.label("tension", "N"))
 
 
@@ -198,24 +197,6 @@ def _stack(heights: list[float], height: int) -> Any:
     )
     fig.update_layout(template=style.template(), height=height)
     return fig
-
-
-def _curve(
-    fig: Any,
-    x: FloatArray,
-    y: FloatArray,
-    name: str,
-    colour: str,
-    width: float,
-    *,
-    dash: str = "solid",
-    row: int | None = None,
-) -> None:
-    if np.isnan(y).all():
-        return
-    where = {} if row is None else {"row": row, "col": 1}
-    line = {"color": colour, "width": width, "dash": dash}
-    fig.add_trace(go.Scatter(x=x, y=_small(y), mode="lines", name=name, line=line), **where)
 
 
 def _mark_instants(fig: Any, snapshots: Sequence[Snapshot]) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 
 FONT: Final = "Inter, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 MONO: Final = "'JetBrains Mono', 'SF Mono', Consolas, 'Liberation Mono', monospace"
@@ -83,3 +85,30 @@ def axes(fig: Any, x: str, y: str, **where: Any) -> Any:
     fig.update_xaxes(title_text=x, **where)
     fig.update_yaxes(title_text=y, **where)
     return fig
+
+
+def curve(
+    fig: Any,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    name: str,
+    colour: str,
+    width: float,
+    *,
+    dash: str = "solid",
+    legend: bool = True,
+    row: int | None = None,
+    col: int = 1,
+) -> None:
+    """Draw y over x as a line, in a subplot if `row` is given; what is unknown throughout is left out."""
+    if np.isnan(y).all():
+        return
+    fig.add_scatter(
+        x=x,
+        y=y.astype(np.float32),  # enough for a screen, half the page
+        name=name,
+        mode="lines",
+        showlegend=legend,
+        line={"color": colour, "width": width, "dash": dash},
+        **({} if row is None else {"row": row, "col": col}),
+    )

@@ -3,31 +3,16 @@
 from __future__ import annotations
 
 import json
-import queue
-import threading
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from cablecomp.errors import DeviceError
-from cablecomp.recording.recorder import Recorder
-from cablecomp.recording.table import FloatArray
-from cablecomp.recording.writer import CsvWriter
+from cablecomp.recording.recorder import Recorder, TableLog
+from cablecomp.recording.replay import PredictionCsv
 from cablecomp.signals import Estimate, Sample
 
-PREDICTION: Final = (
-    "time_s",
-    "deflection_rad",
-    "deflection_low_rad",
-    "deflection_high_rad",
-    "joint_position_rad",
-    "residual_rad",
-    "tension_h_N",
-    "tension_l_N",
-)
+PREDICTION: Final = PredictionCsv.COLUMNS
 """Columns of `prediction.csv`, as `replay` writes them."""
 
 CYCLE: Final = (
@@ -51,66 +36,6 @@ CYCLE: Final = (
 """Columns of `cycles.csv`: whether under control, what was asked for at that instant, what was sent,
 how old the data were, what was wrong (bits), how long it took.
 """
-
-
-class TableLog:
-    """Rows of floats to a CSV file, written by a thread of its own; `append` never waits for the disk."""
-
-    def __init__(self, path: Path, columns: Sequence[str], rows_per_write: int = 1000) -> None:
-        self.path = path
-        self.rows = 0
-        self.failure: OSError | None = None
-        self._columns = tuple(columns)
-        self._shape = (rows_per_write, len(self._columns))
-        self._buffer: FloatArray = np.empty(self._shape)
-        self._filled = 0
-        self._queue: queue.SimpleQueue[FloatArray | None] = queue.SimpleQueue()
-        try:
-            self._writer = CsvWriter(path, self._columns)
-        except OSError as error:
-            raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
-        self._thread: threading.Thread | None = threading.Thread(target=self._drain, name="log", daemon=True)
-        self._thread.start()
-
-    def append(self, row: Sequence[float]) -> None:
-        """Take in one row."""
-        self._buffer[self._filled] = row
-        self._filled += 1
-        self.rows += 1
-        if self._filled == len(self._buffer):
-            self._hand_over()
-
-    def close(self) -> None:
-        """Write the rest and finish the file; DeviceError if the disk refused. May be called again."""
-        if self._thread is not None:
-            self._hand_over()
-            self._queue.put(None)
-            self._thread.join()
-            self._thread = None
-        if self.failure is not None:
-            raise DeviceError(f"{self.path}: is incomplete ({self.failure.strerror}); free some space")
-
-    def _hand_over(self) -> None:
-        if self._filled:
-            self._queue.put(self._buffer[: self._filled])
-            self._buffer = np.empty(self._shape)
-            self._filled = 0
-
-    def _drain(self) -> None:
-        while (block := self._queue.get()) is not None:
-            self._guarded(partial(self._write, block))
-        self._guarded(self._writer.close)
-
-    def _write(self, block: FloatArray) -> None:
-        self._writer.write({name: block[:, k] for k, name in enumerate(self._columns)})
-        self._writer.flush()
-
-    def _guarded(self, action: Callable[[], None]) -> None:
-        try:
-            if self.failure is None:
-                action()
-        except OSError as error:
-            self.failure = error
 
 
 class JointLog:
