@@ -95,7 +95,7 @@ def stiffness_range(
     )
 
 
-class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc]
+class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc]  # python-control has no types
     """Deflection to load of a joint, motor held, as python-control's describing functions want a
     nonlinearity.
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -102,7 +103,7 @@ def _fit(
     scale = 1.0
     for _ in range(_ROUNDS):
         current = scale
-        parts = interpolated(lambda x, s=current: bench.parts(x, s, peak), load)  # type: ignore[misc]
+        parts = interpolated(partial(bench.parts, scale=current, peak_Nm=peak), load)
         wrap = deflection - parts.span
         slope, intercept = np.polyfit(parts.vector, wrap, 1)
         if not slope > 0.0:

@@ -13,7 +13,7 @@ from cablecomp.links.devices import Gear, Outgoing, Receiver, chain
 from cablecomp.links.readings import DeviceClock, JointReadings
 from cablecomp.links.records import CHANNELS, DriveState, Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd, SensorEnd
-from cablecomp.links.schema_devices import DbcDevice, DbcMessage, StateSource
+from cablecomp.links.schema_devices import DbcDevice, DbcMessage, DbcRequest, StateSource
 from cablecomp.links.units import Linear, quantity_of, to_si
 
 _PARTS: Final = ("position", "velocity", "torque", "stiffness", "damping")
@@ -162,7 +162,8 @@ class DbcDrive:
         self._command = self._layout(device.command.message)
         self._parts = self._command_parts()
         self._constant = self._constants()
-        for request in device.request:
+        self._requests = dict[str, DbcRequest](device.request.items())
+        for request in self._requests:
             self._encode_request(request)
 
     def _layout(self, message: str) -> Layout:
@@ -248,13 +249,13 @@ class DbcDrive:
         """See `Drive.request`; `stop` falls back on `disable`."""
         if mode is not None:
             self._mode = mode
-        name: str = request.value
-        if name == "stop" and "stop" not in self._device.request:
+        name = request.value
+        if name == "stop" and "stop" not in self._requests:
             name = "disable"
-        return (self._encode_request(name),) if name in self._device.request else ()
+        return (self._encode_request(name),) if name in self._requests else ()
 
     def _encode_request(self, name: str) -> Frame:
-        wanted = self._device.request[name]  # type: ignore[index]
+        wanted = self._requests[name]
         layout = self._layout(wanted.message)
         where = f"{self._where}, request `{name}`"
         values: dict[str, float] = {}

@@ -43,14 +43,15 @@ def summary_rows(found: Comparison) -> list[tuple[str, str, str, str, str]]:
     """Controller, true joint-side RMS error without and with joint encoder feedback (mrad), and factors
     over the observer's.
     """
-    rows = []
-    for name in NAMES:
-        cells = []
-        for report in (found.open_loop, found.closed_loop):
-            joint = next(j for j in report.joints if j.name == name)
-            cells += [f"{1e3 * joint.true_position_rad:.4f}", f"{found.factor(name, report):.1f}×"]
-        rows.append((_WORDS[name], *cells))
-    return rows  # type: ignore[return-value]
+    return [
+        (_WORDS[name], *_cells(found, name, found.open_loop), *_cells(found, name, found.closed_loop))
+        for name in NAMES
+    ]
+
+
+def _cells(found: Comparison, name: str, report: RunReport) -> tuple[str, str]:
+    joint = next(j for j in report.joints if j.name == name)
+    return f"{1e3 * joint.true_position_rad:.4f}", f"{found.factor(name, report):.1f}×"
 
 
 HEAD = ("controller", "RMS error / mrad", "over ours", "with joint feedback / mrad", "over ours")

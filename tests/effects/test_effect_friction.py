@@ -31,7 +31,7 @@ def stretch(law: Law, tau: float, wrap: float) -> float:
     def at_rest(angle: float, state: np.ndarray) -> float:
         return float(state[0] - 1.0)
 
-    at_rest.terminal = True  # type: ignore[attr-defined]
+    at_rest.terminal = True
     found = solve_ivp(slope, (0.0, wrap), [tau, 0.0], rtol=1e-11, atol=1e-13, events=at_rest)
     assert found.t_events[0].size == 1
     return float(found.y[1, -1])

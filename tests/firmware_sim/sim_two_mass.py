@@ -48,17 +48,17 @@ class ListPort:
         self.sent: list[tuple[float, object]] = []
         self.closed = False
 
-    def poll(self, now_s):  # type: ignore[no-untyped-def]
+    def poll(self, now_s):
         frames, self.arriving = self.arriving, []
         return frames
 
-    def send(self, frames, now_s):  # type: ignore[no-untyped-def]
+    def send(self, frames, now_s):
         self.sent += [(now_s, frame) for frame in frames]
 
-    def wait(self, timeout_s):  # type: ignore[no-untyped-def]
+    def wait(self, timeout_s):
         return None
 
-    def describe(self):  # type: ignore[no-untyped-def]
+    def describe(self):
         return {"interface": "list"}
 
     def close(self) -> None:

@@ -89,7 +89,7 @@ def test_what_is_no_protocol_is_refused(tmp_path: Path, text: str, message: str)
 )
 def test_the_other_explanation_fits_a_confounded_recording(case: object) -> None:
     """Some size of the partner leaves less than a tenth of what the true effect does."""
-    trial = draw_trial(5, Assignment(0, "confounded", case=case.name))  # type: ignore[attr-defined]
+    trial = draw_trial(5, Assignment(0, "confounded", case=case.name))
     scene = Scene(trial.joint, trial.courses[0], trial.plain)
     plain = run_course(scene, (), COARSE).joint_position_rad
     added = run_course(scene, [trial.effects[0].spec], COARSE).joint_position_rad - plain

@@ -22,7 +22,7 @@ STILL = Readings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 25.0)
 
 
 def bench_of(port: ListPort, **options: object) -> Bench:
-    return make_bench(BenchConfig(**options), lambda number: TwoMass(), port)  # type: ignore[arg-type]
+    return make_bench(BenchConfig(**options), lambda number: TwoMass(), port)
 
 
 def torque(value: float) -> bytes:
@@ -77,7 +77,7 @@ def test_tick_follows_the_callers_time_on_an_absolute_grid() -> None:
     bench = bench_of(port)
     for now in (0.0001, 0.00099, 0.00151, 0.0049, 0.005, 0.0151):
         bench.tick(now)
-    states = [read_state(f) for f in port.take() if f.identifier == 0x600]  # type: ignore[attr-defined]
+    states = [read_state(f) for f in port.take() if f.identifier == 0x600]
     assert len(states) == 15  # one for each whole millisecond, however the ticks fell
     assert bench.time_s == pytest.approx(0.015, abs=2.6e-4)
 
@@ -97,13 +97,13 @@ def test_stepped_time_moves_by_commands_alone() -> None:
     port.arriving = [Frame(1, ENTER)]
     assert bench.pump() == 0
     assert bench.time_s == 0.0
-    assert [f.identifier for f in port.take()] == [0]  # type: ignore[attr-defined]
+    assert [f.identifier for f in port.take()] == [0]
     port.arriving = [Frame(1, torque(0.1))] * 3
     assert bench.pump() == 3
     first, second = bench.joints
     assert first.time_s == pytest.approx(3e-3)
     assert second.time_s == 0.0
-    told = [f.identifier for f in port.take()]  # type: ignore[attr-defined]
+    told = [f.identifier for f in port.take()]
     assert told == [0x600, 0x601, 0, 0x600, 0x601, 0, 0x600, 0]  # samples first, the reply last
 
 
@@ -113,7 +113,7 @@ def test_stepped_by_sync_moves_all_joints() -> None:
     port.arriving = [Frame(1, torque(0.1)), Frame(0x700, b"\0\0\0\0"), Frame(0x700)]
     assert bench.pump() == 2
     assert {joint.time_s for joint in bench.joints} == {2e-3}
-    states = [f.identifier for f in port.take() if f.identifier & 0x60F == 0x600]  # type: ignore[attr-defined]
+    states = [f.identifier for f in port.take() if f.identifier & 0x60F == 0x600]
     assert states == [0x600, 0x610, 0x620] * 2
 
 
@@ -130,7 +130,7 @@ def test_the_same_commands_in_stepped_and_in_given_time_give_the_same_samples() 
         stepped.pump()
         ports[1].arriving = [frame]
         ticked.tick((k + 1) * 1e-3)
-    samples = [[f for f in port.take() if f.identifier == 0x600] for port in ports]  # type: ignore[attr-defined]
+    samples = [[f for f in port.take() if f.identifier == 0x600] for port in ports]
     # in given time the command is heard after the step that it was sent in would have begun: compare on the
     # way there
     assert len(samples[0]) == len(samples[1]) == 200
@@ -151,8 +151,8 @@ def test_eight_mit_joints_each_answer_with_their_own_id() -> None:
     bench = bench_of(port, joints=8)
     port.arriving = [Frame(n, torque(0.0)) for n in range(1, 9)]
     bench.tick(0.0)
-    replies = [f for f in port.take() if f.identifier == 0]  # type: ignore[attr-defined]
-    assert [f.data[0] for f in replies] == list(range(1, 9))  # type: ignore[attr-defined]
+    replies = [f for f in port.take() if f.identifier == 0]
+    assert [f.data[0] for f in replies] == list(range(1, 9))
 
 
 # ---- protocols -------------------------------------------------------------------------------------
@@ -173,7 +173,7 @@ def test_odrive_joint_moves_and_reports_by_itself() -> None:
     (joint,) = bench.joints
     assert joint.drive.state is DriveState.ENABLED
     assert joint.drive.position_rad == pytest.approx(0.2 * math.pi, abs=5e-3)
-    told = [f.identifier for f in port.take()]  # type: ignore[attr-defined]
+    told = [f.identifier for f in port.take()]
     assert told.count(0x29) == pytest.approx(1500, abs=2)
     assert 15 <= told.count(0x21) <= 18
 
@@ -192,10 +192,10 @@ def test_dbc_joint_by_the_shipped_table() -> None:
     assert joint.drive.setpoint == pytest.approx((0.5, 0.0, 0.0, 2.0, 0.1))
     assert joint.drive.position_rad == pytest.approx(0.5, abs=2e-3)
     told = port.take()
-    states = [f for f in told if f.identifier == 0x402]  # type: ignore[attr-defined]
-    assert [f.data[7] for f in states] == [(k + 1) % 256 for k in range(len(states))]  # type: ignore[attr-defined]
-    status = next(f for f in told if f.identifier == 0x403)  # type: ignore[attr-defined]
-    assert status.data[0] == 0x32  # type: ignore[attr-defined]  # enabled, impedance
+    states = [f for f in told if f.identifier == 0x402]
+    assert [f.data[7] for f in states] == [(k + 1) % 256 for k in range(len(states))]
+    status = next(f for f in told if f.identifier == 0x403)
+    assert status.data[0] == 0x32  # enabled, impedance
 
 
 FOREIGN = """VERSION ""
@@ -267,5 +267,5 @@ def test_a_wrong_map_is_one_line(tmp_path: Path, text: str, message: str) -> Non
 def test_status_is_read_back_from_the_wire() -> None:
     port = ListPort()
     bench_of(port).tick(1e-3)
-    status = next(f for f in port.take() if f.identifier == 0x601)  # type: ignore[attr-defined]
-    assert read_status(status).error_flags == SensorFlag.STARTED_AFRESH  # type: ignore[arg-type]
+    status = next(f for f in port.take() if f.identifier == 0x601)
+    assert read_status(status).error_flags == SensorFlag.STARTED_AFRESH

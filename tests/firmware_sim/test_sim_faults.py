@@ -25,11 +25,11 @@ ENTER = Frame(1, b"\xff" * 7 + b"\xfc")
 def through(spec: str, frames: list[Frame], seed: int = 0, until: float = 1.0) -> list[tuple[float, Frame]]:
     """What a faulty port sends of frames that are sent 1 ms apart."""
     inner = ListPort()
-    port = FaultyPort(inner, [parse_fault(spec, seed)])  # type: ignore[list-item]
+    port = FaultyPort(inner, [parse_fault(spec, seed)])
     sent = list(frames)
     for k in range(round(until / 1e-3)):
         port.send([sent.pop(0)] if sent else [], k * 1e-3)
-    return inner.sent  # type: ignore[return-value]
+    return inner.sent
 
 
 MANY = [Frame(0x100 + k % 7, k.to_bytes(4, "big")) for k in range(300)]
@@ -74,7 +74,7 @@ def test_repeated_and_reordered_and_corrupted() -> None:
 
 def test_faults_compose_in_order() -> None:
     inner = ListPort()
-    port = FaultyPort(inner, [parse_fault("repeat:times=1"), parse_fault("late:delay=0.005")])  # type: ignore[list-item]
+    port = FaultyPort(inner, [parse_fault("repeat:times=1"), parse_fault("late:delay=0.005")])
     port.send([MANY[0]], 0.0)
     assert inner.sent == []
     port.send([], 0.0051)
@@ -83,7 +83,7 @@ def test_faults_compose_in_order() -> None:
 
 def test_bus_off_stops_both_ways_and_comes_back() -> None:
     inner = ListPort()
-    port = FaultyPort(inner, [parse_fault("bus_off:start=1,stop=2")])  # type: ignore[list-item]
+    port = FaultyPort(inner, [parse_fault("bus_off:start=1,stop=2")])
     for now, passes in ((0.5, True), (1.0, False), (1.99, False), (2.0, True)):
         inner.arriving = [MANY[0]]
         assert bool(port.poll(now)) is passes
@@ -116,8 +116,8 @@ def run(spec: str, seconds: float = 0.6, torque: float = 0.0, load: float = 0.3)
     return bench, port
 
 
-def states(port: ListPort) -> list:  # type: ignore[type-arg]
-    return [(t, read_state(f)) for t, f in port.sent if f.identifier == 0x600]  # type: ignore[attr-defined]
+def states(port: ListPort) -> list:
+    return [(t, read_state(f)) for t, f in port.sent if f.identifier == 0x600]
 
 
 def test_stuck_joint_encoder_stands_still_while_the_joint_moves() -> None:
@@ -141,7 +141,7 @@ def test_stuck_motor_encoder_deceives_the_drive_itself() -> None:
 
 def test_jumping_encoders_are_seen() -> None:
     _, port = run("jump:which=joint,jump=0.4,start=0.3")
-    flags = [read_status(f).error_flags for _, f in port.sent if f.identifier == 0x601]  # type: ignore[attr-defined]
+    flags = [read_status(f).error_flags for _, f in port.sent if f.identifier == 0x601]
     assert SensorFlag.ENCODER_JUMPED in flags
     bench, _ = run("jump:which=motor,jump=0.4,start=0.3")
     assert bench.joints[0].drive.state is DriveState.FAULT
@@ -155,7 +155,7 @@ def test_jumping_encoders_are_seen() -> None:
 def test_saturated_torque_at_motor_and_at_sensor() -> None:
     bench, _ = run("saturate:which=motor,limit=0.05", seconds=0.3)
     plant = bench.joints[0].plant
-    assert abs(plant.last_command_Nm) <= 0.05  # type: ignore[attr-defined]
+    assert abs(plant.last_command_Nm) <= 0.05
     _, port = run("saturate:which=sensor,limit=0.1")
     assert {round(s.joint_torque_Nm, 9) for _, s in states(port)} == {0.1}
 
@@ -178,7 +178,7 @@ def test_silent_sensor_node_counts_on() -> None:
 def test_silent_drive_times_out_by_itself() -> None:
     bench, port = run("silent:node=drive,start=0.2,stop=0.5")
     assert bench.joints[0].drive.flags & DriveFlag.COMMAND_TIMEOUT
-    replies = [t for t, f in port.sent if f.identifier == 0]  # type: ignore[attr-defined]
+    replies = [t for t, f in port.sent if f.identifier == 0]
     assert not [t for t in replies if 0.2011 < t < 0.4999]
     assert [t for t in replies if t > 0.5]
 
@@ -190,7 +190,7 @@ def test_reset_in_mid_motion() -> None:
     assert joint.drive.flags & DriveFlag.STARTED_AFRESH
     again = [s.sequence for t, s in states(port) if t > 0.2505]
     assert again[0] == pytest.approx(50, abs=2)  # silent while it boots, counting from its own start
-    flags = [read_status(f) for t, f in port.sent if f.identifier == 0x601 and t > 0.25]  # type: ignore[attr-defined]
+    flags = [read_status(f) for t, f in port.sent if f.identifier == 0x601 and t > 0.25]
     assert flags[0].device_time_us < 100_000
 
 
@@ -199,7 +199,7 @@ def test_a_fault_of_one_joint_leaves_the_other_alone() -> None:
     bench = make_bench(BenchConfig(joints=2), lambda n: TwoMass(0.3), port, [parse_fault("silent:joint=2")])
     for k in range(50):
         bench.tick(k * 1e-3)
-    told = {f.identifier for _, f in port.sent}  # type: ignore[attr-defined]
+    told = {f.identifier for _, f in port.sent}
     assert told == {0x600, 0x601}
 
 

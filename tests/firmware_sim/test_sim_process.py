@@ -23,7 +23,10 @@ from firmware_sim.wire.serial_records import RecordReader, encode_record
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG = str(ROOT / "configs" / "joints" / "snow-closed-rig.toml")
-LIGHT = "import sys; from sim_two_mass import TwoMass; from firmware_sim.cli import main; sys.exit(main(make_plant=lambda n: TwoMass()))"  # fmt: skip # noqa: E501
+LIGHT = (
+    "import sys; from sim_two_mass import TwoMass; from firmware_sim.cli import main; "
+    "sys.exit(main(make_plant=lambda n: TwoMass()))"
+)
 ENTER = b"\xff" * 7 + b"\xfc"
 ZERO = bytes.fromhex("7FFF7FF0000007FF")
 
@@ -49,7 +52,7 @@ def light(*arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 def told(child: subprocess.Popen[str]) -> dict[str, object]:
     assert child.stdout is not None
-    return json.loads(child.stdout.readline())  # type: ignore[no-any-return]
+    return json.loads(child.stdout.readline())
 
 
 @pytest.mark.parametrize("way", ["SIGTERM", "SIGINT", "stdin"])
@@ -66,7 +69,7 @@ def test_it_ends_cleanly(way: str) -> None:
         assert child.wait(10.0) == 0
         ended = told(child)
         assert ended["ended"] is True
-        assert not child.stderr.read()  # type: ignore[union-attr]
+        assert not child.stderr.read()
 
 
 def test_stepped_slcan_across_processes() -> None:

@@ -74,7 +74,7 @@ def test_record_layout() -> None:
     crc = crc16(body)
     assert encode_record(Frame(0x601, b"\xaa\xbb")) == cobs_encode(body + crc.to_bytes(2, "big")) + b"\x00"
     remote = encode_record(Frame(0x21, remote=True))
-    assert cobs_decode(remote[:-1])[:4] == bytes.fromhex("21000040")  # type: ignore[index]
+    assert cobs_decode(remote[:-1])[:4] == bytes.fromhex("21000040")
 
 
 @given(st.lists(FRAMES, max_size=12), st.integers(1, 9))

@@ -193,7 +193,7 @@ def test_the_command_lines_of_logger_and_player_across_processes(tmp_path: Path)
     finally:
         logger.send_signal(signal.SIGINT)
         logger.wait(10.0)
-        logger.stdout.close()  # type: ignore[union-attr]
+        logger.stdout.close()
     text = path.read_text()
     assert text.count(" 600#") == 40
     only_host = tmp_path / "host.log"

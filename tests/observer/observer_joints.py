@@ -27,7 +27,7 @@ STAGE: dict[str, Any] = {
 
 
 def joint(circuit: str = "closed", *stages: dict[str, Any], **sections: Any) -> JointConfig:
-    """A joint of these stages, each given as what differs from `STAGE`; effectively exact (no merging above 1e-13)."""
+    """A joint of these stages, each given as what differs from `STAGE`; merging below 1e-13."""
     arrangement = sections.pop("arrangement", "series")
     observer = {"merge_tolerance": 1e-13, "max_pieces": 1024, **sections.pop("observer", {})}
     drive = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -226,8 +227,8 @@ def test_progress_and_gaps_are_told(tmp_path: Path) -> None:
 def test_the_bar_shows_only_when_it_takes_long() -> None:
     now = [0.0]
     for step, shown in ((0.1, False), (1.5, True)):
-        console = Console(force_terminal=True, width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
-        with console.file, progress_bar("replay", console, 2.0, lambda: now[0]) as told:
+        console = Console(force_terminal=True, width=80, record=True, file=StringIO())
+        with progress_bar("replay", console, 2.0, lambda: now[0]) as told:
             for k in range(4):
                 now[0] += step
                 told(k / 3, 1000 * k)

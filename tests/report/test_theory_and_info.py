@@ -25,7 +25,7 @@ def joint(name: str) -> JointConfig:
 
 
 def curve(figure: object, name: str) -> tuple[np.ndarray, np.ndarray]:
-    trace = next(trace for trace in figure.data if trace.name == name)  # type: ignore[attr-defined]
+    trace = next(trace for trace in figure.data if trace.name == name)
     return np.asarray(trace.x), np.asarray(trace.y)
 
 
