@@ -20,6 +20,7 @@ from cablecomp.identification.parameters import OFFSET, Parameter, with_values
 from cablecomp.identification.smoothing import FloatArray
 
 Mask = np.ndarray[tuple[int], np.dtype[np.bool_]]
+DAMPING = (0.0, 0.1, 1.0, 10.0)  # tried in turn until the misfit falls
 INFLATION = 3.0  # noise that passes through friction remembers: some ten samples count as one
 
 
@@ -172,24 +173,27 @@ def solve(
     if r is None:
         return None
     now = cost(r, z, prior, mask)
+    fresh = -1
     for k in range(iterations):
         if J is None or k < refresh:
-            J = sensitivities(problem, forms, z, r)
-        step = bounded_step(J[mask], r[mask], z, prior, low, high)
-        size, better = 1.0, None
-        for _ in range(3):
-            trial = np.clip(z + size * step, low, high)
+            J, fresh = sensitivities(problem, forms, z, r), k
+        better = None
+        for damping in DAMPING:
+            step = bounded_step(J[mask], r[mask], z, prior, low, high, damping)
+            trial = np.clip(z + step, low, high)
             found = evaluate(problem, forms, trial)
-            if found is not None:
-                moved = trial - z
-                if float(moved @ moved) > 0.0:
-                    J = J + np.outer((r - found) - J @ moved, moved) / float(moved @ moved)
-                reached = cost(found, trial, prior, mask)
-                if reached < now:
-                    better = (trial, found, reached)
-                    break
-            size *= 0.3
+            moved = trial - z
+            if found is None or float(moved @ moved) == 0.0:
+                continue
+            J = J + np.outer((r - found) - J @ moved, moved) / float(moved @ moved)
+            reached = cost(found, trial, prior, mask)
+            if reached < now:
+                better = (trial, found, reached)
+                break
         if better is None:
+            if refresh > 0 and fresh < k:  # the kept sensitivities may be at fault
+                J, fresh = sensitivities(problem, forms, z, r), k
+                continue
             break
         gain = now - better[2]
         z, r, now = better
@@ -202,10 +206,17 @@ def solve(
 
 
 def bounded_step(
-    J: FloatArray, r: FloatArray, z: FloatArray, prior: FloatArray, low: FloatArray, high: FloatArray
+    J: FloatArray,
+    r: FloatArray,
+    z: FloatArray,
+    prior: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    damping: float = 0.0,
 ) -> FloatArray:
-    """Gauss-Newton step with bounds: coordinates that would leave are held at their bound, the rest
-    solved again.
+    """Gauss-Newton step (Levenberg-Marquardt with `damping`) with bounds.
+
+    Coordinates that would leave are held at their bound, the rest solved again.
     """
     A = J.T @ J + np.diag(prior)
     g = J.T @ r - prior * z
@@ -214,7 +225,7 @@ def bounded_step(
     step = np.zeros(len(z))
     for _ in range(len(z)):
         inner = A[np.ix_(free, free)] / np.outer(scale[free], scale[free])
-        inner += 1e-9 * np.eye(int(free.sum()))
+        inner += (1e-9 + damping) * np.eye(int(free.sum()))
         rest = g[free] - A[np.ix_(free, ~free)] @ step[~free]
         step[free] = np.linalg.solve(inner, rest / scale[free]) / scale[free]
         out = free & ((z + step < low - 1e-12) | (z + step > high + 1e-12))

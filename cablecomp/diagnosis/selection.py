@@ -9,7 +9,7 @@ from math import erf, sqrt
 import numpy as np
 
 from cablecomp.diagnosis.blocks import Layout
-from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, refit, solve
+from cablecomp.diagnosis.fitting import INFLATION, Mask, Model, Problem, refit, solve
 from cablecomp.diagnosis.forms import Form, FreedForm, freed
 from cablecomp.diagnosis.judge import Score, Verdict, compare, judge
 from cablecomp.diagnosis.screening import Guess, Probe, Progress, best_guesses, fit_guess, probe_all, refine
@@ -22,6 +22,7 @@ CLOSE = 0.5  # of the best one's gain, below which a hypothesis is not fitted ca
 LEVEL = 0.01  # of a false support, all hypotheses together
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
+POLISHES = 4  # careful fits of one hypothesis in a row, while they gain
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
 SURE = 3.0  # standard errors of lead beyond which a rival is refuted
 
@@ -190,25 +191,36 @@ def _polish(problem: Problem, fold: Fold, layout: Layout) -> tuple[Model, Fold]:
     Instants of events are the exception: the halves take them from all rows, for an event inside a held-out
     block cannot be placed without it.
     """
-    masks = (layout.training, layout.heldout)
     both = layout.heldout | layout.training
     start = min(fold.models, key=lambda m: float(m.residual[both] @ m.residual[both]))
-    forms, z = free_shapes(start)
-    whole = solve(problem, forms, z, both, None, None, iterations=9, refresh=3)
-    whole = start if whole is None else whole
+    whole = _careful(problem, *free_shapes(start), both) or start
     halves = []
-    for model, mask in zip(fold.models, masks, strict=True):
-        forms, z = _placed(problem, whole) if _has_instant(whole) else free_shapes(model)
-        found = solve(problem, forms, z, mask, None, None, iterations=9, refresh=3)
-        halves.append(model if found is None else found)
+    for model, mask in zip(fold.models, (layout.training, layout.heldout), strict=True):
+        forms, z = _placed(whole) if _has_instant(whole) else free_shapes(model)
+        halves.append(_careful(problem, forms, z, mask) or model)
     return whole, _fold(problem, halves[0], halves[1], layout)
+
+
+def _careful(problem: Problem, forms: Sequence[Form], z: FloatArray, mask: Mask) -> Model | None:
+    """Fit with fresh sensitivities, again and again while it gains."""
+    model: Model | None = None
+    for _ in range(POLISHES):
+        found = solve(problem, forms, z, mask, None, None, iterations=8, refresh=2)
+        if found is None:
+            break
+        before = np.inf if model is None else float(model.residual[mask] @ model.residual[mask])
+        model, z = found, found.z
+        now = float(found.residual[mask] @ found.residual[mask])
+        if now > 0.97 * before or now * INFLATION**2 < NOISE * int(mask.sum()):
+            break
+    return model
 
 
 def _has_instant(model: Model) -> bool:
     return any(p.name == "time_s" for f in model.forms for p in f.shapes)
 
 
-def _placed(problem: Problem, model: Model) -> tuple[tuple[Form, ...], FloatArray]:
+def _placed(model: Model) -> tuple[tuple[Form, ...], FloatArray]:
     """The model with the instants of its events taken as known."""
     forms: list[Form] = []
     xs: list[FloatArray] = []
