@@ -236,7 +236,7 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
 def _share_of(d: Diagnosis, name: str) -> float:
     """Held-out gain of the round in which an effect was accepted."""
     for round_ in d.selection.rounds:
-        best = round_.verdict.best
+        best = round_.accepted
         if best is not None and best.name == name:
             return best.heldout_gain
     return 0.0

@@ -20,6 +20,7 @@ LEAST_SHARE = 0.1  # of the best linear drop that a hypothesis must promise to b
 CAREFUL = 3  # hypotheses that are then fitted with their shapes free
 CLOSE = 0.5  # of the best one's gain, below which a hypothesis is not fitted carefully
 LEVEL = 0.01  # of a false support, all hypotheses together
+LEAST = 0.08  # of the floor's mean square that an effect must remove as well: instants are searched over all rows
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
 POLISHES = 4  # careful fits of one hypothesis in a row, while they gain
@@ -46,6 +47,7 @@ class Round:
     asked: Mapping[str, float]
     """Linear drop in cost of every hypothesis, as a share of the residual's energy."""
     folds: Mapping[str, Fold]
+    accepted: Score | None = None
     rivals: tuple[tuple[str, float], ...] = ()
     """Hypotheses that the data do not set apart from the best: name and z of the best one's lead."""
 
@@ -93,9 +95,12 @@ def select(
             models[score.name], folds[score.name] = _polish(problem, folds[score.name], layout)
         if models:
             verdict = _judged(current_fold, folds, both, rng)
-        best = next((s for s in verdict.scores if s.supported and s.name in models), None)
+        present = _energy(current_fold, problem, layout)
+        best = next(
+            (s for s in verdict.scores if s.supported and s.name in models and s.heldout_gain * present > LEAST), None
+        )
         rivals = () if best is None else _rivals(best, verdict, folds, models, problem, both, rng)
-        rounds.append(Round(current.name, verdict, asked, folds, rivals))
+        rounds.append(Round(current.name, verdict, asked, folds, best, rivals))
         if best is None:
             break
         current, current_fold = models[best.name], folds[best.name]
@@ -295,6 +300,11 @@ def confidence(rivals: Sequence[tuple[str, float]]) -> float:
     """Probability that the best hypothesis predicts better than each rival, by the normal law of its lead."""
     doubt = sum(0.5 * (1.0 - erf(z / sqrt(2.0))) for _, z in rivals)
     return 1.0 / (1.0 + 2.0 * doubt) if rivals else 0.99
+
+
+def _energy(fold: Fold, problem: Problem, layout: Layout) -> float:
+    kept = layout.heldout | layout.training
+    return float(np.mean((fold.residual_rad[kept] / problem.sigma[kept]) ** 2))
 
 
 def _at_noise(model: Model, layout: Layout) -> bool:

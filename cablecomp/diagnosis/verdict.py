@@ -53,7 +53,7 @@ def weigh(
     whole = float(np.mean((selection.model.residual * INFLATION) ** 2))
     end = min(energy(selection.final.residual_rad, setting), whole)
     excess, left = max(start - 1.0, 0.0), max(end - 1.0, 0.0)
-    accepted = [r for r in selection.rounds if r.verdict.best is not None]
+    accepted = [r for r in selection.rounds if r.accepted is not None]
     if not final.effects:
         located = bool(before.significant(0.01)) and start > STRUCTURED
         if located:
@@ -62,7 +62,7 @@ def weigh(
     tied, named = [], []
     for k, (form, entry, values) in enumerate(final.effects):
         rivals: Sequence[tuple[str, float]] = next(
-            (r.rivals for r in accepted if r.verdict.best is not None and r.verdict.best.name == form.name),
+            (r.rivals for r in accepted if r.accepted is not None and r.accepted.name == form.name),
             (),
         )
         sure = confidence(rivals)

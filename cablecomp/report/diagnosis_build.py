@@ -93,7 +93,7 @@ def _hypotheses(diagnosis: Diagnosis) -> Iterator[Hypothesis]:
     ruled_out: list[Hypothesis] = []
     nan = float("nan")
     for number, round_ in enumerate(diagnosis.selection.rounds):
-        best = round_.verdict.best
+        best = round_.accepted
         beside = "the calibrated drive" if number == 0 else round_.base.replace("_", " ")
         for score in round_.verdict.scores:
             chosen = best is not None and best.name == score.name
