@@ -1,0 +1,124 @@
+"""Recordings of the simulated plant, physics concealed, through the command line's own diagnosis."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cablecomp.cli import main
+from cablecomp.config import load_joint
+from cablecomp.observer import Observer
+from cablecomp.recording.reader import read_all
+from cablecomp.recording.writer import write_canonical
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
+
+STAGE = {
+    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0, "pretension_N": 60.0,
+    "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
+}  # fmt: skip
+TRUE = {**STAGE, "EA_N": 20500.0, "pretension_N": 57.5, "mu_output": 0.135, "mu_input": 0.125}
+NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 3e-3, "motor_position_rad": 2e-5}
+
+
+def joint_file(folder: Path) -> Path:
+    """The nominal joint, tolerances and sensors stated."""
+    lines = ["schema = 1", 'name = "blind"', "[drive]", 'circuit = "closed"', "[[drive.stage]]"]
+    lines += [f"{key} = {value!r}" for key, value in STAGE.items()]
+    lines += [
+        "[tolerance]",
+        "EA_N = 0.04",
+        "pretension_N = 0.06",
+        "mu_output = 0.25",
+        "mu_input = 0.25",
+        "[sensors]",
+    ]
+    lines += [
+        "joint_position_noise_rad = 1e-5",
+        "joint_torque_noise_Nm = 3e-3",
+        "motor_position_noise_rad = 2e-5",
+    ]
+    path = folder / "joint.toml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def recordings(folder: Path, effects: list[EffectSpec], seed: int) -> list[Path]:
+    """Two recordings of 30 s at 100 Hz: both pulleys turning, load of two frequencies, noise on all channels."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for number in range(2):
+        time = np.arange(0.0, 30.0, 0.01)
+        w = rng.uniform(0.4, 2.2, 4)
+        soft = 1.0 - np.exp(-time)
+        motor = soft * (0.8 * np.sin(w[0] * time) + 0.5 * np.sin(w[1] * time))
+        load = soft * (0.9 * np.sin(1.7 * w[2] * time) + 0.6 * np.sin(1.7 * w[3] * time))
+        config = PlantConfig.from_dict(
+            {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [TRUE]}}
+        )
+        run = simulate(config, time, motor, load, effects=effects)
+        columns = {name: run.channels()[name] for name in ("time_s", *NOISE)}
+        for name, sigma in NOISE.items():
+            columns[name] = columns[name] + sigma * rng.standard_normal(len(time))
+        path = folder / f"recording-{number}.csv.gz"
+        write_canonical(path, columns)
+        paths.append(path)
+    return paths
+
+
+def diagnosed(folder: Path, effects: list[EffectSpec], seed: int) -> dict[str, object]:
+    """The result file of `cablecomp diagnose`."""
+    joint = joint_file(folder)
+    files = [str(path) for path in recordings(folder, effects, seed)]
+    assert main(["diagnose", *files, "--config", str(joint), "--out", str(folder / "out")]) == 0
+    result: dict[str, object] = json.loads((folder / "out/diagnosis.json").read_text())
+    return result
+
+
+def test_concealed_bearing_friction_is_named_measured_and_modelled(tmp_path: Path) -> None:
+    spec = EffectSpec(
+        "bearing_friction", {"torque_Nm": 0.02, "load_coefficient": 0.0, "presliding_rad": 2e-4}
+    )
+    result = diagnosed(tmp_path, [spec], 11)
+    assert result["verdict"] == "explained"
+    (found,) = result["missing_physics"]  # type: ignore[misc]
+    assert found["effect"] == "bearing_friction"
+    torque = found["parameters"]["torque_Nm"]
+    assert abs(torque["value"] - 0.02) < 4.0 * torque["sd"] + 0.02 * 0.02
+    assert found["heldout_gain"] > 0.5
+    assert result["mismatch"][0]["covariate"] in ("reversal", "velocity", "load_direction")  # type: ignore[index]
+    assert (tmp_path / "out/report.html").stat().st_size > 1_000_000
+    # the augmented joint runs as it is, and predicts to the noise floor
+    augmented = load_joint(tmp_path / "out/joint.augmented.toml")
+    columns = read_all(tmp_path / "recording-0.csv.gz").columns
+    predicted = Observer(augmented).run(columns)["joint_position_rad"]
+    residual = columns["joint_position_rad"] - predicted - augmented.sensors.joint_position_offset_rad
+    assert np.sqrt(np.mean(residual**2)) < 1.6 * float(result["noise_floor_rad"])  # type: ignore[arg-type]
+
+
+def test_parameters_off_their_nominal_values_are_no_missing_physics(tmp_path: Path) -> None:
+    result = diagnosed(tmp_path, [], 12)
+    assert result["verdict"] == "recalibrate"
+    assert result["missing_physics"] == []
+    assert result["not_excluded"] == []
+    calibration = result["calibration"]
+    for name in ("EA_N", "mu_output", "mu_input"):
+        value = calibration[name]  # type: ignore[index]
+        assert abs(value["value"] - TRUE[name]) < 4.0 * value["sd"] + 0.01 * TRUE[name]
+    unseen = {entry["effect"] for entry in result["could_be_unseen"]}  # type: ignore[attr-defined]
+    assert {"bearing_friction", "series_compliance", "routing_friction"} <= unseen
+
+
+def test_a_missing_channel_is_one_line_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bare.csv"
+    write_canonical(path, {"time_s": np.arange(50.0), "motor_position_rad": np.zeros(50)})
+    code = main(
+        ["diagnose", str(path), "--config", str(joint_file(tmp_path)), "--out", str(tmp_path / "out")]
+    )
+    assert code == 2
+    assert "joint_position_rad" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
