@@ -16,7 +16,7 @@ from rich.table import Table
 from cablecomp.config import load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import Diagnosis, diagnose, report_json, write_diagnosis
-from cablecomp.errors import InputError
+from cablecomp.effects import load_effects
 from cablecomp.identification.bench import bench_recording, evaluate_bench
 from cablecomp.mechanics.design import design_sheet
 from cablecomp.mechanics.jit import is_compiled
@@ -120,7 +120,7 @@ def diagnose_recordings(
 ) -> None:
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
     for path in effects or ():
-        _load_effect(path)
+        load_effects(path)
     joint = load_joint(config)
     data = {str(path): read_all(path).columns for path in recordings}
     announce_compilation()
@@ -171,11 +171,3 @@ def _show(found: Diagnosis) -> None:
         table.add_row("next experiment", result["next_experiment"]["why"])
     console.print(table)
 
-
-def _load_effect(path: Path) -> None:
-    """Run a file of the user's that registers an effect."""
-    import runpy
-
-    if not path.is_file():
-        raise InputError(f"{path}: is no file; give a Python file that registers an effect")
-    runpy.run_path(str(path))
