@@ -106,6 +106,8 @@ class Compensator:
         self._reference: Reference | None = None
         self._switch = True
         self._velocity = 0.0
+        self._motor_share = self.gains.motor_integral_per_s * period_s
+        self._motor_limit = options.motor_integral_limit_rad
         self._linear = options.linear_stiffness_Nm_per_rad
         self._from_sensor = options.load != "reference"
 
@@ -244,10 +246,10 @@ class Compensator:
         if self._switch:
             self._begin(sample, wanted)
         else:
-            limit = self.options.motor_integral_limit_rad
+            limit = self._motor_limit
             error = self.target_rad - sample.motor_position_rad
-            trim = self.motor_trim_rad + self.gains.motor_integral_per_s * self.period_s * error
-            self.motor_trim_rad = min(max(trim, -limit), limit)
+            trim = self.motor_trim_rad + self._motor_share * error
+            self.motor_trim_rad = limit if trim > limit else -limit if trim < -limit else trim
         target = wanted + self.bump.step()
         self._velocity = velocity + self.bump.slope
         self.target_rad = target

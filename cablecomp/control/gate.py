@@ -108,25 +108,36 @@ def gate(
     if not age_s <= limits.age_s:
         return SafeCommand(before.motor_position_rad, 0.0, 0.0, STALE)
     flags = 0
-    lead, last = limits.lead_max_rad, before.motor_position_rad
-    step = limits.position_rate_rad_s * period_s
-    even = min(max(q, last - step), last + step)
+    last = before.motor_position_rad
+    even = _within(q, last, limits.position_rate_rad_s * period_s)
     if even != q:
         flags |= RATE_LIMITED
-    near = min(max(even, motor_position_rad - lead), motor_position_rad + lead)
+    near = _within(even, motor_position_rad, limits.lead_max_rad)
     if near != even:
         flags |= FAR_FROM_MOTOR
-    q = min(max(near, limits.position_min_rad), limits.position_max_rad)
+    q = near
+    if q < limits.position_min_rad:
+        q = limits.position_min_rad
+    elif q > limits.position_max_rad:
+        q = limits.position_max_rad
     if q != near:
         flags |= POSITION_LIMITED
-    slow = min(max(v, -limits.velocity_max_rad_s), limits.velocity_max_rad_s)
+    slow = _within(v, 0.0, limits.velocity_max_rad_s)
     if slow != v:
         flags |= VELOCITY_LIMITED
-    weak = min(max(tau, -limits.torque_max_Nm), limits.torque_max_Nm)
+    weak = _within(tau, 0.0, limits.torque_max_Nm)
     if weak != tau:
         flags |= TORQUE_LIMITED
-    step = limits.torque_rate_Nm_s * period_s
-    gradual = min(max(weak, before.motor_torque_Nm - step), before.motor_torque_Nm + step)
+    gradual = _within(weak, before.motor_torque_Nm, limits.torque_rate_Nm_s * period_s)
     if gradual != weak:
         flags |= RATE_LIMITED
     return SafeCommand(q, slow, gradual, flags)
+
+
+def _within(value: float, middle: float, reach: float) -> float:
+    """The value, cut to middle +- reach."""
+    if value > middle + reach:
+        return middle + reach
+    if value < middle - reach:
+        return middle - reach
+    return value

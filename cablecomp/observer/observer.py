@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -57,11 +58,14 @@ class Observer:
         self._F[st.GAIN] = config.sensors.joint_torque_gain
         self._F[st.OFFSET] = config.sensors.joint_torque_offset_Nm
         self._F[st.CUTOFF] = 2.0 * np.pi * config.observer.input_filter_Hz
+        # every array is written in place for good, so one tuple serves all calls
+        self._arrays = (self.model.P, self.model.I, self._S, self._J, self.model.L, self._F)
         self._row = np.zeros(st.IN_OTHER + len(self.channels))
         self._out = np.zeros(st.OUT_WIDTH)
         self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
         self._ratio = _rigid_ratio(config)
-        self._last_time = -np.inf
+        self._last_time = -math.inf
+        self._source = config.observer.load
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
 
     # --- the three ways to use it ---------------------------------------------------------------------------------
@@ -69,10 +73,11 @@ class Observer:
     def step(self, sample: Sample) -> Estimate:
         """Commit one sample and say what the joint does."""
         self._read(sample)
-        if self.config.observer.load == "both_encoders":
+        if self._source == "both_encoders":
             self._solve_load()
         status = st.step_one(*self._kernel(), self._row, self._out)
-        self._check(status, sample.time_s)
+        if status != o.STATUS_OK:
+            self._check(status, sample.time_s)
         self._last_time = sample.time_s
         low, high = NAN, NAN
         if self._bounds is not None:
@@ -228,8 +233,7 @@ class Observer:
     # --- inside ---------------------------------------------------------------------------------------------------
 
     def _kernel(self) -> tuple[Floats, ...]:
-        model = self.model
-        return model.P, model.I, self._S, self._J, model.L, self._F  # type: ignore[return-value]
+        return self._arrays  # type: ignore[return-value]
 
     def _bound_pair(self) -> BoundPair:
         options = self.config.observer
@@ -256,14 +260,14 @@ class Observer:
             )
         row = self._row
         row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_JOINT] = sample.time_s, sample.motor_position_rad, sample.joint_position_rad
-        load = self.config.observer.load
         row[st.IN_LOAD] = sample.joint_torque_Nm
-        if load == "motor_torque":
+        if self._source == "motor_torque":
             row[st.IN_LOAD] = -sample.motor_torque_Nm / self._ratio
         row[st.IN_TEMPERATURE] = sample.temperature_degC
-        for k, value in enumerate(sample.other[: len(self.channels)]):
-            row[st.IN_OTHER + k] = value
-        if not np.isfinite(self._last_time):
+        if self.channels:
+            for k, value in enumerate(sample.other[: len(self.channels)]):
+                row[st.IN_OTHER + k] = value
+        if self._last_time == -math.inf:
             self._start(sample.time_s, sample.motor_position_rad)
 
     def _rows(self, columns: Mapping[str, NDArray[np.float64]]) -> Floats:
@@ -306,19 +310,11 @@ class Observer:
             raise InputError(f"{where} {REASONS[status]}")
 
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
-        out = self._out
-        joint = float(out[st.OUT_JOINT])
+        joint, drive, load, tension_h, tension_l, _ = self._out.tolist()
         rigid = self._ratio * sample.motor_position_rad
-        shift = joint - float(out[st.OUT_DRIVE]) - rigid
+        shift = joint - drive - rigid
         return Estimate(
-            sample.time_s,
-            joint - rigid,
-            low + shift,
-            high + shift,
-            joint,
-            float(out[st.OUT_LOAD]),
-            float(out[st.OUT_T_H]),
-            float(out[st.OUT_T_L]),
+            sample.time_s, joint - rigid, low + shift, high + shift, joint, load, tension_h, tension_l
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, inf, isfinite, nan, pi, sqrt
+from math import exp, inf, isfinite, nan, pi
 
 
 class Channel:
@@ -45,6 +45,15 @@ class Channel:
         """Judge one new value that came at `arrived_s`; False = turned down."""
         raw, dt = self._raw, arrived_s - self._raw_s
         self._raw, self._raw_s = value, arrived_s
+        if not self.suspect and abs(value) < self._most and abs(value - raw) <= self._rate * dt + self._floor:
+            # the usual case first: it is the one that must be quick
+            if value != self.value:
+                self.changed_s = arrived_s
+            self.value, self.arrived_s = value, arrived_s
+            return True
+        return self._judge(value, arrived_s, raw, dt)
+
+    def _judge(self, value: float, arrived_s: float, raw: float, dt: float) -> bool:
         if not -self._most < value < self._most:
             self.refused += 1
             self.suspect = self.suspect or not isfinite(value)
@@ -80,8 +89,9 @@ class Sustained:
     def step(self, condition: bool, now_s: float) -> bool:
         """Whether the condition has held since `for_s` ago."""
         if not condition:
-            self._since = inf
-            self.age_s = 0.0
+            if self._since != inf:
+                self._since = inf
+                self.age_s = 0.0
             return False
         if self._since == inf:
             self._since = now_s
@@ -121,27 +131,26 @@ class Latency:
 
 
 class Shaking:
-    """Root mean square of what is quick in a signal: the signal less its slow part (10 Hz), averaged
+    """Mean square of what is quick in a signal: the signal less its slow part (10 Hz), averaged
     over 30 ms.
     """
 
-    __slots__ = ("_mean", "_now_s", "_slow", "rms")
+    __slots__ = ("_follow", "_forget", "_slow", "square")
 
-    def __init__(self) -> None:
+    def __init__(self, period_s: float) -> None:
+        self._follow = 1.0 - exp(-2.0 * pi * 10.0 * period_s)
+        self._forget = 1.0 - exp(-period_s / 0.03)
         self._slow = nan
-        self._mean = 0.0
-        self._now_s = nan
-        self.rms = 0.0
+        self.square = 0.0
 
-    def step(self, value: float, now_s: float) -> float:
-        """Take a value; NaN is left out."""
-        if value != value:
-            return self.rms
-        if self._slow != self._slow:
-            self._slow, self._now_s = value, now_s
-        dt = now_s - self._now_s
-        self._now_s = now_s
-        self._slow += (1.0 - exp(-2.0 * pi * 10.0 * dt)) * (value - self._slow)
-        self._mean += (1.0 - exp(-dt / 0.03)) * ((value - self._slow) ** 2 - self._mean)
-        self.rms = sqrt(self._mean)
-        return self.rms
+    def step(self, value: float) -> float:
+        """Take a value once a period; returns the mean square. NaN is left out."""
+        if value == value:
+            slow = self._slow
+            if slow != slow:
+                slow = value
+            slow += self._follow * (value - slow)
+            self._slow = slow
+            quick = value - slow
+            self.square += self._forget * (quick * quick - self.square)
+        return self.square

@@ -91,6 +91,7 @@ class Health:
         options: HealthOptions,
         ratio: float,
         fresh_s: float,
+        period_s: float,
         *,
         needs_torque: bool = True,
         needs_joint: bool = False,
@@ -102,8 +103,9 @@ class Health:
         self.joint = Channel(o.joint_rate_rad_s, 0.002, fresh_s)
         self.torque = Channel(o.torque_rate_Nm_s, 0.05, fresh_s, limit)
         self.latency = Latency()
-        self.shaking = Shaking()
+        self.shaking = Shaking(period_s)
         self._o = o
+        self._most_Nm = limit
         self._ratio = ratio
         self._fresh_s = fresh_s
         self._needs_torque = needs_torque
@@ -115,9 +117,10 @@ class Health:
         self._lags = Sustained(o.confirm_s)
         self._shakes = Sustained(0.2 * o.confirm_s)
         self._mean_mismatch = 0.0
+        self._share = 1.0 - exp(-period_s / o.confirm_s)
+        self._shake_square = inf if o.shake_Nm is None else o.shake_Nm**2
         self._motor_changed_s = nan
         self._target_then = nan
-        self._last_s = nan
 
     def check(
         self, readings: JointReadings, now_s: float, predicted_rad: float = nan, target_rad: float = nan
@@ -143,11 +146,13 @@ class Health:
             flags |= UNANSWERED
         flags |= self._encoders(now_s, predicted_rad, target_rad)
         flags |= self._torques(values[MOTOR_TORQUE], now_s)
-        self._last_s = now_s
         joint_bad = bool(flags & (JOINT_RESIDUAL | JOINT_STUCK))
         load_age = self._shakes.age_s
         if self._needs_torque:
-            load_age = max(load_age, torque_age, self._mismatch.age_s)
+            if torque_age > load_age:
+                load_age = torque_age
+            if self._mismatch.age_s > load_age:
+                load_age = self._mismatch.age_s
         if self._needs_joint:
             load_age = max(load_age, joint_age, self._residual.age_s)
         ready = (
@@ -168,19 +173,25 @@ class Health:
         return Checked(sample, motor_age, load_age, flags, ready, joint_ok, bool(flags & FATAL))
 
     def _take(self, values: list[float], arrived: list[float], updates: list[int]) -> int:
+        motor, torque, joint = self.motor, self.torque, self.joint
+        n = updates[MOTOR_POSITION]
+        if n != motor.seen:
+            motor.seen = n
+            motor.take(values[MOTOR_POSITION], arrived[MOTOR_POSITION])
+        n = updates[JOINT_TORQUE]
+        if n != torque.seen:
+            torque.seen = n
+            torque.take(values[JOINT_TORQUE], arrived[JOINT_TORQUE])
+        n = updates[JOINT_POSITION]
+        if n != joint.seen:
+            joint.seen = n
+            joint.take(values[JOINT_POSITION], arrived[JOINT_POSITION])
         flags = 0
-        for channel, place, jump in (
-            (self.motor, MOTOR_POSITION, MOTOR_JUMP),
-            (self.torque, JOINT_TORQUE, TORQUE_JUMP),
-            (self.joint, JOINT_POSITION, JOINT_JUMP),
-        ):
-            if updates[place] != channel.seen:
-                channel.seen = updates[place]
-                channel.take(values[place], arrived[place])
-            if channel.suspect:
-                flags |= jump
-        limit = self._o.torque_max_Nm
-        if limit is not None and abs(values[JOINT_TORQUE]) >= limit:
+        if motor.suspect or torque.suspect or joint.suspect:
+            flags |= MOTOR_JUMP if motor.suspect else 0
+            flags |= TORQUE_JUMP if torque.suspect else 0
+            flags |= JOINT_JUMP if joint.suspect else 0
+        if abs(values[JOINT_TORQUE]) >= self._most_Nm:
             flags |= TORQUE_SATURATED
         return flags
 
@@ -221,10 +232,9 @@ class Health:
         if o.torque_mismatch_Nm is not None and motor_torque == motor_torque:
             mismatch = torque + motor_torque / self._ratio
             if mismatch == mismatch:
-                dt = now_s - self._last_s if self._last_s == self._last_s else 0.0
-                self._mean_mismatch += (1.0 - exp(-dt / o.confirm_s)) * (mismatch - self._mean_mismatch)
+                self._mean_mismatch += self._share * (mismatch - self._mean_mismatch)
             off = abs(self._mean_mismatch) > o.torque_mismatch_Nm
             flags |= TORQUE_MISMATCH if self._mismatch.step(off, now_s) else 0
-        if o.shake_Nm is not None and self._shakes.step(self.shaking.step(torque, now_s) > o.shake_Nm, now_s):
+        if self._shakes.step(self.shaking.step(torque) > self._shake_square, now_s):
             flags |= SHAKES
         return flags

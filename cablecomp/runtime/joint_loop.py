@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from cablecomp.config import JointConfig
-from cablecomp.control.command import Command, Reference
+from cablecomp.control.command import FULL, Command, Reference
 from cablecomp.control.compensator import Compensator
 from cablecomp.control.degrade import NORMAL, DegradeState, DegradeTimes, Phase, degrade, feed_of
 from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gate_names
@@ -22,6 +22,9 @@ from cablecomp.signals import Estimate, Sample
 
 References = Callable[[float], Reference]
 """What is wanted of a joint at a time (s since the run was armed)."""
+
+
+_NOT_RUNNING = (DriveState.FAULT, DriveState.DISABLED)
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,11 @@ class JointTally:
     torque_count: int = 0
     residual_square: float = 0.0
     deflection_square: float = 0.0
-    phases: dict[str, int] = field(default_factory=dict)
+    phases: list[int] = field(default_factory=lambda: [0] * len(Phase))
+
+    def phases_by_name(self) -> dict[str, int]:
+        """Cycles spent in each phase that came up."""
+        return {phase.name.lower(): self.phases[phase] for phase in Phase if self.phases[phase]}
 
 
 class JointLoop:
@@ -90,6 +97,7 @@ class JointLoop:
         self._predicted = nan
         self._flags = 0
         self._gate_flags = 0
+        self._period_s = setup.compensator.period_s
         self._offset = setup.config.sensors.joint_position_offset_rad
         self._last_reference = setup.reference(0.0)
 
@@ -164,20 +172,22 @@ class JointLoop:
         target = self._sent.motor_position_rad if since_s is not None else nan
         checked = s.health.check(self.readings, now_s, self._predicted + self._offset, target)
         self.checked = checked
-        period = s.compensator.period_s
+        period = self._period_s
         if since_s is not None:
             self._judge(checked, now_s, period)
         reference = s.reference(period + (0.0 if since_s is None else since_s))
         sample = checked.sample
         begin = perf_counter()
-        command = s.compensator.step(sample, reference, feed_of(self.degraded), joint_ok=checked.joint_ok)
+        feed = FULL if self.degraded is NORMAL else feed_of(self.degraded)
+        command = s.compensator.step(sample, reference, feed, joint_ok=checked.joint_ok)
         self.step_s = perf_counter() - begin
         estimate = s.compensator.estimate
         assert estimate is not None
         self._predicted = estimate.joint_position_rad
         if since_s is not None and not self.stop_reason:
             self._pass(command, checked, now_s, period)
-        self._note(checked.flags, now_s)
+        if checked.flags != self._flags:
+            self._note(checked.flags, now_s)
         self._count(sample, estimate, since_s)
         self.view = View(
             s.name, now_s, self.degraded.phase, sample, estimate, command, reference, checked.flags
@@ -197,7 +207,7 @@ class JointLoop:
             self.stop_reason = self.stop_reason or words
         elif checked.fatal:
             self.stop_reason = self.stop_reason or ", ".join(health_names(checked.flags))
-        elif self.readings.state in (DriveState.FAULT, DriveState.DISABLED):
+        elif self.readings.state in _NOT_RUNNING:
             state = self.readings.state.name.lower()
             self.stop_reason = self.stop_reason or f"drive reports {state} (error {self.readings.error:#x})"
 
@@ -223,8 +233,7 @@ class JointLoop:
 
     def _count(self, sample: Sample, estimate: Estimate, since_s: float | None) -> None:
         tally = self.tally
-        name = self.degraded.phase.name.lower()
-        tally.phases[name] = tally.phases.get(name, 0) + 1
+        tally.phases[self.degraded.phase] += 1
         if since_s is None:
             return
         tally.cycles += 1

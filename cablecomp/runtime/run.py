@@ -176,7 +176,8 @@ def run_joints(
     gains = design_loop(first.config, link.rate_Hz, chosen).gains if given is None else given
     period = 1.0 / link.rate_Hz
     bus: Link = BusLink(link)
-    setups = tuple(_setup(c, mode, bus, control, protocol, gains, period, options) for c in contestants)
+    references = _references(protocol, mode is not ControlMode.POSITION)
+    setups = tuple(_setup(c, mode, bus, control, references, gains, period, options) for c in contestants)
     if options.out is not None:
         _prepare(options.out, setups)
     duration = protocol.duration_s if options.duration_s is None else options.duration_s
@@ -257,7 +258,7 @@ def _setup(
     mode: ControlMode,
     bus: Link,
     control: ControlConfig,
-    protocol: Protocol,
+    references: References,
     gains: Gains,
     period: float,
     options: RunOptions,
@@ -281,14 +282,13 @@ def _setup(
         control.health,
         ratio_of(config),
         times.fresh_s,
+        period,
         needs_torque=sensor,
         needs_joint=both,
         others=_places(bus.joints[c.place], observer.channels),
     )
     limits = GateLimits.of(c.config.limits, age_s=times.motor_stop_s)
-    return JointSetup(
-        c.place, c.name, config, compensator, health, limits, times, _references(protocol, force)
-    )
+    return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
 
 
 def _places(readings: JointReadings, channels: Sequence[str]) -> tuple[int, ...]:
@@ -314,12 +314,17 @@ def observed(config: JointConfig, options: CompensatorOptions) -> JointConfig:
 
 
 def _references(protocol: Protocol, force: bool) -> References:
-    if force:
-        return protocol.reference
+    """The protocol as joints see it; joints that ask for the same instant share the answer."""
+    asked, answer = nan, Reference()
 
     def reference(time_s: float) -> Reference:
-        # In position mode the load is the surroundings' own: the controller is not told.
-        return protocol.reference(time_s)._replace(joint_torque_Nm=nan)
+        nonlocal asked, answer
+        if time_s != asked:
+            found = protocol.reference(time_s)
+            # In position mode the load is the surroundings' own: the controller is not told.
+            answer = found if force else found._replace(joint_torque_Nm=nan)
+            asked = time_s
+        return answer
 
     return reference
 
@@ -383,7 +388,7 @@ def _result(joint: JointLoop, truths: TruthTally) -> JointResult:
         true_torque,
         rms(t.residual_square, t.position_count),
         rms(t.deflection_square, t.cycles),
-        dict(t.phases),
+        t.phases_by_name(),
     )
 
 
