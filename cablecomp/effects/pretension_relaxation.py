@@ -7,32 +7,46 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.mechanics.layout import X_COMMIT, X_FIRST, X_PRETENSION_H, X_PRETENSION_L, X_TIME
+from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
+from cablecomp.mechanics.layout import (
+    X_COMMIT,
+    X_FIRST,
+    X_MOMENT,
+    X_PRETENSION_H,
+    X_PRETENSION_L,
+    X_TIME,
+)
 
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
-@term(parameters=2, state=1)
+@term(parameters=3, state=1)
 def _relax(c: Any, p: Any, s: Any) -> None:
-    """p: fraction, time constant [s]; s: time of the first sample [s]."""
+    """p: fraction, time constant [s], hanging moment R T0 [N m] (closed: 0); s: the first sample's time."""
     start = c[X_TIME] if c[X_FIRST] != 0.0 else s[0]
     factor = max(1.0 - p[0] * math.log1p((c[X_TIME] - start) / p[1]), LEAST)
-    c[X_PRETENSION_H] *= factor
-    c[X_PRETENSION_L] *= factor
+    if p[2] > 0.0:
+        c[X_MOMENT] += p[2] * (1.0 - factor)
+    else:
+        c[X_PRETENSION_H] *= factor
+        c[X_PRETENSION_L] *= factor
     if c[X_COMMIT] != 0.0:
         s[0] = start
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_relax(values["fraction"], values["time_constant_s"]), moves_pretension=True)
+    closed = config.drive.circuit == "closed"
+    hanging = 0.0 if closed else pretension_moment(config)
+    terms = _relax(values["fraction"], values["time_constant_s"], hanging)
+    return Change(terms=terms, moves_pretension=closed)
 
 
 EFFECT = Effect(
     id="pretension_relaxation",
     statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
     "more slowly.",
-    equation="T0(t) = T0 (1 - a ln(1 + t/t_c)), t since the recording's first sample",
+    equation="T0(t) = T0 (1 - a ln(1 + t/t_c)), t since the recording's first sample; in an open circuit "
+    "T = T0(t) + M/R",
     source="logarithmic stress relaxation of steel wire and polymers at constant length: W. N. Findley, J. "
     "S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     parameters=(
@@ -62,4 +76,5 @@ EFFECT = Effect(
     acts_through=("time",),
     bounded=True,
     change=_change,
+    rank=15,
 )

@@ -7,25 +7,33 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, cable_strain, term
-from cablecomp.mechanics.layout import X_PRETENSION_H, X_PRETENSION_L, X_TEMPERATURE
+from cablecomp.effects.base import Change, Effect, Parameter, cable_strain, pretension_moment, term
+from cablecomp.mechanics.layout import X_MOMENT, X_PRETENSION_H, X_PRETENSION_L, X_TEMPERATURE
 
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
-@term(parameters=2)
+@term(parameters=3)
 def _expand(c: Any, p: Any, s: Any) -> None:
-    """p: coefficient [1/K], reference [degC]; without a temperature nothing is changed."""
+    """p: coefficient [1/K], reference [degC], moment R T0 that hangs [N m] (closed circuit: 0).
+
+    Without a temperature nothing is changed.
+    """
     warm = c[X_TEMPERATURE]
     if not math.isnan(warm):
         factor = max(1.0 + p[0] * (warm - p[1]), LEAST)
-        c[X_PRETENSION_H] *= factor
-        c[X_PRETENSION_L] *= factor
+        if p[2] > 0.0:
+            c[X_MOMENT] += p[2] * (1.0 - factor)
+        else:
+            c[X_PRETENSION_H] *= factor
+            c[X_PRETENSION_L] *= factor
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    terms = _expand(values["coefficient_per_K"], values["reference_degC"])
-    return Change(terms=terms, moves_pretension=True)
+    closed = config.drive.circuit == "closed"
+    hanging = 0.0 if closed else pretension_moment(config)
+    terms = _expand(values["coefficient_per_K"], values["reference_degC"], hanging)
+    return Change(terms=terms, moves_pretension=closed)
 
 
 def _per_strain(config: JointConfig) -> float:
@@ -37,7 +45,8 @@ EFFECT = Effect(
     id="thermal_pretension",
     statement="Cable and frame expand differently with temperature, and the pretension rises or falls with "
     "it.",
-    equation="T0(ϑ) = T0 (1 + k (ϑ - ϑ_ref)), with k = (α_frame - α_cable) EA/T0 for a stiff frame",
+    equation="T0(ϑ) = T0 (1 + k (ϑ - ϑ_ref)), with k = (α_frame - α_cable) EA/T0 for a stiff frame; in an "
+    "open circuit T = T0(ϑ) + M/R",
     source="thermal strain of a member held at constant length: S. Timoshenko, Strength of Materials, part "
     "I, 1930",
     parameters=(
@@ -59,4 +68,5 @@ EFFECT = Effect(
     acts_through=("temperature", "time"),
     bounded=True,
     change=_change,
+    rank=15,
 )
