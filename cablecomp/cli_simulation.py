@@ -49,9 +49,9 @@ def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
 class _Joints(HostedJoints):
     """Simulated joints whose own end (a drum run empty, no equilibrium) is a device's error to the run."""
 
-    def advance(self) -> None:
+    def advance(self, periods: int = 1) -> None:
         try:
-            super().advance()
+            super().advance(periods)
         except (SimError, PlantError) as error:
             raise DeviceError(f"simulated joint: {error}") from None
 

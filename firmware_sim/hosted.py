@@ -100,12 +100,13 @@ class HostedJoints:
         """Put a wall at a joint angle, or take it away (None)."""
         self.plants[number].plant.set_wall(position_rad)
 
-    def advance(self) -> None:
-        """Stepped time, one sample period a call: each joint steps for its command; one that heard none
-        (lost on the way, or none was sent) goes on all the same.
+    def advance(self, periods: int = 1) -> None:
+        """Stepped time: each joint steps one sample period for its command; one that heard none (lost
+        on the way, or none was sent) goes on all the same. `periods` more than 1: the host left out
+        ticks, time went on.
         """
         self.bench.pump()
-        self._periods += 1
+        self._periods += periods
         for joint in self.bench.joints:
             due = self._periods * joint.timing.sample_s
             if joint.time_s < due - 0.5 * joint.timing.sample_s:

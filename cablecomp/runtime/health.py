@@ -147,8 +147,9 @@ class Health:
         flags |= self._encoders(now_s, predicted_rad, target_rad)
         flags |= self._torques(values[MOTOR_TORQUE], now_s)
         joint_bad = bool(flags & (JOINT_RESIDUAL | JOINT_STUCK))
-        load_age = self._shakes.age_s
+        load_age = 0.0
         if self._needs_torque:
+            load_age = self._shakes.age_s
             if torque_age > load_age:
                 load_age = torque_age
             if self._mismatch.age_s > load_age:

@@ -72,7 +72,7 @@ def _memory(policy: Policy, granted: Granted) -> _Undo:
         granted.lines.append("memory not locked, as asked")
         return _Undo()
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
-    if limit != resource.RLIM_INFINITY:
+    if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         # Locking under a finite limit would make some later allocation fail in the middle of the run.
         granted.lines.append(
             f"memory not locked: RLIMIT_MEMLOCK is {limit // 1024} KiB; give memlock unlimited in limits.conf"

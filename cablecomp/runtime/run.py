@@ -188,13 +188,11 @@ def run_joints(
 
     def after(tick: Tick, stage: Stage) -> None:
         if simulation is not None:
-            _simulate(loop, simulation, protocol, mode, stage, truths, options.stepped)
+            _simulate(loop, tick, simulation, protocol, mode, stage, truths)
         if watch is not None:
             watch(loop, tick)
 
     loop = Loop(bus, setups, clock, period, timing, options.out, after)
-    if simulation is not None and not options.stepped:
-        simulation.start(period)
     report = loop.run()
     found = RunReport(
         tuple(_result(joint, truths) for joint in loop.joints),
@@ -338,24 +336,26 @@ def _drive_mode(link: LinkConfig, place: int) -> Mode:
 
 def _simulate(
     loop: Loop,
+    tick: Tick,
     simulation: Simulation,
     protocol: Protocol,
     mode: ControlMode,
     stage: Stage,
     truths: TruthTally,
-    stepped: bool,
 ) -> None:
+    """One period of the simulation after each cycle's commands, in step with the loop whether that is
+    paced or not.
+    """
     since = loop.since_s
     load = protocol.reference(since).joint_torque_Nm if stage is Stage.RUNNING else protocol.start_load_Nm
     for joint in loop.joints:
         if mode is ControlMode.POSITION:
             simulation.set_load(joint.setup.place + 1, load)
-    if stepped:
-        simulation.advance()
+    simulation.advance(1 + tick.skipped)
     if stage is not Stage.RUNNING:
         return
-    # in stepped time the truth is one period on, where the reference of the next instant applies
-    wanted = protocol.reference(since + (loop.period_s if stepped else 0.0))
+    # the truth is one period on, where the reference of the next instant applies
+    wanted = protocol.reference(since + loop.period_s)
     for joint in loop.joints:
         truth = simulation.truth(joint.setup.place + 1)
         torque = truth.joint_torque_Nm - wanted.joint_torque_Nm

@@ -32,14 +32,11 @@ class Simulation(Protocol):
     def set_wall(self, number: int, position_rad: float | None) -> None:
         """Put a wall at a joint angle, met from below, or take it away."""
 
-    def advance(self) -> None:
-        """Stepped time: take one period for the commands that were sent."""
+    def advance(self, periods: int = 1) -> None:
+        """Take that many periods, the first one for the commands that were sent."""
 
     def truth(self, number: int) -> TruthLike:
         """What a joint really does, at the end of its last step."""
-
-    def start(self, period_s: float) -> None:
-        """Real time, by itself."""
 
     def close(self) -> None:
         """End it."""

@@ -101,16 +101,13 @@ class SpringySimulation:
     def set_wall(self, number: int, position_rad: float | None) -> None:
         """There is none."""
 
-    def advance(self) -> None:
+    def advance(self, periods: int = 1) -> None:
         """One period for the commands sent."""
         self.bench.pump()
 
     def truth(self, number: int) -> Truth:
         """Not looked at."""
         return Truth(nan, nan, nan, nan)
-
-    def start(self, period_s: float) -> None:
-        """Stepped only."""
 
     def close(self) -> None:
         """Close the bus."""

@@ -117,6 +117,7 @@ def test_what_is_not_permitted_is_said_and_survived(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (65536, 65536))
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
     with armed(Policy()) as granted:
         pass
     assert any("not permitted" in line for line in granted.lines)

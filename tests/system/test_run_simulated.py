@@ -157,7 +157,6 @@ def test_impedance_yields_by_its_stiffness() -> None:
         load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
     )
     simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
-    simulation.set_load(1, 0.4)
     quiet = parse_protocol(
         {"schema": 1, "name": "rest", "segment": [{"kind": "hold", "duration_s": 3.0}]}, "test"
     )
@@ -165,6 +164,7 @@ def test_impedance_yields_by_its_stiffness() -> None:
 
     def watch(loop: Loop, tick: Tick) -> None:
         if loop.stage is Stage.RUNNING:
+            simulation.set_load(1, 0.4 * min(loop.since_s / 0.5, 1.0))
             angles.append(simulation.truth(1).joint_position_rad)
 
     try:
@@ -192,3 +192,89 @@ def test_the_command_line_runs_and_writes_a_page(tmp_path: Path, capsys: pytest.
     page = (tmp_path / "report.html").read_text()
     assert "https://" not in page.split("<script>")[0]
     assert "prediction residual" in page
+
+
+def test_a_force_run_replays_bit_for_bit_as_well(tmp_path: Path) -> None:
+    """The load comes from both encoders there; `joint.toml` beside the recording says so."""
+    simulated_run(tmp_path / "run", 1.0, ControlMode.FORCE)
+    config = load_joint(tmp_path / "run" / "joint.toml")
+    assert config.observer.load == "both_encoders"
+    write_replay(
+        open_recording(tmp_path / "run" / "recording.csv"), config, Observer(config), tmp_path / "replay"
+    )
+    live, again = (
+        pl.read_csv(tmp_path / name / "prediction.csv", infer_schema_length=None)
+        for name in ("run", "replay")
+    )
+    for name in ("deflection_rad", "joint_position_rad", "tension_h_N", "tension_l_N"):
+        assert live[name].equals(again[name]), name
+
+
+def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
+    protocol = tmp_path / "p.toml"
+    protocol.write_text(REACH.to_toml(), encoding="utf-8")
+    arguments = [
+        "run",
+        "--config",
+        str(JOINT),
+        "--control",
+        str(CONTROL),
+        "--sim",
+        "--fast",
+        "--duration",
+        "0.3",
+    ]
+    assert cli.main([*arguments, "--protocol", str(protocol), "--out", str(tmp_path / "out")]) == 0
+    cycles = pl.read_csv(tmp_path / "out" / "cycles.csv", infer_schema_length=None).filter(
+        pl.col("controlled") > 0
+    )
+    asked = cycles["reference_position_rad"].to_numpy()[-1]
+    assert asked == pytest.approx(REACH.reference(0.3).joint_position_rad, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "--sim"], "--config"),
+        (["run", "--config", "nowhere.toml", "--sim"], "nowhere.toml"),
+        (["run", "--config", str(JOINT)], "--link is missing"),
+        (["run", "--config", str(JOINT), "--sim", "--mode", "sideways"], "sideways"),
+        (["run", "--config", str(JOINT), "--sim", "--protocol", str(JOINT)], "segment"),
+        (["run", "--config", str(JOINT), "--link", str(JOINT)], "bus"),
+        (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
+        (["run", "--config", str(JOINT), "--sim", "--fast", "--fault", "gremlins"], "gremlins"),
+        (
+            ["run", "--config", str(JOINT), "--link", str(CONFIGS / "links/mit-serial.toml"), "--sim"],
+            "serial",
+        ),
+        (["run", "--config", str(JOINT), "--link", str(LINK), "--fast"], "--sim"),
+        (["design", "--config", str(JOINT), "--rate", "-5"], "-5"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_bus_that_is_not_there_is_exit_code_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (
+        LINK.read_text()
+        .replace('interface = "virtual"', 'interface = "socketcan"')
+        .replace('"wrist"', '"nocan9"', 1)
+    )
+    link = tmp_path / "link.toml"
+    link.write_text(text.replace("cablecomp_joint.dbc", str(CONFIGS / "links/cablecomp_joint.dbc")))
+    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--link", str(link)]
+    assert cli.main([*arguments, "--out", str(tmp_path / "o")]) == 3
+    assert "nocan9" in capsys.readouterr().err
