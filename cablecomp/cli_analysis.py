@@ -170,4 +170,3 @@ def _show(found: Diagnosis) -> None:
     if result["next_experiment"]:
         table.add_row("next experiment", result["next_experiment"]["why"])
     console.print(table)
-

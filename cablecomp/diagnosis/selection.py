@@ -20,7 +20,8 @@ LEAST_SHARE = 0.1  # of the best linear drop that a hypothesis must promise to b
 CAREFUL = 3  # hypotheses that are then fitted with their shapes free
 CLOSE = 0.5  # of the best one's gain, below which a hypothesis is not fitted carefully
 LEVEL = 0.01  # of a false support, all hypotheses together
-LEAST = 0.08  # of the floor's mean square that an effect must remove as well: instants are searched over all rows
+# of the floor's mean square that an effect must remove as well: instants are searched over all rows
+LEAST = 0.08
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
 POLISHES = 4  # careful fits of one hypothesis in a row, while they gain
@@ -97,7 +98,12 @@ def select(
             verdict = _judged(current_fold, folds, both, rng)
         present = _energy(current_fold, problem, layout)
         best = next(
-            (s for s in verdict.scores if s.supported and s.name in models and s.heldout_gain * present > LEAST), None
+            (
+                s
+                for s in verdict.scores
+                if s.supported and s.name in models and s.heldout_gain * present > LEAST
+            ),
+            None,
         )
         rivals = () if best is None else _rivals(best, verdict, folds, models, problem, both, rng)
         rounds.append(Round(current.name, verdict, asked, folds, best, rivals))
@@ -248,7 +254,9 @@ def free_shapes(model: Model) -> tuple[tuple[Form, ...], FloatArray]:
 def _without(
     problem: Problem, model: Model, fold: Fold, layout: Layout, rng: np.random.Generator
 ) -> tuple[Model, Fold]:
-    """Drop an earlier effect where held-out data do not miss it, or where the rest explains them down to noise."""
+    """Drop an earlier effect where held-out data do not miss it, or where the rest explains them down to
+    noise.
+    """
     both = all_rows(layout)
     for k in range(len(model.forms) - 1):
         forms = tuple(f for j, f in enumerate(model.forms) if j != k)

@@ -16,8 +16,8 @@ from cablecomp.recording.writer import write_canonical
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 STAGE = {
-    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0, "pretension_N": 60.0,
-    "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
+    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0,
+    "pretension_N": 60.0, "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
 }  # fmt: skip
 TRUE = {**STAGE, "EA_N": 20500.0, "pretension_N": 57.5, "mu_output": 0.135, "mu_input": 0.125}
 NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 3e-3, "motor_position_rad": 2e-5}
@@ -46,7 +46,9 @@ def joint_file(folder: Path) -> Path:
 
 
 def recordings(folder: Path, effects: list[EffectSpec], seed: int) -> list[Path]:
-    """Two recordings of 30 s at 100 Hz: both pulleys turning, load of two frequencies, noise on all channels."""
+    """Two recordings of 30 s at 100 Hz: both pulleys turning, load of two frequencies, noise on all
+    channels.
+    """
     rng = np.random.default_rng(seed)
     paths = []
     for number in range(2):
