@@ -60,15 +60,6 @@ class Parameter:
         return self.low * unit, self.high * unit
 
 
-def zero_load_compliance(config: JointConfig) -> float:
-    """Compliance of the free spans alone [rad/(N m)]: L/(EA R^2) over stages, halved in a closed circuit."""
-    total, ratio = 0.0, 1.0
-    for stage in reversed(config.drive.stage):
-        total += ratio**2 * stage.free_length_m / (stage.EA_N * stage.output_radius_m**2)
-        ratio *= stage.input_radius_m / stage.output_radius_m
-    return total / 2.0 if config.drive.circuit == "closed" else total
-
-
 def pretension_moment(config: JointConfig) -> float:
     """R T0 of the output stage [N m]: the natural unit of load."""
     return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
