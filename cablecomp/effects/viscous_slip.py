@@ -26,7 +26,14 @@ EFFECT = Effect(
     source="Snow 1993, sections 3.3 and 4.3 (observed, unexplained)",
     parameters=(
         Parameter(
-            "coefficient_Ns_per_m_rad", "N s/(m rad)", 0.0, 1e-5, 1e3, "viscous coefficient", log=True, scale=_unit
+            "coefficient_Ns_per_m_rad",
+            "N s/(m rad)",
+            0.0,
+            1e-5,
+            1e3,
+            "viscous coefficient",
+            log=True,
+            scale=_unit,
         ),
     ),
     acts_through=("dwell", "load_rate", "load_direction", "velocity"),

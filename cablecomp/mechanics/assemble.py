@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +50,7 @@ class Model:
     I: Ints
     S: Floats
     J: Ints
-    L: NDArray[np.float64] | None
+    L: Any  # law tables, or None for the plain drive: the compiler tells the two apart
 
 
 def stage_ratios(stages: Sequence[Stage]) -> list[float]:
@@ -85,7 +86,11 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
                 cables.append(_cable(stage, n_i, last, sign, config, extra))
         structure += [first_h, len(group), closed, first_h + len(group) * closed]
     wet = o.CONTEXT + o.MEET * 2 * n_cables
-    sizes = {"cable": o.CABLE_STATE * n_cables, "context": wet, "terms": sum(t.state_size for t in extra.terms)}
+    sizes = {
+        "cable": o.CABLE_STATE * n_cables,
+        "context": wet,
+        "terms": sum(t.state_size for t in extra.terms),
+    }
     s_cable = 0
     s_context = sizes["cable"]
     s_term = s_context + sizes["context"]
@@ -110,11 +115,17 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
     return Model(P, I, S, np.zeros(n_stacks, dtype=np.int64), extra.law)
 
 
-def _cable(stage: Stage, n_i: float, last: Stage, sign: float, config: JointConfig, extra: Extension) -> list[float]:
+def _cable(
+    stage: Stage, n_i: float, last: Stage, sign: float, config: JointConfig, extra: Extension
+) -> list[float]:
     """Parameters of one cable, in the order of the layout."""
     row = [0.0] * o.CABLE
     row[o.R_OUT], row[o.R_IN] = stage.output_radius_m, stage.input_radius_m
-    row[o.LENGTH], row[o.EA], row[o.T0] = stage.free_length_m + extra.extra_length_m, stage.EA_N, stage.pretension_N
+    row[o.LENGTH], row[o.EA], row[o.T0] = (
+        stage.free_length_m + extra.extra_length_m,
+        stage.EA_N,
+        stage.pretension_N,
+    )
     row[o.MU_OUT], row[o.MU_IN] = stage.mu_output, stage.mu_input
     row[o.W_OUT], row[o.W_IN] = stage.wrap_output_rad, stage.wrap_input_rad
     row[o.SCALE] = n_i * last.output_radius_m / stage.output_radius_m

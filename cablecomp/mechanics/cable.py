@@ -31,7 +31,17 @@ def law_of(P: Floats, p: int, end: int) -> int:
 
 @leaf_njit
 def drum_eval(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, end: int, tau: float, v: float, w: float
+    P: Floats,
+    I: Ints,
+    S: Floats,
+    J: Ints,
+    L: Floats,
+    G: Floats,
+    c: int,
+    end: int,
+    tau: float,
+    v: float,
+    w: float,
 ) -> tuple[float, float, float]:
     """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending."""
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
@@ -42,9 +52,7 @@ def drum_eval(
     if L is not None:
         if P[p + o.VISCOUS] > 0.0:
             return viscous_eval(P, I, S, c, end, w, tau, mu)
-    total, slope, k, ym, vm, cm, bm, tm = wrap_eval(
-        G, L, law_of(P, p, end), wrap, J[wrap], w, v, tau, mu
-    )
+    total, slope, k, ym, vm, cm, bm, tm = wrap_eval(G, L, law_of(P, p, end), wrap, J[wrap], w, v, tau, mu)
     S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = total, k, ym, vm
     S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
     # where the cone cuts, turning by dw lowers the slipped part by mu dw
@@ -54,7 +62,16 @@ def drum_eval(
 
 @leaf_njit
 def cable_eval(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, tension: float, x_in: float, x_out: float
+    P: Floats,
+    I: Ints,
+    S: Floats,
+    J: Ints,
+    L: Floats,
+    G: Floats,
+    c: int,
+    tension: float,
+    x_in: float,
+    x_out: float,
 ) -> tuple[float, float, float]:
     """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and its derivatives
     by the tension [m/N] and by the output shaft's angle [m/rad].
@@ -139,4 +156,3 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
         J[wrap] = wrap_commit(G, L, law_of(P, p, end), wrap, J[wrap], meet, w, v, tau, P[p + o.MERGE])
         error += P[p + (o.R_OUT if end == 0 else o.R_IN)] * G[wrap, B, J[wrap] - 1]
     S[q + o.Q_ERROR] = error * P[p + o.T0] / P[p + o.EA]
-

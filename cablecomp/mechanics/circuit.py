@@ -15,7 +15,17 @@ from cablecomp.mechanics.profile import Floats, Ints
 
 @leaf_njit
 def chain_eval(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
+    P: Floats,
+    I: Ints,
+    S: Floats,
+    J: Ints,
+    L: Floats,
+    G: Floats,
+    first: int,
+    count: int,
+    tension: float,
+    x_in: float,
+    x_out: float,
 ) -> tuple[float, float, float]:
     """Rotation [rad] of the chain's output shaft out of its stretch, and its derivatives by the output cable's tension and by
     that shaft's angle.
@@ -44,7 +54,16 @@ def chain_eval(
 
 @njit
 def circuit_solve(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, ic: int, moment: float, x_in: float, x_guess: float
+    P: Floats,
+    I: Ints,
+    S: Floats,
+    J: Ints,
+    L: Floats,
+    G: Floats,
+    ic: int,
+    moment: float,
+    x_in: float,
+    x_guess: float,
 ) -> tuple[float, float, int]:
     """Output angle [rad] of circuit `ic` under `moment` [N m] at input angle x_in, its compliance [rad/(N m)], and a status."""
     h = o.HEADER + o.CIRCUIT * ic

@@ -30,7 +30,7 @@ class Tensions(NamedTuple):
     """Dimensionless tensions of the two cables; h tightens under M > 0."""
 
     h: Array
-    l: Array  # noqa: E741 (the thesis's name)
+    l: Array
 
 
 def unending_stage(GF: float) -> EquivalentStage:

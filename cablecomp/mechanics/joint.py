@@ -129,7 +129,9 @@ def advance(
     """Write one sample's readings into the context."""
     x = I[o.S_CONTEXT]
     # first guess of the angle: along the last compliance
-    S[x + o.X_JOINT] += S[x + o.X_COMPLIANCE] * (load - S[x + o.X_LOAD]) + S[x + o.X_RIGID] * (motor - S[x + o.X_MOTOR])
+    S[x + o.X_JOINT] += S[x + o.X_COMPLIANCE] * (load - S[x + o.X_LOAD]) + S[x + o.X_RIGID] * (
+        motor - S[x + o.X_MOTOR]
+    )
     S[x + o.X_DT] = time - S[x + o.X_TIME]
     S[x + o.X_TIME] = time
     S[x + o.X_MOTOR] = motor

@@ -7,7 +7,20 @@
 from __future__ import annotations
 
 # --- structure I: header, then circuits, then terms
-N_CIRCUITS, N_CABLES, CAPACITY, N_TERMS, N_STACKS, S_PROFILE, S_CABLE, S_CONTEXT, S_TERM, S_WET, NODES, HEADER = range(12)
+(
+    N_CIRCUITS,
+    N_CABLES,
+    CAPACITY,
+    N_TERMS,
+    N_STACKS,
+    S_PROFILE,
+    S_CABLE,
+    S_CONTEXT,
+    S_TERM,
+    S_WET,
+    NODES,
+    HEADER,
+) = range(12)
 #   one circuit: first cable of chain h, cables in a chain, 1 if closed, first cable of chain l
 C_FIRST_H, C_COUNT, C_CLOSED, C_FIRST_L, CIRCUIT = range(5)
 #   one term: address of its compiled function, offset of its parameters in P, offset of its state in S

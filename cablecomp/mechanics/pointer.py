@@ -14,7 +14,7 @@ TERM_SIGNATURE = types.void(
 )
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]  # numba is not typed
 def _call(typing: Any, address: Any, data: Any, parameters: Any, state: Any) -> Any:
     signature = types.void(types.int64, types.int64, types.int64, types.int64)
 

@@ -83,7 +83,9 @@ def _piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float
 
 
 @leaf_njit
-def wrap_eval(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, tau: float, mu: float) -> Meet:
+def wrap_eval(
+    G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, tau: float, mu: float
+) -> Meet:
     """What wrap i would hold at wrap angle w and end value v, without committing it.
 
     Returns (integral of e, its derivative by v, last point kept, and the point where the cone meets the old profile:
@@ -220,7 +222,12 @@ def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
             else:
                 G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = y1, v1, G[i, D, k], made[k]
                 m += 1
-        G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1], made[n - 1]
+        G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = (
+            G[i, Y, n - 1],
+            G[i, V, n - 1],
+            G[i, D, n - 1],
+            made[n - 1],
+        )
         n = m + 1
         limit *= 4.0
     accumulate(G, L, law, i, n)

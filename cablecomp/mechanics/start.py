@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import law_of, stacks
 from cablecomp.mechanics.arc import arc_fill
+from cablecomp.mechanics.cable import law_of, stacks
 from cablecomp.mechanics.jit import njit
 from cablecomp.mechanics.profile import Floats, Ints, wrap_fill
 from cablecomp.mechanics.tables import v_of_tau
@@ -16,7 +16,9 @@ VISCOUS_TRAVEL = 4.0  # rotation [rad] beyond position zero that the viscous gri
 
 
 @njit
-def joint_start(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, motor: float, slope: float) -> None:
+def joint_start(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, motor: float, slope: float
+) -> None:
     """Fill all wraps at the drive's position: u = 0 at every departure point, rising inward by `slope` * mu per radian.
 
     slope 0 = uniform T0; +1 and -1 = the highest and the lowest profile that friction admits at that end tension.
@@ -41,7 +43,11 @@ def joint_start(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, 
                 q = I[o.S_CABLE] + o.CABLE_STATE * c
                 after = shaft * P[p + o.RATIO]
                 for end in range(2):
-                    w = P[p + o.W_OUT] + P[p + o.SIGN] * after if end == 0 else P[p + o.W_IN] - P[p + o.SIGN] * shaft
+                    w = (
+                        P[p + o.W_OUT] + P[p + o.SIGN] * after
+                        if end == 0
+                        else P[p + o.W_IN] - P[p + o.SIGN] * shaft
+                    )
                     mu = P[p + o.MU_OUT] if end == 0 else P[p + o.MU_IN]
                     law = law_of(P, p, end)
                     v = v_of_tau(L, law, 1.0)

@@ -2,8 +2,9 @@
 
 `L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count].
 Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `L` is None for the plain drive without any
-extension: the compiler then leaves out all code that a plain drive does not need. In mode 1 row 1 holds u = ln tau on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) = int m_g dy on an even
-grid of y, and row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
+extension: the compiler then leaves out all code that a plain drive does not need. In mode 1 row 1 holds u = ln tau
+on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) =
+int m_g dy on an even grid of y, row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
 """
 
@@ -155,9 +156,10 @@ def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
 @njit
 def _slope_table(L: Floats, law: int, tau: float, v: float) -> float:
     step = L[law, 0, 2]
-    du = (look_up(L, law, 1, L[law, 0, 1], step, v + 0.01 * step) - look_up(L, law, 1, L[law, 0, 1], step, v - 0.01 * step)) / (
-        0.02 * step
-    )
+    du = (
+        look_up(L, law, 1, L[law, 0, 1], step, v + 0.01 * step)
+        - look_up(L, law, 1, L[law, 0, 1], step, v - 0.01 * step)
+    ) / (0.02 * step)
     return 1.0 / (tau * du)
 
 

@@ -67,7 +67,9 @@ def viscous_eval(
             y = j * h
             w_old, t_old = S[b + W_ANGLE], S[b + W_END]
             if y <= w_old:
-                S[old + j] = S[old + before - 1] + (y - y_last) / (w_old - y_last) * (t_old - S[old + before - 1])
+                S[old + j] = S[old + before - 1] + (y - y_last) / (w_old - y_last) * (
+                    t_old - S[old + before - 1]
+                )
             else:
                 S[old + j] = t_old + (y - w_old) / (w - w_old) * (tau - t_old)
         if not again:

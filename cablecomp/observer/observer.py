@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +99,9 @@ class Observer:
             self._check(status, time_s)
         return float(self._out[st.OUT_JOINT]) - self._ratio * motor_position_rad
 
-    def run(self, columns: Mapping[str, NDArray[np.float64]], bounds: bool = False) -> dict[str, NDArray[np.float64]]:
+    def run(
+        self, columns: Mapping[str, NDArray[np.float64]], bounds: bool = False
+    ) -> dict[str, NDArray[np.float64]]:
         """Step through a block of samples given as canonical channels; returns the estimates as columns.
 
         Raises InputError naming the sample (counted from 0 within the block) that cannot be taken; those before it are committed.
@@ -192,8 +194,16 @@ class Observer:
         twin.step(still)
         twin.peek(still)
         twin.inverse(still)
-        columns = {"time_s": np.array([1.0]), "motor_position_rad": np.zeros(1), "joint_torque_Nm": np.zeros(1)}
-        columns |= {"joint_position_rad": np.zeros(1), "temperature_degC": np.zeros(1), "motor_torque_Nm": np.zeros(1)}
+        columns = {
+            "time_s": np.array([1.0]),
+            "motor_position_rad": np.zeros(1),
+            "joint_torque_Nm": np.zeros(1),
+        }
+        columns |= {
+            "joint_position_rad": np.zeros(1),
+            "temperature_degC": np.zeros(1),
+            "motor_torque_Nm": np.zeros(1),
+        }
         twin.run(columns | {name: np.zeros(1) for name in self.channels})
 
     def stiffness(self) -> float:
@@ -227,13 +237,15 @@ class Observer:
             n = int(self._J[wrap])
             t0 = P[p + o.T0] * self._S[q + o.Q_T0] * self._S[q + o.Q_EA]
             tau = np.array([tau_of_v(self.model.L, 2, v) for v in G[wrap, V, :n]])
-            result.append(WrapProfile(_wrap_name(self.config, wrap, P[p + o.SIGN]), G[wrap, Y, :n].copy(), t0 * tau))
+            result.append(
+                WrapProfile(_wrap_name(self.config, wrap, P[p + o.SIGN]), G[wrap, Y, :n].copy(), t0 * tau)
+            )
         return result
 
     # --- inside ---------------------------------------------------------------------------------------------------
 
-    def _kernel(self) -> tuple[Floats, ...]:
-        return self._arrays  # type: ignore[return-value]
+    def _kernel(self) -> tuple[Any, Any, Any, Any, Any, Any]:
+        return self._arrays
 
     def _bound_pair(self) -> BoundPair:
         options = self.config.observer
@@ -259,7 +271,11 @@ class Observer:
                 f"sample at {sample.time_s:g} s comes after one at {self._last_time:g} s; time must not run backwards"
             )
         row = self._row
-        row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_JOINT] = sample.time_s, sample.motor_position_rad, sample.joint_position_rad
+        row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_JOINT] = (
+            sample.time_s,
+            sample.motor_position_rad,
+            sample.joint_position_rad,
+        )
         row[st.IN_LOAD] = sample.joint_torque_Nm
         if self._source == "motor_torque":
             row[st.IN_LOAD] = -sample.motor_torque_Nm / self._ratio

@@ -18,9 +18,16 @@ VERSION = 1
 State = tuple[Floats, Ints]
 
 
-def pack(config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats], last_time: float) -> bytes:
+def pack(
+    config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats], last_time: float
+) -> bytes:
     """Serialise the states (scalars whole, profiles as far as they are used) and further numbers."""
-    parts = [MAGIC, struct.pack("<HH", VERSION, len(states)), _joint_key(config), struct.pack("<d", last_time)]
+    parts = [
+        MAGIC,
+        struct.pack("<HH", VERSION, len(states)),
+        _joint_key(config),
+        struct.pack("<d", last_time),
+    ]
     parts += [row.tobytes() for row in numbers]
     for S, J in states:
         parts += [J.astype("<i8").tobytes(), S[: I[o.S_PROFILE]].tobytes()]
@@ -29,20 +36,30 @@ def pack(config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequenc
     return body + hashlib.sha256(body).digest()
 
 
-def unpack(data: bytes, config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats]) -> float:
+def unpack(
+    data: bytes, config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats]
+) -> float:
     """Fill the states from a snapshot and return the time of its last sample; nothing is touched unless all of it is sound."""
     body, digest = data[:-32], data[-32:]
     if len(data) < 60 or not body.startswith(MAGIC):
-        raise InputError("snapshot: is none of ours (wrong first bytes); give a file written by Observer.save")
+        raise InputError(
+            "snapshot: is none of ours (wrong first bytes); give a file written by Observer.save"
+        )
     if hashlib.sha256(body).digest() != digest:
-        raise InputError("snapshot: its checksum does not fit, the file is damaged; start from a known state instead")
+        raise InputError(
+            "snapshot: its checksum does not fit, the file is damaged; start from a known state instead"
+        )
     version, count = struct.unpack_from("<HH", body, 8)
     if version != VERSION:
         raise InputError(f"snapshot: has version {version}; this program reads version {VERSION}")
     if body[12:28] != _joint_key(config):
-        raise InputError(f"snapshot: belongs to another joint configuration than `{config.name}`; use its own")
+        raise InputError(
+            f"snapshot: belongs to another joint configuration than `{config.name}`; use its own"
+        )
     if count != len(states):
-        raise InputError(f"snapshot: holds {count} histories, this observer {len(states)}; open it with the same `bounds`")
+        raise InputError(
+            f"snapshot: holds {count} histories, this observer {len(states)}; open it with the same `bounds`"
+        )
     (last_time,) = struct.unpack_from("<d", body, 28)
     place = 36
     for row in numbers:

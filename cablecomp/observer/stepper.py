@@ -60,9 +60,7 @@ def predict(
 
 
 @njit
-def step_one(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats
-) -> int:
+def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats) -> int:
     """One sample, committed."""
     G = stacks(I, S)
     status = predict(P, I, S, J, L, G, F, row, out)
