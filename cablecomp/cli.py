@@ -156,7 +156,7 @@ def demo(
         raise InputError(f"{DEMO_JOINT}: is missing; run the demonstration from a clone of the project")
     joint, wanted = load_joint(DEMO_JOINT), load_control(DEMO_CONTROL)
     bus, wanted = matched(load_link(DEMO_LINK), wanted, own_link=False)
-    _compare(DEMO_JOINT, joint, bus, wanted, out, seed, 20.0)
+    _compare(DEMO_JOINT, joint, bus, wanted, out, seed, 14.0)
 
 
 def _compare(
@@ -176,7 +176,7 @@ def _compare(
             wanted,
             lambda wish: _simulation(path, wish),
             _calibrated,
-            CompareOptions(out, seed, duration_s, min(15.0, duration_s)),
+            CompareOptions(out, seed, duration_s, min(10.0, duration_s)),
             time.perf_counter,
             view.say,
             view.watch,
