@@ -91,8 +91,21 @@ def design_page(design: LoopDesign) -> str:
 
 
 def _sections(design: LoopDesign) -> Iterator[Section]:
-    cards = [Fact(name, value) for name, value in design_rows(design)]
-    yield Section("Result", page.facts(cards) + page.bullets(design.warnings))
+    worst = min((loop.worst for loop in design.loops), key=lambda m: m.modulus_margin)
+    stable = all(loop.worst.stable for loop in design.loops)
+    cards = [
+        Fact(
+            "loops stable",
+            "all" if stable else "not all",
+            "over the whole range",
+            "good" if stable else "bad",
+        ),
+        Fact("nearest to −1", shown(worst.modulus_margin), f"at {worst.stiffness_Nm_per_rad:.4g} N·m/rad"),
+        Fact("loss factor", shown(design.limit_cycle.margin), "of the link's swing, least"),
+        Fact("load filter", f"{design.gains.load_filter_Hz:g} Hz"),
+    ]
+    body = page.facts(cards) + page.table(("quantity", "value"), design_rows(design))
+    yield Section("Result", body + page.bullets(design.warnings))
     yield Section("Stiffness", page.columns(page.figure(_loop(design)), page.figure(_stiffness(design))))
     yield Section(
         "Feed-forward on the measured load",

@@ -1,0 +1,40 @@
+"""Pages of runs and designs open offline and hold what was measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cablecomp.config import load_joint
+from cablecomp.config_text import joint_text
+from cablecomp.control.design import design_loop
+from cablecomp.control.options import load_control
+from cablecomp.report.design_page import design_page, design_rows, design_tables
+from cablecomp.report.info import as_text
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+def test_the_design_page_shows_every_loop_and_number() -> None:
+    joint = load_joint(CONFIGS / "joints/wrist-capstan.toml")
+    found = design_loop(joint, 1000.0, load_control(CONFIGS / "control/wrist-capstan.toml"))
+    html = design_page(found)
+    head = html.split("<script>")[0]
+    assert "http" not in head
+    for loop in found.loops:
+        assert loop.name in html
+    for name, value in design_rows(found):
+        assert name.replace("'", "&#x27;") in html
+        assert value.split(" ")[0] in html
+    text = as_text(design_tables(found), 140)
+    assert "load feed-forward" in text
+    assert "none predicted" in text
+
+
+@pytest.mark.parametrize("path", sorted((CONFIGS / "joints").glob("*.toml")), ids=lambda p: p.stem)
+def test_a_joint_written_back_reads_as_the_same_joint(path: Path, tmp_path: Path) -> None:
+    config = load_joint(path)
+    again = tmp_path / "again.toml"
+    again.write_text(joint_text(config, ("a remark",)), encoding="utf-8")
+    assert load_joint(again) == config
