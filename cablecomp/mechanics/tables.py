@@ -16,6 +16,7 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from cablecomp.mechanics.jit import leaf_njit, njit
 
@@ -44,7 +45,7 @@ def law_table(
     v = _integral(u, 1.0 / tension_factor(np.exp(u)))
     v -= np.interp(0.0, u, v)
     v_grid = np.linspace(v[0], v[-1], SIZE)
-    table[1] = np.interp(v_grid, v, u)
+    table[1] = CubicHermiteSpline(v, u, tension_factor(np.exp(u)))(v_grid)
     table[3] = v
     y = np.linspace(0.0, wrap_max_rad, SIZE)
     table[2] = _integral(y, groove_factor(y))
