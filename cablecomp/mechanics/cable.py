@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.guide import guide_commit, guide_split
-from cablecomp.mechanics.jit import leaf_njit, njit
+from cablecomp.mechanics.jit import inlined, leaf_njit, njit
 from cablecomp.mechanics.profile import ROWS, B, Floats, Ints, wrap_commit, wrap_eval
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
@@ -12,7 +12,7 @@ from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 OUT, IN = 0, 1
 
 
-@njit
+@inlined
 def stacks(I: Ints, S: Floats) -> Floats:
     """All profiles as an array [stack, row, point]: 2c is cable c's output drum, 2c + 1 its input drum, guides follow."""
     wraps = I[o.N_STACKS]
@@ -29,7 +29,7 @@ def law_of(P: Floats, p: int, end: int) -> int:
     return 0 if P[p + o.SIGN] > 0.0 else 1
 
 
-@leaf_njit
+@inlined
 def drum_eval(
     P: Floats,
     I: Ints,
@@ -60,7 +60,7 @@ def drum_eval(
     return total, slope, turn
 
 
-@leaf_njit
+@inlined
 def cable_eval(
     P: Floats,
     I: Ints,
@@ -81,39 +81,42 @@ def cable_eval(
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     q = I[o.S_CABLE] + o.CABLE_STATE * c
     t0 = P[p + o.T0] * S[q + o.Q_T0] * S[q + o.Q_EA]
+    unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA]
     tau = tension / t0
     v = v_of_tau(L, 2, tau)
-    w_out = P[p + o.W_OUT] + P[p + o.SIGN] * x_out
-    w_in = P[p + o.W_IN] - P[p + o.SIGN] * x_in
-    e_out, a_out, turn = drum_eval(P, I, S, J, L, G, c, 0, tau, v, w_out)
-    S[q + o.Q_TENSION] = tension
     dv = dv_dtau(L, 2, tau, v)
-    unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA]
-    if L is not None:
-        if P[p + o.GUIDE] > 0.0:
-            far, a_far, tau_in = guide_split(P, I, S, J, L, G, c, v, x_in, w_in)
-            e_span, a_span = strain_of_tau(L, 2, tau)
-            near_length = 0.5 * P[p + o.LENGTH]
-            total = P[p + o.R_OUT] * e_out + near_length * e_span + far
-            slope = (P[p + o.R_OUT] * a_out + a_far) * dv + near_length * a_span
-            S[q + o.Q_TENSION_IN] = tau_in * t0
-            S[q + o.Q_STRETCH] = total * unit
-            S[q + o.Q_COMPLIANCE] = slope * unit / t0
-            return total * unit, slope * unit / t0, P[p + o.SIGN] * P[p + o.R_OUT] * turn * unit
-    e_in, a_in, _ = drum_eval(P, I, S, J, L, G, c, 1, tau, v, w_in)
     e_span, a_span = strain_of_tau(L, 2, tau)
     length = P[p + o.LENGTH]
-    total = P[p + o.R_OUT] * e_out + P[p + o.R_IN] * e_in + length * e_span
-    slope = (P[p + o.R_OUT] * a_out + P[p + o.R_IN] * a_in) * dv + length * a_span
+    total = turn = slope = 0.0
+    ends = 2
+    S[q + o.Q_TENSION] = S[q + o.Q_TENSION_IN] = tension
     if L is not None:
-        play, d_play = span_play(P[p + o.PLAY_YIELD], S[q + o.Q_PLAY], tension - t0)
-        S[q + o.Q_PLAY_TRY] = play
-        total += length * P[p + o.PLAY_SHARE] * play / t0
-        slope += length * P[p + o.PLAY_SHARE] * d_play
-    S[q + o.Q_TENSION_IN] = tension
+        if P[p + o.GUIDE] > 0.0:
+            w_in = P[p + o.W_IN] - P[p + o.SIGN] * x_in
+            total, slope, tau_in = guide_split(P, I, S, J, L, G, c, v, x_in, w_in)
+            slope *= dv
+            S[q + o.Q_TENSION_IN] = tau_in * t0
+            length *= 0.5
+            ends = 1
+        else:
+            play, d_play = span_play(P[p + o.PLAY_YIELD], S[q + o.Q_PLAY], tension - t0)
+            S[q + o.Q_PLAY_TRY] = play
+            total = length * P[p + o.PLAY_SHARE] * play / t0
+            slope = length * P[p + o.PLAY_SHARE] * d_play
+    total += length * e_span
+    slope += length * a_span
+    angle = P[p + o.SIGN] * x_out
+    for end in range(ends):
+        radius = P[p + o.R_OUT + end]
+        e, a, by_angle = drum_eval(P, I, S, J, L, G, c, end, tau, v, P[p + o.W_OUT + end] + angle)
+        total += radius * e
+        slope += radius * a * dv
+        if end == 0:
+            turn = radius * by_angle
+        angle = -P[p + o.SIGN] * x_in
     S[q + o.Q_STRETCH] = total * unit
     S[q + o.Q_COMPLIANCE] = slope * unit / t0
-    return total * unit, slope * unit / t0, P[p + o.SIGN] * P[p + o.R_OUT] * turn * unit
+    return total * unit, slope * unit / t0, P[p + o.SIGN] * turn * unit
 
 
 @njit

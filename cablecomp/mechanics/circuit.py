@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import cable_commit, cable_eval
-from cablecomp.mechanics.jit import leaf_njit, njit
+from cablecomp.mechanics.jit import inlined, njit
+from cablecomp.mechanics.nudge import SMALL, cable_nudge
 from cablecomp.mechanics.profile import Floats, Ints
 
 
-@leaf_njit
+@inlined
 def chain_eval(
     P: Floats,
     I: Ints,
@@ -76,27 +77,41 @@ def circuit_solve(
     x = x_guess
     if not unwound_ok(P, I, first_h, count, closed, first_l, x_in, x):
         return x, 0.0, o.STATUS_UNWOUND
-    if closed == 0:
-        q = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
-        tension = S[q + o.Q_REFERENCE] * S[q + o.Q_T0] + pull
-        if tension <= floor:
-            return x, 0.0, o.STATUS_SLACK
-        for iteration in range(60):
-            theta, slope, _ = chain_eval(P, I, S, J, L, G, first_h, count, tension, x_in, x)
-            new = rigid + theta
-            if abs(new - x) <= (1e-11 if iteration < 12 else 1e-9):
-                return new, slope / radius, o.STATUS_OK
-            x = new
-        return x, slope / radius, o.STATUS_DIVERGED
-    ql = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
+    last_h = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
+    last_l = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
     unit = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first_l + count - 1) + o.T0]
     lowest = floor if pull >= 0.0 else floor - pull
+    if closed == 1:
+        guess = S[last_l + o.Q_KEPT] - S[last_l + o.Q_REFERENCE] * pull + S[last_l + o.Q_MISS]
+        tension = max(guess, lowest)
+    else:
+        tension = S[last_h + o.Q_REFERENCE] * S[last_h + o.Q_T0]
+        if tension + pull <= floor:
+            return x, 0.0, o.STATUS_SLACK
     low, high = lowest, 1e300
-    tension = max(S[ql + o.Q_KEPT] - S[ql + o.Q_REFERENCE] * pull, lowest)
-    a_h = a_l = 1.0
+    theta_h = theta_l = a_h = a_l = b_h = b_l = 0.0
     for iteration in range(80):
-        theta_h, a_h, b_h = chain_eval(P, I, S, J, L, G, first_h, count, tension + pull, x_in, x)
-        theta_l, a_l, b_l = chain_eval(P, I, S, J, L, G, first_l, count, tension, x_in, x)
+        for chain in range(1 + closed):
+            first, here = (first_h, tension + pull) if chain == 0 else (first_l, tension)
+            theta, a, b = chain_eval(P, I, S, J, L, G, first, count, here, x_in, x)
+            if chain == 0:
+                theta_h, a_h, b_h = theta, a, b
+            else:
+                theta_l, a_l, b_l = theta, a, b
+        off = rigid + theta_h - x
+        if closed == 0:
+            turn = off / (1.0 - b_h)
+            if (
+                L is None
+                and count == 1
+                and abs(turn) <= SMALL
+                and cable_nudge(P, I, S, J, G, first_h, 0.0, turn)
+            ):
+                return x + turn, a_h / radius, o.STATUS_OK
+            if abs(turn) <= (1e-11 if iteration < 12 else 1e-9):
+                return x + turn, a_h / radius, o.STATUS_OK
+            x += turn if iteration < 12 else off
+            continue
         gap = theta_h + theta_l
         if tension <= lowest and gap >= 0.0:  # one side is slack: the other alone carries and positions
             new = rigid + theta_h if pull >= 0.0 else rigid - theta_l
@@ -104,13 +119,17 @@ def circuit_solve(
                 return new, (a_h if pull >= 0.0 else a_l) / radius, o.STATUS_OK
             x = new
             continue
-        # Newton in (T_l, x) on gap = 0 and rigid + theta_h - x = 0
-        off = rigid + theta_h - x
-        det = (a_h + a_l) * (b_h - 1.0) - a_h * (b_h + b_l)
-        step = (off * (b_h + b_l) - gap * (b_h - 1.0)) / det
-        turn = (gap * a_h - off * (a_h + a_l)) / det
+        # Newton in (T_l, x) on gap = 0 and off = 0
+        scale = 1.0 / ((a_h + a_l) * (b_h - 1.0) - a_h * (b_h + b_l))
+        step = (off * (b_h + b_l) - gap * (b_h - 1.0)) * scale
+        turn = (gap * a_h - off * (a_h + a_l)) * scale
         if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
             return x + turn, a_h * a_l / (a_h + a_l) / radius, o.STATUS_OK
+        if L is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
+            if abs(step) <= SMALL * min(tension, tension + pull):
+                done = cable_nudge(P, I, S, J, G, first_h, step, turn)
+                if done and cable_nudge(P, I, S, J, G, first_l, step, turn):
+                    return x + turn, a_h * a_l / (a_h + a_l) / radius, o.STATUS_OK
         x += turn
         if gap > 0.0:
             high = tension
@@ -124,7 +143,7 @@ def circuit_solve(
                 return x, a_h * a_l / (a_h + a_l) / radius, o.STATUS_OK
             if not low < tension < high:
                 tension = 0.5 * (low + high)
-    return x, a_h * a_l / (a_h + a_l) / radius, o.STATUS_DIVERGED
+    return x, 0.0, o.STATUS_DIVERGED
 
 
 @njit
@@ -161,6 +180,11 @@ def circuit_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats,
         last_l = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
         share = a_h / (a_h + a_l)
         pull = S[last_h + o.Q_TENSION] - S[last_l + o.Q_TENSION]
+        miss = S[last_l + o.Q_TENSION] - (S[last_l + o.Q_KEPT] - S[last_l + o.Q_REFERENCE] * pull)
+        before = S[last_l + o.Q_MISS_OLD]
+        S[last_l + o.Q_MISS_OLD] = miss
+        # what the last two guesses missed in one direction, the next will miss too
+        S[last_l + o.Q_MISS] = 0.0 if miss * before <= 0.0 else (miss if abs(miss) < abs(before) else before)
         S[last_l + o.Q_KEPT] = S[last_l + o.Q_TENSION] + share * pull
         S[last_l + o.Q_REFERENCE] = share
     for j in range(count):

@@ -51,12 +51,22 @@ def cached(decorate: Callable[[], F]) -> F:
 
 
 def njit(function: F) -> F:
-    """Compile to machine code on first call, cache on disk; IEEE arithmetic, no reordering."""
-    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True)
+    """Compile to machine code on first call, cache on disk; IEEE arithmetic, no reordering.
+
+    Without reference counts (`_nrt`): compiled code borrows its arrays from Python and allocates none; counting cost
+    as much time as the mechanics.
+    """
+    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
     return cached(lambda: compile_(function))
 
 
 def leaf_njit(function: F) -> F:
     """As `njit`, for small leaf functions that belong inside their caller's machine code."""
-    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
+    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True, _nrt=False)
+    return cached(lambda: compile_(function))
+
+
+def inlined(function: F) -> F:
+    """For a function that returns a view of its arrays: its text becomes part of every compiled caller's."""
+    compile_ = numba.njit(inline="always", _nrt=False)
     return cached(lambda: compile_(function))

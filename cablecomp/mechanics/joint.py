@@ -6,7 +6,7 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import inlined, njit
 from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import Floats, Ints
@@ -44,7 +44,7 @@ def _distribute(I: Ints, S: Floats) -> None:
                     S[q + o.Q_OFFSET] = S[x + o.X_LENGTH_H + chain]
 
 
-@njit
+@inlined
 def _solve_all(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, moment: float
 ) -> tuple[float, float, int]:
@@ -66,7 +66,7 @@ def _solve_all(
     return x, total, o.STATUS_OK
 
 
-@njit
+@inlined
 def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> int:
     """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved together."""
     x = I[o.S_CONTEXT]

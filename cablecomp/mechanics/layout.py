@@ -38,12 +38,13 @@ J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
 # --- state S: profiles [2 cables, 5, capacity], cables [.., CABLE_STATE], context, term states
 #   one cable: tension at output and input end, stretch, its derivative, shaft angle at its output, play, play trial,
 #   pretension and stiffness factors, length offset, error bound of the stretch, warm start and reference of the solver;
-#   with a guide: stretch of the input side, end values of the guide, input shaft, and the same pending
+#   with a guide: stretch of the input side, end values of the guide, input shaft, and the same pending;
+#   what the solver's first guess missed
 (
     Q_TENSION, Q_TENSION_IN, Q_STRETCH, Q_COMPLIANCE, Q_SHAFT, Q_PLAY, Q_PLAY_TRY,
     Q_T0, Q_EA, Q_OFFSET, Q_ERROR, Q_KEPT, Q_REFERENCE, Q_SIDE, Q_GUIDE_END, Q_GUIDE_FAR, Q_SHAFT_IN,
-    Q_SIDE_TRY, Q_GUIDE_TRY, Q_SHAFT_IN_TRY, CABLE_STATE,
-) = range(21)  # fmt: skip
+    Q_SIDE_TRY, Q_GUIDE_TRY, Q_SHAFT_IN_TRY, Q_MISS, Q_MISS_OLD, CABLE_STATE,
+) = range(23)  # fmt: skip
 
 #   one wrap's pending step in the context: last point kept, meeting point (y, v, C, B, exp v), wrap angle,
 #   end value and its exp

@@ -40,6 +40,13 @@ GAUSS_W = _w / 2.0
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
+@njit
+def copy_floats(source: Floats, i: int, target: Floats, j: int, n: int) -> None:
+    """target[j : j + n] = source[i : i + n], forwards and in place."""
+    for k in range(n):
+        target[j + k] = source[i + k]
+
+
 @leaf_njit
 def piece(
     L: Floats, law: int, y1: float, v1: float, t1: float, y2: float, v2: float, t2: float
@@ -205,7 +212,9 @@ def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
 
     A chord of a mu-Lipschitz profile is mu-Lipschitz, so the friction bound survives.
     """
-    made = np.zeros(n)  # error made here, by the piece below each point; the limit is on this alone
+    # error made here, by the piece below each point, kept in the row E (renewed at the end); the limit is on this alone
+    for k in range(n):
+        G[i, E, k] = 0.0
     limit = 1e-12
     while n > G.shape[2] // 2:
         m = 1
@@ -215,19 +224,16 @@ def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
             y2, v2 = G[i, Y, k + 1], G[i, V, k + 1]
             s0 = groove(L, law, y0)
             off = abs(v0 + (groove(L, law, y1) - s0) / (groove(L, law, y2) - s0) * (v2 - v0) - v1)
-            error = max(made[k], made[k + 1]) + off
+            error = max(G[i, E, k], G[i, E, k + 1]) + off
             if error <= limit:
-                made[k + 1] = error
+                G[i, E, k + 1] = error
                 G[i, D, k + 1] = max(G[i, D, k], G[i, D, k + 1]) + off
             else:
-                G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = y1, v1, G[i, D, k], made[k]
+                G[i, Y, m], G[i, V, m], G[i, D, m], G[i, E, m] = y1, v1, G[i, D, k], G[i, E, k]
                 m += 1
-        G[i, Y, m], G[i, V, m], G[i, D, m], made[m] = (
-            G[i, Y, n - 1],
-            G[i, V, n - 1],
-            G[i, D, n - 1],
-            made[n - 1],
-        )
+        G[i, Y, m], G[i, V, m], G[i, D, m], G[i, E, m] = (
+            G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1], G[i, E, n - 1]
+        )  # fmt: skip
         n = m + 1
         limit *= 4.0
     accumulate(G, L, law, i, n)

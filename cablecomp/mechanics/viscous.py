@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.jit import njit
-from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 
 # one wrap's block: grid step, committed free nodes, wrap angle, end tension, the same pending, then four rows of nodes:
 # committed, pending, two of scratch
@@ -191,4 +191,4 @@ def viscous_commit(I: Ints, S: Floats, wrap: int) -> None:
     n = I[o.NODES]
     S[b + W_COUNT], S[b + W_ANGLE], S[b + W_END] = S[b + W_COUNT_TRY], S[b + W_ANGLE_TRY], S[b + W_END_TRY]
     count = int(S[b + W_COUNT])
-    S[b + W_HEAD : b + W_HEAD + count] = S[b + W_HEAD + n : b + W_HEAD + n + count]
+    copy_floats(S, b + W_HEAD + n, S, b + W_HEAD, count)

@@ -15,8 +15,9 @@ import math
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import stacks
 from cablecomp.mechanics.jit import njit
-from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 from cablecomp.observer.bounds_kernel import (
+    W_CABLE,
     W_CIRCUIT,
     W_EA,
     W_EPS,
@@ -175,6 +176,7 @@ def closed_interval(
     x: tuple[float, float, float], x_in: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Lowest and highest possible deflection [rad] of a closed circuit; leaves the sides' next states pending."""
+    h = o.HEADER + o.CIRCUIT * ic
     b = W_HEAD + W_CIRCUIT * ic
     lowest = floor_tension(P, ic, pull)
     t_low, t_high = tension_interval(P, I, N, L, W, ic, low, up, lowest, pull, x, x_in)
@@ -294,7 +296,7 @@ def circuit_keep(
             W[k + W_T0], W[k + W_EA], W[k + W_TURN] = low[0][q + o.Q_T0], N[q + o.Q_EA], N[q + o.Q_SHAFT]
             W[k + W_EPS_OLD] = W[k + W_EPS]
             W[k + W_EPS] = W[k + W_NEXT]
-    W[b : b + W_PENDING] = W[b + W_PENDING : b + W_PULL]
+    copy_floats(W, b + W_PENDING, W, b, W_PENDING)
     W[b + W_PULL], W[b + W_X_IN], W[b + W_FIRST] = pull, x_in, 0.0
 
 

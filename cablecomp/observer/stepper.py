@@ -6,9 +6,9 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import stacks
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import inlined, njit
 from cablecomp.mechanics.joint import advance, joint_commit, joint_solve
-from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 
 # options F: [torque gain, torque offset, filter angular frequency, 0]; filter state follows: two one-poles each for angle and load
 GAIN, OFFSET, CUTOFF, STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, OPTIONS = range(9)
@@ -36,7 +36,7 @@ def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, floa
     return F[MOTOR_2], F[LOAD_2]
 
 
-@njit
+@inlined
 def predict(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, F: Floats, row: Floats, out: Floats
 ) -> int:
@@ -75,11 +75,11 @@ def peek_one(
 ) -> int:
     """One sample, nothing committed: everything but the profiles (which a prediction never touches) is put back."""
     small = I[o.S_PROFILE]
-    spare[:small] = S[:small]
-    spare[small : small + OPTIONS] = F
+    copy_floats(S, 0, spare, 0, small)
+    copy_floats(F, 0, spare, small, OPTIONS)
     status = predict(P, I, S, J, L, stacks(I, S), F, row, out)
-    S[:small] = spare[:small]
-    F[:] = spare[small : small + OPTIONS]
+    copy_floats(spare, 0, S, 0, small)
+    copy_floats(spare, small, F, 0, OPTIONS)
     return status
 
 
