@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from rich.console import Console
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.errors import InputError
+from cablecomp.observer import WrapProfile
 from cablecomp.recording.progress import progress_bar
 from cablecomp.recording.reader import Recording, open_recording
 from cablecomp.recording.recorder import Recorder
@@ -36,13 +36,6 @@ STAGE = {
 def joint(**sections: object) -> JointConfig:
     drive = {"circuit": "closed", "stage": [STAGE]}
     return parse_joint({"schema": 1, "name": "rig", "drive": drive} | sections, "test")
-
-
-@dataclass
-class Profile:
-    name: str
-    angle_rad: np.ndarray
-    tension_N: np.ndarray
 
 
 class PlayObserver:
@@ -70,8 +63,8 @@ class PlayObserver:
             "tension_l_N": np.full(len(load), np.nan),
         }
 
-    def profiles(self) -> Sequence[Profile]:
-        return [Profile("output", np.array([0.0, 1.0]), np.array([self.play, 0.0]))]
+    def profiles(self) -> Sequence[WrapProfile]:
+        return [WrapProfile("output", np.array([0.0, 1.0]), np.array([self.play, 0.0]))]
 
 
 class Kept:

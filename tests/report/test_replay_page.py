@@ -7,7 +7,6 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.errors import InputError
+from cablecomp.observer import WrapProfile
 from cablecomp.recording.reader import open_recording, read_all
 from cablecomp.recording.writer import write_canonical
 from cablecomp.report import page
@@ -43,13 +43,6 @@ JOINT = {
 }
 
 
-@dataclass
-class Profile:
-    name: str
-    angle_rad: np.ndarray
-    tension_N: np.ndarray
-
-
 class Spring:
     """deflection = load / 500, refuses loads above 90."""
 
@@ -71,9 +64,9 @@ class Spring:
             "tension_l_N": 30.0 - load,
         }
 
-    def profiles(self) -> Sequence[Profile]:
+    def profiles(self) -> Sequence[WrapProfile]:
         angle = np.linspace(0.0, 6.0, 20)
-        return [Profile(name, angle, self.load * np.exp(-angle)) for name in ("output", "input")]
+        return [WrapProfile(name, angle, self.load * np.exp(-angle)) for name in ("output", "input")]
 
 
 def _joint() -> JointConfig:
