@@ -9,19 +9,19 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import B, C, D, E, Floats, V, Y, _piece_plain
 
 ArcMeet: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
-@njit
+@kernel
 def line(y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
     """Integral of exp(v) - 1, and of exp(v), over a straight piece."""
     return _piece_plain(y2 - y1, v2 - v1, math.exp(v1), math.exp(v2))
 
 
-@njit
+@kernel
 def integral_to(G: Floats, i: int, n: int, y: float) -> float:
     """Integral of exp(v) - 1 from the near end to y, over the committed profile."""
     for k in range(n - 1):
@@ -33,7 +33,7 @@ def integral_to(G: Floats, i: int, n: int, y: float) -> float:
     return G[i, C, n - 1]
 
 
-@njit
+@kernel
 def _value(G: Floats, i: int, n: int, y: float) -> float:
     """v of the committed profile at y."""
     k = 0
@@ -43,7 +43,7 @@ def _value(G: Floats, i: int, n: int, y: float) -> float:
     return G[i, V, k] + share * (G[i, V, k + 1] - G[i, V, k])
 
 
-@njit
+@kernel
 def _near_meet(G: Floats, i: int, n: int, v: float, steep: float, s: float) -> float:
     """Where the cone from the near end meets the profile; beyond the far end if nowhere."""
     y_before, over_before = 0.0, v - G[i, V, 0]
@@ -55,7 +55,7 @@ def _near_meet(G: Floats, i: int, n: int, v: float, steep: float, s: float) -> f
     return 1e300
 
 
-@njit
+@kernel
 def _far_meet(G: Floats, i: int, n: int, v: float, steep: float, s: float) -> float:
     """Where the cone from the far end meets the profile; below zero if nowhere."""
     width = G[i, Y, n - 1]
@@ -68,7 +68,7 @@ def _far_meet(G: Floats, i: int, n: int, v: float, steep: float, s: float) -> fl
     return -1e300
 
 
-@njit
+@kernel
 def arc_eval(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> ArcMeet:
     """The arc at end values v1 (near) and v2 (far), |v1 - v2| <= mu width, without committing it.
 
@@ -102,7 +102,7 @@ def arc_eval(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> ArcM
     return total, change, grown1, grown2, near, far, swap
 
 
-@njit
+@kernel
 def arc_commit(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> int:
     """Clamp the arc's profile to its new end values; returns the new number of points."""
     width = G[i, Y, n - 1]
@@ -116,6 +116,7 @@ def arc_commit(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> in
             keep_to = k
     tail = max(keep_to - keep_from + 1, 0)
     lead = 1 + (1 if near > 0.0 else 0)
+    total = lead + tail + (1 if far < width and (far > near or near == 0.0) else 0) + (1 if near < width else 0)
     shift = lead - keep_from
     if tail > 0 and shift <= 0:
         for k in range(keep_from, keep_to + 1):
@@ -137,7 +138,7 @@ def arc_commit(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> in
     return _tidy(G, i, m)
 
 
-@njit
+@kernel
 def arc_turn(G: Floats, i: int, n: int, turn: float, v_arriving: float) -> int:
     """Let a pulley turn: cable arrives at the near end (turn > 0) at v_arriving and as much leaves at the far end; turn < 0
     the other way round. The width stays."""
@@ -152,7 +153,7 @@ def arc_turn(G: Floats, i: int, n: int, turn: float, v_arriving: float) -> int:
     return _tidy(G, i, arc_turn_on(G, i, n, width, turn, v_arriving))
 
 
-@njit
+@kernel
 def arc_turn_on(G: Floats, i: int, n: int, width: float, turn: float, v_arriving: float) -> int:
     """Shift the profile inward by `turn`, put arriving cable before it, cut what left the arc."""
     if turn >= width:
@@ -171,7 +172,7 @@ def arc_turn_on(G: Floats, i: int, n: int, width: float, turn: float, v_arriving
     return n + 1
 
 
-@njit
+@kernel
 def arc_fill(G: Floats, i: int, width: float, v: float) -> int:
     """Start an arc at uniform tension."""
     G[i, :, :] = 0.0
@@ -180,19 +181,19 @@ def arc_fill(G: Floats, i: int, width: float, v: float) -> int:
     return _tidy(G, i, 2)
 
 
-@njit
+@kernel
 def _put(G: Floats, i: int, k: int, y: float, v: float) -> None:
     G[i, Y, k] = y
     G[i, V, k] = v
 
 
-@njit
+@kernel
 def _copy(G: Floats, i: int, source: int, target: int) -> None:
     G[i, Y, target] = G[i, Y, source]
     G[i, V, target] = G[i, V, source]
 
 
-@njit
+@kernel
 def _mirror(G: Floats, i: int, n: int) -> None:
     width = G[i, Y, n - 1]
     for k in range(n // 2):
@@ -203,7 +204,7 @@ def _mirror(G: Floats, i: int, n: int) -> None:
         G[i, Y, n // 2] = width - G[i, Y, n // 2]
 
 
-@njit
+@kernel
 def _tidy(G: Floats, i: int, n: int) -> int:
     """Join pieces that lie on one line (and, when memory runs out, those that nearly do); renew the running integrals."""
     limit = 1e-13
@@ -225,9 +226,7 @@ def _tidy(G: Floats, i: int, n: int) -> int:
     G[i, E, 0] = math.exp(G[i, V, 0])
     for k in range(1, n):
         G[i, E, k] = math.exp(G[i, V, k])
-        part, _ = _piece_plain(
-            G[i, Y, k] - G[i, Y, k - 1], G[i, V, k] - G[i, V, k - 1], G[i, E, k - 1], G[i, E, k]
-        )
+        part, _ = _piece_plain(G[i, Y, k] - G[i, Y, k - 1], G[i, V, k] - G[i, V, k - 1], G[i, E, k - 1], G[i, E, k])
         G[i, C, k] = G[i, C, k - 1] + part
         G[i, D, k] = G[i, B, k] = 0.0
     return n

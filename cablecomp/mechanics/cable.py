@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.guide import guide_commit, guide_split
-from cablecomp.mechanics.jit import inlined, leaf_njit, njit
+from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
 from cablecomp.mechanics.profile import ROWS, B, Floats, Ints, wrap_commit, wrap_eval
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
@@ -12,7 +12,7 @@ from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 OUT, IN = 0, 1
 
 
-@inlined
+@inlined_kernel
 def stacks(I: Ints, S: Floats) -> Floats:
     """All profiles as an array [stack, row, point]: 2c is cable c's output drum, 2c + 1 its input drum, guides follow."""
     wraps = I[o.N_STACKS]
@@ -21,7 +21,7 @@ def stacks(I: Ints, S: Floats) -> Floats:
     return S[first : first + size].reshape((wraps, ROWS, I[o.CAPACITY]))
 
 
-@leaf_njit
+@leaf_kernel
 def law_of(P: Floats, p: int, end: int) -> int:
     """Which law table a wrap uses: 0, 1 = the joint's own drum in chain h, l; 2 = everything else."""
     if end == 1 or P[p + o.JOINT_DRUM] == 0.0:
@@ -29,7 +29,7 @@ def law_of(P: Floats, p: int, end: int) -> int:
     return 0 if P[p + o.SIGN] > 0.0 else 1
 
 
-@inlined
+@inlined_kernel
 def drum_eval(
     P: Floats,
     I: Ints,
@@ -60,7 +60,7 @@ def drum_eval(
     return total, slope, turn
 
 
-@inlined
+@inlined_kernel
 def cable_eval(
     P: Floats,
     I: Ints,
@@ -119,7 +119,7 @@ def cable_eval(
     return total * unit, slope * unit / t0, P[p + o.SIGN] * turn * unit
 
 
-@njit
+@kernel
 def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
     """Play operator of the given radius: output follows the input x once it leaves the play; (output, derivative by x)."""
     if radius <= 0.0:
@@ -131,7 +131,7 @@ def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
     return z, 0.0
 
 
-@njit
+@kernel
 def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int) -> None:
     """Make the last evaluation of cable c its state, and renew the bound on what merging has done to its stretch.
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import cable_commit, cable_eval
-from cablecomp.mechanics.jit import inlined, njit
+from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.nudge import SMALL, cable_nudge
 from cablecomp.mechanics.profile import Floats, Ints
 
 
-@inlined
+@inlined_kernel
 def chain_eval(
     P: Floats,
     I: Ints,
@@ -53,7 +53,7 @@ def chain_eval(
     return theta, compliance, turn
 
 
-@njit
+@kernel
 def circuit_solve(
     P: Floats,
     I: Ints,
@@ -146,7 +146,7 @@ def circuit_solve(
     return x, 0.0, o.STATUS_DIVERGED
 
 
-@njit
+@kernel
 def unwound_ok(
     P: Floats, I: Ints, first_h: int, count: int, closed: int, first_l: int, x_in: float, x_out: float
 ) -> bool:
@@ -163,7 +163,7 @@ def unwound_ok(
     return True
 
 
-@njit
+@kernel
 def circuit_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, ic: int) -> None:
     """Make the last solution of circuit `ic` its state."""
     h = o.HEADER + o.CIRCUIT * ic

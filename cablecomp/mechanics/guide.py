@@ -11,12 +11,12 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.arc import arc_commit, arc_eval
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import Floats, Ints, wrap_eval
 from cablecomp.mechanics.tables import strain_of_tau, tau_of_v
 
 
-@njit
+@kernel
 def guide_split(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, v2: float, x_in: float, w_in: float
 ) -> tuple[float, float, float]:
@@ -42,7 +42,9 @@ def guide_split(
     m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
     for iteration in range(60):
         tau1 = tau_of_v(L, 2, v1)
-        e_in, a_in, k, ym, vm, cm, bm, tm = wrap_eval(G, L, 2, wrap, J[wrap], w_in, v1, tau1, P[p + o.MU_IN])
+        e_in, a_in, k, ym, vm, cm, bm, tm = wrap_eval(
+            G, L, 2, wrap, J[wrap], w_in, v1, tau1, P[p + o.MU_IN]
+        )
         S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = e_in, k, ym, vm
         S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
         S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w_in, v1, tau1
@@ -75,7 +77,7 @@ def guide_split(
     return side + per_turn * e_arc, slope, math.exp(v1)
 
 
-@njit
+@kernel
 def guide_commit(I: Ints, S: Floats, J: Ints, G: Floats, c: int) -> None:
     """Make the last split the state of cable c's guide."""
     q = I[o.S_CABLE] + o.CABLE_STATE * c

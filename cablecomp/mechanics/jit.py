@@ -51,22 +51,30 @@ def cached(decorate: Callable[[], F]) -> F:
 
 
 def njit(function: F) -> F:
-    """Compile to machine code on first call, cache on disk; IEEE arithmetic, no reordering.
+    """Compile to machine code on first call, cache on disk; IEEE arithmetic, no reordering."""
+    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True)
+    return cached(lambda: compile_(function))
 
-    Without reference counts (`_nrt`): compiled code borrows its arrays from Python and allocates none; counting cost
-    as much time as the mechanics.
+
+def kernel(function: F) -> F:
+    """As `njit`, for the mechanics: arrays are borrowed from Python, none is made or returned.
+
+    So no references need to be counted (`_nrt`); counting took longer than the mechanics itself.
     """
     compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
     return cached(lambda: compile_(function))
 
 
-def leaf_njit(function: F) -> F:
-    """As `njit`, for small leaf functions that belong inside their caller's machine code."""
+def leaf_kernel(function: F) -> F:
+    """As `kernel`, for small leaf functions that belong inside their caller's machine code."""
     compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True, _nrt=False)
     return cached(lambda: compile_(function))
 
 
-def inlined(function: F) -> F:
-    """For a function that returns a view of its arrays: its text becomes part of every compiled caller's."""
-    compile_ = numba.njit(inline="always", _nrt=False)
+def inlined_kernel(function: F) -> F:
+    """As `kernel`, for functions with one caller or with a view as result: their text becomes part of the caller's.
+
+    Every level of calls costs one more optimisation of all the code below it.
+    """
+    compile_ = numba.njit(inline="always", error_model="numpy", nogil=True, _nrt=False)
     return cached(lambda: compile_(function))

@@ -6,13 +6,13 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
-from cablecomp.mechanics.jit import inlined, njit
+from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import Floats, Ints
 
 
-@njit
+@kernel
 def run_terms(P: Floats, I: Ints, S: Floats) -> None:
     """Let every term add its part to the context."""
     x = I[o.S_CONTEXT]
@@ -25,7 +25,7 @@ def run_terms(P: Floats, I: Ints, S: Floats) -> None:
         call_term(I[t], context, P[I[t + o.T_PARAMETER] :], S[I[t + o.T_STATE] :])
 
 
-@njit
+@kernel
 def _distribute(I: Ints, S: Floats) -> None:
     """Hand the terms' lengths and stiffness factors to the cables at the joint (pretension factors: at commits)."""
     x = I[o.S_CONTEXT]
@@ -44,7 +44,7 @@ def _distribute(I: Ints, S: Floats) -> None:
                     S[q + o.Q_OFFSET] = S[x + o.X_LENGTH_H + chain]
 
 
-@inlined
+@inlined_kernel
 def _solve_all(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, moment: float
 ) -> tuple[float, float, int]:
@@ -66,7 +66,7 @@ def _solve_all(
     return x, total, o.STATUS_OK
 
 
-@inlined
+@inlined_kernel
 def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> int:
     """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved together."""
     x = I[o.S_CONTEXT]
@@ -122,7 +122,7 @@ def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) ->
     return status
 
 
-@njit
+@kernel
 def advance(
     P: Floats, I: Ints, S: Floats, time: float, motor: float, load: float, temperature: float
 ) -> None:
@@ -140,7 +140,7 @@ def advance(
     S[x + o.X_COMMIT] = 0.0
 
 
-@njit
+@kernel
 def _follow_pretension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
     """Let the pretension of all cables follow the terms' factors; the next sample finds it."""
     x = I[o.S_CONTEXT]
@@ -152,7 +152,7 @@ def _follow_pretension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Flo
                 retension(P, I, S, J, L, G, first + j, S[x + o.X_PRETENSION_H + chain])
 
 
-@njit
+@kernel
 def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
     """Make the solved sample the state."""
     x = I[o.S_CONTEXT]

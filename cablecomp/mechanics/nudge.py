@@ -8,19 +8,19 @@ of the order of the step's square, 1e-14. Where the edge would leave its piece, 
 from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.jit import leaf_njit, njit
+from cablecomp.mechanics.jit import kernel, leaf_kernel
 from cablecomp.mechanics.profile import D, Floats, Ints, V, Y, _piece_plain
 
 SMALL = 1e-7  # greatest step, as a share of the tension and in rad
 
 
-@leaf_njit
+@leaf_kernel
 def grown(value: float, d: float) -> float:
     """value * exp(d) for a small d."""
     return value * (1.0 + d * (1.0 + 0.5 * d))
 
 
-@njit
+@kernel
 def wrap_nudge(S: Floats, G: Floats, m: int, i: int, n: int, mu: float, dv: float, dw: float) -> bool:
     """Shift the pending step at S[m] of plain wrap i by dv in its end value and dw in its wrap angle, if that is simple."""
     k = int(S[m + o.M_K])
@@ -56,7 +56,7 @@ def wrap_nudge(S: Floats, G: Floats, m: int, i: int, n: int, mu: float, dv: floa
     return True
 
 
-@njit
+@kernel
 def cable_nudge(P: Floats, I: Ints, S: Floats, J: Ints, G: Floats, c: int, step: float, turn: float) -> bool:
     """Shift the pending evaluation of plain cable c by `step` [N] of tension and `turn` [rad] of its output shaft."""
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]

@@ -14,7 +14,7 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import law_of
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import D, Floats, Ints, V, Y, accumulate
 from cablecomp.mechanics.tables import between, groove, tau_of_v, v_of_tau
 from cablecomp.mechanics.viscous import W_END, W_HEAD, block_of
@@ -24,7 +24,7 @@ LONGEST = 0.06  # rise of a straight piece that still stays straight enough when
 TOUCH = 1e-12
 
 
-@njit
+@kernel
 def retension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, factor: float) -> None:
     """Bring cable c's profiles to pretension T0 * factor."""
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
@@ -47,12 +47,12 @@ def retension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: i
         S[q + o.Q_GUIDE_END] = G[arc, V, 0]
 
 
-@njit
+@kernel
 def _moved(tau: float, g: float) -> float:
     return max(1.0 + (tau - 1.0) / g, LEAST_TAU)
 
 
-@njit
+@kernel
 def _shift(G: Floats, J: Ints, L: Floats, law: int, stack: int, mu: float, g: float) -> None:
     n = _split(G, L, law, stack, J[stack])
     J[stack] = n
@@ -62,7 +62,7 @@ def _shift(G: Floats, J: Ints, L: Floats, law: int, stack: int, mu: float, g: fl
     accumulate(G, L, law, stack, n)
 
 
-@njit
+@kernel
 def _split(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
     """Divide long pieces, which would not stay straight; returns the new number of points."""
     k = n - 1
@@ -84,7 +84,7 @@ def _split(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
     return n
 
 
-@njit
+@kernel
 def _let_slip(G: Floats, L: Floats, law: int, i: int, n: int, mu: float) -> None:
     """Let every zone slide that is steeper than friction holds."""
     k = 1
@@ -96,7 +96,7 @@ def _let_slip(G: Floats, L: Floats, law: int, i: int, n: int, mu: float) -> None
         k += 1
 
 
-@njit
+@kernel
 def _slide(G: Floats, L: Floats, law: int, i: int, k: int, n: int, steep: float) -> int:
     """Give the zone around piece k the slope `steep`, as wide as its stretch asks for; returns its outer
     point.
@@ -131,7 +131,7 @@ def _slide(G: Floats, L: Floats, law: int, i: int, k: int, n: int, steep: float)
     return b
 
 
-@njit
+@kernel
 def _over(G: Floats, L: Floats, law: int, i: int, k: int, steep: float) -> float:
     """By how much piece k is steeper than `steep`, in its direction."""
     rise = G[i, V, k] - G[i, V, k - 1]
@@ -139,7 +139,7 @@ def _over(G: Floats, L: Floats, law: int, i: int, k: int, steep: float) -> float
     return rise - held if steep > 0.0 else held - rise
 
 
-@njit
+@kernel
 def _level(G: Floats, L: Floats, law: int, i: int, a: int, b: int, steep: float) -> float:
     """Height at groove coordinate 0 of the line of slope `steep` that keeps the stretch of points a..b."""
     total = weights = 0.0
@@ -152,7 +152,7 @@ def _level(G: Floats, L: Floats, law: int, i: int, a: int, b: int, steep: float)
     return total / weights
 
 
-@njit
+@kernel
 def _crossing(G: Floats, L: Floats, law: int, i: int, j: int, k: int, level: float, steep: float) -> float:
     """Groove coordinate at which the zone's line meets the piece from j to k."""
     g1, g2 = groove(L, law, G[i, Y, j]), groove(L, law, G[i, Y, k])
@@ -162,7 +162,7 @@ def _crossing(G: Floats, L: Floats, law: int, i: int, j: int, k: int, level: flo
     return (level - G[i, V, j] + slope * g1) / (slope - steep)
 
 
-@njit
+@kernel
 def _place(L: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
     low, high = groove(L, law, y_low), groove(L, law, y_high)
     if high <= low:

@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.mechanics.jit import leaf_njit, njit
+from cablecomp.mechanics.jit import kernel, leaf_kernel
 from cablecomp.mechanics.tables import between, groove, strain
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -40,14 +40,14 @@ GAUSS_W = _w / 2.0
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
-@njit
+@kernel
 def copy_floats(source: Floats, i: int, target: Floats, j: int, n: int) -> None:
     """target[j : j + n] = source[i : i + n], forwards and in place."""
     for k in range(n):
         target[j + k] = source[i + k]
 
 
-@leaf_njit
+@leaf_kernel
 def piece(
     L: Floats, law: int, y1: float, v1: float, t1: float, y2: float, v2: float, t2: float
 ) -> tuple[float, float]:
@@ -61,7 +61,7 @@ def piece(
     return _piece_table(L, law, y1, v1, y2, v2)
 
 
-@leaf_njit
+@leaf_kernel
 def _piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, float]:
     """`piece` in closed form: exp(v) over a straight piece that rises by d."""
     if abs(d) > 0.1:
@@ -71,7 +71,7 @@ def _piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, floa
     return grown - dy, grown
 
 
-@njit
+@kernel
 def _piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
     """`piece` by Gauss-Legendre quadrature, for tabulated laws."""
     dy = y2 - y1
@@ -89,7 +89,7 @@ def _piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float
     return total * dy, slope * dy
 
 
-@leaf_njit
+@leaf_kernel
 def wrap_eval(
     G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, tau: float, mu: float
 ) -> Meet:
@@ -148,7 +148,7 @@ def wrap_eval(
     return cm + integral, slope, k, ym, vm, cm, bm, tm
 
 
-@leaf_njit
+@leaf_kernel
 def _running(
     G: Floats, L: Floats, law: int, i: int, k: int, n: int, y: float, v: float, t: float
 ) -> tuple[float, float]:
@@ -160,7 +160,7 @@ def _running(
     return G[i, C, k] + integral, G[i, B, k] + error * (integral + y - G[i, Y, k])
 
 
-@njit
+@kernel
 def wrap_commit(
     G: Floats, L: Floats, law: int, i: int, n: int, meet: Meet, w: float, v: float, tau: float, tolerance: float
 ) -> int:  # fmt: skip
@@ -197,7 +197,7 @@ def wrap_commit(
     return n
 
 
-@njit
+@kernel
 def _merge_error(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float) -> float:
     """Distance in v of the last point from the straight piece that would replace it."""
     y0, y1 = G[i, Y, n - 2], G[i, Y, n - 1]
@@ -206,7 +206,7 @@ def _merge_error(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: fl
     return abs(G[i, V, n - 2] + share * (v - G[i, V, n - 2]) - G[i, V, n - 1])
 
 
-@njit
+@kernel
 def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
     """Halve the list by dropping the points that a straight piece replaces best; the error made is kept in D and B.
 
@@ -240,7 +240,7 @@ def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
     return n
 
 
-@njit
+@kernel
 def accumulate(G: Floats, L: Floats, law: int, i: int, n: int) -> None:
     """Recompute the running integrals C and B of wrap i."""
     G[i, C, 0] = 0.0
@@ -256,7 +256,7 @@ def accumulate(G: Floats, L: Floats, law: int, i: int, n: int) -> None:
         G[i, B, k] = G[i, B, k - 1] + G[i, D, k] * (integral + dy)
 
 
-@njit
+@kernel
 def wrap_fill(G: Floats, L: Floats, law: int, i: int, w: float, v: float, slope: float) -> int:
     """Start wrap i straight: v at the departure point, falling inward by `slope` per sigma (0 = uniform)."""
     G[i, :, :] = 0.0

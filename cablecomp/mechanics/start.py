@@ -7,7 +7,7 @@ import math
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.arc import arc_fill
 from cablecomp.mechanics.cable import law_of, stacks
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import Floats, Ints, wrap_fill
 from cablecomp.mechanics.tables import v_of_tau
 from cablecomp.mechanics.viscous import viscous_fill
@@ -15,7 +15,7 @@ from cablecomp.mechanics.viscous import viscous_fill
 VISCOUS_TRAVEL = 4.0  # rotation [rad] beyond position zero that the viscous grid covers
 
 
-@njit
+@kernel
 def joint_start(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, motor: float, slope: float
 ) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from cablecomp.mechanics.jit import leaf_njit, njit
+from cablecomp.mechanics.jit import kernel, leaf_kernel
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def _integral(x: Floats, f: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-@njit
+@kernel
 def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) -> float:
     """Cubic interpolation on an even grid (Catmull-Rom); straight beyond its ends."""
     p = (x - low) / step
@@ -86,7 +86,7 @@ def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) ->
     )
 
 
-@leaf_njit
+@leaf_kernel
 def groove(L: Floats, law: int, y: float) -> float:
     """Friction-weighted angle g(y); y itself for the plain law."""
     if L is None:
@@ -96,7 +96,7 @@ def groove(L: Floats, law: int, y: float) -> float:
     return look_up(L, law, 2, L[law, 0, 4], L[law, 0, 5], y)
 
 
-@leaf_njit
+@leaf_kernel
 def between(L: Floats, law: int, y_low: float, y_high: float, share: float) -> float:
     """The angle whose groove coordinate lies by `share` between those of y_low and y_high."""
     if L is None:
@@ -107,7 +107,7 @@ def between(L: Floats, law: int, y_low: float, y_high: float, share: float) -> f
     return groove_inverse(L, law, low + share * (groove(L, law, y_high) - low), y_low, y_high)
 
 
-@njit
+@kernel
 def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
     """The y between y_low and y_high with groove coordinate g (secant, then bisection where it leaves the bracket)."""
     lo, hi = y_low, y_high
@@ -133,7 +133,7 @@ def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -
     return y
 
 
-@leaf_njit
+@leaf_kernel
 def v_of_tau(L: Floats, law: int, tau: float) -> float:
     """Profile variable of the tension ratio tau = T/T0: ln tau for the plain law."""
     u = math.log(tau)
@@ -144,7 +144,7 @@ def v_of_tau(L: Floats, law: int, tau: float) -> float:
     return look_up(L, law, 3, L[law, 0, 7], L[law, 0, 8], u)
 
 
-@leaf_njit
+@leaf_kernel
 def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
     """Derivative of `v_of_tau`; 1/tau for the plain law."""
     if L is None:
@@ -154,7 +154,7 @@ def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
     return _slope_table(L, law, tau, v)
 
 
-@njit
+@kernel
 def _slope_table(L: Floats, law: int, tau: float, v: float) -> float:
     step = L[law, 0, 2]
     du = (
@@ -164,7 +164,7 @@ def _slope_table(L: Floats, law: int, tau: float, v: float) -> float:
     return 1.0 / (tau * du)
 
 
-@leaf_njit
+@leaf_kernel
 def tau_of_v(L: Floats, law: int, v: float) -> float:
     """Tension ratio of the profile variable."""
     if L is None:
@@ -174,7 +174,7 @@ def tau_of_v(L: Floats, law: int, v: float) -> float:
     return math.exp(look_up(L, law, 1, L[law, 0, 1], L[law, 0, 2], v))
 
 
-@leaf_njit
+@leaf_kernel
 def strain_of_tau(L: Floats, law: int, tau: float) -> tuple[float, float]:
     """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int d tau/(1 + b (tau - 1))."""
     if L is None:
@@ -184,7 +184,7 @@ def strain_of_tau(L: Floats, law: int, tau: float) -> tuple[float, float]:
     return stiffening_strain(L[law, 0, STIFFENING], tau)
 
 
-@njit
+@kernel
 def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
     """The same for the stiffening coefficient b."""
     if b == 0.0:
@@ -196,7 +196,7 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
     return math.log1p(b * (tau - 1.0)) / b, 1.0 / stiffness
 
 
-@njit
+@kernel
 def strain(L: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
     tau = tau_of_v(L, law, v)

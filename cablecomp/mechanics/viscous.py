@@ -8,7 +8,7 @@ method on a tridiagonal system; only the part that can move is solved. c = 0 is 
 from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 
 # one wrap's block: grid step, committed free nodes, wrap angle, end tension, the same pending, then four rows of nodes:
@@ -18,13 +18,13 @@ W_STEP, W_COUNT, W_ANGLE, W_END, W_COUNT_TRY, W_ANGLE_TRY, W_END_TRY, W_TIME_TRY
 STIFFEST = 1e3  # diffusion number per step beyond which slip is as good as quasi-static
 
 
-@njit
+@kernel
 def block_of(I: Ints, wrap: int) -> int:
     """Where a wrap's grid lies in S."""
     return I[o.S_WET] + wrap * (W_HEAD + 4 * I[o.NODES])
 
 
-@njit
+@kernel
 def viscous_fill(I: Ints, S: Floats, wrap: int, w: float, reach: float) -> None:
     """Start a wrap at uniform tension T0 with wrap angle w; the grid covers `reach` [rad]."""
     b = block_of(I, wrap)
@@ -37,13 +37,13 @@ def viscous_fill(I: Ints, S: Floats, wrap: int, w: float, reach: float) -> None:
     S[b + W_HEAD : b + W_HEAD + 4 * n] = 1.0
 
 
-@njit
+@kernel
 def _free_nodes(w: float, h: float, n: int) -> int:
     """Number of grid nodes well inside the wrap; the departure point itself is one node more."""
     return min(max(int((w - 0.3 * h) / h) + 1, 1), n)
 
 
-@njit
+@kernel
 def viscous_eval(
     P: Floats, I: Ints, S: Floats, c: int, end: int, w: float, tau: float, mu: float
 ) -> tuple[float, float, float]:
@@ -89,7 +89,7 @@ def viscous_eval(
     return total, slope * tau, tau - 1.0
 
 
-@njit
+@kernel
 def _relax(
     S: Floats, old: int, new: int, size: int, n: int, h: float, w: float, tau: float, mu: float, rate: float
 ) -> float:
@@ -113,7 +113,7 @@ def _relax(
     return slope
 
 
-@njit
+@kernel
 def _front(S: Floats, old: int, new: int, n: int, h: float, gap: float, tau: float, mu: float) -> int:
     """The deepest node that moves, or n if none does; deep cable may still creep while the cable outside of it sticks."""
     for j in range(n):
@@ -124,7 +124,7 @@ def _front(S: Floats, old: int, new: int, n: int, h: float, gap: float, tau: flo
     return n
 
 
-@njit
+@kernel
 def _face(a: float, b: float, d: float, mu: float) -> tuple[float, float, float]:
     """Slip drive shrink((b - a)/d, mu (a + b)/2) and its derivatives by a and b."""
     g = (b - a) / d
@@ -136,7 +136,7 @@ def _face(a: float, b: float, d: float, mu: float) -> tuple[float, float, float]
     return 0.0, 0.0, 0.0
 
 
-@njit
+@kernel
 def _row(
     S: Floats, old: int, new: int, n: int, j: int, h: float, gap: float, tau: float, mu: float, rate: float
 ) -> tuple[float, float, float, float]:
@@ -154,7 +154,7 @@ def _row(
     return residual, k * inner_a, 1.0 - k * (out_a - inner_b), -k * out_b
 
 
-@njit
+@kernel
 def _newton(
     S: Floats, old: int, new: int, size: int, n: int, first: int, h: float, gap: float, tau: float, mu: float,
     rate: float, linear: bool,
@@ -184,7 +184,7 @@ def _newton(
     return largest
 
 
-@njit
+@kernel
 def viscous_commit(I: Ints, S: Floats, wrap: int) -> None:
     """Make the pending profile of a wrap its state."""
     b = block_of(I, wrap)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.observer.bounds_circuit import bounds_step
 from cablecomp.observer.stepper import find_load, step_one
 
 
-@njit
+@kernel
 def run_bounded(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats, spare: Floats, inverse: bool,
     W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints, interval: Floats,

@@ -14,10 +14,9 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import stacks
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 from cablecomp.observer.bounds_kernel import (
-    W_CABLE,
     W_CIRCUIT,
     W_EA,
     W_EPS,
@@ -48,7 +47,7 @@ OUTWARD = 1e-11  # rounding of solved tensions, as a share of T0
 ROUNDING = 1e-11  # of solved angles [rad], as the solver stops there
 
 
-@njit
+@kernel
 def pair_gap(
     P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, ic: int, high: Side, low: Side, tension: float, pull: float,
     x: tuple[float, float, float], safe: float,
@@ -64,7 +63,7 @@ def pair_gap(
     return theta_h + theta_l, a_h + a_l, theta_h, theta_l
 
 
-@njit
+@kernel
 def pair_root(
     P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, ic: int, high: Side, low: Side, lowest: float, guess: float,
     pull: float, x: tuple[float, float, float], safe: float, target: float,
@@ -97,7 +96,7 @@ def pair_root(
     return tension
 
 
-@njit
+@kernel
 def tension_interval(
     P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, ic: int, low: Side, up: Side, lowest: float, pull: float,
     x: tuple[float, float, float], x_in: float,
@@ -146,14 +145,14 @@ def tension_interval(
     return t_low, max(t_high, t_low)
 
 
-@njit
+@kernel
 def floor_tension(P: Floats, ic: int, pull: float) -> float:
     """The tension of cable l at which it, or cable h, is slack."""
     floor = P[o.JOINT * ic + o.J_SLACK]
     return floor if pull >= 0.0 else floor - pull
 
 
-@njit
+@kernel
 def _comparable(P: Floats, I: Ints, N: Floats, W: Floats, ic: int, low: Side) -> bool:
     """True where surplus and deficit carry over from the last step: same factors, less cable wound on than is free."""
     h = o.HEADER + o.CIRCUIT * ic
@@ -170,7 +169,7 @@ def _comparable(P: Floats, I: Ints, N: Floats, W: Floats, ic: int, low: Side) ->
     return True
 
 
-@njit
+@kernel
 def closed_interval(
     P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, ic: int, low: Side, up: Side, pull: float,
     x: tuple[float, float, float], x_in: float,
@@ -197,7 +196,7 @@ def closed_interval(
     return theta_low, theta_high
 
 
-@njit
+@kernel
 def _part(mixed: float, least: float, most: float, pull: float, by_h: float, by_l: float) -> float:
     """Which chain's stretch bounds the deflection; where the tension is none of the ends, either does unless one is slack."""
     if mixed < least:
@@ -207,7 +206,7 @@ def _part(mixed: float, least: float, most: float, pull: float, by_h: float, by_
     return by_h if pull >= 0.0 else by_l
 
 
-@njit
+@kernel
 def circuit_interval(
     P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, ic: int, low: Side, up: Side, moment: float,
     x: tuple[float, float, float],
@@ -236,7 +235,7 @@ def circuit_interval(
     return math.nan, math.nan
 
 
-@njit
+@kernel
 def _eps_hold(
     P: Floats, I: Ints, N: Floats, W: Floats, ic: int, low: Side, up: Side, theta_low: float, theta_high: float,
     x: tuple[float, float, float],
@@ -270,7 +269,7 @@ def _eps_hold(
     return held
 
 
-@njit
+@kernel
 def circuit_keep(
     P: Floats,
     I: Ints,
@@ -300,7 +299,7 @@ def circuit_keep(
     W[b + W_PULL], W[b + W_X_IN], W[b + W_FIRST] = pull, x_in, 0.0
 
 
-@njit
+@kernel
 def bounds_step(
     P: Floats, I: Ints, L: Floats, N: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints
 ) -> tuple[float, float]:

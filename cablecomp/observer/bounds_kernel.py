@@ -13,7 +13,7 @@ import numpy as np
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import law_of, stacks
-from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, tau_of_v, v_of_tau
@@ -33,13 +33,13 @@ MERGE = 1e-13  # error of v below which neighbours are merged; more only where m
 EPS_START = 1e-4  # first guess of the half width of a shaft's angle
 
 
-@njit
+@kernel
 def bounds_size(I: Ints) -> int:
     """Number of floats in W."""
     return int(W_HEAD + W_CIRCUIT * I[o.N_CIRCUITS] + W_CABLE * I[o.N_CABLES])
 
 
-@njit
+@kernel
 def cable_block(I: Ints, c: int) -> int:
     """Where cable c's numbers lie in W."""
     return W_HEAD + W_CIRCUIT * I[o.N_CIRCUITS] + W_CABLE * c
@@ -55,7 +55,7 @@ def steepest(L: Floats | None) -> float:
     return max(place, 1.0) * max(tension, 1.0)
 
 
-@njit
+@kernel
 def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints) -> None:
     """Fill all wraps of two started joints with the least and the greatest tension of the past; the first step cuts them
     to what friction admits."""
@@ -76,7 +76,7 @@ def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, 
         W[W_HEAD + W_CIRCUIT * ic + W_FIRST] = 1.0
 
 
-@njit
+@kernel
 def side_follow(I: Ints, N: Floats, S: Floats, first: bool) -> None:
     """Take over stiffness factors and lengths of the nominal state N, at the first step its pretension factors too."""
     for c in range(I[o.N_CABLES]):
@@ -86,7 +86,7 @@ def side_follow(I: Ints, N: Floats, S: Floats, first: bool) -> None:
             S[q + o.Q_T0] = N[q + o.Q_T0]
 
 
-@njit
+@kernel
 def side_retension(P: Floats, I: Ints, N: Floats, L: Floats, side: Side) -> None:
     """Bring one bound to the pretension that the nominal state N took on when it committed."""
     S, J, G, _ = side
@@ -94,7 +94,7 @@ def side_retension(P: Floats, I: Ints, N: Floats, L: Floats, side: Side) -> None
         retension(P, I, S, J, L, G, c, N[I[o.S_CABLE] + o.CABLE_STATE * c + o.Q_T0])
 
 
-@njit
+@kernel
 def _cable(
     P: Floats,
     I: Ints,
@@ -143,7 +143,7 @@ def _cable(
     return total * unit - S[q + o.Q_OFFSET], slope * unit / t0, margin * unit
 
 
-@njit
+@kernel
 def chain_bound(
     P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, side: Side, first: int, count: int, tension: float, x_in: float,
     x_out: float, eps_in: float,
@@ -171,7 +171,7 @@ def chain_bound(
     return theta, slope, margin
 
 
-@njit
+@kernel
 def chain_turning(
     P: Floats, I: Ints, S: Floats, L: Floats, W: Floats, first: int, count: int
 ) -> tuple[float, float, float]:
@@ -196,7 +196,7 @@ def chain_turning(
     return turning, shifting, compliance
 
 
-@njit
+@kernel
 def chain_commit(P: Floats, I: Ints, L: Floats, side: Side, first: int, count: int) -> None:
     """Make the last evaluation of a chain its bound's state."""
     S, J, G, _ = side

@@ -6,7 +6,7 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import stacks
-from cablecomp.mechanics.jit import inlined, njit
+from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.joint import advance, joint_commit, joint_solve
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 
@@ -18,7 +18,7 @@ IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
 OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_WIDTH = range(7)
 
 
-@njit
+@kernel
 def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, float]:
     """Causal input filter: two equal one-pole stages, exact for uneven steps; off at cutoff 0."""
     if F[CUTOFF] <= 0.0:
@@ -36,7 +36,7 @@ def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, floa
     return F[MOTOR_2], F[LOAD_2]
 
 
-@inlined
+@inlined_kernel
 def predict(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, F: Floats, row: Floats, out: Floats
 ) -> int:
@@ -59,7 +59,7 @@ def predict(
     return status
 
 
-@njit
+@kernel
 def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats) -> int:
     """One sample, committed."""
     G = stacks(I, S)
@@ -69,7 +69,7 @@ def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: 
     return status
 
 
-@njit
+@kernel
 def peek_one(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats, spare: Floats
 ) -> int:
@@ -83,7 +83,7 @@ def peek_one(
     return status
 
 
-@njit
+@kernel
 def run_block(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats
 ) -> tuple[int, int]:
@@ -97,7 +97,7 @@ def run_block(
     return rows.shape[0], o.STATUS_OK
 
 
-@njit
+@kernel
 def find_load(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats, spare: Floats
 ) -> int:
@@ -135,7 +135,7 @@ def find_load(
     return o.STATUS_OK
 
 
-@njit
+@kernel
 def run_inverse(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats, spare: Floats
 ) -> tuple[int, int]:
