@@ -116,7 +116,6 @@ def arc_commit(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> in
             keep_to = k
     tail = max(keep_to - keep_from + 1, 0)
     lead = 1 + (1 if near > 0.0 else 0)
-    total = lead + tail + (1 if far < width and (far > near or near == 0.0) else 0) + (1 if near < width else 0)
     shift = lead - keep_from
     if tail > 0 and shift <= 0:
         for k in range(keep_from, keep_to + 1):
@@ -226,7 +225,9 @@ def _tidy(G: Floats, i: int, n: int) -> int:
     G[i, E, 0] = math.exp(G[i, V, 0])
     for k in range(1, n):
         G[i, E, k] = math.exp(G[i, V, k])
-        part, _ = _piece_plain(G[i, Y, k] - G[i, Y, k - 1], G[i, V, k] - G[i, V, k - 1], G[i, E, k - 1], G[i, E, k])
+        part, _ = _piece_plain(
+            G[i, Y, k] - G[i, Y, k - 1], G[i, V, k] - G[i, V, k - 1], G[i, E, k - 1], G[i, E, k]
+        )
         G[i, C, k] = G[i, C, k - 1] + part
         G[i, D, k] = G[i, B, k] = 0.0
     return n

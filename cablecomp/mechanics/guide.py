@@ -42,9 +42,7 @@ def guide_split(
     m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
     for iteration in range(60):
         tau1 = tau_of_v(L, 2, v1)
-        e_in, a_in, k, ym, vm, cm, bm, tm = wrap_eval(
-            G, L, 2, wrap, J[wrap], w_in, v1, tau1, P[p + o.MU_IN]
-        )
+        e_in, a_in, k, ym, vm, cm, bm, tm = wrap_eval(G, L, 2, wrap, J[wrap], w_in, v1, tau1, P[p + o.MU_IN])
         S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = e_in, k, ym, vm
         S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
         S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w_in, v1, tau1

@@ -21,7 +21,7 @@ from cablecomp.observer.bounds_kernel import (
     steepest,
 )
 
-Kernel: TypeAlias = tuple[Any, ...]
+Kernel: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 EXTREME = 30.0  # |ln(T/T0)| beyond anything
 
 

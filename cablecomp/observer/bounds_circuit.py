@@ -175,7 +175,6 @@ def closed_interval(
     x: tuple[float, float, float], x_in: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Lowest and highest possible deflection [rad] of a closed circuit; leaves the sides' next states pending."""
-    h = o.HEADER + o.CIRCUIT * ic
     b = W_HEAD + W_CIRCUIT * ic
     lowest = floor_tension(P, ic, pull)
     t_low, t_high = tension_interval(P, I, N, L, W, ic, low, up, lowest, pull, x, x_in)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -244,8 +244,8 @@ class Observer:
 
     # --- inside ---------------------------------------------------------------------------------------------------
 
-    def _kernel(self) -> tuple[Floats, ...]:
-        return self._arrays  # type: ignore[return-value]
+    def _kernel(self) -> tuple[Any, Any, Any, Any, Any, Any]:
+        return self._arrays
 
     def _bound_pair(self) -> BoundPair:
         options = self.config.observer
