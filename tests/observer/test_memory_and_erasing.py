@@ -1,0 +1,120 @@
+"""Memory stays bounded and its error accounted for; history can be erased as planned; a snapshot loses nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from observer_joints import STAGE, joint, pull_unit
+
+from cablecomp.config import Limits, parse_joint
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+from cablecomp.observer.erase import excitation, plan_erase
+from cablecomp.signals import Sample
+
+
+def wandering(seed: int, samples: int, unit: float) -> dict[str, np.ndarray]:
+    """Both pulleys turning and a load that wanders."""
+    rng = np.random.default_rng(seed)
+    time = 0.01 * np.arange(samples)
+    load = 0.8 * unit * np.sin(1.3 * time + rng.uniform(0, 6)) * np.cos(0.37 * time)
+    motor = 1.2 * np.sin(0.7 * time) + 0.6 * np.sin(2.3 * time + rng.uniform(0, 6))
+    return {
+        "time_s": time,
+        "motor_position_rad": motor,
+        "joint_torque_Nm": load + 0.02 * unit * rng.standard_normal(samples),
+    }
+
+
+def test_memory_is_bounded_and_the_stated_error_bounds_what_merging_does() -> None:
+    exact = joint("closed", observer={"max_pieces": 4096, "merge_tolerance": 1e-13})
+    small = joint("closed", observer={"max_pieces": 48, "merge_tolerance": 1e-5})
+    columns = wandering(1, 6000, pull_unit(exact))
+    a, b = Observer(exact), Observer(small)
+    truth, merged = a.run(columns), b.run(columns)
+    assert b.pieces() <= 4 * 48
+    error = abs(truth["deflection_rad"][-1] - merged["deflection_rad"][-1])
+    assert 0.0 < error <= b.merge_error_rad()
+    assert np.max(np.abs(truth["deflection_rad"] - merged["deflection_rad"])) < 1e-3 * np.ptp(
+        truth["deflection_rad"]
+    )
+
+
+def test_pieces_do_not_grow_with_the_length_of_the_run() -> None:
+    config = joint("closed", observer={"max_pieces": 192, "merge_tolerance": 1e-6})
+    observer = Observer(config)
+    counts = []
+    for part in range(8):
+        columns = wandering(part, 20000, pull_unit(config))
+        observer.run({**columns, "time_s": columns["time_s"] + 200.0 * part})
+        counts.append(observer.pieces())
+    assert max(counts) <= 4 * 192
+    assert counts[-1] < 2 * max(counts[:2])
+
+
+def test_a_snapshot_continues_bit_for_bit_and_a_peek_leaves_no_trace(tmp_path: Path) -> None:
+    config = joint("closed")
+    columns = wandering(3, 400, pull_unit(config))
+    first = {key: value[:200] for key, value in columns.items()}
+    rest = {key: value[200:] for key, value in columns.items()}
+    observer = Observer(config)
+    observer.run(first)
+    observer.save(tmp_path / "joint.snapshot")
+    before = observer.snapshot()
+    observer.peek(Sample(2.5, 0.3, 0.7 * pull_unit(config)))
+    assert observer.snapshot() == before
+    other = Observer(config)
+    other.load(tmp_path / "joint.snapshot")
+    assert np.array_equal(observer.run(rest)["deflection_rad"], other.run(rest)["deflection_rad"])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda data: data[:-1] + bytes([data[-1] ^ 1]), "damaged"),
+        (lambda data: b"nonsense" + data[8:], "none of ours"),
+        (lambda data: data[:30], "none of ours"),
+    ],
+)
+def test_a_spoiled_snapshot_is_one_line(spoil, words: str) -> None:  # type: ignore[no-untyped-def]  # a lambda
+    observer = Observer(joint("closed"))
+    observer.step(Sample(0.0, 0.0, 0.1))
+    with pytest.raises(InputError, match=words):
+        Observer(joint("closed")).restore(spoil(observer.snapshot()))
+    with pytest.raises(InputError, match="another joint"):
+        Observer(joint("closed", {"mu_output": 0.2})).restore(observer.snapshot())
+
+
+def test_the_planned_swing_erases_and_a_smaller_one_does_not() -> None:
+    config = joint("closed")
+    unit = pull_unit(config)
+    limits = Limits(joint_torque_max_Nm=1.5 * unit, motor_position_min_rad=-3.0, motor_position_max_rad=3.0)
+    known = Observer(config)
+    known.run(
+        {
+            "time_s": np.arange(80.0),
+            "motor_position_rad": np.zeros(80),
+            "joint_torque_Nm": np.concatenate(
+                [np.linspace(0, 0.9 * unit, 40), np.linspace(0.9 * unit, 0.1 * unit, 40)]
+            ),
+        }
+    )
+    plan = plan_erase(known, 79.0, 0.0, 0.1 * unit, limits)
+    assert plan.possible
+    # what a swing up to the old peak wipes out (return-point memory), no more is needed
+    assert plan.load_swing_Nm == pytest.approx(0.9 * unit, rel=0.02)
+    fresh = Observer(config)
+    fresh.step(Sample(79.0, 0.0, 0.1 * unit))
+    columns = excitation((79.0, 0.0, 0.1 * unit), 1.02 * plan.load_swing_Nm, plan.first, turn=False)
+    a, b = known.run(columns)["deflection_rad"][-1], fresh.run(columns)["deflection_rad"][-1]
+    assert abs(a - b) < 1e-12
+
+
+def test_erasing_says_what_it_needs() -> None:
+    config = parse_joint(
+        {"schema": 1, "name": "bare", "drive": {"circuit": "closed", "stage": [STAGE]}}, "test"
+    )
+    with pytest.raises(InputError, match="joint_torque_max_Nm"):
+        plan_erase(Observer(config), 0.0, 0.0, 0.0)
