@@ -29,7 +29,9 @@ from cablecomp.report.compare_page import HEAD, summary_rows, write_comparison
 from cablecomp.report.design_page import design_page, design_tables
 from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
-from cablecomp.runtime.run import RunOptions, RunReport, matched, run_joint
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
 

@@ -13,7 +13,7 @@ from cablecomp.report.page import Fact, Section
 from cablecomp.report.run_data import RunData, load_run
 from cablecomp.report.run_page import TIME, curve, deflection_figure, stack, timing_section
 from cablecomp.runtime.compare import LINEAR, MOTOR_ALONE, NAMES, OBSERVER, Comparison
-from cablecomp.runtime.run import RunReport
+from cablecomp.runtime.results import RunReport
 
 _COLOURS = {MOTOR_ALONE: style.BASELINE, LINEAR: style.RESIDUAL, OBSERVER: style.PREDICTED}
 _WORDS = {

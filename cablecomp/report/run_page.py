@@ -14,7 +14,7 @@ from plotly.subplots import make_subplots
 from cablecomp.report import page, style
 from cablecomp.report.page import Fact, Section
 from cablecomp.report.run_data import Floats, RunData, load_run
-from cablecomp.runtime.run import JointResult, RunReport
+from cablecomp.runtime.results import JointResult, RunReport
 
 TIME = style.label("time", "s")
 

@@ -20,7 +20,9 @@ from cablecomp.control.standard import calibration_protocol, force_protocol, rea
 from cablecomp.errors import InputError
 from cablecomp.links.schema import LinkConfig
 from cablecomp.recording.reader import read_all
-from cablecomp.runtime.run import Contestant, RunOptions, RunReport, Watch, run_joints, same_joint
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, Watch, run_joints
+from cablecomp.runtime.setup import Contestant, same_joint
 from cablecomp.runtime.simulated import Simulation, SimulationFactory, SimulationWish
 
 Columns = Mapping[str, NDArray[np.float64]]

@@ -18,7 +18,9 @@ from cablecomp.control.standard import reaching_protocol
 from cablecomp.links.schema import load_link
 from cablecomp.observer import Observer
 from cablecomp.runtime.priority import Policy
-from cablecomp.runtime.run import Contestant, RunOptions, RunReport, matched, run_joints, same_joint
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, run_joints
+from cablecomp.runtime.setup import Contestant, matched, same_joint
 from cablecomp.signals import Sample
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.hosted import Truth

@@ -23,7 +23,9 @@ from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop, Stage
-from cablecomp.runtime.run import RunOptions, RunReport, matched, run_joint
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from firmware_sim.build import BenchConfig
 from firmware_sim.faults import parse_fault
@@ -300,7 +302,7 @@ def test_no_answer_at_all_is_a_device_error_in_one_line(tmp_path: Path) -> None:
 
 
 def test_times_follow_from_the_link() -> None:
-    from cablecomp.runtime.run import times_of
+    from cablecomp.runtime.setup import times_of
 
     link = load_link(CONFIGS / "links/wrist-virtual.toml")
     times = times_of(link, 1e-3)

@@ -23,7 +23,9 @@ from cablecomp.recording.reader import open_recording
 from cablecomp.report.replay_page import write_replay
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop, Stage
-from cablecomp.runtime.run import RunOptions, RunReport, matched, run_joint
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import SimulationWish
 
 CONFIGS = Path(__file__).parents[2] / "configs"

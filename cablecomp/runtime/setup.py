@@ -1,0 +1,158 @@
+"""From configuration, link and control file to joints that can be run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+
+from cablecomp.config import JointConfig
+from cablecomp.control.command import Reference
+from cablecomp.control.compensator import Compensator, Gains, ratio_of
+from cablecomp.control.degrade import DegradeTimes
+from cablecomp.control.gate import GateLimits
+from cablecomp.control.options import CompensatorOptions, ControlConfig, ControlMode
+from cablecomp.control.protocol import Protocol
+from cablecomp.errors import InputError
+from cablecomp.links.link import Link
+from cablecomp.links.readings import JointReadings
+from cablecomp.links.schema import JointEnds, LinkConfig
+from cablecomp.observer import Observer
+from cablecomp.runtime.health import Health
+from cablecomp.runtime.joint_loop import JointSetup, References
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One joint of a run: its place on the link (from 0), a name for its folder, its configuration and
+    controller.
+    """
+
+    place: int
+    name: str
+    config: JointConfig
+    options: CompensatorOptions
+
+
+def matched(link: LinkConfig, control: ControlConfig, *, own_link: bool) -> tuple[LinkConfig, ControlConfig]:
+    """Link and control file that say the same of the drive's stiffness and damping.
+
+    `own_link`: the link is the user's, and what it states holds; else it takes over what the control
+    file states.
+    """
+    motor = link.joint[0].motor
+    if motor is None or motor.mode != "impedance":
+        return link, control
+    if own_link and motor.stiffness_Nm_per_rad > 0.0:
+        own = {
+            "stiffness_Nm_per_rad": motor.stiffness_Nm_per_rad,
+            "damping_Nms_per_rad": motor.damping_Nms_per_rad or control.motor.damping_Nms_per_rad,
+        }
+        return link, control.model_copy(update={"motor": control.motor.model_copy(update=own)})
+    gains = {
+        "stiffness_Nm_per_rad": control.motor.stiffness_Nm_per_rad,
+        "damping_Nms_per_rad": control.motor.damping_Nms_per_rad,
+    }
+    ends = link.joint[0].model_copy(update={"motor": motor.model_copy(update=gains)})
+    return link.model_copy(update={"joint": (ends, *link.joint[1:])}), control
+
+
+def same_joint(link: LinkConfig, names: Sequence[str]) -> LinkConfig:
+    """The link with its first joint once for each name, on nodes counted up from its own."""
+    base = link.joint[0]
+
+    def copy(k: int, name: str) -> JointEnds:
+        motor = None if base.motor is None else base.motor.model_copy(update={"node": base.motor.node + k})
+        sensor = (
+            None if base.sensor is None else base.sensor.model_copy(update={"node": base.sensor.node + k})
+        )
+        return JointEnds(name=name, motor=motor, sensor=sensor)
+
+    return link.model_copy(update={"joint": tuple(copy(k, name) for k, name in enumerate(names))})
+
+
+def times_of(link: LinkConfig, period_s: float) -> DegradeTimes:
+    """The link's timeouts as times of the descent; two periods and a half count as fresh."""
+    t = link.timeouts
+    fresh = min(2.5 * period_s, t.hold_s)
+    return DegradeTimes(fresh, t.hold_s, t.fade_s, t.stop_s, t.fade_s, max(0.5 * t.fade_s, fresh))
+
+
+def joint_setup(
+    c: Contestant,
+    mode: ControlMode,
+    bus: Link,
+    control: ControlConfig,
+    references: References,
+    gains: Gains,
+    period: float,
+    *,
+    bounds: bool = False,
+    resume: Path | None = None,
+) -> JointSetup:
+    """Everything that one joint of a run needs; raises InputError for what does not fit together."""
+    link = bus.config
+    if not 0 <= c.place < len(link.joint):
+        raise InputError(
+            f"link `{link.name}` has {len(link.joint)} joints; joint {c.place + 1} is not among them"
+        )
+    chosen = c.options.model_copy(update={"mode": mode})
+    force = mode is not ControlMode.POSITION
+    both = force and chosen.torque_from == "encoders"
+    config = observed(c.config, chosen)
+    observer = Observer(config, bounds=bounds)
+    if resume is not None:
+        observer.load(resume)
+    compensator = Compensator(config, chosen, period, observer, gains=gains, motor=control.motor)
+    times = times_of(link, period)
+    sensor = config.observer.load == "joint_torque"
+    health = Health(
+        control.health,
+        ratio_of(config),
+        times.fresh_s,
+        period,
+        needs_torque=sensor,
+        needs_joint=both,
+        others=_places(bus.joints[c.place], observer.channels),
+    )
+    limits = GateLimits.of(c.config.limits, age_s=times.motor_stop_s)
+    return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
+
+
+def _places(readings: JointReadings, channels: Sequence[str]) -> tuple[int, ...]:
+    missing = [name for name in channels if name not in readings.others]
+    if missing:
+        raise InputError(
+            f"joint `{readings.name}`: an effect reads `{missing[0]}`, which is not on this link; "
+            "add the channel to a device's messages"
+        )
+    return tuple(readings.index(name) for name in channels)
+
+
+def observed(config: JointConfig, options: CompensatorOptions) -> JointConfig:
+    """The configuration as the run's observer has it: where its load comes from follows from the
+    control mode.
+    """
+    load: str = config.observer.load
+    if options.mode is not ControlMode.POSITION:
+        load = {"encoders": "both_encoders", "motor_torque": "motor_torque", "sensor": "joint_torque"}[
+            options.torque_from
+        ]
+    return config.model_copy(update={"observer": config.observer.model_copy(update={"load": load})})
+
+
+def references_of(protocol: Protocol, force: bool) -> References:
+    """The protocol as joints see it; joints that ask for the same instant share the answer."""
+    asked, answer = nan, Reference()
+
+    def reference(time_s: float) -> Reference:
+        nonlocal asked, answer
+        if time_s != asked:
+            found = protocol.reference(time_s)
+            # In position mode the load is the surroundings' own: the controller is not told.
+            answer = found if force else found._replace(joint_torque_Nm=nan)
+            asked = time_s
+        return answer
+
+    return reference
