@@ -4,7 +4,7 @@ from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.control.command import Command, Reference
 from cablecomp.control.compensator import Compensator
 from cablecomp.errors import CablecompError, DeviceError, InputError, InternalError
-from cablecomp.observer import Observer, WrapProfile
+from cablecomp.observer import ErasePlan, Observer, WrapProfile, plan_erase
 from cablecomp.signals import Estimate, Sample
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "Command",
     "Compensator",
     "DeviceError",
+    "ErasePlan",
     "Estimate",
     "InputError",
     "InternalError",
@@ -22,4 +23,5 @@ __all__ = [
     "WrapProfile",
     "load_joint",
     "parse_joint",
+    "plan_erase",
 ]

@@ -1,5 +1,7 @@
 """The online state of a joint: init, step, peek, snapshot, bounds, erasing history."""
 
-from cablecomp.observer.observer import Observer, WrapProfile
+from cablecomp.observer.erase import ErasePlan, plan_erase
+from cablecomp.observer.observer import Observer
+from cablecomp.observer.wraps import WrapProfile
 
-__all__ = ["Observer", "WrapProfile"]
+__all__ = ["ErasePlan", "Observer", "WrapProfile", "plan_erase"]

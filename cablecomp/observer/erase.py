@@ -80,7 +80,7 @@ def excitation(at: tuple[float, float, float], size: float, first: int, turn: bo
     way = np.concatenate([np.linspace(a, b, STEPS + 1)[1:] for a, b in pairwise(legs)])
     steady = np.ones(len(way))
     return {
-        "time_s": time + 0.01 * np.arange(1, len(way) + 1),
+        "time_s": time + 0.01 * np.arange(1, len(way) + 1, dtype=np.float64),
         "motor_position_rad": motor + (way if turn else 0.0 * way),
         "joint_torque_Nm": load * steady if turn else way,
         "temperature_degC": 20.0 * steady,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,22 +16,13 @@ from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
-from cablecomp.mechanics.profile import ROWS, Floats, Ints, V, Y
+from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.start import joint_start
-from cablecomp.mechanics.tables import tau_of_v
 from cablecomp.observer import stepper as st
 from cablecomp.observer.bounds import BoundPair
 from cablecomp.observer.snapshot import pack, unpack
+from cablecomp.observer.wraps import WrapProfile, wrap_profiles
 from cablecomp.signals import NAN, Estimate, Sample
-
-
-class WrapProfile(NamedTuple):
-    """Tension along one wrap: angle [rad] from the termination, tension [N]."""
-
-    name: str
-    angle_rad: NDArray[np.float64]
-    tension_N: NDArray[np.float64]
-
 
 REASONS = {
     o.STATUS_UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, wrap_input_rad and the angles' zero",
@@ -226,21 +217,7 @@ class Observer:
 
     def profiles(self) -> list[WrapProfile]:
         """The tension profile on every wrap, termination first."""
-        I, P = self.model.I, self.model.P
-        wraps, stacks = 2 * int(I[o.N_CABLES]), int(I[o.N_STACKS])
-        first = int(I[o.S_PROFILE])
-        G = self._S[first : first + stacks * ROWS * int(I[o.CAPACITY])].reshape(stacks, ROWS, -1)
-        result = []
-        for wrap in range(wraps):
-            p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * (wrap // 2)
-            q = int(I[o.S_CABLE]) + o.CABLE_STATE * (wrap // 2)
-            n = int(self._J[wrap])
-            t0 = P[p + o.T0] * self._S[q + o.Q_T0] * self._S[q + o.Q_EA]
-            tau = np.array([tau_of_v(self.model.L, 2, v) for v in G[wrap, V, :n]])
-            result.append(
-                WrapProfile(_wrap_name(self.config, wrap, P[p + o.SIGN]), G[wrap, Y, :n].copy(), t0 * tau)
-            )
-        return result
+        return wrap_profiles(self.config, self.model, self._S, self._J)
 
     # --- inside ---------------------------------------------------------------------------------------------------
 
@@ -342,16 +319,3 @@ def _need(columns: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.f
 
 def _rigid_ratio(config: JointConfig) -> float:
     return float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))
-
-
-def _wrap_name(config: JointConfig, wrap: int, sign: float) -> str:
-    stages = len(config.drive.stage)
-    closed = config.drive.circuit == "closed"
-    cable = wrap // 2
-    if closed and config.drive.arrangement == "series":
-        stage = cable // 2
-    else:
-        stage = cable % stages
-    side = "output" if wrap % 2 == 0 else "input"
-    label = f"cable {'h' if sign > 0 else 'l'}, {side} pulley"
-    return label if stages == 1 else f"stage {stage + 1}, {label}"

@@ -1,0 +1,52 @@
+"""The tension profiles of all wraps, as users read them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.config import JointConfig
+from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.assemble import Model
+from cablecomp.mechanics.profile import ROWS, Floats, Ints, V, Y
+from cablecomp.mechanics.tables import tau_of_v
+
+
+class WrapProfile(NamedTuple):
+    """Tension along one wrap: angle [rad] from the termination, tension [N]."""
+
+    name: str
+    angle_rad: NDArray[np.float64]
+    tension_N: NDArray[np.float64]
+
+
+def wrap_profiles(config: JointConfig, model: Model, S: Floats, J: Ints) -> list[WrapProfile]:
+    """The tension profile on every wrap in the state S, J, termination first."""
+    I, P = model.I, model.P
+    wraps, stacks = 2 * int(I[o.N_CABLES]), int(I[o.N_STACKS])
+    first = int(I[o.S_PROFILE])
+    G = S[first : first + stacks * ROWS * int(I[o.CAPACITY])].reshape(stacks, ROWS, -1)
+    result = []
+    for wrap in range(wraps):
+        p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * (wrap // 2)
+        q = int(I[o.S_CABLE]) + o.CABLE_STATE * (wrap // 2)
+        n = int(J[wrap])
+        t0 = P[p + o.T0] * S[q + o.Q_T0] * S[q + o.Q_EA]
+        tau = np.array([tau_of_v(model.L, 2, v) for v in G[wrap, V, :n]])
+        result.append(WrapProfile(_wrap_name(config, wrap, P[p + o.SIGN]), G[wrap, Y, :n].copy(), t0 * tau))
+    return result
+
+
+def _wrap_name(config: JointConfig, wrap: int, sign: float) -> str:
+    stages = len(config.drive.stage)
+    closed = config.drive.circuit == "closed"
+    cable = wrap // 2
+    if closed and config.drive.arrangement == "series":
+        stage = cable // 2
+    else:
+        stage = cable % stages
+    side = "output" if wrap % 2 == 0 else "input"
+    label = f"cable {'h' if sign > 0 else 'l'}, {side} pulley"
+    return label if stages == 1 else f"stage {stage + 1}, {label}"
