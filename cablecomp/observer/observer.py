@@ -28,6 +28,7 @@ REASONS = {
     o.STATUS_UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, wrap_input_rad and the angles' zero",
     o.STATUS_SLACK: "the load would slacken the cable of an open circuit (T0 + M/R <= 0); check pretension_N and the load's sign",
     o.STATUS_DIVERGED: "the tensions could not be solved; check the configuration's orders of magnitude",
+    o.STATUS_NAN: "has no finite time, motor angle or load; leave it out or mend the channel",
 }
 
 
@@ -55,6 +56,7 @@ class Observer:
         self._out = np.zeros(st.OUT_WIDTH)
         self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
         self._ratio = _rigid_ratio(config)
+        self._breaking = config.drive.stage[-1].breaking_force_N
         self._last_time = -math.inf
         self._source = config.observer.load
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
@@ -105,6 +107,13 @@ class Observer:
             self._start(rows[0, st.IN_TIME], rows[0, st.IN_MOTOR])
         done, status = self._run_rows(rows, outs, low, high)
         self._check(status, rows[min(done, len(rows) - 1), st.IN_TIME], done)
+        if self._breaking is not None:
+            over = np.fmax(outs[:, st.OUT_T_H], outs[:, st.OUT_T_L]) > self._breaking
+            if np.any(over):
+                k = int(np.argmax(over))
+                raise InputError(
+                    f"sample {k}: at {rows[k, st.IN_TIME]:g} s {self._too_much(float(np.nanmax(outs[k, st.OUT_T_H : st.OUT_T_L + 1])))}"
+                )
         if len(rows):
             self._last_time = float(rows[-1, st.IN_TIME])
         offset = self._ratio * rows[:, st.IN_MOTOR]
@@ -302,8 +311,13 @@ class Observer:
             where = f"sample at {time_s:g} s" if index is None else f"sample {index}: at {time_s:g} s"
             raise InputError(f"{where} {REASONS[status]}")
 
+    def _too_much(self, tension: float) -> str:
+        return f"puts {tension:.4g} N on a cable that breaks at {self._breaking:g} N; lower the load or check breaking_force_N"
+
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
         joint, drive, load, tension_h, tension_l, _ = self._out.tolist()
+        if self._breaking is not None and (tension_h > self._breaking or tension_l > self._breaking):
+            raise InputError(f"sample at {sample.time_s:g} s {self._too_much(max(tension_h, tension_l))}")
         rigid = self._ratio * sample.motor_position_rad
         shift = joint - drive - rigid
         return Estimate(

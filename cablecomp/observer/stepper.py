@@ -10,7 +10,7 @@ from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.joint import advance, joint_commit, joint_solve
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 
-# options F: [torque gain, torque offset, filter angular frequency, 0]; filter state follows: two one-poles each for angle and load
+# options F: [torque gain, torque offset, filter angular frequency, 0]; filter state follows: value and slope of angle and load
 GAIN, OFFSET, CUTOFF, STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, OPTIONS = range(9)
 # one row of inputs
 IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
@@ -20,20 +20,26 @@ OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_WIDTH = ra
 
 @kernel
 def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, float]:
-    """Causal input filter: two equal one-pole stages, exact for uneven steps; off at cutoff 0."""
+    """Causal input filter: an alpha-beta tracker of value and slope, critically damped; it follows ramps without lag.
+
+    Uneven steps are exact in the gains; off at cutoff 0.
+    """
     if F[CUTOFF] <= 0.0:
         return motor, load
     if F[STARTED] == 0.0:
         F[STARTED] = 1.0
-        F[MOTOR_1] = F[MOTOR_2] = motor
-        F[LOAD_1] = F[LOAD_2] = load
+        F[MOTOR_1], F[LOAD_1] = motor, load
+        F[MOTOR_2] = F[LOAD_2] = 0.0
         return motor, load
-    share = -math.expm1(-F[CUTOFF] * dt)
-    F[MOTOR_1] += share * (motor - F[MOTOR_1])
-    F[MOTOR_2] += share * (F[MOTOR_1] - F[MOTOR_2])
-    F[LOAD_1] += share * (load - F[LOAD_1])
-    F[LOAD_2] += share * (F[LOAD_1] - F[LOAD_2])
-    return F[MOTOR_2], F[LOAD_2]
+    if dt <= 0.0:
+        return F[MOTOR_1], F[LOAD_1]
+    keep = math.exp(-F[CUTOFF] * dt)
+    follow, turn = 1.0 - keep * keep, (1.0 - keep) * (1.0 - keep) / dt
+    miss = motor - (F[MOTOR_1] + F[MOTOR_2] * dt)
+    F[MOTOR_1], F[MOTOR_2] = motor - (1.0 - follow) * miss, F[MOTOR_2] + turn * miss
+    miss = load - (F[LOAD_1] + F[LOAD_2] * dt)
+    F[LOAD_1], F[LOAD_2] = load - (1.0 - follow) * miss, F[LOAD_2] + turn * miss
+    return F[MOTOR_1], F[LOAD_1]
 
 
 @inlined_kernel
@@ -41,6 +47,8 @@ def predict(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, F: Floats, row: Floats, out: Floats
 ) -> int:
     """Solve the joint for one row of readings without committing it; `out` gets the outputs. Returns a status."""
+    if not (math.isfinite(row[IN_MOTOR]) and math.isfinite(row[IN_LOAD]) and math.isfinite(row[IN_TIME])):
+        return o.STATUS_NAN
     x = I[o.S_CONTEXT]
     raw = (row[IN_LOAD] - F[OFFSET]) / F[GAIN]
     dt = row[IN_TIME] - S[x + o.X_TIME]

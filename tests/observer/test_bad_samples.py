@@ -1,0 +1,68 @@
+"""What the observer refuses, and how it says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from observer_joints import joint, pull_unit
+
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
+
+
+def columns(load: np.ndarray, motor: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """A block of samples, one second apart."""
+    still = np.zeros(len(load)) if motor is None else motor
+    return {"time_s": np.arange(float(len(load))), "motor_position_rad": still, "joint_torque_Nm": load}
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_a_load_that_is_no_number(bad: float) -> None:
+    load = np.array([0.0, 0.1, bad, 0.2])
+    with pytest.raises(InputError, match=r"sample 2: at 2 s has no finite"):
+        Observer(joint("closed")).run(columns(load))
+    with pytest.raises(InputError, match="no finite"):
+        Observer(joint("closed")).step(Sample(0.0, 0.0, bad))
+
+
+def test_time_that_runs_backwards() -> None:
+    observer = Observer(joint("closed"))
+    observer.step(Sample(1.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="time must not run backwards"):
+        observer.step(Sample(0.5, 0.0, 0.0))
+
+
+def test_a_load_that_slackens_an_open_circuit() -> None:
+    config = joint("open")
+    with pytest.raises(InputError, match="slacken"):
+        Observer(config).run(columns(np.array([0.0, -1.1 * pull_unit(config)])))
+
+
+def test_wrap_used_up_by_rotation() -> None:
+    config = joint("closed", {"wrap_output_rad": 2.0})
+    motor = np.linspace(0.0, 2.2 * 0.04 / 0.015, 50)
+    with pytest.raises(InputError, match="runs out of cable"):
+        Observer(config).run(columns(np.zeros(50), motor))
+
+
+def test_a_load_beyond_what_the_cable_carries() -> None:
+    config = joint("closed", {"breaking_force_N": 80.0})
+    load = np.linspace(0.0, 1.5 * pull_unit(config), 20)
+    with pytest.raises(InputError, match="breaks at 80 N"):
+        Observer(config).run(columns(load))
+
+
+def test_a_filter_follows_a_ramp_without_lag_and_calms_noise() -> None:
+    config = joint("closed", observer={"input_filter_Hz": 20.0})
+    plain = joint("closed")
+    rng = np.random.default_rng(5)
+    time = 0.001 * np.arange(3000)
+    ramp = 0.3 * pull_unit(config) * time
+    block = {"time_s": time, "motor_position_rad": np.zeros(3000), "joint_torque_Nm": ramp}
+    a, b = Observer(config).run(block)["deflection_rad"], Observer(plain).run(block)["deflection_rad"]
+    assert np.max(np.abs(a - b)[200:]) < 1e-3 * np.ptp(b)
+    noisy = {**block, "joint_torque_Nm": ramp + 0.01 * pull_unit(config) * rng.standard_normal(3000)}
+    calm = Observer(config).run(noisy)["deflection_rad"] - b
+    raw = Observer(plain).run(noisy)["deflection_rad"] - b
+    assert np.std(calm[200:]) < 0.5 * np.std(raw[200:])
