@@ -82,7 +82,7 @@ def stiffness_range(
     down = np.interp(way[:n], way[n : n + samples // 2][::-1], deflection[n : n + samples // 2][::-1])
     width = float(np.max(np.abs(down - deflection[:n])))
     peak = float(deflection[n - 1])
-    useful = stiffness[1:][np.isfinite(stiffness[1:]) & (stiffness[1:] > 0)]
+    useful = stiffness[np.isfinite(stiffness) & (stiffness > 0)]
     return StiffnessRange(
         float(stiffness[1]),
         float(useful.min()),
