@@ -17,6 +17,7 @@ from cablecomp.identification.smoothing import FloatArray
 
 LEFT = 0.1  # share of the mismatch's energy beyond noise that a named effect may leave over
 STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
+CERTAIN = 2.25  # mean square over the floor that is no noise, wherever it sits
 WEAK = 3.0  # sds below which a fitted amplitude is no finding
 NEARLY_SURE = 0.9
 
@@ -55,7 +56,7 @@ def weigh(
     excess, left = max(start - 1.0, 0.0), max(end - 1.0, 0.0)
     accepted = [r for r in selection.rounds if r.accepted is not None]
     if not final.effects:
-        located = bool(before.significant(0.01)) and start > STRUCTURED
+        located = start > CERTAIN or (bool(before.significant(0.01)) and start > STRUCTURED)
         if located:
             return Findings("unexplained", (), (), excess, excess)
         return Findings(_plain(setting, selection, rng), (), (), excess, excess)
