@@ -316,8 +316,6 @@ class Observer:
 
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
         joint, drive, load, tension_h, tension_l, _ = self._out.tolist()
-        if self._breaking is not None and (tension_h > self._breaking or tension_l > self._breaking):
-            raise InputError(f"sample at {sample.time_s:g} s {self._too_much(max(tension_h, tension_l))}")
         rigid = self._ratio * sample.motor_position_rad
         shift = joint - drive - rigid
         return Estimate(
