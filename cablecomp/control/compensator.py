@@ -71,7 +71,8 @@ class Compensator:
 
     `step` takes the sample of now and the reference of the next instant (one period on). NaN in
     `sample.joint_position_rad` = no joint encoder: feedback then rests. After `enable`, `disable` or a change
-    of mode the target runs on without a step and blends over within `blend_s`.
+    of mode the target runs on without a step and blends over within `blend_s`. `observed`: whether the last
+    sample went into the observer.
     """
 
     def __init__(
@@ -102,6 +103,7 @@ class Compensator:
         self.deflection_used_rad = 0.0
         self.target_rad = NAN
         self.estimate: Estimate | None = None
+        self.observed = True
         self._motor = MotorModel() if motor is None else motor
         self._reference: Reference | None = None
         self._switch = True
@@ -140,8 +142,14 @@ class Compensator:
             estimate = self.observer.step(sample)
             self.estimate = estimate
             return self._position(sample, reference, feed, estimate, joint_ok)
+        before = self.estimate
+        if feed.held and before is not None and self.options.torque_from == "encoders":
+            # Old readings of one encoder against new ones of the other would be taken for a load:
+            # better none.
+            self.observed = False
+            return self._force(sample, reference, feed, before)
         estimate = self._known_torque(sample)
-        self.estimate = estimate
+        self.estimate, self.observed = estimate, True
         return self._force(sample, reference, feed, estimate)
 
     # ---- position mode ---------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from cablecomp.config import JointConfig
-from cablecomp.control.command import FULL, Command, Reference
+from cablecomp.control.command import FULL, Command, Feed, Reference
 from cablecomp.control.compensator import Compensator
 from cablecomp.control.degrade import NORMAL, DegradeState, DegradeTimes, Phase, degrade, feed_of
 from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gate_names
@@ -24,6 +24,7 @@ References = Callable[[float], Reference]
 """What is wanted of a joint at a time (s since the run was armed)."""
 
 
+_NOTHING_NEW = Feed(0.0, True)
 _NOT_RUNNING = (DriveState.FAULT, DriveState.DISABLED)
 
 
@@ -179,6 +180,8 @@ class JointLoop:
         sample = checked.sample
         begin = perf_counter()
         feed = FULL if self.degraded is NORMAL else feed_of(self.degraded)
+        if since_s is None and max(checked.motor_age_s, checked.load_age_s) > s.times.fresh_s:
+            feed = _NOTHING_NEW
         command = s.compensator.step(sample, reference, feed, joint_ok=checked.joint_ok)
         self.step_s = perf_counter() - begin
         estimate = s.compensator.estimate
@@ -254,7 +257,7 @@ class JointLoop:
     def _record(
         self, sample: Sample, estimate: Estimate, command: Command, checked: Checked, controlled: bool
     ) -> None:
-        if self._folder is None:
+        if self._folder is None or not self.setup.compensator.observed:
             return
         if self.log is None:
             comments = (f"cablecomp run, joint {self.setup.name}, configuration joint.toml",)
