@@ -1,5 +1,4 @@
-"""Simulated joints for a host program in the same process: stepped by its commands, or in real time in a
-thread."""
+"""Simulated joints for a host program in the same process, in step with its commands."""
 
 from __future__ import annotations
 
@@ -15,7 +14,6 @@ from firmware_sim.faults import Fault
 from firmware_sim.plant import NORMAL, LinkSpec, MotorSpec, Plant, PlantConfig, PlantReadings, Resolution
 from firmware_sim.plantlike import Readings, readings_of
 from firmware_sim.ports import open_port
-from firmware_sim.runner import BenchThread
 
 OFF_NOMINAL = ("EA_N", "pretension_N", "mu_output", "mu_input")
 
@@ -66,8 +64,7 @@ class LoadedPlant:
 
 
 class HostedJoints:
-    """Joints 1…n behind a port. Stepped time: call `advance` after each cycle's commands. Real time: `start`,
-    `close`."""
+    """Joints 1…n behind a port; call `advance` after each cycle's commands."""
 
     def __init__(self, spec: HostedSpec) -> None:
         config = PlantConfig.from_dict(spec.joint, str(spec.joint.get("name", "joint")))
@@ -89,7 +86,6 @@ class HostedJoints:
             return self.plants[number]
 
         self.bench = make_bench(spec.bench, make, open_port(spec.bus, None, None), spec.faults)
-        self._thread: BenchThread | None = None
         self._periods = 0
 
     def set_load(self, number: int, torque_Nm: float) -> None:
@@ -120,17 +116,9 @@ class HostedJoints:
         t = last.truth
         return Truth(t.pulley_position_rad, t.joint_torque_Nm, t.tension_h_N, t.tension_l_N)
 
-    def start(self, period_s: float = 1e-3) -> None:
-        """Real time, in a thread of its own."""
-        self._thread = BenchThread(self.bench, period_s=period_s).start()
-
     def close(self) -> None:
-        """End the thread, close the port."""
-        if self._thread is not None:
-            self._thread.stop()
-            self._thread = None
-        else:
-            self.bench.close()
+        """Close the port."""
+        self.bench.close()
 
 
 def off_nominal(config: PlantConfig, tolerance: Mapping[str, float], seed: int) -> PlantConfig:
