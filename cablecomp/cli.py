@@ -108,7 +108,8 @@ def run(
     elif calibration:
         asked = calibration_protocol(joint)
     else:
-        asked = force_protocol(joint, seed) if force else reaching_protocol(joint, seed)
+        span = 30.0 if duration is None else max(duration, 30.0)
+        asked = force_protocol(joint, seed, span) if force else reaching_protocol(joint, seed, span)
     wish = SimulationWish(bus, wanted, 1, not nominal, seed, tuple(fault or ()))
     simulation = _simulation(config, wish) if sim else None
     if simulation is not None and asked.mode == "force":

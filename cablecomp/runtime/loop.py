@@ -16,10 +16,12 @@ from cablecomp.errors import DeviceError
 from cablecomp.links.link import Link
 from cablecomp.links.records import BusState, Mode, Request
 from cablecomp.runtime.clock import Clock, Tick, Ticker
+from cablecomp.runtime.histogram import CycleTimes
 from cablecomp.runtime.joint_loop import JointLoop, JointSetup
 from cablecomp.runtime.log import EventLog
+from cablecomp.runtime.minutes import Minutes
 from cablecomp.runtime.priority import QUIET, Granted, Policy, armed
-from cablecomp.runtime.timing import CycleTimes, TimingReport
+from cablecomp.runtime.timing import TimingReport
 
 BUS_EVERY = 5  # ticks between two looks at the bus's own state
 COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
@@ -72,6 +74,7 @@ class Loop:
         self.stage = Stage.LISTENING
         self.stop_reason = ""
         self.times = CycleTimes()
+        self.minutes = Minutes()
         self.events = EventLog(Path("/dev/null") if folder is None else folder / "events.jsonl")
         folders = [None if folder is None else _folder_of(folder, s, len(setups)) for s in setups]
         self.joints = tuple(JointLoop(s, link, f, self.events) for s, f in zip(setups, folders, strict=True))
@@ -120,7 +123,7 @@ class Loop:
             rate_Hz=(self._ticks - 1) / span if span > 0.0 else 0.0,
             asked_Hz=1.0 / self.period_s,
             ticks=self._ticks,
-            skipped=0 if self._ticker is None else self._ticker.skipped,
+            skipped=self._skipped,
             misses=t.misses,
             period=t.period.spread(),
             jitter=t.jitter.spread(),
@@ -136,9 +139,14 @@ class Loop:
             dropped_frames=status.dropped,
             send_failures=status.send_failures,
             policy=tuple(self._granted.lines),
+            minutes=tuple(self.minutes.done),
         )
 
     # ---- inside ----------------------------------------------------------------------------------
+
+    @property
+    def _skipped(self) -> int:
+        return 0 if self._ticker is None else self._ticker.skipped
 
     def _loop(self) -> None:
         ticker = self._ticker = Ticker(self._clock, self.period_s)
@@ -211,6 +219,9 @@ class Loop:
         since = now - self._armed_s
         for joint in self.joints:
             joint.run(now, since)
+        if since >= self.minutes.due_s:
+            minute = self.minutes.close(self.times, self._skipped, self.link.status())
+            self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
         if tick.skipped:
             self.events.add(now, "", f"{tick.skipped} ticks skipped")
         why = self._asked_to_stop or next(

@@ -1,67 +1,13 @@
-"""What a loop's time was spent on: histograms of bounded size, and the report that a run ends with."""
+"""The report that a run ends with: how it kept its time and its data."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from math import exp2, inf, log2, nan
-from typing import Any, Final
+from math import inf
+from typing import Any
 
-_PER_OCTAVE: Final = 32  # a bin is 2.2 % wide: percentiles are known to 1.1 %
-_LOWEST: Final = 1e-8
-_BINS: Final = 32 * 40
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Distribution of a time in s: count, mean, median, 99th and 99.9th percentile, greatest."""
-
-    count: int
-    mean_s: float
-    p50_s: float
-    p99_s: float
-    p999_s: float
-    max_s: float
-
-
-class Histogram:
-    """Counts of positive times in bins of equal ratio; memory does not grow with what is counted."""
-
-    __slots__ = ("_bins", "count", "greatest", "total")
-
-    def __init__(self) -> None:
-        self._bins = [0] * _BINS
-        self.count = 0
-        self.total = 0.0
-        self.greatest = 0.0
-
-    def add(self, seconds: float) -> None:
-        """Count one time; what lies below 10 ns counts as that."""
-        self.count += 1
-        self.total += seconds
-        if seconds > self.greatest:
-            self.greatest = seconds
-        k = int(log2(seconds / _LOWEST) * _PER_OCTAVE) if seconds > _LOWEST else 0
-        self._bins[k if k < _BINS else _BINS - 1] += 1
-
-    def quantile(self, share: float) -> float:
-        """Time below which that share of the counted ones lies (NaN if there is none), within 1.1 %."""
-        if self.count == 0:
-            return nan
-        wanted = share * self.count
-        seen = 0
-        for k, n in enumerate(self._bins):
-            seen += n
-            if seen >= wanted:
-                return min(_LOWEST * exp2((k + 0.5) / _PER_OCTAVE), self.greatest)
-        return self.greatest
-
-    def spread(self) -> Spread:
-        """The distribution so far."""
-        mean = self.total / self.count if self.count else nan
-        greatest = self.greatest if self.count else nan
-        return Spread(
-            self.count, mean, self.quantile(0.5), self.quantile(0.99), self.quantile(0.999), greatest
-        )
+from cablecomp.runtime.histogram import Spread
+from cablecomp.runtime.minutes import Minute, shown
 
 
 @dataclass(frozen=True)
@@ -72,7 +18,7 @@ class TimingReport:
     observe, compensate, encode, record of all joints; `step`: observer and compensator of one joint;
     `data_age`: age of the oldest channel used. `misses`: cycles that ended after the next tick was due;
     `skipped`: ticks left out for that. `policy` says what of scheduling, memory and garbage collection could
-    be had, and what not.
+    be had, and what not; `minutes`: the whole minutes of a long run one by one.
     """
 
     rate_Hz: float
@@ -94,6 +40,7 @@ class TimingReport:
     dropped_frames: int
     send_failures: int
     policy: tuple[str, ...]
+    minutes: tuple[Minute, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, for JSON (NaN and infinity as None)."""
@@ -123,6 +70,7 @@ class TimingReport:
                 f"{self.reordered_frames} reordered, {self.invalid_frames} damaged, "
                 f"{self.dropped_frames} dropped by the system, {self.send_failures} not sent",
             ),
+            *((f"minute {m.number}", m.words()) for m in shown(self.minutes)),
             *(("policy", line_) for line_ in self.policy),
         ]
 
@@ -135,18 +83,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not -inf < value < inf:
         return None
     return value
-
-
-class CycleTimes:
-    """Histograms that a loop fills."""
-
-    __slots__ = ("cycle", "data_age", "jitter", "misses", "period", "poll", "step")
-
-    def __init__(self) -> None:
-        self.period = Histogram()
-        self.jitter = Histogram()
-        self.poll = Histogram()
-        self.step = Histogram()
-        self.cycle = Histogram()
-        self.data_age = Histogram()
-        self.misses = 0

@@ -6,14 +6,18 @@ from __future__ import annotations
 
 import gc
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cablecomp.errors import InputError
+from cablecomp.links.link import LinkStatus
+from cablecomp.links.records import BusState
 from cablecomp.runtime.clock import MonotonicClock, SteppedClock, Ticker
+from cablecomp.runtime.histogram import CycleTimes, Histogram
+from cablecomp.runtime.minutes import Minutes, resident_MB, shown
 from cablecomp.runtime.priority import Policy, armed
-from cablecomp.runtime.timing import CycleTimes, Histogram
 
 
 class WorkingClock:
@@ -122,3 +126,51 @@ def test_what_is_not_permitted_is_said_and_survived(monkeypatch: pytest.MonkeyPa
         pass
     assert any("not permitted" in line for line in granted.lines)
     assert any("RLIMIT_MEMLOCK is 64 KiB" in line for line in granted.lines)
+
+
+def test_what_came_since_is_what_was_added_since() -> None:
+    rng = np.random.default_rng(4)
+    first, later, whole = Histogram(), Histogram(), Histogram()
+    for k, x in enumerate(rng.uniform(1e-6, 1e-3, 3000)):
+        whole.add(x)
+        (first if k < 1000 else later).add(x)
+        if k == 999:
+            before = whole.copy()
+    since = whole.since(before)
+    for share in (0.1, 0.5, 0.99):
+        assert since.quantile(share) == later.quantile(share)
+    assert since.count == 2000
+    assert since.total == pytest.approx(later.total)
+    assert later.greatest <= since.greatest <= 1.03 * later.greatest
+    assert whole.since(whole.copy()).count == 0
+
+
+def status_with(lost: int) -> LinkStatus:
+    return LinkStatus(BusState.ACTIVE, "", *[0] * 14)._replace(lost=lost)
+
+
+def test_minutes_count_their_own_only() -> None:
+    minutes, times = Minutes(), CycleTimes()
+    for number in range(1, 31):
+        for _ in range(100):
+            times.step.add(number * 1e-6)
+            times.cycle.add(10.0 * number * 1e-6)
+        times.misses += number
+        minute = minutes.close(times, 2 * number, status_with(3 * number))
+        assert minute.number == number
+        assert minutes.due_s == 60.0 * (number + 1)
+        assert minute.step_p50_s == pytest.approx(number * 1e-6, rel=0.012)
+        assert minute.cycle_p99_s == pytest.approx(10.0 * number * 1e-6, rel=0.012)
+        assert (minute.misses, minute.skipped, minute.lost_frames) == (number, 2, 3)
+    assert [m.number for m in shown(tuple(minutes.done[:4]))] == [1, 2, 3, 4]
+    some = [m.number for m in shown(tuple(minutes.done))]
+    assert {1, 2, 30} <= set(some)
+    assert len(some) <= 13
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="resident memory is read on Linux alone")
+def test_resident_memory_grows_by_what_is_taken() -> None:
+    before = resident_MB()
+    taken = np.ones(25_000_000)
+    assert 150.0 < resident_MB() - before < 250.0
+    del taken
