@@ -7,12 +7,15 @@ neighbour that goes its own way.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from firmware_sim.concealment.courses import Course, Range, draw_course
+from firmware_sim.concealment.joints import DrawnJoint
+from firmware_sim.concealment.measures import PlainDrive
+from firmware_sim.concealment.sizes import run_course
 from firmware_sim.concealment.suspects import CATALOGUE, Scene, Shape, by_id
 
 
@@ -21,7 +24,8 @@ class Case:
     """Two explanations that a course cannot tell apart.
 
     `pair` are the two; which one is true is drawn, but `calibration` partners (keys of the configuration)
-    never are. `course` makes a recording; `geometry_friction` bounds the joint's GF.
+    never are. `course` makes a recording; `tie` fits the recordings of a trial to the joint and to each
+    other; `geometry_friction` bounds the joint's GF.
     """
 
     name: str
@@ -30,6 +34,7 @@ class Case:
     geometry_friction: tuple[float, float] = (0.05, 10.0)
     shape: Callable[[np.random.Generator, Scene, str], Shape] | None = None
     sizes: tuple[float, float] = (0.08, 0.40)
+    tie: Callable[[DrawnJoint, Sequence[Course]], tuple[Course, ...]] | None = None
 
 
 def _slow_small_load(rng: np.random.Generator, within: Range) -> Course:
@@ -42,27 +47,41 @@ def _slow_small_load(rng: np.random.Generator, within: Range) -> Course:
 
 
 def _one_sine(rng: np.random.Generator, within: Range) -> Course:
-    """A narrow sweep at a single frequency: acceleration and angle are in proportion."""
-    course = draw_course(rng, "bench", within)
-    t = course.time_s - course.time_s[0]
-    joint = float(rng.uniform(0.2, 0.3)) * np.sin(2.0 * math.pi * float(rng.uniform(0.5, 0.8)) * t)
-    return replace(course, kind="moving", motor_rad=np.asarray(joint * within.motor_per_joint))
-
-
-def _warming_up(rng: np.random.Generator, within: Range) -> Course:
-    """The temperature rises with the logarithm of time, as creep does."""
-    course = draw_course(rng, "bench" if rng.uniform() < 0.5 else "moving", within)
-    rise = float(rng.uniform(2.0, 3.0)) * np.log1p((course.time_s - course.time_s[0]) / _WARMING_S)
-    return replace(course, temperature_degC=np.asarray(20.0 + rise))
-
-
-def _in_step(rng: np.random.Generator, within: Range) -> Course:
-    """The neighbour's load follows this joint's angle, as a weight's moment would."""
+    """A narrow swing at a single frequency under a small load: acceleration and angle are in proportion."""
     course = draw_course(rng, "moving", within)
-    angle = course.motor_rad / within.motor_per_joint
-    return replace(course, other=np.asarray(within.load_Nm * np.sin(angle)))
+    t = course.time_s - course.time_s[0]
+    joint = float(rng.uniform(0.08, 0.12)) * np.cos(2.0 * math.pi * float(rng.uniform(0.5, 0.8)) * t)
+    load = within.load_Nm * (0.05 + 0.02 * np.sin(2.0 * math.pi * 0.04 * t))
+    return replace(course, motor_rad=np.asarray(joint * within.motor_per_joint), load_Nm=np.asarray(load))
 
 
+def _bench_or_moving(rng: np.random.Generator, within: Range) -> Course:
+    return draw_course(rng, "bench" if rng.uniform() < 0.5 else "moving", within)
+
+
+def _moving(rng: np.random.Generator, within: Range) -> Course:
+    return draw_course(rng, "moving", within)
+
+
+def _warming_up(joint: DrawnJoint, courses: Sequence[Course]) -> tuple[Course, ...]:
+    """The temperature rises with the logarithm of time, as creep does, through all recordings."""
+    start = courses[0].time_s[0]
+    return tuple(
+        replace(c, temperature_degC=np.asarray(20.0 + _WARMING_K * np.log1p((c.time_s - start) / _WARMING_S)))
+        for c in courses
+    )
+
+
+def _in_step(joint: DrawnJoint, courses: Sequence[Course]) -> tuple[Course, ...]:
+    """The neighbour's load follows this joint's angle, as a weight's moment would."""
+    plain = PlainDrive(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    angles = [run_course(Scene(joint, c, plain)).joint_position_rad for c in courses]
+    return tuple(
+        replace(c, other=np.asarray(joint.load_Nm * np.sin(q))) for c, q in zip(courses, angles, strict=True)
+    )
+
+
+_WARMING_K = 2.5
 _WARMING_S = 8.0
 
 
@@ -107,10 +126,11 @@ CASES = (
     Case(
         "thermal_or_relaxation",
         ("thermal_pretension", "pretension_relaxation"),
-        _warming_up,
+        _bench_or_moving,
         shape=_own_shape,
+        tie=_warming_up,
     ),
-    Case("crosstalk_or_gravity", ("crosstalk", "gravity_load"), _in_step, shape=_own_shape),
+    Case("crosstalk_or_gravity", ("crosstalk", "gravity_load"), _moving, shape=_own_shape, tie=_in_step),
 )
 
 

@@ -18,7 +18,7 @@ from firmware_sim.concealment.sizes import run_course
 from firmware_sim.concealment.suspects import Scene
 from firmware_sim.concealment.trial import PAUSE_S
 from firmware_sim.concealment.writing import write_recording
-from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantError, StageConfig
+from firmware_sim.plant import FINE, EffectSpec, PlantConfig, PlantError, StageConfig
 
 _LONGEST_S = 1200.0
 
@@ -50,7 +50,7 @@ def run_experiment(sealed: Path, number: int, protocol: Path, out: Path, seed: i
         draw_neighbour(rng, time, joint.load_Nm),
     )
     effects = [EffectSpec(e["id"], _numbers(e["parameters"])) for e in truth["effects"]]
-    run = run_course(Scene(joint, course, PlainDrive(**truth["plain"])), effects, NORMAL)
+    run = run_course(Scene(joint, course, PlainDrive(**truth["plain"])), effects, FINE)
     write_recording(out, read_sensors(rng, run, joint, course, bool(truth["neighbour"])))
     return out
 

@@ -54,7 +54,7 @@ def draw_joint(
     closed: bool = False,
 ) -> DrawnJoint:
     """Draw a single-stage joint: four in five closed, radii 5–60 mm, GF `between` two values
-    (less where the cable would be longer than 0.6 m), EA 5–50 kN, T0 20–150 N.
+    (less where the cable would be longer than 0.6 m), EA 5–50 kN, T0 20–120 N.
 
     Wraps are long enough that the slip zone of the greatest load stays on the drums at every angle of the
     travel. With `as_stated` the true values are the nominal ones, with `closed` the circuit is.
@@ -66,9 +66,9 @@ def draw_joint(
     mu = 1.0 / (1.0 / mu_out + ratio / mu_in)
     longest = LONGEST_M * mu / R
     geometry_friction = log_uniform(rng, min(between[0], 0.5 * longest), min(between[1], longest))
-    T0 = log_uniform(rng, 20.0, 150.0)
-    # so tight that strains stay small, so slack that the deflection is worth a compensator
-    EA = log_uniform(rng, max(5e3, 150.0 * T0), 5e4)
+    T0 = log_uniform(rng, 20.0, 120.0)
+    # strains as wire ropes are laid out for, some 0.25 % at the most: the theory is one of small strains
+    EA = log_uniform(rng, max(5e3, 400.0 * T0), 5e4)
     share = float(rng.uniform(0.5, 1.0 if closed else 0.8))
     travel = float(rng.uniform(1.0, 1.5))
     reach = _slip_angle(share, geometry_friction, closed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from firmware_sim.concealment.sensors import draw_sensors, noise_floor_rad, read
 from firmware_sim.concealment.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
 from firmware_sim.concealment.strangers import STRANGERS
 from firmware_sim.concealment.suspects import CATALOGUE, Scene, Shape, Suspect, by_id
-from firmware_sim.plant import NORMAL, EffectSpec, PlantError, PlantRun
+from firmware_sim.plant import FINE, EffectSpec, PlantError, PlantRun
 from firmware_sim.plant.records import Floats
 
 RECORDINGS = 2
@@ -83,8 +83,13 @@ def _draw_confounded(rng: np.random.Generator, wanted: Assignment, case: Case) -
     within = usable(joint)
     true, partner = draw_truth(rng, case)
     courses = _one_after_another([case.course(rng, within) for _ in range(RECORDINGS)])
+    if case.tie is not None:
+        courses = case.tie(joint, courses)
     usual, _ = plain_scene(joint, draw_course(rng, "bench", within))  # what sensors are bought for
     scene, plain_run = plain_scene(joint, courses[0])
+    # sizes count in loops of the usual course: this one may hardly have any
+    own = {k: getattr(scene.plain, k) for k in ("speed_rms", "acceleration_rms", "other_rms")}
+    scene = replace(scene, plain=replace(usual.plain, **own))
     assert case.shape is not None
     shape = case.shape(rng, scene, true)
     if case.sizes[1] > 1.0:
@@ -150,7 +155,7 @@ def _record(
 ) -> Trial | None:
     recordings = []
     for course in courses:
-        run = run_course(Scene(joint, course, plain), [e.spec for e in effects], NORMAL)
+        run = run_course(Scene(joint, course, plain), [e.spec for e in effects], FINE)
         if _slack(run, joint):
             return None
         recordings.append(read_sensors(rng, run, joint, course, neighbour))
