@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from firmware_sim.bench import Bench, Stepping
@@ -65,7 +65,7 @@ def make_bench(config: BenchConfig, make_plant: MakePlant, port: Port, faults: S
             make_wire(config, number),
             number,
             config.drive,
-            config.sensor,
+            replace(config.sensor, status_phase=number - 1),
             config.timing,
             device,
         )

@@ -122,8 +122,12 @@ def _field(signal: Any, length: int) -> Field:
 
 def counts(field: Field, data: bytes) -> int:
     """Raw counts of an integer field in a frame."""
-    word = int.from_bytes(data, "big" if field.big else "little")
-    n = word >> field.shift & field.mask
+    return counts_in(field, int.from_bytes(data, "little"), int.from_bytes(data, "big"))
+
+
+def counts_in(field: Field, little: int, big: int) -> int:
+    """Raw counts of an integer field in a frame that has been read as one integer, both ways."""
+    n = (big if field.big else little) >> field.shift & field.mask
     return n - (field.sign << 1) if n & field.sign else n
 
 

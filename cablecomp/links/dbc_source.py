@@ -95,9 +95,10 @@ class Source:
         if len(data) != self._layout.length:
             stats.invalid += 1
             return 0
-        selector = self._selector
-        entries = self._entries.get(ALWAYS if selector is None else dbc.counts(selector, data), ())
         little, big = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+        selector = self._selector
+        chosen = ALWAYS if selector is None else dbc.counts_in(selector, little, big)
+        entries = self._entries.get(chosen, ())
         if self._real and not _finite(entries, little, big):
             stats.invalid += 1
             return 0
@@ -124,28 +125,29 @@ class Source:
         stats.received += 1
         stats.last_s = now_s
         if self.status is not None:
-            self._take_status(self.status, data)
+            self._take_status(self.status, little, big)
         return taken
 
-    def _take_status(self, status: Status, data: bytes) -> None:
+    def _take_status(self, status: Status, little: int, big: int) -> None:
         readings = self._readings
-        if status.reply:
+        state, states, error, flags, time, clock, _, _, reply = status
+        if reply:
             readings.replies += 1
             readings.unanswered = 0
-        if status.state is not None:
-            readings.state = status.states.get(dbc.counts(status.state, data), DriveState.UNKNOWN)
-        if status.error is not None:
-            readings.error = dbc.counts(status.error, data)
-        if status.flags is not None:
-            readings.sensor_flags = dbc.counts(status.flags, data)
-        if status.time is not None and status.clock is not None:
-            self._stamp(status, status.clock.seconds(dbc.counts(status.time, data)), data)
+        if state is not None:
+            readings.state = states.get(dbc.counts_in(state, little, big), DriveState.UNKNOWN)
+        if error is not None:
+            readings.error = dbc.counts_in(error, little, big)
+        if flags is not None:
+            readings.sensor_flags = dbc.counts_in(flags, little, big)
+        if time is not None and clock is not None:
+            self._stamp(status, clock.seconds(dbc.counts_in(time, little, big)), little, big)
 
-    def _stamp(self, status: Status, device_s: float, data: bytes) -> None:
+    def _stamp(self, status: Status, device_s: float, little: int, big: int) -> None:
         stamped = self
         if status.stamps is not None and status.stamps_sequence is not None:
             stamped = status.stamps
-            if stamped.stats.sequence != dbc.counts(status.stamps_sequence, data):
+            if stamped.stats.sequence != dbc.counts_in(status.stamps_sequence, little, big):
                 return
         for place in stamped.places:
             self._readings.device_s[place] = device_s

@@ -127,12 +127,20 @@ def _states(source: StateSource, layout: Layout, where: str) -> dict[int, DriveS
 
 
 class _Part(NamedTuple):
-    """One part of a command: its place in `MotorCommand`, field, and counts = `gain x + offset`."""
+    """One part of a command: its place in `MotorCommand`, counts = `gain x + offset` within `low` and `high`.
+
+    `shift`: up to the field in the message read as one integer, Intel's way; `~shift` if it lies Motorola's
+    way. `field`: for a float, whose counts are its bits, else None.
+    """
 
     which: int
-    field: Field
     gain: float
     offset: float
+    low: int
+    high: int
+    shift: int
+    mask: int
+    field: Field | None
 
 
 class DbcDrive:
@@ -161,7 +169,7 @@ class DbcDrive:
         )
         self._command = self._layout(device.command.message)
         self._parts = self._command_parts()
-        self._constant = self._constants()
+        self._start = int.from_bytes(self._constants(), "little")
         self._requests = dict[str, DbcRequest](device.request.items())
         for request in self._requests:
             self._encode_request(request)
@@ -183,7 +191,10 @@ class DbcDrive:
                 continue
             where = f"{self._where}, command `{self._command.name}`, {part}"
             field = dbc.field_of(self._command, signal, where)
-            parts.append(_Part(which, field, *self._line(which, field, where)))
+            line = self._line(which, field, where)
+            shift = ~field.shift if field.big else field.shift
+            real = field if field.real else None
+            parts.append(_Part(which, *line, field.low, field.high, shift, field.mask, real))
         if not parts:
             raise InputError(f"{self._where}: [device.command] names no signal; name at least one")
         return tuple(parts)
@@ -205,9 +216,9 @@ class DbcDrive:
         """See `Drive.command`; raises InputError on NaN or infinity, and for gains that the message cannot
         carry."""
         length = self._command.length
-        little, big = int.from_bytes(self._constant, "little"), 0
-        clipped = carried = 0
-        for which, field, gain, offset in self._parts:
+        little, big = self._start, 0
+        clipped = 0
+        for which, gain, offset, low, high, shift, mask, field in self._parts:
             x = command[which]
             if x is None:
                 x = self._gains[which - 3]
@@ -216,30 +227,31 @@ class DbcDrive:
                     f"joint `{self._name}`: {_PARTS[which]} is {x}; finite numbers are accepted; "
                     "nothing was sent"
                 )
-            carried |= 1 << which
-            if field.real:
-                n, fits = dbc.raw(field, (gain * x + offset) * field.scale + field.offset)
-            else:
+            if field is None:
                 n = round(gain * x + offset)
-                fits = field.low <= n <= field.high
-                if not fits:
-                    n = field.low if n < field.low else field.high
-            if not fits:
-                clipped |= 1 << which
-            if field.big:
-                big |= (n & field.mask) << field.shift
+                if n < low or n > high:
+                    n = low if n < low else high
+                    clipped |= 1 << which
             else:
-                little |= (n & field.mask) << field.shift
-        self._refuse_gains(command, carried)
+                n, fits = dbc.raw(field, (gain * x + offset) * field.scale + field.offset)
+                if not fits:
+                    clipped |= 1 << which
+            if shift < 0:
+                big |= (n & mask) << ~shift
+            else:
+                little |= (n & mask) << shift
+        if command[3] is not None or command[4] is not None:
+            self._refuse_gains(command)
         data = little.to_bytes(length, "little")
         if big:
             data = (int.from_bytes(data, "big") | big).to_bytes(length, "big")
         return Outgoing((Frame(self._command.identifier, data),), clipped)
 
-    def _refuse_gains(self, command: MotorCommand, carried: int) -> None:
+    def _refuse_gains(self, command: MotorCommand) -> None:
+        carried = {part.which for part in self._parts}
         for which in (3, 4):
             x = command[which]
-            if x is not None and not carried >> which & 1 and x != self._gains[which - 3]:
+            if x is not None and which not in carried and x != self._gains[which - 3]:
                 raise InputError(
                     f"joint `{self._name}`: message `{self._command.name}` cannot carry {_PARTS[which]} {x}; "
                     f"leave it None, or give the link's own {self._gains[which - 3]}; nothing was sent"

@@ -72,6 +72,8 @@ def message_identifier(message: Any) -> int:
 def make_message(identifier: int, data: bytes) -> Any:
     """A python-can message; a remote frame asks for 8 bytes. Stamped with wall time, as other programs on the
     bus expect."""
+    if identifier <= _STANDARD_MASK:  # the usual case; by position, which is twice as quick as by keyword
+        return can.Message(time.time(), identifier, False, False, False, None, len(data), data)
     extended, remote = bool(identifier & EXTENDED), bool(identifier & REMOTE)
     return can.Message(
         arbitration_id=identifier & (_EXTENDED_MASK if extended else _STANDARD_MASK),
@@ -109,6 +111,7 @@ class VirtualPort(PortBase):
         found = 0
         # popleft is atomic, and an unbounded queue has no waiting writers to wake.
         take = self._bus.queue.get_nowait if self._bounded else waiting.popleft
+        off = self.state == BusState.OFF
         while found < limit:
             try:
                 message = take()
@@ -117,10 +120,12 @@ class VirtualPort(PortBase):
             found += 1
             if message.is_error_frame:
                 self.note_error(message.arbitration_id, message.data)
-            else:
-                if self.state == BusState.OFF:
-                    self.heard()
-                sink(message_identifier(message), message.data)
+                off = self.state == BusState.OFF
+                continue
+            if off:
+                self.heard()
+                off = False
+            sink(message_identifier(message), message.data)
         self.counters.backlogs += bool(waiting)
         return found
 

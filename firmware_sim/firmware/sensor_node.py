@@ -13,9 +13,14 @@ from firmware_sim.plantlike import Readings
 
 @dataclass(frozen=True)
 class SensorNodeConfig:
-    """Parameters of the node; `clock_drift_ppm` > 0 makes its clock fast."""
+    """Parameters of the node; `clock_drift_ppm` > 0 makes its clock fast.
+
+    `status_phase`: how many samples earlier than another node's its status comes, so that many nodes on a
+    bus do not all send theirs at once.
+    """
 
     status_every: int = 10
+    status_phase: int = 0
     torque_range_Nm: float = 80.0
     temperature_limit_degC: float = 90.0
     jump_rad: float = 0.2
@@ -57,7 +62,7 @@ class SensorNode:
         self._count += 1
         sequence = self._count % 256
         sample = Sample(self._position, torque, sequence)
-        if self._count % self.config.status_every and flags == self._told:
+        if (self._count + self.config.status_phase) % self.config.status_every and flags == self._told:
             return sample, None
         self._told, self._fresh = flags, SensorFlag(0)
         return sample, Status(self.device_time_us(now_s), readings.temperature_degC, flags, sequence)

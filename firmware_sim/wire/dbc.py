@@ -163,6 +163,7 @@ class DbcWire:
         )
         self.requests = m.requests
         self.status_every = status_every
+        self.status_phase = joint - 1
         self.reset()
 
     def reset(self) -> None:
@@ -224,16 +225,17 @@ class DbcWire:
         return spoken.encode(self._values(drive.report()))
 
     def cyclic(self, drive: Drive, now_s: float) -> list[Frame]:
-        """The status with every tenth state, and at once when state, mode or flags change."""
+        """The status with every tenth state (each drive of a bus at another one of the ten), and at once
+        when state, mode or flags change."""
         report = drive.report()
         key = (report.state, report.mode, report.flags)
-        due = self._told != key or self._sequence // self.status_every != self._told_sequence
-        if self.status is None or not due:
+        turn = (self._sequence + self.status_phase) // self.status_every
+        if self.status is None or (self._told == key and turn == self._told_turn):
             return []
-        self._told, self._told_sequence = key, self._sequence // self.status_every
+        self._told, self._told_turn = key, turn
         return [self.status.encode(self._values(report))]
 
-    _told_sequence = 0
+    _told_turn = 0
 
     def _values(self, report: DriveReport) -> dict[str, float]:
         temperature = report.temperature_degC
