@@ -76,25 +76,24 @@ class Channel:
 
 class Sustained:
     """A condition that counts once it has lasted `for_s`; `age_s` = for how long it has counted (0 = it
-    does not).
+    does not). `begun`: it held at the last step; while it has not, a step with it false changes nothing.
     """
 
-    __slots__ = ("_for_s", "_since", "age_s")
+    __slots__ = ("_for_s", "_since", "age_s", "begun")
 
     def __init__(self, for_s: float) -> None:
         self._for_s = for_s
         self._since = inf
         self.age_s = 0.0
+        self.begun = False
 
     def step(self, condition: bool, now_s: float) -> bool:
         """Whether the condition has held since `for_s` ago."""
         if not condition:
-            if self._since != inf:
-                self._since = inf
-                self.age_s = 0.0
+            self._since, self.age_s, self.begun = inf, 0.0, False
             return False
-        if self._since == inf:
-            self._since = now_s
+        if not self.begun:
+            self._since, self.begun = now_s, True
         lasted = now_s - self._since
         self.age_s = max(lasted - self._for_s, 0.0)
         return lasted >= self._for_s

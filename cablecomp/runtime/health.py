@@ -111,6 +111,10 @@ class Health:
         self._needs_torque = needs_torque
         self._needs_joint = needs_joint
         self._others = others
+        self._unanswered = o.unanswered
+        self._lead_rad = inf if o.lead_rad is None else o.lead_rad
+        self._stuck_rad = inf if o.stuck_rad is None else o.stuck_rad
+        self._mismatch_Nm = inf if o.torque_mismatch_Nm is None else o.torque_mismatch_Nm
         self._residual = Sustained(o.confirm_s)
         self._far = Sustained(_FAR_S)
         self._mismatch = Sustained(o.confirm_s)
@@ -128,25 +132,24 @@ class Health:
         """One cycle. `predicted_rad`: joint position that the observer said last; `target_rad`: motor
         target sent last.
         """
-        values, updates = readings.values, readings.updates
-        flags = self._take(values, readings.arrived_s, updates)
-        late = self.latency.take(readings.arrived_s[JOINT_TORQUE], readings.device_s[JOINT_TORQUE])
-        motor_age = now_s - self.motor.arrived_s
-        torque_age = now_s - self.torque.arrived_s + late
-        joint_age = now_s - self.joint.arrived_s + late
-        fresh = self._fresh_s
-        has_joint, has_torque = self.joint.value == self.joint.value, self.torque.value == self.torque.value
+        values = readings.values
+        flags = self._take(values, readings.arrived_s, readings.updates)
+        motor, torque, joint, fresh = self.motor, self.torque, self.joint, self._fresh_s
+        stamp = readings.device_s[JOINT_TORQUE]
+        late = self.latency.take(readings.arrived_s[JOINT_TORQUE], stamp) if stamp == stamp else 0.0
+        motor_age = now_s - motor.arrived_s
+        torque_age = now_s - torque.arrived_s + late
+        joint_age = now_s - joint.arrived_s + late
+        has_joint, has_torque = joint.value == joint.value, torque.value == torque.value
         if motor_age > fresh:
             flags |= MOTOR_STALE
         if has_torque and torque_age > fresh:
             flags |= LATE if late > fresh else TORQUE_STALE
         if has_joint and joint_age > fresh:
             flags |= LATE if late > fresh else JOINT_STALE
-        if readings.unanswered > self._o.unanswered:
+        if readings.unanswered > self._unanswered:
             flags |= UNANSWERED
-        flags |= self._encoders(now_s, predicted_rad, target_rad)
-        flags |= self._torques(values[MOTOR_TORQUE], now_s)
-        joint_bad = bool(flags & (JOINT_RESIDUAL | JOINT_STUCK))
+        flags |= self._encoders(now_s, predicted_rad, target_rad) | self._torques(values[MOTOR_TORQUE], now_s)
         load_age = 0.0
         if self._needs_torque:
             load_age = self._shakes.age_s
@@ -157,20 +160,23 @@ class Health:
         if self._needs_joint:
             load_age = max(load_age, joint_age, self._residual.age_s)
         ready = (
-            self.motor.value == self.motor.value
+            motor.value == motor.value
             and (has_torque or not self._needs_torque)
             and (has_joint or not self._needs_joint)
         )
+        others = self._others
         sample = Sample(
             now_s,
-            self.motor.value,
-            self.torque.value,
-            self.joint.value,
+            motor.value,
+            torque.value,
+            joint.value,
             values[MOTOR_TORQUE],
             values[TEMPERATURE],
-            tuple([values[place] for place in self._others]) if self._others else (),
+            tuple([values[place] for place in others]) if others else (),
         )
-        joint_ok = has_joint and not joint_bad and joint_age <= fresh
+        if flags == 0:  # nearly always
+            return Checked(sample, motor_age, load_age, 0, ready, has_joint and joint_age <= fresh, False)
+        joint_ok = has_joint and not flags & (JOINT_RESIDUAL | JOINT_STUCK) and joint_age <= fresh
         return Checked(sample, motor_age, load_age, flags, ready, joint_ok, bool(flags & FATAL))
 
     def _take(self, values: list[float], arrived: list[float], updates: list[int]) -> int:
@@ -197,24 +203,25 @@ class Health:
         return flags
 
     def _encoders(self, now_s: float, predicted_rad: float, target_rad: float) -> int:
-        o, flags = self._o, 0
-        limit = o.joint_residual_rad
+        flags, limit, motor = 0, self._o.joint_residual_rad, self.motor
         if limit is not None and not self.joint.suspect:
             residual = abs(self.joint.value - predicted_rad)
-            if self._residual.step(residual > limit, now_s):
+            if (residual > limit or self._residual.begun) and self._residual.step(residual > limit, now_s):
                 flags |= JOINT_RESIDUAL
-            if self._far.step(residual > _FAR * limit, now_s):
+            far = residual > _FAR * limit
+            if (far or self._far.begun) and self._far.step(far, now_s):
                 flags |= self._who_is_stuck(now_s)
-        if o.stuck_rad is not None and target_rad == target_rad:
-            if self.motor.changed_s != self._motor_changed_s or self._target_then != self._target_then:
-                self._motor_changed_s, self._target_then = self.motor.changed_s, target_rad
-            elif (
-                abs(target_rad - self._target_then) > o.stuck_rad
-                and self.motor.arrived_s > self._motor_changed_s
-            ):
-                flags |= MOTOR_STUCK
-        if o.lead_rad is not None and self._lags.step(abs(target_rad - self.motor.value) > o.lead_rad, now_s):
+        leads = abs(target_rad - motor.value) > self._lead_rad
+        if (leads or self._lags.begun) and self._lags.step(leads, now_s):
             flags |= MOTOR_LAGS
+        if target_rad != target_rad:
+            return flags
+        if motor.changed_s != self._motor_changed_s or self._target_then != self._target_then:
+            self._motor_changed_s, self._target_then = motor.changed_s, target_rad
+        elif (
+            abs(target_rad - self._target_then) > self._stuck_rad and motor.arrived_s > self._motor_changed_s
+        ):
+            flags |= MOTOR_STUCK
         return flags
 
     def _who_is_stuck(self, now_s: float) -> int:
@@ -228,14 +235,14 @@ class Health:
         return ENCODERS_DISAGREE
 
     def _torques(self, motor_torque: float, now_s: float) -> int:
-        o, flags = self._o, 0
-        torque = self.torque.value
-        if o.torque_mismatch_Nm is not None and motor_torque == motor_torque:
-            mismatch = torque + motor_torque / self._ratio
-            if mismatch == mismatch:
-                self._mean_mismatch += self._share * (mismatch - self._mean_mismatch)
-            off = abs(self._mean_mismatch) > o.torque_mismatch_Nm
-            flags |= TORQUE_MISMATCH if self._mismatch.step(off, now_s) else 0
-        if self._shakes.step(self.shaking.step(torque) > self._shake_square, now_s):
+        flags, torque = 0, self.torque.value
+        mismatch = torque + motor_torque / self._ratio
+        if mismatch == mismatch:
+            self._mean_mismatch += self._share * (mismatch - self._mean_mismatch)
+        off = not -self._mismatch_Nm <= self._mean_mismatch <= self._mismatch_Nm
+        if (off or self._mismatch.begun) and self._mismatch.step(off, now_s):
+            flags |= TORQUE_MISMATCH
+        shakes = self.shaking.step(torque) > self._shake_square
+        if (shakes or self._shakes.begun) and self._shakes.step(shakes, now_s):
             flags |= SHAKES
         return flags

@@ -87,13 +87,13 @@ class JointLoop:
         self.degraded: DegradeState = NORMAL
         self.stop_reason = ""
         self.step_s = nan
-        self.view: View | None = None
         self.tally = JointTally()
         self.log: JointLog | None = None
         self.checked: Checked | None = None
         self._link = link
         self._folder = folder
         self._events = events
+        self._seen: tuple[float, Sample, Estimate, Command, Reference, int] | None = None
         self._sent = SafeCommand(nan, 0.0, 0.0, 0)
         self._predicted = nan
         self._flags = 0
@@ -101,6 +101,16 @@ class JointLoop:
         self._period_s = setup.compensator.period_s
         self._offset = setup.config.sensors.joint_position_offset_rad
         self._last_reference = setup.reference(0.0)
+
+    @property
+    def view(self) -> View | None:
+        """The last cycle, for the eye; None before the first one."""
+        seen = self._seen
+        if seen is None:
+            return None
+        now_s, sample, estimate, command, reference, flags = seen
+        name, phase = self.setup.name, self.degraded.phase
+        return View(name, now_s, phase, sample, estimate, command, reference, flags)
 
     @property
     def ready(self) -> bool:
@@ -192,9 +202,7 @@ class JointLoop:
         if checked.flags != self._flags:
             self._note(checked.flags, now_s)
         self._count(sample, estimate, since_s)
-        self.view = View(
-            s.name, now_s, self.degraded.phase, sample, estimate, command, reference, checked.flags
-        )
+        self._seen = (now_s, sample, estimate, command, reference, checked.flags)
         self._record(sample, estimate, command, checked, since_s is not None)
         self._last_reference = reference
 
