@@ -1,4 +1,6 @@
-"""Command line: builds objects and calls them. Exit codes: 0 done, 2 bad input, 3 device, 4 our own fault."""
+"""Command line: builds objects and calls them. Exit codes: 0 done, 2 bad input, 3 device (also: a run that had
+to stop the joint), 4 our own fault.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cablecomp import cli_prove
+from cablecomp import cli_prove, cli_study
 from cablecomp.cli_analysis import register
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
@@ -49,6 +51,7 @@ app = typer.Typer(
 console = Console()
 register(app)
 cli_prove.register(app)
+cli_study.register(app)
 
 Config = Annotated[Path, typer.Option("--config", help="joint configuration (TOML)")]
 Control = Annotated[
@@ -125,6 +128,8 @@ def run(
     _show(report)
     page = write_run_page(report, joint_text(joint))
     console.print(f"report: {page}")
+    if not report.ended_well:
+        raise typer.Exit(3)
 
 
 @app.command()
@@ -208,6 +213,9 @@ def _simulation(path: Path, wish: SimulationWish) -> Simulation:
 def _show(report: RunReport) -> None:
     table = Table(title=f"Run ended: {report.stop_reason}", show_header=False, box=None)
     for joint in report.joints:
+        if joint.cycles == 0:
+            table.add_row(joint.name, "never under control")
+            continue
         true = (
             ""
             if joint.true_position_rad != joint.true_position_rad

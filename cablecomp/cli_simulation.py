@@ -8,7 +8,7 @@ from pathlib import Path
 from cablecomp.config import read_toml
 from cablecomp.control.options import MotorModel
 from cablecomp.errors import DeviceError, InputError
-from cablecomp.links.schema import CanBus, LinkConfig
+from cablecomp.links.schema import LinkConfig, SerialBus
 from cablecomp.links.schema_devices import CanSimpleDevice, MitDevice
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from firmware_sim.build import BenchConfig
@@ -87,14 +87,18 @@ def _bench(wish: SimulationWish, torque: float) -> BenchConfig:
 
 def _bus(link: LinkConfig) -> str:
     bus = link.bus
-    if isinstance(bus, CanBus) and bus.interface == "virtual":
+    if isinstance(bus, SerialBus):
+        return "serial"
+    if bus.interface == "slcan":
+        return "slcan"
+    if bus.interface == "virtual":
         return f"virtual:{bus.channel}"
-    if isinstance(bus, CanBus) and bus.interface == "udp_multicast":
+    if bus.interface == "udp_multicast":
         port = bus.options.get("port")
         return f"udp_multicast:{bus.channel}" + (f":{port}" if port is not None else "")
     raise InputError(
-        f"--sim: link `{link.name}` is not on a virtual or udp_multicast bus; "
-        "start `python -m firmware_sim` on the other end of that line instead"
+        f"--sim: link `{link.name}` is on a {bus.interface} bus; virtual, udp_multicast, slcan and serial are "
+        "accepted; start `python -m firmware_sim` on the other end of that bus instead"
     )
 
 

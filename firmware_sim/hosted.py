@@ -88,6 +88,12 @@ class HostedJoints:
         self.bench = make_bench(spec.bench, make, open_port(spec.bus, None, None), spec.faults)
         self._periods = 0
 
+    @property
+    def terminal(self) -> str | None:
+        """The pseudo-terminal of a serial or slcan port; None on other buses."""
+        path = self.bench.port.describe().get("terminal")
+        return None if path is None else str(path)
+
     def set_load(self, number: int, torque_Nm: float) -> None:
         """External torque on the link of joint `number`, along +q_out, from now on."""
         self.plants[number].load_Nm = torque_Nm

@@ -153,6 +153,10 @@ class LinkConfig(Frozen):
             bus = CanBus(kind="can", interface=interface, channel=channel, options=options, **shared)
         return self.model_copy(update={"bus": bus})
 
+    def at_terminal(self, path: str) -> LinkConfig:
+        """The same slcan or serial link on another terminal, such as a simulated adapter's."""
+        return self.redirect("serial" if isinstance(self.bus, SerialBus) else "slcan", path)
+
     def device_of(self, end: MotorEnd | SensorEnd) -> MitDevice | CanSimpleDevice | DbcDevice:
         """The device that an end names."""
         return next(d for d in self.device if d.id == end.device)

@@ -150,10 +150,12 @@ def timing_section(report: RunReport) -> Section:
 def _sections(report: RunReport, config_text: str) -> Iterator[Section]:
     for joint in report.joints:
         yield Section(joint.name, page.facts(run_facts(joint)))
-        folder = report.folder
-        if folder is None:
+        if report.folder is None:
             continue
-        data = load_run(folder if len(report.joints) == 1 else folder / joint.name)
+        folder = report.folder if len(report.joints) == 1 else report.folder / joint.name
+        if not (folder / "recording.csv").exists():  # stopped before its first sample
+            continue
+        data = load_run(folder)
         yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
         yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data)))
         yield Section(f"{joint.name}: cables", page.figure(tension_figure(data)))

@@ -20,6 +20,7 @@ from cablecomp.control.standard import calibration_protocol, force_protocol, rea
 from cablecomp.errors import InputError
 from cablecomp.links.schema import LinkConfig
 from cablecomp.recording.reader import read_all
+from cablecomp.runtime.loop import TIME_IS_OVER
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, Watch, run_joints
 from cablecomp.runtime.setup import Contestant, same_joint
@@ -208,7 +209,7 @@ class _Base(NamedTuple):
             report = run_joints(contestants, link, self.control, protocol, options, simulation, self.watch)
         finally:
             simulation.close()
-        if report.stop_reason != "time is over":
+        if report.stop_reason != TIME_IS_OVER:
             raise InputError(
                 f"{name}: the run stopped early: {report.stop_reason}; see {options.out}/events.jsonl"
             )

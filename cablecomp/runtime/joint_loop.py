@@ -148,8 +148,9 @@ class JointLoop:
             self._send(self._sent)
 
     def stand(self, now_s: float) -> None:
-        """After the stop: observe and record, command nothing."""
-        self._cycle(now_s, None)
+        """After the stop: observe and record what has come, command nothing."""
+        if self.ready:
+            self._cycle(now_s, None)
 
     def close(self) -> None:
         """Keep the observer's state, finish the logs."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 from cablecomp.errors import DeviceError
 from cablecomp.recording.recorder import Recorder, TableLog
@@ -117,25 +117,35 @@ class JointLog:
 
 
 class EventLog:
-    """What happened, one JSON line each, at once on disk; the last ones are kept for the live view."""
+    """What happened, one JSON line each, at once on disk (`path` None = nowhere; made with the first event); the
+    last ones are kept for the live view.
+    """
 
-    def __init__(self, path: Path, keep: int = 200) -> None:
+    def __init__(self, path: Path | None, keep: int = 200) -> None:
         self.last: list[tuple[float, str, str]] = []
         self._keep = keep
-        try:
-            self._file = path.open("w", encoding="utf-8")
-        except OSError as error:
-            raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+        self._path = path
+        self._file: TextIO | None = None
 
     def add(self, time_s: float, joint: str, what: str) -> None:
         """Note an event of a joint ("" = of the run)."""
         self.last.append((time_s, joint, what))
         if len(self.last) > self._keep:
             del self.last[0]
-        if not self._file.closed:
+        if self._file is None and self._path is not None:
+            self._file = _opened(self._path)
+        if self._file is not None and not self._file.closed:
             self._file.write(json.dumps({"time_s": round(time_s, 6), "joint": joint, "what": what}) + "\n")
             self._file.flush()
 
     def close(self) -> None:
         """Finish the file; may be called again."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
+
+
+def _opened(path: Path) -> TextIO:
+    try:
+        return path.open("w", encoding="utf-8")
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None

@@ -23,6 +23,8 @@ from cablecomp.runtime.minutes import Minutes
 from cablecomp.runtime.priority import QUIET, Granted, Policy, armed
 from cablecomp.runtime.timing import TimingReport
 
+TIME_IS_OVER = "time is over"
+ASKED_BY_USER = "asked by the user"
 BUS_EVERY = 5  # ticks between two looks at the bus's own state
 COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
 DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
@@ -56,7 +58,9 @@ AfterTick = Callable[[Tick, Stage], None]
 
 class Loop:
     """Runs joints on a link. `run` returns when the time is over or something asked for a stop; the stop
-    command is sent in every case, an unexpected exception included, and all logs are closed."""
+    command is sent in every case, an unexpected exception included, and all logs are closed. `prepare` is
+    called once the link is open: nothing is written before.
+    """
 
     def __init__(
         self,
@@ -67,6 +71,7 @@ class Loop:
         options: LoopOptions,
         folder: Path | None = None,
         after_tick: AfterTick | None = None,
+        prepare: Callable[[], None] | None = None,
     ) -> None:
         self.link = link
         self.options = options
@@ -75,11 +80,12 @@ class Loop:
         self.stop_reason = ""
         self.times = CycleTimes()
         self.minutes = Minutes()
-        self.events = EventLog(Path("/dev/null") if folder is None else folder / "events.jsonl")
+        self.events = EventLog(None if folder is None else folder / "events.jsonl")
         folders = [None if folder is None else _folder_of(folder, s, len(setups)) for s in setups]
         self.joints = tuple(JointLoop(s, link, f, self.events) for s, f in zip(setups, folders, strict=True))
         self._clock = clock
         self._after = after_tick
+        self._prepare = prepare
         self._ticker: Ticker | None = None
         self._granted = Granted()
         self._stage_s = 0.0
@@ -106,8 +112,8 @@ class Loop:
             compile_all = getattr(joint.setup.compensator.observer, "compile", None)
             if compile_all is not None:
                 compile_all()
+        self._open()
         try:
-            self.link.open()
             with armed(self.options.policy) as self._granted:
                 self._loop()
         finally:
@@ -147,6 +153,16 @@ class Loop:
     @property
     def _skipped(self) -> int:
         return 0 if self._ticker is None else self._ticker.skipped
+
+    def _open(self) -> None:
+        """A link that does not open, or a folder that cannot be made, leaves nothing behind."""
+        try:
+            self.link.open()
+            if self._prepare is not None:
+                self._prepare()
+        except BaseException:
+            self.link.close()
+            raise
 
     def _loop(self) -> None:
         ticker = self._ticker = Ticker(self._clock, self.period_s)
@@ -230,7 +246,7 @@ class Loop:
         if not why and tick.number % BUS_EVERY == 0:
             why = self._bus_trouble()
         if not why and since >= self.options.duration_s:
-            why = "time is over"
+            why = TIME_IS_OVER
         if why:
             self._stop(why, now)
 

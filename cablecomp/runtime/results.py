@@ -10,6 +10,7 @@ from typing import Any
 
 from cablecomp.control.compensator import Gains
 from cablecomp.runtime.joint_loop import JointLoop
+from cablecomp.runtime.loop import ASKED_BY_USER, TIME_IS_OVER
 from cablecomp.runtime.timing import TimingReport
 
 
@@ -43,6 +44,11 @@ class RunReport:
     events: tuple[tuple[float, str, str], ...]
     gains: Gains
     folder: Path | None
+
+    @property
+    def ended_well(self) -> bool:
+        """Whether the run lasted as long as was asked, or was ended by the user."""
+        return self.stop_reason in (TIME_IS_OVER, ASKED_BY_USER)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, for `run.json`."""

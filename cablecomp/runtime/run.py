@@ -87,6 +87,8 @@ def run_joints(
         raise InputError("stepped time needs a simulated joint; leave out --fast, or add --sim")
     for c in contestants:
         protocol.check_within(c.config.limits, protocol.name)
+    if simulation is not None and simulation.terminal is not None:
+        link = link.at_terminal(simulation.terminal)
     first = contestants[0]
     mode = ControlMode.FORCE if protocol.mode == "force" else first.options.mode
     chosen = control.model_copy(update={"compensator": first.options.model_copy(update={"mode": mode})})
@@ -101,8 +103,6 @@ def run_joints(
         )
         for c in contestants
     )
-    if options.out is not None:
-        _prepare(options.out, setups)
     duration = protocol.duration_s if options.duration_s is None else options.duration_s
     policy = options.policy if options.policy is not None else (QUIET if options.stepped else Policy())
     clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
@@ -115,7 +115,11 @@ def run_joints(
         if watch is not None:
             watch(loop, tick)
 
-    loop = Loop(bus, setups, clock, period, timing, options.out, after)
+    def prepare() -> None:
+        if options.out is not None:
+            _prepare(options.out, setups)
+
+    loop = Loop(bus, setups, clock, period, timing, options.out, after, prepare)
     report = loop.run()
     found = RunReport(
         tuple(result_of(joint, truths) for joint in loop.joints),

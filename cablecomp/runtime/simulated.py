@@ -26,6 +26,10 @@ class TruthLike(Protocol):
 class Simulation(Protocol):
     """Simulated joints 1…n behind the bus that a link names."""
 
+    @property
+    def terminal(self) -> str | None:
+        """The pseudo-terminal that stands for the link's serial line or slcan adapter; None on other buses."""
+
     def set_load(self, number: int, torque_Nm: float) -> None:
         """External torque on the link of a joint, along +q_out, from now on."""
 

@@ -16,7 +16,7 @@ from cablecomp.control.degrade import Phase
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.health import health_names
 from cablecomp.runtime.joint_loop import JointLoop, View
-from cablecomp.runtime.loop import Loop
+from cablecomp.runtime.loop import ASKED_BY_USER, Loop
 
 _COLOURS = {
     Phase.NORMAL: "green",
@@ -44,7 +44,7 @@ class LiveView:
         """Called once a tick; costs next to nothing."""
         self._loop = loop
         if self._pressed:
-            loop.ask_to_stop("asked by the user")
+            loop.ask_to_stop(ASKED_BY_USER)
 
     def press(self) -> None:
         """Ask the run to stop."""

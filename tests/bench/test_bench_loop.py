@@ -92,6 +92,8 @@ class Springy:
 class SpringySimulation:
     """Eight of them behind the bus."""
 
+    terminal = None
+
     def __init__(self, joints: int) -> None:
         self.bench = make_bench(
             BenchConfig(protocol="dbc", joints=joints), lambda number: Springy(), open_port("virtual:wrist")

@@ -43,6 +43,15 @@ def settle(fd: int) -> None:
     assert select.select([fd], [], [], 5.0)[0]
 
 
+def heard(fd: int, end: bytes) -> bytes:
+    """What has come, up to its `end`: a terminal may hand one write over in pieces."""
+    said = b""
+    while not said.endswith(end):
+        settle(fd)
+        said += os.read(fd, 1000)
+    return said
+
+
 @pytest.mark.parametrize("kind", ["direct", "generic", "bounded"])
 def test_virtual_both_ways_with_a_stock_client(channel: str, kind: str) -> None:
     options = {"rx_queue_size": 100} if kind == "bounded" else {}
@@ -305,13 +314,9 @@ def test_slcan_over_a_terminal() -> None:
     with terminal() as (master, path):
         port = can_port("slcan", path, 1_000_000, {"sleep_after_open": 0})
         port.open()
-        settle(master)
-        opening = os.read(master, 1000)
-        assert opening.startswith(b"C\rS8\r")
-        assert opening.endswith(b"O\r")
+        assert heard(master, b"O\r").startswith(b"C\rS8\r")
         assert port.send(0x100, b"\x11\x33")
-        settle(master)
-        assert os.read(master, 100) == b"t10021133\r"
+        assert heard(master, b"\r") == b"t10021133\r"
         os.write(master, b"z\r\at0011AA\rT1ABCDEF080000000000000000\rr7F70\rt99\r")
         settle(port._fd)
         got = Catch()
@@ -319,11 +324,7 @@ def test_slcan_over_a_terminal() -> None:
         assert got == [(1, b"\xaa"), (0x1ABCDEF0 | EXTENDED, bytes(8)), (0x7F7 | REMOTE, b"")]
         assert (port.counters.invalid, port.counters.overflows) == (1, 1)
         port.close()
-        said = b""
-        while b"C\r" not in said:
-            settle(master)
-            said += os.read(master, 100)
-        assert said == b"F\rC\r", "a refusal is asked about once, then the channel is closed"
+        assert heard(master, b"C\r") == b"F\rC\r", "a refusal is asked about once, then the channel is closed"
 
 
 def test_what_cannot_be_opened_is_said_in_one_line(tmp_path) -> None:

@@ -21,6 +21,7 @@ from cablecomp.links.schema import load_link
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
 from cablecomp.report.replay_page import write_replay
+from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop, Stage
 from cablecomp.runtime.results import RunReport
@@ -246,8 +247,8 @@ def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
         (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
         (["run", "--config", str(JOINT), "--sim", "--fast", "--fault", "gremlins"], "gremlins"),
         (
-            ["run", "--config", str(JOINT), "--link", str(CONFIGS / "links/mit-serial.toml"), "--sim"],
-            "serial",
+            ["run", "--config", str(JOINT), "--link", str(CONFIGS / "links/mit-socketcan.toml"), "--sim"],
+            "socketcan",
         ),
         (["run", "--config", str(JOINT), "--link", str(LINK), "--fast"], "--sim"),
         (["design", "--config", str(JOINT), "--rate", "-5"], "-5"),
@@ -280,3 +281,50 @@ def test_a_bus_that_is_not_there_is_exit_code_3(tmp_path: Path, capsys: pytest.C
     arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--link", str(link)]
     assert cli.main([*arguments, "--out", str(tmp_path / "o")]) == 3
     assert "nocan9" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("name", ["mit-virtual", "odrive-virtual", "dbc-virtual", "mit-slcan", "mit-serial"])
+def test_the_simulated_joint_sits_behind_every_kind_of_link(name: str, tmp_path: Path) -> None:
+    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--sim", "--fast", "--nominal"]
+    arguments += ["--link", str(CONFIGS / "links" / f"{name}.toml"), "--duration", "0.8", "--no-bounds"]
+    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
+    said = json.loads((tmp_path / "run.json").read_text())
+    assert said["joints"][0]["cycles"] > 790
+    assert said["joints"][0]["residual_rad"] < 2e-3
+    assert said["timing"]["lost_frames"] == 0
+
+
+def test_a_run_that_had_to_stop_the_joint_says_so_by_its_exit_code(tmp_path: Path) -> None:
+    arguments = [
+        "run",
+        "--config",
+        str(JOINT),
+        "--control",
+        str(CONTROL),
+        "--sim",
+        "--fast",
+        "--duration",
+        "2",
+    ]
+    assert cli.main([*arguments, "--fault", "silent:node=drive,start=0.3", "--out", str(tmp_path)]) == 3
+    assert "stale" in json.loads((tmp_path / "run.json").read_text())["stop_reason"]
+    assert (tmp_path / "report.html").exists()
+
+
+def test_asked_to_stop_before_anything_has_come_leaves_a_page_and_no_riddle(tmp_path: Path) -> None:
+    joint, control = load_joint(JOINT), load_control(CONTROL)
+    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=GAINS)})
+    link, control = matched(load_link(LINK), control, own_link=False)
+    simulation = start_simulation(JOINT, SimulationWish(link, control, faults=("silent:node=both",)))
+
+    def watch(loop: Loop, tick: Tick) -> None:
+        if tick.number > 20:
+            loop.ask_to_stop("asked by the user")
+
+    try:
+        report = run_joint(joint, link, control, REACH, RunOptions(1.0, True, tmp_path), simulation, watch)
+    finally:
+        simulation.close()
+    assert report.ended_well
+    assert "Timing and data" in write_run_page(report, "").read_text()
