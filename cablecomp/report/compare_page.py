@@ -117,7 +117,7 @@ def _errors(data: dict[str, RunData]) -> Any:
         curve(fig, run.time_s[on], 1e3 * run.error_rad()[on], _WORDS[name], _COLOURS[name], 1)
     run = data[OBSERVER]
     curve(fig, run.time_s, run.column("joint_torque_Nm"), "load", style.LOAD, 2)
-    curve(fig, run.time_s, run.cycles["reference_position_rad"], "asked position (rad)", style.MEASURED, 2)
+    curve(fig, run.time_s, run.asked_rad, "asked position (rad)", style.MEASURED, 2)
     style.axes(fig, "", style.label("joint error", "mrad"), row=1, col=1)
     style.axes(fig, TIME, "load / N·m, position / rad", row=2, col=1)
     return fig

@@ -43,12 +43,15 @@ class RunData:
                 return table[name]
         return np.full(len(self.recording["time_s"]), np.nan)
 
+    @property
+    def asked_rad(self) -> Floats:
+        """What was asked for at that instant, NaN where nothing was (before control began, after it ended)."""
+        asked = self.cycles["reference_position_rad"]
+        return np.asarray(np.where(self.cycles["controlled"] > 0.0, asked, np.nan), dtype=np.float64)
+
     def error_rad(self, offset_rad: float = 0.0) -> Floats:
-        """Joint encoder less what was asked for at that instant."""
-        return np.asarray(
-            self.column("joint_position_rad") - offset_rad - self.cycles["reference_position_rad"],
-            dtype=np.float64,
-        )
+        """Joint encoder less what was asked for."""
+        return np.asarray(self.column("joint_position_rad") - offset_rad - self.asked_rad, dtype=np.float64)
 
 
 def load_run(folder: Path, points: int = 6000) -> RunData:

@@ -56,7 +56,7 @@ def position_figure(data: RunData) -> Any:
     """Asked and measured joint position, error, load, over time."""
     fig = stack([0.45, 0.3, 0.25], 640)
     time = data.time_s
-    curve(fig, time, data.cycles["reference_position_rad"], "asked", style.BASELINE, 1)
+    curve(fig, time, data.asked_rad, "asked", style.BASELINE, 1)
     curve(fig, time, data.column("joint_position_rad"), "measured", style.MEASURED, 1)
     curve(fig, time, 1e3 * data.error_rad(), "error", style.RESIDUAL, 2)
     curve(fig, time, data.column("joint_torque_Nm"), "load", style.LOAD, 3)
