@@ -125,7 +125,10 @@ class VirtualPort(PortBase):
             if off:
                 self.heard()
                 off = False
-            sink(message_identifier(message), message.data)
+            identifier = message.arbitration_id
+            if message.is_extended_id or message.is_remote_frame:
+                identifier = message_identifier(message)
+            sink(identifier, message.data)
         self.counters.backlogs += bool(waiting)
         return found
 
