@@ -17,6 +17,11 @@ from cablecomp.links.records import BusState
 
 _MAX_PENDING = 65_536
 _CHUNK = 65_536
+_PIECE = 2048
+"""A terminal gives at most 4096 bytes at once; after less than this nothing is left. To read on all the same
+would wait: the kernel answers an empty read only once its own worker has run (`flush_work` in
+drivers/tty/n_tty.c), milliseconds later on a busy computer.
+"""
 _GONE = (BusState.CLOSED, BusState.LOST)
 
 
@@ -76,6 +81,8 @@ class LinePort(PortBase):
             if not chunk:
                 break
             found += self._reader.feed(chunk, sink)
+            if len(chunk) < _PIECE:
+                break
             if found >= limit:
                 self.counters.backlogs += 1
                 break
