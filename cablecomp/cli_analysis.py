@@ -124,7 +124,7 @@ def diagnose_recordings(
     joint = load_joint(config)
     data = {str(path): read_all(path).columns for path in recordings}
     announce_compilation()
-    with _hypothesis_bar() as told:
+    with hypothesis_bar() as told:
         found = diagnose(joint, data, told, seed)
     with atomic_directory(out) as folder:
         write_diagnosis(found, folder)
@@ -136,7 +136,8 @@ def diagnose_recordings(
 
 
 @contextmanager
-def _hypothesis_bar() -> Iterator[Callable[[str, float], None]]:
+def hypothesis_bar() -> Iterator[Callable[[str, float], None]]:
+    """Give a function to be told (what is being tried, share done); the bar goes when it is over."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=1.0)

@@ -25,6 +25,8 @@ from cablecomp.mechanics.closed_forms_stage import EquivalentStage, cable_change
 
 Array = npt.NDArray[np.float64]
 
+_ROUNDING = 1e-12  # dimensionless load that is none: the tensions are sums of it and 1
+
 
 class Parts(NamedTuple):
     """Deflection of a drive in its two parts: theta = span + vector/s; rad."""
@@ -50,7 +52,9 @@ class DriveOnBench:
         for n, nominal in acting_stages(self.drive):
             stage = nominal.with_friction(scale)
             peak = None if peak_Nm is None else np.asarray(n * peak_Nm / stage.moment_scale_Nm)
-            tau, top = self._tensions(n * load_Nm / stage.moment_scale_Nm, peak, stage)
+            m = n * load_Nm / stage.moment_scale_Nm
+            m = np.where(np.abs(m) < _ROUNDING, 0.0, m)
+            tau, top = self._tensions(m, peak, stage)
             shape = cable_loading((tau if top is None else top) - 1.0, stage)
             if top is not None:
                 shape = shape + cable_change(tau, top, stage)

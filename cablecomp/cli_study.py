@@ -1,0 +1,62 @@
+"""The command line's study of the thesis's open questions, on the simulated plant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from cablecomp.cli_analysis import hypothesis_bar
+from cablecomp.config import JointConfig, load_joint
+from cablecomp.errors import InputError
+from cablecomp.identification.bench_cycle import Array, Columns, Rigs
+from cablecomp.identification.bench_study import study
+from cablecomp.report.study_page import study_table, write_study
+
+console = Console()
+JOINTS = Path(__file__).resolve().parents[1] / "configs/joints"
+
+
+def register(app: typer.Typer) -> None:
+    """Add this module's command to the application."""
+    app.command("study")(study_bench)
+
+
+def study_bench(
+    out: Annotated[Path, typer.Option(help="folder for study.html")] = Path("study"),
+) -> None:
+    """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""
+    opened, closed = (JOINTS / f"snow-{name}-rig.toml" for name in ("open", "closed"))
+    if not opened.exists():
+        raise InputError(f"{opened}: is missing; run the study from a clone of the project")
+    with hypothesis_bar() as told:
+        found = study(Rigs(load_joint(opened), load_joint(closed)), by_plant, told)
+    console.print(study_table(found))
+    console.print(f"report: {write_study(found, out, f'cablecomp study --out {out}')}")
+
+
+def by_plant(config: JointConfig, columns: Columns) -> Array:
+    """Simulate a joint and its effects on the plant, which shares no equation with the observer."""
+    from firmware_sim.plant import EffectSpec, PlantConfig, simulate  # compiled code: only where it is wanted
+    from firmware_sim.plant.errors import PlantError
+
+    data = {**config.model_dump(by_alias=True), "effect": ()}
+    effects = tuple(
+        EffectSpec(entry.id, {k: v for k, v in entry.parameters.items() if k != "channel"})
+        for entry in config.effect
+    )
+    try:
+        run = simulate(
+            PlantConfig.from_dict(data),
+            columns["time_s"],
+            columns["motor_position_rad"],
+            columns["joint_torque_Nm"],
+            effects=effects,
+            temperature_degC=columns["temperature_degC"],
+            other_1=columns["other_1"],
+        )
+    except PlantError as error:
+        raise InputError(f"simulated bench: {error}") from None
+    return run.joint_position_rad
