@@ -11,7 +11,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from cablecomp import cli
 from cablecomp.cli_simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.options import ControlMode, FeedForward, load_control
@@ -178,25 +177,6 @@ def test_impedance_yields_by_its_stiffness() -> None:
     assert moved == pytest.approx(0.4 / 8.0, rel=0.05)
 
 
-def test_the_command_line_runs_and_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = [
-        "run",
-        "--config",
-        str(JOINT),
-        "--control",
-        str(CONTROL),
-        "--sim",
-        "--fast",
-        "--duration",
-        "0.5",
-    ]
-    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
-    assert "report.html" in capsys.readouterr().out.replace("\n", "")
-    page = (tmp_path / "report.html").read_text()
-    assert "https://" not in page.split("<script>")[0]
-    assert "prediction residual" in page
-
-
 def test_a_force_run_replays_bit_for_bit_as_well(tmp_path: Path) -> None:
     """The load comes from both encoders there; `joint.toml` beside the recording says so."""
     simulated_run(tmp_path / "run", 1.0, ControlMode.FORCE)
@@ -211,105 +191,6 @@ def test_a_force_run_replays_bit_for_bit_as_well(tmp_path: Path) -> None:
     )
     for name in ("deflection_rad", "joint_position_rad", "tension_h_N", "tension_l_N"):
         assert live[name].equals(again[name]), name
-
-
-def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
-    protocol = tmp_path / "p.toml"
-    protocol.write_text(REACH.to_toml(), encoding="utf-8")
-    arguments = [
-        "run",
-        "--config",
-        str(JOINT),
-        "--control",
-        str(CONTROL),
-        "--sim",
-        "--fast",
-        "--duration",
-        "0.3",
-    ]
-    assert cli.main([*arguments, "--protocol", str(protocol), "--out", str(tmp_path / "out")]) == 0
-    cycles = pl.read_csv(tmp_path / "out" / "cycles.csv", infer_schema_length=None).filter(
-        pl.col("controlled") > 0
-    )
-    asked = cycles["reference_position_rad"].to_numpy()[-1]
-    assert asked == pytest.approx(REACH.reference(0.3).joint_position_rad, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["run", "--sim"], "--config"),
-        (["run", "--config", "nowhere.toml", "--sim"], "nowhere.toml"),
-        (["run", "--config", str(JOINT)], "--link is missing"),
-        (["run", "--config", str(JOINT), "--sim", "--mode", "sideways"], "sideways"),
-        (["run", "--config", str(JOINT), "--sim", "--protocol", str(JOINT)], "segment"),
-        (["run", "--config", str(JOINT), "--link", str(JOINT)], "bus"),
-        (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
-        (["run", "--config", str(JOINT), "--sim", "--fast", "--fault", "gremlins"], "gremlins"),
-        (
-            ["run", "--config", str(JOINT), "--link", str(CONFIGS / "links/mit-socketcan.toml"), "--sim"],
-            "socketcan",
-        ),
-        (["run", "--config", str(JOINT), "--link", str(LINK), "--fast"], "--sim"),
-        (["design", "--config", str(JOINT), "--rate", "-5"], "-5"),
-        (["fly"], "fly"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(arguments) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_bus_that_is_not_there_is_exit_code_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = (
-        LINK.read_text()
-        .replace('interface = "virtual"', 'interface = "socketcan"')
-        .replace('"wrist"', '"nocan9"', 1)
-    )
-    link = tmp_path / "link.toml"
-    link.write_text(text.replace("cablecomp_joint.dbc", str(CONFIGS / "links/cablecomp_joint.dbc")))
-    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--link", str(link)]
-    assert cli.main([*arguments, "--out", str(tmp_path / "o")]) == 3
-    assert "nocan9" in capsys.readouterr().err
-    assert not (tmp_path / "o").exists()
-
-
-@pytest.mark.parametrize("name", ["mit-virtual", "odrive-virtual", "dbc-virtual", "mit-slcan", "mit-serial"])
-def test_the_simulated_joint_sits_behind_every_kind_of_link(name: str, tmp_path: Path) -> None:
-    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--sim", "--fast", "--nominal"]
-    arguments += ["--link", str(CONFIGS / "links" / f"{name}.toml"), "--duration", "0.8", "--no-bounds"]
-    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
-    said = json.loads((tmp_path / "run.json").read_text())
-    assert said["joints"][0]["cycles"] > 790
-    assert said["joints"][0]["residual_rad"] < 2e-3
-    assert said["timing"]["lost_frames"] == 0
-
-
-def test_a_run_that_had_to_stop_the_joint_says_so_by_its_exit_code(tmp_path: Path) -> None:
-    arguments = [
-        "run",
-        "--config",
-        str(JOINT),
-        "--control",
-        str(CONTROL),
-        "--sim",
-        "--fast",
-        "--duration",
-        "2",
-    ]
-    assert cli.main([*arguments, "--fault", "silent:node=drive,start=0.3", "--out", str(tmp_path)]) == 3
-    assert "stale" in json.loads((tmp_path / "run.json").read_text())["stop_reason"]
-    assert (tmp_path / "report.html").exists()
 
 
 def test_asked_to_stop_before_anything_has_come_leaves_a_page_and_no_riddle(tmp_path: Path) -> None:

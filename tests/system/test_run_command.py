@@ -1,0 +1,162 @@
+"""`cablecomp run` as a user meets it: links, protocols, exit codes, one line for bad input, the README's library
+form.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import polars as pl
+import pytest
+from fault_runs import CONFIGS, JOINT, REACH
+
+from cablecomp import cli
+from cablecomp.cli_simulation import start_simulation
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.simulated import SimulationWish
+
+CONTROL = CONFIGS / "control/wrist-capstan.toml"
+LINK = CONFIGS / "links/wrist-virtual.toml"
+
+
+def test_the_command_line_runs_and_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [
+        "run",
+        "--config",
+        str(JOINT),
+        "--control",
+        str(CONTROL),
+        "--sim",
+        "--fast",
+        "--duration",
+        "0.5",
+    ]
+    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
+    assert "report.html" in capsys.readouterr().out.replace("\n", "")
+    page = (tmp_path / "report.html").read_text()
+    assert "https://" not in page.split("<script>")[0]
+    assert "prediction residual" in page
+
+
+def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
+    protocol = tmp_path / "p.toml"
+    protocol.write_text(REACH.to_toml(), encoding="utf-8")
+    arguments = [
+        "run",
+        "--config",
+        str(JOINT),
+        "--control",
+        str(CONTROL),
+        "--sim",
+        "--fast",
+        "--duration",
+        "0.3",
+    ]
+    assert cli.main([*arguments, "--protocol", str(protocol), "--out", str(tmp_path / "out")]) == 0
+    cycles = pl.read_csv(tmp_path / "out" / "cycles.csv", infer_schema_length=None).filter(
+        pl.col("controlled") > 0
+    )
+    asked = cycles["reference_position_rad"].to_numpy()[-1]
+    assert asked == pytest.approx(REACH.reference(0.3).joint_position_rad, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "--sim"], "--config"),
+        (["run", "--config", "nowhere.toml", "--sim"], "nowhere.toml"),
+        (["run", "--config", str(JOINT)], "--link is missing"),
+        (["run", "--config", str(JOINT), "--sim", "--mode", "sideways"], "sideways"),
+        (["run", "--config", str(JOINT), "--sim", "--protocol", str(JOINT)], "segment"),
+        (["run", "--config", str(JOINT), "--link", str(JOINT)], "bus"),
+        (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
+        (["run", "--config", str(JOINT), "--sim", "--fast", "--fault", "gremlins"], "gremlins"),
+        (
+            ["run", "--config", str(JOINT), "--link", str(CONFIGS / "links/mit-socketcan.toml"), "--sim"],
+            "socketcan",
+        ),
+        (["run", "--config", str(JOINT), "--link", str(LINK), "--fast"], "--sim"),
+        (["design", "--config", str(JOINT), "--rate", "-5"], "-5"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_bus_that_is_not_there_is_exit_code_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (
+        LINK.read_text()
+        .replace('interface = "virtual"', 'interface = "socketcan"')
+        .replace('"wrist"', '"nocan9"', 1)
+    )
+    link = tmp_path / "link.toml"
+    link.write_text(text.replace("cablecomp_joint.dbc", str(CONFIGS / "links/cablecomp_joint.dbc")))
+    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--link", str(link)]
+    assert cli.main([*arguments, "--out", str(tmp_path / "o")]) == 3
+    assert "nocan9" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("name", ["mit-virtual", "odrive-virtual", "dbc-virtual", "mit-slcan", "mit-serial"])
+def test_the_simulated_joint_sits_behind_every_kind_of_link(name: str, tmp_path: Path) -> None:
+    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--sim", "--fast", "--nominal"]
+    arguments += ["--link", str(CONFIGS / "links" / f"{name}.toml"), "--duration", "0.8", "--no-bounds"]
+    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
+    said = json.loads((tmp_path / "run.json").read_text())
+    assert said["joints"][0]["cycles"] > 790
+    assert said["joints"][0]["residual_rad"] < 2e-3
+    assert said["timing"]["lost_frames"] == 0
+
+
+def test_a_run_that_had_to_stop_the_joint_says_so_by_its_exit_code(tmp_path: Path) -> None:
+    arguments = [
+        "run",
+        "--config",
+        str(JOINT),
+        "--control",
+        str(CONTROL),
+        "--sim",
+        "--fast",
+        "--duration",
+        "2",
+    ]
+    assert cli.main([*arguments, "--fault", "silent:node=drive,start=0.3", "--out", str(tmp_path)]) == 3
+    assert "stale" in json.loads((tmp_path / "run.json").read_text())["stop_reason"]
+    assert (tmp_path / "report.html").exists()
+
+
+def test_the_readme_s_ten_lines_run_as_they_stand(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """With a simulated joint put behind their bus, and a short run for their long one."""
+    text = (CONFIGS.parent / "README.md").read_text(encoding="utf-8")
+    blocks = [block.split("```")[0] for block in text.split("```python\n")[1:]]
+    (block,) = [b for b in blocks if "run_joint(" in b]
+    assert len([line for line in block.splitlines() if line and "import" not in line]) <= 10
+    path = CONFIGS / "joints/capstan-arm.toml"
+
+    def short(joint, link, control, protocol, options):
+        simulation = start_simulation(path, SimulationWish(link.redirect("virtual", "readme"), control))
+        try:
+            wanted = RunOptions(0.2, True, tmp_path)
+            return run_joint(joint, link.redirect("virtual", "readme"), control, protocol, wanted, simulation)
+        finally:
+            simulation.close()
+
+    monkeypatch.chdir(CONFIGS.parent)
+    monkeypatch.setattr("cablecomp.runtime.run.run_joint", short)
+    exec(compile(block, "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("time is over\n")
