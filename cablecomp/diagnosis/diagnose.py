@@ -17,16 +17,15 @@ from cablecomp.diagnosis.experiment import Experiment, best_experiment
 from cablecomp.diagnosis.final import Final, finish
 from cablecomp.diagnosis.fitting import INFLATION
 from cablecomp.diagnosis.forms import Form, all_forms
+from cablecomp.diagnosis.hidden import SHOWN
 from cablecomp.diagnosis.locate import Location, locate
 from cablecomp.diagnosis.screening import Progress
 from cablecomp.diagnosis.selection import Selection, select
 from cablecomp.diagnosis.series import Series, make_series
-from cablecomp.diagnosis.setting import ROWS, Setting, set_up
+from cablecomp.diagnosis.setting import Setting, set_up
 from cablecomp.diagnosis.unknown import Description, describe
 from cablecomp.diagnosis.verdict import Findings, weigh
 from cablecomp.identification.smoothing import FloatArray
-
-FINE = 4  # times the usual number of rows, where the usual ones leave something unexplained
 
 
 @dataclass(frozen=True)
@@ -62,27 +61,13 @@ def diagnose(
     `progress` is told the hypothesis under test and the share done. Raises InputError for recordings that
     lack a channel or that the nominal joint cannot follow.
     """
-    found = _diagnose(config, recordings, progress, seed, ROWS)
-    if found.findings.verdict == "unexplained" and found.setting.problem.parts[0].group > 1:
-        # fast physics is lost in the means: look again with shorter ones before anything is called unknown
-        found = _diagnose(config, recordings, progress, seed, FINE * ROWS)
-    return found
-
-
-def _diagnose(
-    config: JointConfig,
-    recordings: Mapping[str, Mapping[str, FloatArray]],
-    progress: Progress,
-    seed: int,
-    rows: int,
-) -> Diagnosis:
     rng = np.random.default_rng(seed)
     progress("calibrating the drive", 0.0)
-    setting = set_up(config, list(recordings.values()), rng, rows)
+    setting = set_up(config, list(recordings.values()), rng)
     groups = all_forms(config, setting.around)
     selection = select(setting.problem, setting.calibrated, groups, setting.layout, rng, progress)
     progress("last fit", 0.95)
-    final = finish(setting.problem, selection.model, setting.layout)
+    final = finish(setting.problem, selection.model, setting.layout, setting.replicas)
     unit = setting.problem.sigma * INFLATION
     nuisance = setting.calibrated.J * unit[:, None]
     calibrated = make_series(selection.baseline.residual_rad, setting.problem.sigma, setting.covariates)
@@ -163,6 +148,10 @@ def _experiment(
     if not findings.tied:
         return None
     problem = setting.problem
+    if findings.verdict in ("consistent", "recalibrate"):
+        plain = problem.joint(setting.calibrated.c)
+        models = [plain, *(h.model for h in selection.hidden[:SHOWN])]
+        return best_experiment(models, setting.covariates, setting.floor_rad, setting.around.temperature_degC)
     models = [final.config]
     for round_ in selection.rounds:
         for name, _ in round_.rivals:

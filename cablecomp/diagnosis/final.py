@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,8 @@ from cablecomp.diagnosis.blocks import Layout
 from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of, sensitivities, solve
 from cablecomp.diagnosis.forms import PHASE, Form
 from cablecomp.diagnosis.selection import free_shapes
+from cablecomp.errors import InputError
+from cablecomp.identification.misfit import Prepared
 from cablecomp.identification.smoothing import FloatArray
 
 SMALL_SAMPLE = 1.15  # what a sandwich of some twenty blocks underestimates
@@ -40,16 +42,16 @@ class Final:
     at_bound: tuple[str, ...]
 
 
-def finish(problem: Problem, model: Model, layout: Layout) -> Final:
+def finish(problem: Problem, model: Model, layout: Layout, replicas: Sequence[tuple[Prepared, ...]]) -> Final:
     """Free all shapes, fit to all rows, and work out the uncertainties."""
     forms, z = free_shapes(model)
     mask = layout.heldout | layout.training
-    found = solve(problem, forms, z, mask, None, None, iterations=6, refresh=2)
+    found = solve(problem, forms, z, mask, iterations=30, renew=True)
     if found is None:
         forms, found = model.forms, model
     J = sensitivities(problem, forms, found.z, found.residual)
     found = replace(found, J=J)
-    covariance = sandwich(problem, found, layout)
+    covariance = sandwich(problem, found, layout, _moved(problem, found, replicas))
     n = len(problem.parameters)
     calibration = {
         p.name: Value(p.value(float(v)), abs(p.slope(float(v))) * float(np.sqrt(covariance[k, k])))
@@ -69,9 +71,24 @@ def finish(problem: Problem, model: Model, layout: Layout) -> Final:
     return Final(config, found, calibration, tuple(effects), found.residual * problem.sigma * INFLATION, edge)
 
 
-def sandwich(problem: Problem, model: Model, layout: Layout) -> FloatArray:
-    """Covariance of z: curvature of the cost, with the scatter of the gradient between blocks
-    (dependence inside blocks kept).
+def _moved(problem: Problem, model: Model, replicas: Sequence[tuple[Prepared, ...]]) -> FloatArray:
+    """How noise on the inputs moves the model's prediction: one row for each replica, weighted."""
+    config = problem.joint(model.c, model.entries())
+    base = problem.predict(config)
+    found = []
+    for parts in replicas:
+        try:
+            found.append((replace(problem, parts=parts).predict(config) - base) / (problem.sigma * INFLATION))
+        except InputError:
+            continue
+    return np.array(found).reshape(-1, problem.rows)
+
+
+def sandwich(problem: Problem, model: Model, layout: Layout, moved: FloatArray) -> FloatArray:
+    """Covariance of z: curvature of the cost, with the scatter of its gradient.
+
+    The larger one counts for each coordinate: the scatter between blocks (dependence inside blocks kept), or
+    what white noise and noise on the inputs (`moved`, its bias included) do to the gradient.
     """
     mask = layout.heldout | layout.training
     prior = prior_of(problem, model.forms)
@@ -84,7 +101,8 @@ def sandwich(problem: Problem, model: Model, layout: Layout) -> FloatArray:
     scores -= scores.mean(axis=0)
     count = len(scores)
     meat = scores.T @ scores * count / max(1, count - 1) + np.diag(prior)
-    white = J.T @ J / INFLATION**2 + np.diag(prior)
+    pushes = moved[:, mask] @ J
+    white = J.T @ J / INFLATION**2 + pushes.T @ pushes / max(1, len(pushes)) + np.diag(prior)
     by_block, by_noise = inverse @ meat @ inverse, inverse @ white @ inverse
     grow = np.sqrt(np.maximum(np.diag(by_noise) / np.maximum(np.diag(by_block), 1e-300), 1.0))
     covariance: FloatArray = by_block * np.outer(grow, grow) * SMALL_SAMPLE**2

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.forms import Form
@@ -21,6 +22,7 @@ from cablecomp.identification.smoothing import FloatArray
 
 Mask = np.ndarray[tuple[int], np.dtype[np.bool_]]
 DAMPING = (0.0, 0.1, 1.0, 10.0)  # tried in turn until the misfit falls
+STALLED = 3e-4  # share of the cost that a step must gain
 INFLATION = 3.0  # noise that passes through friction remembers: some ten samples count as one
 
 
@@ -160,10 +162,10 @@ def solve(
     J: FloatArray | None = None,
     residual: FloatArray | None = None,
     iterations: int = 6,
-    refresh: int = 0,
+    renew: bool = False,
 ) -> Model | None:
-    """Fit from z on the rows of `mask`; J is renewed by differences in the first `refresh` iterations,
-    else by Broyden's rule.
+    """Fit from z on the rows of `mask`; J (by differences if not given) follows by Broyden's rule, and is
+    renewed where steps no longer gain, if `renew`.
 
     Returns None if the joint cannot follow the start.
     """
@@ -173,10 +175,10 @@ def solve(
     if r is None:
         return None
     now = cost(r, z, prior, mask)
-    fresh = -1
-    for k in range(iterations):
-        if J is None or k < refresh:
-            J, fresh = sensitivities(problem, forms, z, r), k
+    fresh = J is None
+    if J is None:
+        J = sensitivities(problem, forms, z, r)
+    for _ in range(iterations):
         better = None
         for damping in DAMPING:
             step = bounded_step(J[mask], r[mask], z, prior, low, high, damping)
@@ -190,17 +192,15 @@ def solve(
             if reached < now:
                 better = (trial, found, reached)
                 break
-        if better is None:
-            if refresh > 0 and fresh < k:  # the kept sensitivities may be at fault
-                J, fresh = sensitivities(problem, forms, z, r), k
-                continue
+        gain = 0.0 if better is None else now - better[2]
+        if better is not None:
+            z, r, now = better
+        if gain > STALLED * now:
+            fresh = False
+        elif renew and not fresh:
+            J, fresh = sensitivities(problem, forms, z, r), True
+        else:
             break
-        gain = now - better[2]
-        z, r, now = better
-        if gain < 1e-4 * now:
-            break
-    if J is None:
-        J = sensitivities(problem, forms, z, r)
     c, xs = split(problem, forms, z)
     return Model(tuple(forms), c, xs, r, J)
 
@@ -214,26 +214,21 @@ def bounded_step(
     high: FloatArray,
     damping: float = 0.0,
 ) -> FloatArray:
-    """Gauss-Newton step (Levenberg-Marquardt with `damping`) with bounds.
-
-    Coordinates that would leave are held at their bound, the rest solved again.
+    """Gauss-Newton step (Levenberg-Marquardt with `damping`) inside the bounds: the least of the quadratic
+    model there.
     """
     A = J.T @ J + np.diag(prior)
     g = J.T @ r - prior * z
     scale = np.sqrt(np.maximum(np.diag(A), 1e-12))
-    free = np.ones(len(z), dtype=bool)
-    step = np.zeros(len(z))
-    for _ in range(len(z)):
-        inner = A[np.ix_(free, free)] / np.outer(scale[free], scale[free])
-        inner += (1e-9 + damping) * np.eye(int(free.sum()))
-        rest = g[free] - A[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.solve(inner, rest / scale[free]) / scale[free]
-        out = free & ((z + step < low - 1e-12) | (z + step > high + 1e-12))
-        if not np.any(out):
-            break
-        step[out] = np.where(z[out] + step[out] < low[out], low[out] - z[out], high[out] - z[out])
-        free &= ~out
-    return step
+    inner = A / np.outer(scale, scale) + (1e-9 + damping) * np.eye(len(z))
+    root = np.linalg.cholesky(inner)
+    wanted = np.linalg.solve(root, g / scale)
+    ends = ((low - z) * scale - 1e-12, (high - z) * scale + 1e-12)
+    free = np.linalg.solve(root.T, wanted)
+    if np.all(free >= ends[0]) and np.all(free <= ends[1]):
+        return np.asarray(free / scale)
+    found = lsq_linear(root.T, wanted, bounds=ends, method="bvls")
+    return np.asarray(found.x / scale)
 
 
 def refit(problem: Problem, model: Model, mask: Mask, iterations: int = 4) -> Model:

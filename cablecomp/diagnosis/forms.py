@@ -41,7 +41,7 @@ class Form:
 
     `amplitudes`: parameters fitted linearly; `shapes`: those that say how; `fixed`: the rest, texts
     included; `point`: shape values of this grid point; `scales`: unit of each amplitude coordinate;
-    `low`, `high`: bounds of the coordinates.
+    `limits`: bounds by name; `further`: amplitudes that join with the shapes, neutral until then.
     """
 
     effect: Effect
@@ -52,6 +52,7 @@ class Form:
     point: tuple[float, ...]
     scales: tuple[float, ...]
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    further: tuple[Parameter, ...] = ()
 
     @property
     def name(self) -> str:
@@ -130,15 +131,14 @@ def forms_of(effect: Effect, config: JointConfig, around: Surroundings) -> list[
     fixed: dict[str, float | str] = {}
     if effect.id == "thermal_pretension":
         fixed["reference_degC"] = around.temperature_degC
-    if len(amplitudes) > 1:  # the first amplitude names the effect; further ones join in the last fit
-        fixed |= {p.name: p.neutral for p in amplitudes[1:]}
-        amplitudes = amplitudes[:1]
+    amplitudes, further = amplitudes[:1], amplitudes[1:]  # the first amplitude names the effect
+    fixed |= {p.name: p.neutral for p in further}
     scales = tuple(_first_scale(p, limits[p.name]) for p in amplitudes)
     found = []
     for channel in channels:
         texts: dict[str, float | str] = {} if channel is None else {"channel": channel}
         found += [
-            Form(effect, amplitudes, shapes, phase, {**fixed, **texts}, point, scales, limits)
+            Form(effect, amplitudes, shapes, phase, {**fixed, **texts}, point, scales, limits, further)
             for point in itertools.product(*grids)
         ]
     return found
@@ -175,22 +175,25 @@ def _grid(p: Parameter, limits: tuple[float, float], around: Surroundings) -> tu
 
 @dataclass(frozen=True)
 class FreedForm(Form):
-    """A form whose shapes are coordinates too: the first ones as in `Form`, then one for each shape, 0
-    at the grid point.
+    """A form whose shapes are coordinates too: the first ones as in `Form`, then the further amplitudes,
+    then one for each shape, 0 at the grid point.
     """
 
     @property
     def size(self) -> int:
         """Number of coordinates, shapes included."""
-        return len(self.amplitudes) + int(self.phase) + len(self.shapes)
+        return self._first + len(self.further) + len(self.shapes)
+
+    @property
+    def _first(self) -> int:
+        return len(self.amplitudes) + int(self.phase)
 
     def shape_values(self, x: Sequence[float]) -> tuple[float, ...]:
         """Shape values at coordinates x: a factor exp(x/2) where logarithmic, else a shift by x
         twentieths of the range.
         """
-        first = self.size - len(self.shapes)
         values = []
-        for p, at, v in zip(self.shapes, self.point, x[first:], strict=True):
+        for p, at, v in zip(self.shapes, self.point, x[self._first + len(self.further) :], strict=True):
             low, high = self.limits[p.name]
             values.append(at * math.exp(0.5 * v) if p.log else at + 0.05 * (high - low) * v)
         return tuple(values)
@@ -202,21 +205,28 @@ class FreedForm(Form):
 
     def entry(self, x: Sequence[float], point: Sequence[float] | None = None) -> EffectEntry:
         """The configuration entry at coordinates x."""
-        first = self.size - len(self.shapes)
-        return super().entry(x[:first], self.shape_values(x) if point is None else point)
+        shapes = self.shape_values(x) if point is None else point
+        found = super().entry(x[: self._first], shapes)
+        more = {
+            p.name: self._inside(p, _first_scale(p, self.limits[p.name]) * v)
+            for p, v in zip(self.further, x[self._first :], strict=False)
+        }
+        return EffectEntry(id=found.id, **{**found.parameters, **more})
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Bounds of all coordinates."""
         low, high = super().bounds()
-        shape = []
+        more = [(0.0 if a >= 0.0 else a, b) for p in self.further for a, b in [self._limit(p)]]
+        scale = [_first_scale(p, self.limits[p.name]) for p in self.further]
+        extra = [(a / s, b / s) for (a, b), s in zip(more, scale, strict=True)]
         for p, at in zip(self.shapes, self.point, strict=True):
             a, b = self.limits[p.name]
             if p.log:
-                shape.append((2.0 * math.log(a / at), 2.0 * math.log(b / at)))
+                extra.append((2.0 * math.log(a / at), 2.0 * math.log(b / at)))
             else:
-                shape.append(((a - at) / (0.05 * (b - a)), (b - at) / (0.05 * (b - a))))
-        extra = np.array(shape).reshape(-1, 2)
-        return np.concatenate([low, extra[:, 0]]), np.concatenate([high, extra[:, 1]])
+                extra.append(((a - at) / (0.05 * (b - a)), (b - at) / (0.05 * (b - a))))
+        ends = np.array(extra).reshape(-1, 2)
+        return np.concatenate([low, ends[:, 0]]), np.concatenate([high, ends[:, 1]])
 
 
 def freed(form: Form) -> FreedForm:
@@ -224,3 +234,8 @@ def freed(form: Form) -> FreedForm:
     if isinstance(form, FreedForm):
         return form
     return FreedForm(**{name: getattr(form, name) for name in form.__dataclass_fields__})
+
+
+def has_instant(form: Form) -> bool:
+    """Whether the form is an event, with its instant as the only shape."""
+    return [p.name for p in form.shapes] == ["time_s"]

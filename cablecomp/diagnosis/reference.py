@@ -86,7 +86,7 @@ def _fold_with(setting: Setting, truth: Truth, names: Sequence[str]) -> Fold | N
     start = _true_coordinates(problem, truth)
     mask = setting.layout.heldout | setting.layout.training
     try:
-        model = solve(problem, (), start, mask, None, None, iterations=5, refresh=2)
+        model = solve(problem, (), start, mask, iterations=15, renew=True)
     except InputError:
         return None
     return None if model is None else fold_of(problem, model, setting.layout)

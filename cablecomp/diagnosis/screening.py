@@ -25,6 +25,9 @@ from cablecomp.diagnosis.forms import Form
 from cablecomp.identification.smoothing import FloatArray
 
 Progress = Callable[[str, float], None]
+CLEAR = 0.1  # share of the cost that an effect must remove at once
+WORTH = 2.0  # mean square over the floor from which on a hidden slope is looked for
+FORCED = (0.5, 0.15)  # sizes that it is else given to begin with, in residuals
 UNSEEN = 1e-3  # of the noise: an effect whose largest contribution is smaller is not asked further
 
 
@@ -163,14 +166,49 @@ def _middle(a: float, b: float, log: bool) -> float:
     return float(np.sqrt(a * b)) if log and a > 0.0 else 0.5 * (a + b)
 
 
-def best_guesses(
-    problem: Problem, base: Model, probes: Sequence[Sequence[Probe]], mask: Mask
-) -> list[tuple[Guess, Sequence[Probe]]]:
-    """The best grid point of each group on these rows, best group first."""
-    found = []
-    for group in probes:
-        found.append((max((guess(problem, base, p, mask) for p in group), key=lambda g: g.drop), group))
-    return sorted(found, key=lambda pair: -pair[0].drop)
+def attempt(problem: Problem, base: Model, group: Sequence[Probe], mask: Mask) -> tuple[Model | None, float]:
+    """Fit the effect of a group from its most promising grid point; also the share of the cost that the
+    linear answer promised. None if nothing is won.
+
+    Where the linear answer promises little, the effect is given a size and the calibration time to make
+    room for it: a calibration that has paid for a missing effect hides the slope towards it.
+    """
+    best = max((guess(problem, base, p, mask) for p in group), key=lambda g: g.drop)
+    best = refine(problem, base, best, mask, group)
+    prior = prior_of(problem, base.forms)
+    before = cost(base.residual, base.z, prior, mask)
+    model = fit_guess(problem, base, best, mask)
+    clear = model is not None and _cost(problem, model, mask) < (1.0 - CLEAR) * before
+    if clear or float(np.mean(base.residual[mask] ** 2)) * INFLATION**2 < WORTH:
+        return model, best.drop / before
+    tried = [model] if model is not None else []
+    tried += [
+        m for p in group for x in _sizes(p.form) if (m := _forced(problem, base, p, x, mask)) is not None
+    ]
+    tried = [m for m in tried if _cost(problem, m, mask) < before]
+    return min(tried, key=lambda m: _cost(problem, m, mask), default=None), best.drop / before
+
+
+def _sizes(form: Form) -> tuple[float, ...]:
+    """Sizes to begin with, of either sign where the effect has one: friction answers the signs differently."""
+    both = not form.phase and form.bounds()[0][0] < 0.0
+    return (*FORCED, *(-x for x in FORCED)) if both else FORCED
+
+
+def _cost(problem: Problem, model: Model, mask: Mask) -> float:
+    return cost(model.residual, model.z, prior_of(problem, model.forms), mask)
+
+
+def _forced(problem: Problem, base: Model, probe_: Probe, size: float, mask: Mask) -> Model | None:
+    """Fit from an effect of `size` (in residuals), the calibration moved to make room as far as it is
+    linear."""
+    forms = (*base.forms, probe_.form)
+    prior, (low, high) = prior_of(problem, base.forms), bounds_of(problem, base.forms)
+    x = np.zeros(probe_.form.size)
+    x[0] = size
+    left = base.residual - probe_.D @ x
+    step = bounded_step(base.J[mask], left[mask], base.z, prior, low, high)
+    return solve(problem, forms, np.concatenate([base.z + step, x]), mask, iterations=6)
 
 
 def fit_guess(problem: Problem, base: Model, found: Guess, mask: Mask) -> Model | None:

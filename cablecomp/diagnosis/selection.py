@@ -9,22 +9,37 @@ from math import erf, sqrt
 import numpy as np
 
 from cablecomp.diagnosis.blocks import Layout
-from cablecomp.diagnosis.fitting import INFLATION, Mask, Model, Problem, refit, solve
-from cablecomp.diagnosis.forms import Form, FreedForm, freed
+from cablecomp.diagnosis.fitting import (
+    INFLATION,
+    Mask,
+    Model,
+    Problem,
+    bounds_of,
+    cost,
+    evaluate,
+    prior_of,
+    refit,
+    solve,
+)
+from cablecomp.diagnosis.forms import Form, FreedForm, freed, has_instant
+from cablecomp.diagnosis.hidden import Hidden, hidden_effects
 from cablecomp.diagnosis.judge import Score, Verdict, compare, judge
-from cablecomp.diagnosis.screening import Guess, Probe, Progress, best_guesses, fit_guess, probe_all, refine
+from cablecomp.diagnosis.screening import Probe, Progress, attempt, probe_all
 from cablecomp.identification.smoothing import FloatArray
 
 FITTED = 7  # hypotheses that are fitted in each round, of all that were asked
 LEAST_SHARE = 0.1  # of the best linear drop that a hypothesis must promise to be fitted
 CAREFUL = 3  # hypotheses that are then fitted with their shapes free
 CLOSE = 0.5  # of the best one's gain, below which a hypothesis is not fitted carefully
+FAR = 10.0  # times what the best one leaves, beyond which a hypothesis is not either
 LEVEL = 0.01  # of a false support, all hypotheses together
 # of the floor's mean square that an effect must remove as well: instants are searched over all rows
 LEAST = 0.08
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
-POLISHES = 4  # careful fits of one hypothesis in a row, while they gain
+INSTANT_STEPS_S = (2.0, 0.5, 0.15, 0.04, 0.01)
+REACH = 4  # such steps either way that an event is looked for
+CAREFULLY = 30  # steps of a careful fit
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
 SURE = 3.0  # standard errors of lead beyond which a rival is refuted
 
@@ -66,6 +81,8 @@ class Selection:
     rounds: tuple[Round, ...]
     layout: Layout
     probes: list[list[Probe]] = field(default_factory=list)
+    hidden: tuple[Hidden, ...] = ()
+    """What the calibrated drive alone could conceal."""
 
 
 def select(
@@ -88,7 +105,7 @@ def select(
         left = [g for g in groups if g[0].name not in {f.name for f in current.forms}]
         probes = probe_all(problem, current, left, progress)
         first_probes = first_probes or probes
-        folds, asked = _fit_folds(problem, current, current_fold, probes, layout, progress)
+        folds, asked = _fit_folds(problem, current, probes, layout, progress)
         verdict = _judged(current_fold, folds, both, rng)
         models: dict[str, Model] = {}
         for score in _front_runners(verdict):
@@ -114,7 +131,8 @@ def select(
             current, current_fold = _without(problem, current, current_fold, layout, rng)
         if _at_noise(current, layout):
             break
-    return Selection(baseline, current_fold, current, base, tuple(rounds), layout, first_probes)
+    hidden = tuple(hidden_effects(problem, base, first_probes, layout))
+    return Selection(baseline, current_fold, current, base, tuple(rounds), layout, first_probes, hidden)
 
 
 def _judged(base: Fold, folds: Mapping[str, Fold], both: Layout, rng: np.random.Generator) -> Verdict:
@@ -131,8 +149,8 @@ def _judged(base: Fold, folds: Mapping[str, Fold], both: Layout, rng: np.random.
 def _front_runners(verdict: Verdict) -> list[Score]:
     """Hypotheses worth a careful fit: the best ones, as far as they may yet overtake each other."""
     top = max((s.heldout_gain for s in verdict.scores), default=0.0)
-    near = [s for s in verdict.scores if s.heldout_gain > max(LEAST_GAIN, CLOSE * top)]
-    return near[:CAREFUL]
+    least = max(LEAST_GAIN, CLOSE * top, 1.0 - FAR * (1.0 - top))
+    return [s for s in verdict.scores if s.heldout_gain > least][:CAREFUL]
 
 
 def all_rows(layout: Layout) -> Layout:
@@ -157,91 +175,83 @@ def _fold(problem: Problem, a: Model, b: Model, layout: Layout) -> Fold:
 def _fit_folds(
     problem: Problem,
     base: Model,
-    base_fold: Fold,
     probes: Sequence[Sequence[Probe]],
     layout: Layout,
     progress: Progress,
 ) -> tuple[dict[str, Fold], dict[str, float]]:
-    """Fit the most promising hypotheses on both halves."""
-    masks = (layout.training, layout.heldout)
-    ranked = [
-        best_guesses(problem, _shifted(base, model), probes, mask)
-        for model, mask in zip(base_fold.models, masks, strict=True)
-    ]
-    energy = float(base.residual @ base.residual)
+    """Fit every hypothesis to all rows, and the most promising ones to either half."""
+    both = layout.heldout | layout.training
+    before = cost(base.residual, base.z, prior_of(problem, base.forms), both)
     asked: dict[str, float] = {}
-    for pairs in ranked:
-        for found, _ in pairs:
-            name = found.probe.form.name
-            asked[name] = asked.get(name, 0.0) + found.drop / energy
-    limit = LEAST_SHARE * max(asked.values(), default=0.0)
-    chosen = [n for n, v in sorted(asked.items(), key=lambda i: -i[1])[:FITTED] if v > limit]
-    folds: dict[str, Fold] = {}
-    for k, name in enumerate(chosen):
-        progress(f"fitting {name}", k / len(chosen))
-        models: list[Model | None] = []
-        for model, mask, pairs in zip(base_fold.models, masks, ranked, strict=True):
-            found, group = next(p for p in pairs if p[0].probe.form.name == name)
-            start = _shifted(base, model)
-            best: Guess = refine(problem, start, found, mask, group)
-            models.append(fit_guess(problem, start, best, mask))
-        a, b = models
-        if a is not None and b is not None:
-            folds[name] = _fold(problem, a, b, layout)
-    return folds, asked
-
-
-def _shifted(base: Model, fitted: Model) -> Model:
-    """The half's own model, with the sensitivities of the one fitted to all rows where it has none better."""
-    return Model(fitted.forms, fitted.c, fitted.x, fitted.residual, base.J if fitted.J is None else fitted.J)
+    models: dict[str, Model] = {}
+    won: dict[str, float] = {}
+    for k, group in enumerate(probes):
+        name = group[0].form.name
+        progress(f"fitting {name}", k / len(probes))
+        model, asked[name] = attempt(problem, base, group, both)
+        if model is not None:
+            models[name] = model
+            won[name] = 1.0 - cost(model.residual, model.z, prior_of(problem, model.forms), both) / before
+    limit = LEAST_SHARE * max(won.values(), default=0.0)
+    chosen = [n for n, v in sorted(won.items(), key=lambda i: -i[1])[:FITTED] if v > limit]
+    return {name: fold_of(problem, models[name], layout) for name in chosen}, asked
 
 
 def _polish(problem: Problem, fold: Fold, layout: Layout) -> tuple[Model, Fold]:
-    """Free the shapes of the effects: fit all rows, then either half.
+    """Free the shapes of the effects: fit all rows, then either half, with the sensitivities of the whole.
 
     Instants of events are the exception: the halves take them from all rows, for an event inside a held-out
     block cannot be placed without it.
     """
     both = layout.heldout | layout.training
     start = min(fold.models, key=lambda m: float(m.residual[both] @ m.residual[both]))
-    whole = _careful(problem, *free_shapes(start), both) or start
+    forms, z = free_shapes(start)
+    z = _instants_found(problem, forms, z, both)
+    whole = solve(problem, forms, z, both, iterations=CAREFULLY, renew=True) or start
     halves = []
-    for model, mask in zip(fold.models, (layout.training, layout.heldout), strict=True):
-        forms, z = _placed(whole) if _has_instant(whole) else free_shapes(model)
-        halves.append(_careful(problem, forms, z, mask) or model)
+    for mask in (layout.training, layout.heldout):
+        forms, z, J = _placed(problem, whole)
+        halves.append(solve(problem, forms, z, mask, J, whole.residual, CAREFULLY, renew=True) or whole)
     return whole, _fold(problem, halves[0], halves[1], layout)
 
 
-def _careful(problem: Problem, forms: Sequence[Form], z: FloatArray, mask: Mask) -> Model | None:
-    """Fit with fresh sensitivities, again and again while it gains."""
-    model: Model | None = None
-    for _ in range(POLISHES):
-        found = solve(problem, forms, z, mask, None, None, iterations=8, refresh=2)
-        if found is None:
-            break
-        before = np.inf if model is None else float(model.residual[mask] @ model.residual[mask])
-        model, z = found, found.z
-        now = float(found.residual[mask] @ found.residual[mask])
-        if now > 0.97 * before or now * INFLATION**2 < NOISE * int(mask.sum()):
-            break
-    return model
+def _instants_found(problem: Problem, forms: Sequence[Form], z: FloatArray, mask: Mask) -> FloatArray:
+    """The coordinates with the instants of events moved to where the misfit is least, in ever finer steps.
+
+    A misfit is no smooth function of an instant, so no slope leads there.
+    """
+    prior, (low, high) = prior_of(problem, forms), bounds_of(problem, forms)
+    end = len(problem.parameters)
+
+    def reached(trial: FloatArray) -> float:
+        found = evaluate(problem, forms, trial)
+        return np.inf if found is None else cost(found, trial, prior, mask)
+
+    for form in forms:
+        end += form.size
+        if not has_instant(form):
+            continue
+        place, unit = end - 1, 20.0 / (form.limits["time_s"][1] - form.limits["time_s"][0])
+        for step in INSTANT_STEPS_S:
+            tries = [z.copy() for _ in range(2 * REACH + 1)]
+            for k, trial in enumerate(tries):
+                trial[place] = np.clip(z[place] + (k - REACH) * step * unit, low[place], high[place])
+            z = min(tries, key=reached)
+    return z
 
 
-def _has_instant(model: Model) -> bool:
-    return any(p.name == "time_s" for f in model.forms for p in f.shapes)
-
-
-def _placed(model: Model) -> tuple[tuple[Form, ...], FloatArray]:
-    """The model with the instants of its events taken as known."""
+def _placed(problem: Problem, model: Model) -> tuple[tuple[Form, ...], FloatArray, FloatArray]:
+    """The model's forms, coordinates and sensitivities, with the instants of its events taken as known."""
     forms: list[Form] = []
-    xs: list[FloatArray] = []
+    keep = np.ones(len(model.z), dtype=bool)
+    end = len(problem.parameters)
     for form, x in zip(model.forms, model.x, strict=True):
-        if isinstance(form, FreedForm) and [p.name for p in form.shapes] == ["time_s"]:
-            x = x[: form.size - 1]
-            form = form.fixed_shapes(model.x[len(forms)].tolist())
+        end += form.size
+        if isinstance(form, FreedForm) and has_instant(form):
+            keep[end - 1] = False
+            form = form.fixed_shapes(x.tolist())
         forms.append(form)
-        xs.append(x)
-    return tuple(forms), np.concatenate([model.c, *xs])
+    return tuple(forms), model.z[keep], model.J[:, keep]
 
 
 def free_shapes(model: Model) -> tuple[tuple[Form, ...], FloatArray]:

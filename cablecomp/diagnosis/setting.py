@@ -12,14 +12,15 @@ from cablecomp.diagnosis.blocks import Layout, alternate_blocks
 from cablecomp.diagnosis.covariates import Covariates, covariates, join
 from cablecomp.diagnosis.fitting import Model, Problem, evaluate, solve
 from cablecomp.diagnosis.forms import Surroundings
+from cablecomp.diagnosis.replicas import MEASURED, observe, shaken, steps_for
 from cablecomp.errors import InputError
-from cablecomp.identification.misfit import Prepared, groups_for, prepare
+from cablecomp.identification.misfit import Prepared
 from cablecomp.identification.noise import channel_noise
 from cablecomp.identification.parameters import OFFSET, Parameter, free_parameters
 from cablecomp.identification.smoothing import FloatArray
-from cablecomp.observer import Observer
 
 ROWS = 5000  # of all recordings together, after averaging
+REPLICAS = 12
 NEEDED = ("time_s", "motor_position_rad", "joint_position_rad")
 Columns = Mapping[str, FloatArray]
 
@@ -35,6 +36,8 @@ class Setting:
     nominal: Model
     calibrated: Model
     floor_rad: float
+    replicas: tuple[tuple[Prepared, ...], ...]
+    """The recordings as they might have been read as well, with other noise on their inputs."""
 
 
 def set_up(
@@ -51,8 +54,10 @@ def set_up(
                 raise InputError(
                     f"channel `{name}` is missing; diagnosis needs {', '.join(NEEDED)} and a load"
                 )
-    group = groups_for(recordings, rows)
-    parts = tuple(prepare(c, config, group, 0.0) for c in recordings)
+    finest, each = steps_for(recordings, rows)
+    seen = [observe(c, config, finest, each) for c in recordings]
+    parts = tuple(part for part, _ in seen)
+    replicas = tuple(tuple(shaken(part, noise, rng) for part, noise in seen) for _ in range(REPLICAS))
     views = join([covariates(_with_load(part.columns, config)) for part in parts])
     problem = Problem(
         config,
@@ -63,15 +68,15 @@ def set_up(
     )
     guard = max(2, len(problem.measured) // 1000)
     layout = alternate_blocks(views.starts, problem.rows, views.values["load_direction"], guard)
-    nominal = _start(problem)
-    floor = _floor(problem, parts, config, rng)
+    _start(problem)  # says it if the nominal joint cannot follow
+    floor = _floor(problem, replicas)
     problem = replace(problem, sigma=problem.sigma * floor / float(np.sqrt(np.mean(problem.sigma**2))))
     nominal = _start(problem)
     mask = layout.heldout | layout.training
-    calibrated = solve(problem, (), nominal.z, mask, None, None, iterations=8, refresh=3)
+    calibrated = solve(problem, (), nominal.z, mask, iterations=20, renew=True)
     if calibrated is None:
         raise InputError(f"{config.name}: the joint cannot follow the recording with its nominal parameters")
-    return Setting(problem, views, layout, _around(recordings), nominal, calibrated, floor)
+    return Setting(problem, views, layout, _around(recordings), nominal, calibrated, floor, replicas)
 
 
 def _parameters(config: JointConfig) -> tuple[Parameter, ...]:
@@ -97,56 +102,28 @@ def _start(problem: Problem) -> Model:
     return Model((), z, (), residual, np.zeros((problem.rows, len(z))))
 
 
-def _floor(
-    problem: Problem, parts: Sequence[Prepared], config: JointConfig, rng: np.random.Generator
-) -> float:
+def _floor(problem: Problem, replicas: Sequence[tuple[Prepared, ...]]) -> float:
     """RMS that noise alone leaves: the joint encoder's own, and what noisy inputs do to the prediction
-    (friction rectifies noise, so this is simulated, with noise added once more).
+    (friction rectifies noise, so this is simulated).
     """
-    own, moved = [], []
-    for part in parts:
-        noisy = dict(part.columns)
-        own.append(
-            _sigma(
-                config.sensors.joint_position_noise_rad,
-                config.sensors.joint_position_resolution_rad,
-                part,
-                "joint_position_rad",
-            )
-        )
-        for name, noise, step in (
-            (
-                "motor_position_rad",
-                config.sensors.motor_position_noise_rad,
-                config.sensors.motor_position_resolution_rad,
-            ),
-            (
-                "joint_torque_Nm",
-                config.sensors.joint_torque_noise_Nm,
-                config.sensors.joint_torque_resolution_Nm,
-            ),
-            (
-                "motor_torque_Nm",
-                config.sensors.motor_torque_noise_Nm,
-                config.sensors.motor_torque_resolution_Nm,
-            ),
-        ):
-            if name in noisy:
-                sigma = _sigma(noise, step, part, name)
-                noisy[name] = noisy[name] + sigma * rng.standard_normal(len(noisy[name]))
+    s = problem.config.sensors
+    own = [
+        _joint_sigma(s.joint_position_noise_rad, s.joint_position_resolution_rad, p) for p in problem.parts
+    ]
+    moved = []
+    base = problem.predict(problem.config)
+    for parts in replicas:
         try:
-            a = Observer(config).run(part.columns)["joint_position_rad"]
-            b = Observer(config).run(noisy)["joint_position_rad"]
-            moved.append(float(np.std(b - a)))
+            moved.append(float(np.std(replace(problem, parts=parts).predict(problem.config) - base)))
         except InputError:  # noise alone can ask for what an edge-of-slack joint cannot give
             moved.append(0.0)
     return float(np.sqrt(np.mean(np.square(own)) + np.mean(np.square(moved))))
 
 
-def _sigma(noise: float | None, resolution: float | None, part: Prepared, name: str) -> float:
-    """1-sigma of a channel's group means; white noise averages, quantisation of a resting signal does not."""
+def _joint_sigma(noise: float | None, resolution: float | None, part: Prepared) -> float:
+    """1-sigma of the joint encoder's group means; white noise averages, quantisation at rest does not."""
     if noise is None and resolution is None:
-        return float(channel_noise(part.columns["time_s"], part.columns[name]).sigma)
+        return float(channel_noise(part.columns["time_s"], part.columns[MEASURED]).sigma)
     white, step = noise or 0.0, (resolution or 0.0) / np.sqrt(12.0)
     if white > step:
         return float(np.hypot(white, step) / np.sqrt(part.group))

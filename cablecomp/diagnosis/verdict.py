@@ -9,9 +9,10 @@ import numpy as np
 
 from cablecomp.diagnosis.final import Final
 from cablecomp.diagnosis.fitting import INFLATION, Model
+from cablecomp.diagnosis.hidden import grouped
 from cablecomp.diagnosis.judge import compare
 from cablecomp.diagnosis.locate import Location
-from cablecomp.diagnosis.selection import Selection, all_rows, confidence
+from cablecomp.diagnosis.selection import SURE, Selection, all_rows, confidence
 from cablecomp.diagnosis.setting import Setting
 from cablecomp.identification.smoothing import FloatArray
 
@@ -19,7 +20,6 @@ LEFT = 0.1  # share of the mismatch's energy beyond noise that a named effect ma
 STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
 CERTAIN = 2.25  # mean square over the floor that is no noise, wherever it sits
 WEAK = 3.0  # sds below which a fitted amplitude is no finding
-NEARLY_SURE = 0.9
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,12 @@ def weigh(
     end = min(energy(selection.final.residual_rad, setting), whole)
     excess, left = max(start - 1.0, 0.0), max(end - 1.0, 0.0)
     accepted = [r for r in selection.rounds if r.accepted is not None]
+    hiding = tuple(grouped(selection.hidden))
     if not final.effects:
         located = start > CERTAIN or (bool(before.significant(0.01)) and start > STRUCTURED)
         if located:
             return Findings("unexplained", (), (), excess, excess)
-        return Findings(_plain(setting, selection, rng), (), (), excess, excess)
+        return Findings(_plain(setting, selection, rng), (), hiding, excess, excess)
     tied, named = [], []
     for k, (form, entry, values) in enumerate(final.effects):
         rivals: Sequence[tuple[str, float]] = next(
@@ -70,7 +71,7 @@ def weigh(
         main = form.amplitudes[0].name
         if abs(values[main].value) < WEAK * values[main].sd:
             continue
-        if sure < NEARLY_SURE:
+        if rivals:
             names = (entry.id, *(n.partition(":")[0] for n, _ in rivals))
             tied.append((tuple(dict.fromkeys(names)), _reason(rivals)))
         else:
@@ -79,13 +80,13 @@ def weigh(
     if leftover:
         return Findings("unexplained", (), tuple(tied), excess, left)
     if not named and not tied:
-        return Findings(_plain(setting, selection, rng), (), (), excess, left)
+        return Findings(_plain(setting, selection, rng), (), hiding, excess, left)
     return Findings("explained", tuple(named), tuple(tied), excess, left)
 
 
 def _reason(rivals: Sequence[tuple[str, float]]) -> str:
     leads = ", ".join(f"{name} by {z:.1f} standard errors" for name, z in rivals)
-    return f"predictions on held-out data coincide: the best one leads {leads}; {3:.0f} are asked for"
+    return f"predictions on held-out data coincide: the best one leads {leads}; {SURE:.0f} are asked for"
 
 
 def _plain(setting: Setting, selection: Selection, rng: np.random.Generator) -> str:

@@ -19,13 +19,19 @@ Columns = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Prepared:
-    """One recording, ready to be fitted: channels in means of `group` samples, 1-sigma noise of each mean
-    (rad), first sample that counts."""
+    """One recording, ready to be fitted.
+
+    `columns`: channels in means of `group` samples, `sigma_rad`: 1-sigma noise of each mean, `first`: first
+    row that counts. `inputs`: what the observer is given, in steps of `group / each` samples; `each` steps
+    of its prediction are averaged to one row.
+    """
 
     columns: dict[str, FloatArray]
     sigma_rad: FloatArray
     group: int
     first: int
+    inputs: dict[str, FloatArray]
+    each: int = 1
 
     @property
     def rows(self) -> int:
@@ -57,14 +63,14 @@ def prepare(columns: Columns, config: JointConfig, group: int, skip_s: float) ->
     floor = residual_floor(joint, inputs, len(means["time_s"])) / sqrt(group)
     floor = np.maximum(floor, 0.05 * joint + 1e-9)  # means of quantised readings are not as good as 1/sqrt(n)
     first = int(np.searchsorted(means["time_s"], means["time_s"][0] + skip_s))
-    return Prepared(means, floor, group, min(first, len(floor) - 2))
+    return Prepared(means, floor, group, min(first, len(floor) - 2), means)
 
 
 def predicted(config: JointConfig, part: Prepared) -> FloatArray:
-    """Joint position that the observer predicts, without any offset; raises InputError where it cannot
-    follow."""
-    found: FloatArray = Observer(config).run(part.columns)["joint_position_rad"]
-    return found
+    """Joint position of each row that the observer predicts, without any offset; raises InputError where it
+    cannot follow."""
+    found: FloatArray = Observer(config).run(part.inputs)["joint_position_rad"]
+    return found if part.each == 1 else group_means(found, part.each)
 
 
 def groups_for(recordings: Sequence[Columns], rows: int) -> int:

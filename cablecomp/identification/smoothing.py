@@ -15,6 +15,10 @@ IntArray = NDArray[np.int64]
 
 _GROUPED_WIDTH: Final = 32
 _GAP: Final = 10.0
+_REACHES: Final = np.array([1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64], dtype=np.int64)
+_EVEN: Final = 8  # samples either way over which a window's width is evened out
+_CORNER: Final = 0.5  # of the variance of a window to both sides, from which a line to one side is taken
+_AGREE: Final = 1.5  # half width of the confidence intervals that have to meet, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,25 @@ def fit_to_noise(time_s: FloatArray, values: FloatArray, sigma: float) -> Smooth
     return best
 
 
+def keep_corners(time_s: FloatArray, values: FloatArray, sigma: float) -> FloatArray:
+    """Smooth a channel with white noise `sigma` without lag and without rounding its corners off.
+
+    How wide a window may be is asked sample by sample: as wide as the estimates of all narrower ones agree,
+    their intervals of +-1.5 standard deviations sharing a point (intersection of confidence intervals:
+    Goldenshluger and Nemirovski 1997, Katkovnik 1999). Where a window to both sides may be wide, the sample
+    takes a quadratic with tricube weights, its width changing slowly so that second differences stay quiet;
+    at a corner, a line to the side that is straight. Windows end at gaps; readings must be finite.
+    """
+    if not sigma > 0.0 or len(values) < 3:
+        return np.asarray(values, dtype=np.float64)
+    bounds = segment_bounds(time_s)
+    wide, variance, line, line_variance = _widest(time_s, values, bounds, sigma, _REACHES, _AGREE)
+    widths = np.exp(_local_mean(np.log(wide), bounds, _EVEN))
+    smooth = _tricube(time_s, values, bounds, widths)
+    corner = line_variance < _CORNER * variance
+    return np.asarray(np.where(corner, line, smooth), dtype=np.float64)
+
+
 def group_means(values: FloatArray, size: int) -> FloatArray:
     """Return means of consecutive groups of `size` samples (the last group may be shorter)."""
     starts = np.arange(0, len(values), size)
@@ -145,3 +168,103 @@ def _local_quadratic(
                 gs += (w * (c01 + c11 * x + c12 * x * x) / det / half_width_s) ** 2
             gain[i], slope_gain[i] = np.sqrt(g), np.sqrt(gs)
     return value, slope, curvature, gain, slope_gain
+
+
+@njit
+def _widest(
+    time_s: FloatArray, values: FloatArray, bounds: IntArray, sigma: float, reaches: IntArray, agree: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Of every sample: reach (samples, at least 1) and variance (over a reading's) of the widest window to
+    both sides; value and variance of the better line to one side."""
+    n = len(values)
+    wide, variance = np.ones(n), np.ones(n)
+    line, line_variance = values.copy(), np.ones(n)
+    for b in range(len(bounds) - 1):
+        first, last = bounds[b], bounds[b + 1]
+        for i in range(first, last):
+            for side in range(3):
+                low, high = values[i] - agree * sigma, values[i] + agree * sigma
+                for reach in reaches:
+                    begin = i if side == 1 else i - reach
+                    end = i if side == 0 else i + reach
+                    if begin < first or end >= last:
+                        break
+                    if end - begin < 2:
+                        continue
+                    estimate, share = _at_sample(time_s, values, begin, end, i)
+                    allowed = agree * sigma * np.sqrt(share)
+                    low, high = max(low, estimate - allowed), min(high, estimate + allowed)
+                    if low > high:
+                        break
+                    if side == 2:
+                        wide[i], variance[i] = reach, share
+                    elif share < line_variance[i]:
+                        line[i], line_variance[i] = estimate, share
+    return wide, variance, line, line_variance
+
+
+@njit
+def _at_sample(time_s: FloatArray, values: FloatArray, begin: int, end: int, i: int) -> tuple[float, float]:
+    """Value at sample i of the line (at an end) or quadratic (inside) through begin..end, and its variance
+    over that of a reading."""
+    s0 = s1 = s2 = s3 = s4 = y0 = y1 = y2 = 0.0
+    width = time_s[end] - time_s[begin]
+    for j in range(begin, end + 1):
+        x = (time_s[j] - time_s[i]) / width
+        s0 += 1.0
+        s1 += x
+        s2 += x * x
+        s3 += x**3
+        s4 += x**4
+        y0 += values[j]
+        y1 += x * values[j]
+        y2 += x * x * values[j]
+    if begin < i < end and end - begin >= 4:
+        c00, c01, c02 = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2
+        det = s0 * c00 + s1 * c01 + s2 * c02
+        return (c00 * y0 + c01 * y1 + c02 * y2) / det, c00 / det
+    det = s0 * s2 - s1 * s1
+    return (s2 * y0 - s1 * y1) / det, s2 / det
+
+
+@njit
+def _local_mean(values: FloatArray, bounds: IntArray, reach: int) -> FloatArray:
+    out = values.copy()
+    for b in range(len(bounds) - 1):
+        first, last = bounds[b], bounds[b + 1]
+        for i in range(first, last):
+            begin, end = max(first, i - reach), min(last, i + reach + 1)
+            out[i] = np.mean(values[begin:end])
+    return out
+
+
+@njit
+def _tricube(time_s: FloatArray, values: FloatArray, bounds: IntArray, widths: FloatArray) -> FloatArray:
+    """Quadratic with tricube weights over `widths` samples to either side; a reading where that is none."""
+    out = values.copy()
+    for b in range(len(bounds) - 1):
+        first, last = bounds[b], bounds[b + 1]
+        for i in range(first, last):
+            reach = int(np.ceil(1.3 * widths[i]))
+            begin, end = max(first, i - reach), min(last - 1, i + reach)
+            if reach < 2 or i - begin < reach or end - i < reach:
+                continue
+            step = (time_s[end] - time_s[begin]) / (end - begin)
+            half = (1.3 * widths[i] + 0.5) * step
+            s0 = s1 = s2 = s3 = s4 = y0 = y1 = y2 = 0.0
+            for j in range(begin, end + 1):
+                x = (time_s[j] - time_s[i]) / half
+                w = (1.0 - min(1.0, abs(x)) ** 3) ** 3
+                s0 += w
+                s1 += w * x
+                s2 += w * x * x
+                s3 += w * x**3
+                s4 += w * x**4
+                y0 += w * values[j]
+                y1 += w * x * values[j]
+                y2 += w * x * x * values[j]
+            c00, c01, c02 = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2
+            det = s0 * c00 + s1 * c01 + s2 * c02
+            if det > 1e-9 * s0 * s0 * s0:
+                out[i] = (c00 * y0 + c01 * y1 + c02 * y2) / det
+    return out

@@ -33,7 +33,7 @@ class Case:
     course: Callable[[np.random.Generator, Range], Course]
     geometry_friction: tuple[float, float] = (0.05, 10.0)
     shape: Callable[[np.random.Generator, Scene, str], Shape] | None = None
-    sizes: tuple[float, float] = (0.08, 0.40)
+    sizes: tuple[float, float] = (0.03, 0.10)
     tie: Callable[[DrawnJoint, Sequence[Course]], tuple[Course, ...]] | None = None
 
 
@@ -47,29 +47,27 @@ def _slow_small_load(rng: np.random.Generator, within: Range) -> Course:
 
 
 def _one_sine(rng: np.random.Generator, within: Range) -> Course:
-    """A narrow swing at a single frequency under a small load: acceleration and angle are in proportion."""
+    """A narrow swing at a single frequency under a small load: acceleration and angle are in proportion.
+
+    It grows so slowly that nothing rings.
+    """
     course = draw_course(rng, "moving", within)
     t = course.time_s - course.time_s[0]
-    joint = float(rng.uniform(0.08, 0.12)) * np.cos(2.0 * math.pi * float(rng.uniform(0.5, 0.8)) * t)
+    grown = 0.5 - 0.5 * np.cos(math.pi * np.minimum(t / (0.7 * t[-1]), 1.0))
+    joint = float(rng.uniform(0.08, 0.12)) * grown * np.sin(2.0 * math.pi * float(rng.uniform(0.5, 0.8)) * t)
     load = within.load_Nm * (0.05 + 0.02 * np.sin(2.0 * math.pi * 0.04 * t))
     return replace(course, motor_rad=np.asarray(joint * within.motor_per_joint), load_Nm=np.asarray(load))
-
-
-def _bench_or_moving(rng: np.random.Generator, within: Range) -> Course:
-    return draw_course(rng, "bench" if rng.uniform() < 0.5 else "moving", within)
 
 
 def _moving(rng: np.random.Generator, within: Range) -> Course:
     return draw_course(rng, "moving", within)
 
 
-def _warming_up(joint: DrawnJoint, courses: Sequence[Course]) -> tuple[Course, ...]:
-    """The temperature rises with the logarithm of time, as creep does, through all recordings."""
-    start = courses[0].time_s[0]
-    return tuple(
-        replace(c, temperature_degC=np.asarray(20.0 + _WARMING_K * np.log1p((c.time_s - start) / _WARMING_S)))
-        for c in courses
-    )
+def _warming_up(rng: np.random.Generator, within: Range) -> Course:
+    """The temperature rises with the logarithm of time, as creep does; both begin with the recording."""
+    course = draw_course(rng, "bench" if rng.uniform() < 0.5 else "moving", within)
+    rise = _WARMING_K * np.log1p((course.time_s - course.time_s[0]) / _WARMING_S)
+    return replace(course, temperature_degC=np.asarray(20.0 + rise))
 
 
 def _in_step(joint: DrawnJoint, courses: Sequence[Course]) -> tuple[Course, ...]:
@@ -122,13 +120,14 @@ CASES = (
         shape=_within_tolerance,
         sizes=(0.0, 10.0),
     ),
-    Case("gravity_or_inertia", ("gravity_load", "inertial_load"), _one_sine, shape=_up_high),
+    Case(
+        "gravity_or_inertia", ("gravity_load", "inertial_load"), _one_sine, shape=_up_high, sizes=(0.04, 0.12)
+    ),
     Case(
         "thermal_or_relaxation",
         ("thermal_pretension", "pretension_relaxation"),
-        _bench_or_moving,
+        _warming_up,
         shape=_own_shape,
-        tie=_warming_up,
     ),
     Case("crosstalk_or_gravity", ("crosstalk", "gravity_load"), _moving, shape=_own_shape, tie=_in_step),
 )
