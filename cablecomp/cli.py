@@ -15,7 +15,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cablecomp import cli_prove
+from cablecomp import cli_prove, cli_study
 from cablecomp.cli_analysis import register
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
@@ -51,6 +51,7 @@ app = typer.Typer(
 console = Console()
 register(app)
 cli_prove.register(app)
+cli_study.register(app)
 
 Config = Annotated[Path, typer.Option("--config", help="joint configuration (TOML)")]
 Control = Annotated[

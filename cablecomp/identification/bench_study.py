@@ -82,9 +82,10 @@ def study(
         told(" + ".join(sizes), (len(listed) + k) / (len(listed) + len(_TOGETHER)))
         group = [named[name] for name in sizes]
         together.append(best_of(bench, None, group, list(itertools.product(*sizes.values())), full=True))
-    order = sorted(findings, key=lambda f: f.misfit)
+    for found in (findings, together):
+        found.sort(key=lambda f: f.misfit)
     plain = Signature(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    return Study(tuple(order), tuple(together), misfit(plain))
+    return Study(tuple(findings), tuple(together), misfit(plain))
 
 
 _TOGETHER: Final[tuple[dict[str, tuple[float, ...]], ...]] = (

@@ -39,13 +39,13 @@ _COLOURS = {"yes": "green", "no": "dim", "opposite": "red"}
 
 
 def study_table(study: Study) -> Table:
-    """What reproduces what, for the terminal; best first, combinations last."""
+    """What reproduces what, for the terminal; combinations first, best first."""
     table = Table(
         title="What the thesis saw and left open: which physics gives it?", title_justify="left", box=None
     )
     for name in ("switched on", "size", *QUESTIONS, "misfit"):
         table.add_column(name, justify="right" if name == "misfit" else "left", no_wrap=name == "switched on")
-    for finding in (*study.findings, *study.together):
+    for finding in (*study.together, *study.findings):
         words = [f"[{_COLOURS.get(word, 'yellow')}]{word}[/]" for word in answers(finding)]
         name, size = finding.name.replace(" + ", "\n+ "), _size(finding).replace(", ", "\n")
         table.add_row(name, size, *words, f"{finding.misfit:.1f}")
@@ -62,7 +62,7 @@ def write_study(study: Study, out: Path, command: str) -> Path:
 
 def study_page(study: Study, command: str) -> str:
     """The whole page: answers, the figure of ratios, creep, all numbers, the command."""
-    every = (*study.findings, *study.together)
+    every = (*study.together, *study.findings)
     rows = [(f.name, f.label, _size(f), f.plausible, *answers(f), round(f.misfit, 1)) for f in every]
     heads = ("switched on", "what it is", "size", "plausible on that bench", *QUESTIONS, "misfit")
     sections = [
@@ -97,30 +97,30 @@ def study_page(study: Study, command: str) -> str:
 
 def ratios_figure(study: Study) -> Any:
     """Six ratios of coefficients of friction, a row for each suspect, the thesis's value as a line."""
-    shown = [*study.findings[::-1], *study.together[::-1]]
+    shown = [*study.findings[::-1], *study.together[::-1]]  # drawn from below
     names = [f.name for f in shown]
     fig = make_subplots(
         1, 6, shared_yaxes=True, horizontal_spacing=0.012, subplot_titles=[_wrapped(t) for _, t in _NUMBERS]
     )
     fig.update_layout(template=style.template(), height=110 + 24 * len(shown), showlegend=False)
-    fig.update_layout(margin={"l": 330, "r": 16, "t": 84, "b": 40})
+    fig.update_layout(margin={"l": 330, "r": 16, "t": 96, "b": 40})
     fig.update_annotations(font_size=12)
     for k, (key, _) in enumerate(_NUMBERS, start=1):
         values = [getattr(f.signature, key) for f in shown]
         target = getattr(THESIS, key)
         low, high = min(*values, 0.86), max(*values, 1.14)
-        if math.isnan(target):
-            side = (low - 0.03, 1.0) if key == "true_down" else (1.0, high + 0.03)
-            fig.add_vrect(*side, fillcolor=style.BOUNDS, line_width=0, row=1, col=k)
-        else:
-            fig.add_vline(target, line={"color": style.RESIDUAL, "width": 2}, row=1, col=k)
-        fig.add_vline(1.0, line={"color": style.MUTED, "width": 1, "dash": "dot"}, row=1, col=k)
         pairs = [len(f.sizes) > 1 for f in shown]
         marker = {"size": 9, "color": [style.CABLE_L if pair else style.PREDICTED for pair in pairs]}
         fig.add_scatter(
             x=values, y=names, mode="markers", marker=marker, cliponaxis=False, row=1, col=k,
             hovertemplate="%{y}: %{x:.3f}<extra></extra>",
         )  # fmt: skip
+        if math.isnan(target):
+            side = (low - 0.03, 1.0) if key == "true_down" else (1.0, high + 0.03)
+            fig.add_vrect(*side, fillcolor=style.BOUNDS, line_width=0, row=1, col=k)
+        else:
+            fig.add_vline(target, line={"color": style.RESIDUAL, "width": 2}, row=1, col=k)
+        fig.add_vline(1.0, line={"color": style.MUTED, "width": 1, "dash": "dot"}, row=1, col=k)
         fig.update_xaxes(range=[low - 0.03, high + 0.03], nticks=5, row=1, col=k)
     return fig
 
@@ -179,4 +179,4 @@ def _size(finding: Finding) -> str:
 
 
 def _wrapped(title: str) -> str:
-    return title.replace(", M_pk", ",<br>M_pk").replace("acting/true, ", "acting/true,<br>")
+    return title.replace(", ", "<br>")
