@@ -14,7 +14,7 @@ from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.identification.autocorrelation import integrated_time_of_parts
 from cablecomp.identification.smoothing import FloatArray
-from cablecomp.identification.transmission_path import PathRecording, predict_path
+from cablecomp.identification.transmission_path import PathModel, PathRecording, path_model, predict_path
 
 Channel = Literal["joint_position_rad", "motor_torque_Nm"]
 JOINT: Final[Channel] = "joint_position_rad"
@@ -142,6 +142,7 @@ class _Fit:
         self._high = np.array([u.to_x(u.high) for u in unknowns])
         self._start = np.array([u.to_x(u.start) for u in unknowns])
         self._prior = np.array([u.sd for u in unknowns])
+        self._weights = [r.weight for r in self.recordings]
 
     def values(self, x: FloatArray) -> dict[str, float]:
         return {**self.fixed, **{u.name: u.value(float(v)) for u, v in zip(self.unknowns, x, strict=True)}}
@@ -150,8 +151,14 @@ class _Fit:
         """Measured less predicted, less zero (and slope), by channel and recording."""
         values = self.values(x)
         joint, motor = [], []
+        models: dict[
+            tuple[object, ...], PathModel
+        ] = {}  # recordings in which the joint stands alike share one
         for r in self.recordings:
-            found = predict_path(self.config, values, r)
+            key = (r.bend_rad, *r.own.items())
+            if key not in models:
+                models[key] = path_model(self.config, values, r)
+            found = models[key].predict(r)
             joint.append((r.columns[JOINT] - found.joint_position_rad)[r.counted])
             if MOTOR in r.columns:
                 motor.append((r.columns[MOTOR] - found.motor_torque_Nm)[r.counted])
@@ -169,7 +176,9 @@ class _Fit:
             mine = [k for k, r in enumerate(self.recordings) if r.session == session]
             motor = [r.columns["motor_position_rad"][r.counted] for r in (self.recordings[k] for k in mine)]
             basis = [np.column_stack((np.ones(len(m)), m) if slope else (np.ones(len(m)),)) for m in motor]
-            found = np.linalg.lstsq(np.vstack(basis), np.concatenate([parts[k] for k in mine]), rcond=None)[0]
+            weight = np.concatenate([self._weights[k] for k in mine])
+            whole = np.concatenate([parts[k] for k in mine])
+            found = np.linalg.lstsq(weight[:, None] * np.vstack(basis), weight * whole, rcond=None)[0]
             zero[session] = found
             for k, b in zip(mine, basis, strict=True):
                 parts[k] = parts[k] - b @ found
@@ -179,7 +188,7 @@ class _Fit:
         """All misfits over their scale, and the priors."""
         try:
             misfits = self.misfits(x)
-            rows = [m / sigma[c] for c in sigma for m in misfits[c]]
+            rows = [m / sigma[c] for c in sigma for m in self.weighted(misfits[c])]
         except InputError:
             # A trial that the drive cannot follow: far worse than any real one.
             rows = [np.full(r.rows, _HOPELESS) for _ in sigma for r in self.recordings]
@@ -204,7 +213,12 @@ class _Fit:
     def remembered(self, x: FloatArray, sigma: Mapping[Channel, float]) -> dict[Channel, float]:
         """RMS misfit times the root of its memory in rows, for the channels of `sigma`."""
         misfits = self.misfits(x)
-        return {c: _rms(misfits[c]) * sqrt(integrated_time_of_parts(misfits[c])) for c in sigma}
+        parts = {c: self.weighted(misfits[c]) for c in sigma}
+        return {c: _rms(p) * sqrt(integrated_time_of_parts(p)) for c, p in parts.items()}
+
+    def weighted(self, misfits: Sequence[FloatArray]) -> list[FloatArray]:
+        """Rows weighted by the time that they stand for."""
+        return [w * m for m, w in zip(misfits, self._weights, strict=True)]
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:

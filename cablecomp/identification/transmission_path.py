@@ -21,7 +21,7 @@ from cablecomp.errors import InputError
 from cablecomp.identification.parameters import with_values
 from cablecomp.identification.smoothing import FloatArray, IntArray, group_means
 from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.assemble import assemble
+from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.cable import stacks
 from cablecomp.mechanics.jit import njit
 from cablecomp.mechanics.joint import joint_commit
@@ -35,6 +35,8 @@ PRESLIDING = "motor_presliding_rad"
 """Turn of the motor in which it builds up [rad]."""
 BEND = "friction_per_bend"
 """Growth of the path's `routing_friction.mu_angle` with its bend [1/rad]: a coefficient of friction."""
+SHARE = "guided_share"
+"""Share of a cable's length between the drums that lies on guides or in the sheath [-]; the length stays."""
 ZERO_EA = "EA_at_zero_N"
 """Cable's axial stiffness at no tension [N]; with `STIFFENING`, EA(T) = EA_0 + b_T T whatever the
 pretension is."""
@@ -43,7 +45,7 @@ STIFFENING = "EA_per_tension"
 
 BoolArray: TypeAlias = NDArray[np.bool_]
 
-_PATH = (FRICTION, PRESLIDING, BEND, ZERO_EA, STIFFENING)
+_PATH = (FRICTION, PRESLIDING, BEND, SHARE, ZERO_EA, STIFFENING)
 _LEAST_FRICTION = 2e-5
 _MOST_STIFFENING = 0.95
 
@@ -72,6 +74,14 @@ class PathRecording:
         """Rows that are judged."""
         return int(np.count_nonzero(self.counted))
 
+    @property
+    def weight(self) -> FloatArray:
+        """Root of the time that each counted row stands for, over its mean: thinned rows weigh as what they
+        replace."""
+        time = self.columns["time_s"]
+        share = np.gradient(time)[self.counted]
+        return np.asarray(np.sqrt(share / share.mean()), dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class PathPrediction:
@@ -89,16 +99,16 @@ def path_config(config: JointConfig, values: Mapping[str, float], recording: Pat
     `routing_friction.mu_angle` grows by `friction_per_bend` times the recording's bend; where the cable's
     law EA(T) is given, EA and `nonlinear_cable.stiffening` at the pretension follow from it.
     """
-    named = {
-        recording.own.get(name, name): v
-        for name, v in values.items()
-        if "[" not in name or name in recording.own
-    }
+    named = _named(values, recording)
     plain = {name: v for name, v in named.items() if name not in _PATH}
     if STIFFENING in named:
         gained = named[STIFFENING] * named.get("pretension_N", config.drive.stage[-1].pretension_N)
         plain["EA_N"] = named[ZERO_EA] + gained
         plain["effect.nonlinear_cable.stiffening"] = min(gained / plain["EA_N"], _MOST_STIFFENING)
+    if SHARE in named:
+        whole = config.drive.stage[-1].free_length_m
+        plain["effect.routing_friction.arc_length_m"] = named[SHARE] * whole
+        plain["free_length_m"] = (1.0 - named[SHARE]) * whole
     if BEND in named:
         key = "effect.routing_friction.mu_angle"
         straight = plain.get(key, _given(config, "routing_friction", "mu_angle"))
@@ -120,28 +130,54 @@ def predict_path(
     tau_motor = -r (T_h - T_l at the input drum) + tau_f z, z the elasto-plastic direction of the motor.
     Raises InputError where the drive cannot follow (slack in an open circuit, cable run out).
     """
+    return path_model(config, values, recording).predict(recording)
+
+
+@dataclass(frozen=True)
+class PathModel:
+    """The joint with one set of parameter values, set up: good for every recording it stands alike in."""
+
+    joint: JointConfig
+    model: Model
+    friction_Nm: float
+    presliding_rad: float
+
+    def predict(self, recording: PathRecording) -> PathPrediction:
+        """As `predict_path`."""
+        model, columns = self.model, recording.columns
+        rows = np.full((len(columns["time_s"]), st.IN_OTHER), np.nan)
+        rows[:, st.IN_TIME], rows[:, st.IN_MOTOR] = columns["time_s"], columns["motor_position_rad"]
+        rows[:, st.IN_LOAD] = columns.get("joint_torque_Nm", 0.0)
+        options = np.zeros(st.OPTIONS)
+        sensors = self.joint.sensors
+        options[st.GAIN], options[st.OFFSET] = sensors.joint_torque_gain, sensors.joint_torque_offset_Nm
+        S, J = model.S.copy(), model.J.copy()
+        tables = cast(FloatArray, model.L)  # None is the plain law: compiled apart, never read
+        joint_start(model.P, model.I, S, J, tables, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
+        outs, tension = np.empty((len(rows), st.OUT_WIDTH)), np.empty((len(rows), 2))
+        done, status = _run(model.P, model.I, S, J, tables, options, rows, outs, tension)
+        if status != o.STATUS_OK:
+            raise InputError(f"{recording.name}: at {rows[done, st.IN_TIME]:g} s {REASONS[status]}")
+        torque = -self.joint.drive.stage[0].input_radius_m * (tension[:, 0] - tension[:, 1])
+        if self.friction_Nm > 0.0:
+            z = direction(columns["motor_position_rad"], self.presliding_rad)
+            torque = torque + self.friction_Nm * z
+        return PathPrediction(outs[:, st.OUT_JOINT], torque, tension)
+
+
+def path_model(config: JointConfig, values: Mapping[str, float], recording: PathRecording) -> PathModel:
+    """The joint with these parameter values, set up as it stood in this recording (its bend, what is its
+    own)."""
     joint = path_config(config, values, recording)
-    model, columns = assemble(joint, extend(joint)), recording.columns
-    rows = np.full((len(columns["time_s"]), st.IN_OTHER), np.nan)
-    rows[:, st.IN_TIME], rows[:, st.IN_MOTOR] = columns["time_s"], columns["motor_position_rad"]
-    rows[:, st.IN_LOAD] = columns.get("joint_torque_Nm", 0.0)
-    options = np.zeros(st.OPTIONS)
-    options[st.GAIN], options[st.OFFSET] = (
-        joint.sensors.joint_torque_gain,
-        joint.sensors.joint_torque_offset_Nm,
-    )
-    S, J = model.S.copy(), model.J.copy()
-    tables = cast(FloatArray, model.L)  # None is the plain law: compiled apart, never read
-    joint_start(model.P, model.I, S, J, tables, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
-    outs, tension = np.empty((len(rows), st.OUT_WIDTH)), np.empty((len(rows), 2))
-    done, status = _run(model.P, model.I, S, J, tables, options, rows, outs, tension)
-    if status != o.STATUS_OK:
-        raise InputError(f"{recording.name}: at {rows[done, st.IN_TIME]:g} s {REASONS[status]}")
-    torque = -joint.drive.stage[0].input_radius_m * (tension[:, 0] - tension[:, 1])
-    if values.get(FRICTION, 0.0) > 0.0:
-        reach = values.get(PRESLIDING, math.radians(0.15))
-        torque = torque + values[FRICTION] * direction(columns["motor_position_rad"], reach)
-    return PathPrediction(outs[:, st.OUT_JOINT], torque, tension)
+    named = _named(values, recording)
+    friction, presliding = named.get(FRICTION, 0.0), named.get(PRESLIDING, math.radians(0.15))
+    return PathModel(joint, assemble(joint, extend(joint)), friction, presliding)
+
+
+def _named(values: Mapping[str, float], recording: PathRecording) -> dict[str, float]:
+    """The values that hold in this recording, by the names that the model knows."""
+    own = recording.own
+    return {own.get(name, name): v for name, v in values.items() if "[" not in name or name in own}
 
 
 @njit
@@ -189,14 +225,15 @@ def by_travel(
     Swings are counted from reversal to reversal, at a third of the motor's range.
     """
     means = {name: group_means(np.asarray(v, dtype=np.float64), group) for name, v in columns.items()}
-    kept = _kept(means["motor_position_rad"], travel_rad, len(means["time_s"]) if swings is None else swings)
+    motor = means["motor_position_rad"]
+    third = float(np.ptp(motor)) / 3.0
+    kept = _kept(motor, travel_rad, third, len(motor) if swings is None else swings)
     return {name: np.ascontiguousarray(v[kept]) for name, v in means.items()}
 
 
 @njit
-def _kept(motor: FloatArray, travel: float, swings: int) -> IntArray:
+def _kept(motor: FloatArray, travel: float, reversal: float, swings: int) -> IntArray:
     """Indices kept by `by_travel`: every so much travel, and where the motor turned round in between."""
-    reversal = (motor.max() - motor.min()) / 3.0
     kept = np.zeros(2 * len(motor), dtype=np.int64)
     count, done, sign, extreme, top, bottom = 1, 0, 0.0, 0, 0, 0
     for k in range(1, len(motor)):
