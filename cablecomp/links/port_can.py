@@ -140,12 +140,11 @@ class VirtualPort(PortBase):
         taken = True
         own = self._bus.queue
         for other in tuple(self._bus.channel):
-            if other is own:
-                continue
-            try:
-                other.put_nowait(make_message(identifier, data))
-            except queue.Full:
-                taken = False
+            if other is not own:
+                try:
+                    other.put(make_message(identifier, data), False)
+                except queue.Full:
+                    taken = False
         self.counters.send_failures += not taken
         return taken
 

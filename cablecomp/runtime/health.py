@@ -102,6 +102,11 @@ class Health:
         self.motor = Channel(o.motor_rate_rad_s, 0.002, fresh_s)
         self.joint = Channel(o.joint_rate_rad_s, 0.002, fresh_s)
         self.torque = Channel(o.torque_rate_Nm_s, 0.05, fresh_s, limit)
+        self._channels = (
+            (self.motor, MOTOR_POSITION, MOTOR_JUMP),
+            (self.torque, JOINT_TORQUE, TORQUE_JUMP),
+            (self.joint, JOINT_POSITION, JOINT_JUMP),
+        )
         self.latency = Latency()
         self.shaking = Shaking(period_s)
         self._o = o
@@ -180,24 +185,14 @@ class Health:
         return Checked(sample, motor_age, load_age, flags, ready, joint_ok, bool(flags & FATAL))
 
     def _take(self, values: list[float], arrived: list[float], updates: list[int]) -> int:
-        motor, torque, joint = self.motor, self.torque, self.joint
-        n = updates[MOTOR_POSITION]
-        if n != motor.seen:
-            motor.seen = n
-            motor.take(values[MOTOR_POSITION], arrived[MOTOR_POSITION])
-        n = updates[JOINT_TORQUE]
-        if n != torque.seen:
-            torque.seen = n
-            torque.take(values[JOINT_TORQUE], arrived[JOINT_TORQUE])
-        n = updates[JOINT_POSITION]
-        if n != joint.seen:
-            joint.seen = n
-            joint.take(values[JOINT_POSITION], arrived[JOINT_POSITION])
         flags = 0
-        if motor.suspect or torque.suspect or joint.suspect:
-            flags |= MOTOR_JUMP if motor.suspect else 0
-            flags |= TORQUE_JUMP if torque.suspect else 0
-            flags |= JOINT_JUMP if joint.suspect else 0
+        for channel, place, jump in self._channels:
+            n = updates[place]
+            if n != channel.seen:
+                channel.seen = n
+                channel.take(values[place], arrived[place])
+            if channel.suspect:
+                flags |= jump
         if abs(values[JOINT_TORQUE]) >= self._most_Nm:
             flags |= TORQUE_SATURATED
         return flags
@@ -208,7 +203,8 @@ class Health:
             residual = abs(self.joint.value - predicted_rad)
             if (residual > limit or self._residual.begun) and self._residual.step(residual > limit, now_s):
                 flags |= JOINT_RESIDUAL
-            far = residual > _FAR * limit
+            # a motor that says nothing is stale, not stuck
+            far = residual > _FAR * limit and now_s - motor.arrived_s <= self._fresh_s
             if (far or self._far.begun) and self._far.step(far, now_s):
                 flags |= self._who_is_stuck(now_s)
         leads = abs(target_rad - motor.value) > self._lead_rad

@@ -208,8 +208,15 @@ class JointLoop:
         self._last_reference = reference
 
     def _judge(self, checked: Checked, now_s: float, period_s: float) -> None:
-        before = self.degraded.phase
-        s = self.setup
+        before, s = self.degraded.phase, self.setup
+        if (
+            self.degraded is NORMAL
+            and checked.motor_age_s <= s.times.fresh_s
+            and checked.load_age_s <= s.times.fresh_s
+            and not checked.fatal
+            and self.readings.state is DriveState.ENABLED
+        ):
+            return  # nearly always: nothing is amiss
         self.degraded = degrade(self.degraded, period_s, checked.motor_age_s, checked.load_age_s, s.times)
         phase = self.degraded.phase
         if phase is not before:
@@ -250,17 +257,17 @@ class JointLoop:
             return
         tally.cycles += 1
         wanted = self._last_reference
-        measured = sample.joint_position_rad
+        measured = sample.joint_position_rad - self._offset
         if measured == measured:
-            tally.position_square += (measured - self._offset - wanted.joint_position_rad) ** 2
+            error = measured - wanted.joint_position_rad
+            residual = measured - estimate.joint_position_rad
+            tally.position_square += error * error
             tally.position_count += 1
-            tally.residual_square += (measured - estimate.joint_position_rad - self._offset) ** 2
-        tally.deflection_square += estimate.deflection_rad**2
-        if (
-            wanted.joint_torque_Nm == wanted.joint_torque_Nm
-            and estimate.joint_torque_Nm == estimate.joint_torque_Nm
-        ):
-            tally.torque_square += (estimate.joint_torque_Nm - wanted.joint_torque_Nm) ** 2
+            tally.residual_square += residual * residual
+        tally.deflection_square += estimate.deflection_rad * estimate.deflection_rad
+        torque_error = estimate.joint_torque_Nm - wanted.joint_torque_Nm
+        if torque_error == torque_error:
+            tally.torque_square += torque_error * torque_error
             tally.torque_count += 1
 
     def _record(

@@ -228,3 +228,13 @@ def test_shaking_is_the_mean_square_of_what_is_quick() -> None:
     for k in range(3000):
         shaking.step(3.0 + sin(2.0 * 3.14159265 * 100.0 * k * T))
     assert shaking.square == pytest.approx(0.5, rel=0.08)
+
+
+def test_a_motor_that_says_nothing_is_stale_and_not_stuck() -> None:
+    wire, flags = Wire(), 0
+    for k in range(40):
+        wire.cycle(0.002 * k, 0.0, 0.002 * k * N, predicted=0.002 * k * N)
+    for k in range(60):
+        flags |= wire.cycle(None, 0.0, 0.0266 + 0.005 * k, predicted=0.0266).flags
+    assert flags & MOTOR_STALE
+    assert not flags & MOTOR_STUCK
