@@ -203,8 +203,7 @@ class Health:
             residual = abs(self.joint.value - predicted_rad)
             if (residual > limit or self._residual.begun) and self._residual.step(residual > limit, now_s):
                 flags |= JOINT_RESIDUAL
-            # a motor that says nothing is stale, not stuck
-            far = residual > _FAR * limit and now_s - motor.arrived_s <= self._fresh_s
+            far = residual > _FAR * limit
             if (far or self._far.begun) and self._far.step(far, now_s):
                 flags |= self._who_is_stuck(now_s)
         leads = abs(target_rad - motor.value) > self._lead_rad
@@ -222,8 +221,10 @@ class Health:
 
     def _who_is_stuck(self, now_s: float) -> int:
         """Joint and prediction are far apart: the encoder whose reading does not change at all is the
-        one that lies.
+        one that lies. A motor that says nothing is stale, not stuck.
         """
+        if now_s - self.motor.arrived_s > self._fresh_s:
+            return ENCODERS_DISAGREE
         motor_still = now_s - self.motor.changed_s > _STILL_S
         joint_still = now_s - self.joint.changed_s > _STILL_S
         if motor_still != joint_still:

@@ -11,6 +11,7 @@ from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE
 from cablecomp.runtime.channel import Channel, Latency, Shaking, Sustained
 from cablecomp.runtime.health import (
+    ENCODERS_DISAGREE,
     JOINT_JUMP,
     JOINT_RESIDUAL,
     JOINT_STUCK,
@@ -237,4 +238,5 @@ def test_a_motor_that_says_nothing_is_stale_and_not_stuck() -> None:
     for k in range(60):
         flags |= wire.cycle(None, 0.0, 0.0266 + 0.005 * k, predicted=0.0266).flags
     assert flags & MOTOR_STALE
+    assert flags & ENCODERS_DISAGREE
     assert not flags & MOTOR_STUCK
