@@ -91,7 +91,7 @@ def study(
 _TOGETHER: Final[tuple[dict[str, tuple[float, ...]], ...]] = (
     {"viscous_slip": (1.0, 1.7, 3.0), "bearing_friction": (0.01, 0.02, 0.04)},
     {"viscous_slip": (1.0, 1.7, 3.0), "pressure_dependent_friction": (0.1, 0.2, 0.3)},
-    {"viscous_slip": (1.0, 1.7, 3.0), "nonlinear_cable": (0.05, 0.1, 0.15, 0.2)},
+    {"viscous_slip": (1.0, 1.7, 3.0), "nonlinear_cable": (0.05, 0.1, 0.15)},
     {"viscous_slip": (1.0, 1.7), "nonlinear_cable": (0.1, 0.15), "pressure_dependent_friction": (0.1, 0.2)},
 )
 
