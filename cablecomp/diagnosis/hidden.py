@@ -9,7 +9,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.blocks import Layout
-from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of
+from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, evaluate, prior_of
 from cablecomp.diagnosis.screening import Probe
 from cablecomp.identification.parameters import OFFSET
 from cablecomp.identification.smoothing import FloatArray
@@ -17,6 +17,7 @@ from cablecomp.identification.smoothing import FloatArray
 SEEN = 2.0  # standard deviations up to which an amplitude is not excluded
 LARGE = 1.5  # noise floors (RMS) that such an effect makes before calibration takes it up
 ALIKE = 0.25  # of that, what calibration leaves of it
+SHOWS = 0.1  # mean square over the floor that may be left of it
 SHOWN = 3  # models that the next experiment is to set apart
 
 
@@ -73,21 +74,30 @@ def _one(
     moved = inverse @ (J.T @ d)
     info = float(d @ d - d @ (J @ moved))
     _, high = probe.form.bounds()
-    x = min(SEEN / np.sqrt(max(info, 1e-12)), float(high[0]))
-    whole = _rms(_without_offset(problem, d, J))
-    left = _rms(d - J @ moved)
-    if x * whole * INFLATION < LARGE or left > ALIKE * whole:
+    if _rms(d - J @ moved) > ALIKE * _rms(_without_offset(problem, d, J)):
         return None
-    along = [
-        abs(_cosine(_without_offset(problem, J[:, k], J), d)) if free[k] else 0.0 for k in range(len(free))
-    ]
-    behind = problem.parameters[int(np.argmax(along))].name
+    largest = min(SEEN / np.sqrt(max(info, 1e-12)), float(high[0]))
     low, top = np.array([[p.low, p.high] for p in problem.parameters]).T
-    c = np.clip(base.c - x * moved, low, top)
-    amplitudes = np.zeros(probe.form.size)
-    amplitudes[0] = x
-    model = problem.joint(c, [*base.entries(), probe.form.entry(list(amplitudes))])
-    return Hidden(probe.form.name, behind, x * whole * INFLATION, model)
+    forms = (*base.forms, probe.form)
+    for x in (largest, 0.5 * largest, 0.25 * largest):
+        amplitudes = np.zeros(probe.form.size)
+        amplitudes[0] = x
+        bare = evaluate(problem, forms, np.concatenate([base.z, amplitudes]))
+        c = np.clip(base.z - x * moved, low, top)
+        taken_up = evaluate(problem, forms, np.concatenate([c, amplitudes]))
+        if bare is None or taken_up is None:
+            continue
+        size = _rms(_without_offset(problem, (base.residual - bare)[mask], J)) * INFLATION
+        shown = _rms(taken_up[mask]) ** 2 - _rms(base.residual[mask]) ** 2
+        if size >= LARGE and shown * INFLATION**2 < SHOWS:
+            along = [
+                abs(_cosine(_without_offset(problem, J[:, k], J), d)) if free[k] else 0.0
+                for k in range(len(free))
+            ]
+            behind = problem.parameters[int(np.argmax(along))].name
+            model = problem.joint(c, [*base.entries(), probe.form.entry(list(amplitudes))])
+            return Hidden(probe.form.name, behind, size, model)
+    return None
 
 
 def grouped(found: Sequence[Hidden]) -> list[tuple[tuple[str, ...], str]]:

@@ -28,6 +28,7 @@ Progress = Callable[[str, float], None]
 CLEAR = 0.1  # share of the cost that an effect must remove at once
 WORTH = 2.0  # mean square over the floor from which on a hidden slope is looked for
 FORCED = (0.5, 0.15)  # sizes that it is else given to begin with, in residuals
+HIDDEN = 0.1  # weight of what calibration can take up of an effect, where its size is chosen
 UNSEEN = 1e-3  # of the noise: an effect whose largest contribution is smaller is not asked further
 
 
@@ -49,19 +50,20 @@ def probe(problem: Problem, base: Model, form: Form, project: FloatArray) -> Pro
     """
     size = float(np.sqrt(np.mean(base.residual**2))) * INFLATION
     target = max(0.7 * size, 1.0)
-    form, columns = form, []
+    columns: list[FloatArray] = []
     for _ in range(4):
         columns = _columns(problem, base, form)
         if not columns:
             form = form.scaled([0.1] * len(form.amplitudes))
             continue
-        seen = [_length(c, project) for c in columns]
+        # what calibration takes up counts a little: else a hidden effect would be asked in absurd sizes
+        seen = [_length(c, project) + HIDDEN * _size(c) for c in columns]
         factor = target / max(max(seen), 1e-12)
         smaller = form.scaled([min(max(factor, 1e-4), 1e4)] * len(form.amplitudes))
         if 0.5 < factor < 2.0 or smaller.scales == form.scales:
             break
         form = smaller
-    if not columns or max(_length(c, project) for c in columns) < UNSEEN:
+    if not columns or max(_size(c) for c in columns) < UNSEEN:
         return None
     D = np.stack(columns, axis=1)
     return Probe(form, D, max(_length(c, project) for c in columns))
@@ -83,6 +85,11 @@ def _length(column: FloatArray, project: FloatArray) -> float:
     """RMS over the noise of a column, less its part along the calibration."""
     rest = column - project @ (project.T @ column)
     return float(np.sqrt(np.mean(rest**2))) * INFLATION
+
+
+def _size(column: FloatArray) -> float:
+    """RMS over the noise of a column."""
+    return float(np.sqrt(np.mean(column**2))) * INFLATION
 
 
 def projector(problem: Problem, base: Model) -> FloatArray:

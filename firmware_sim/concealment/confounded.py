@@ -47,14 +47,14 @@ def _slow_small_load(rng: np.random.Generator, within: Range) -> Course:
 
 
 def _one_sine(rng: np.random.Generator, within: Range) -> Course:
-    """A narrow swing at a single frequency under a small load: acceleration and angle are in proportion.
+    """A swing at a single frequency under a small load: acceleration and angle are in proportion.
 
     It grows so slowly that nothing rings.
     """
     course = draw_course(rng, "moving", within)
     t = course.time_s - course.time_s[0]
     grown = 0.5 - 0.5 * np.cos(math.pi * np.minimum(t / (0.7 * t[-1]), 1.0))
-    joint = float(rng.uniform(0.08, 0.12)) * grown * np.sin(2.0 * math.pi * float(rng.uniform(0.5, 0.8)) * t)
+    joint = float(rng.uniform(0.25, 0.35)) * grown * np.sin(2.0 * math.pi * float(rng.uniform(0.6, 0.9)) * t)
     load = within.load_Nm * (0.05 + 0.02 * np.sin(2.0 * math.pi * 0.04 * t))
     return replace(course, motor_rad=np.asarray(joint * within.motor_per_joint), load_Nm=np.asarray(load))
 
