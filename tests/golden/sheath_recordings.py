@@ -39,8 +39,8 @@ def recording(bend_deg: int, thin: bool = True) -> PathRecording:
 
 
 def fit(bends: Sequence[int], iterations: int = 30) -> PathFit:
-    """One drive for all these bends: sheath friction growing with the bend, a tip with friction and a
-    restoring moment."""
+    """One drive for all these bends: sheath friction growing with the bend, friction on the drums, a tip
+    with friction and a restoring moment."""
     config = load_joint(files.CONFIGS / "tendon-sheath.toml")
     moment = config.drive.stage[0].output_radius_m * config.drive.stage[0].pretension_N
     starts = {
@@ -52,6 +52,8 @@ def fit(bends: Sequence[int], iterations: int = 30) -> PathFit:
         BEND: 0.15,
     }
     unknowns = [*stage_unknowns(config), *(Unknown(k, v, 1e-3 * v, 20.0 * v, 2.3) for k, v in starts.items())]
+    # Started high: from little friction on the drums the fit ends in a shallower valley.
+    unknowns += [Unknown(k, 0.5, 0.005, 2.0, 2.3) for k in ("mu_output", "mu_input")]
     unknowns.append(Unknown(_REST, 0.3, -3.0, 3.0, logarithmic=False))
     given: dict[str, dict[str, float]] = {
         "gravity_load": {"phase_rad": 0.0},

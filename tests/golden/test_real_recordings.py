@@ -21,8 +21,6 @@ pytestmark = pytest.mark.skipif(
 )
 
 TRAIN = ("L_4/11", "L_4/14", "L_4/10", "L_2/10", "L_2/12")
-REACHED_ON_THE_SHEATH = 1.6
-"""Degrees; asked were 1.5, see README."""
 JUDGE = ("L_4/12", "L_2/11", "L_2/13")
 
 
@@ -70,17 +68,18 @@ def test_a_wrist_pitch_is_predicted_once_its_lightest_load_has_shown_the_pretens
     assert degrees(together) <= 0.45
 
 
-@pytest.mark.parametrize("kind", ["linear", "polynomial"])
-def test_models_without_the_drive_predict_a_left_out_pitch_worse(kind: str) -> None:
-    for pitch in jaw.PITCHES:
-        assert degrees(jaw.baseline_pitch(kind, pitch)) > degrees(jaw.pitch_left_out(pitch))
+@pytest.mark.parametrize("kind", ["linear", "polynomial", "plays"])
+def test_models_without_the_drive_predict_left_out_pitches_worse(kind: str) -> None:
+    ours = {n: m for p in jaw.PITCHES for n, m in jaw.pitch_left_out(p).items()}
+    theirs = {n: m for p in jaw.PITCHES for n, m in jaw.baseline_pitch(kind, p).items()}
+    assert degrees(ours) < degrees(theirs)
 
 
 def test_one_sheath_drive_for_all_bends() -> None:
     found = sheath.all_bends()
     each = ", ".join(f"{b} deg {degrees({b: m}):.2f}" for b, m in found.items())
     print(f"\n  sheath, one drive, all bends: {degrees(found):.2f} deg ({each})")
-    assert degrees(found) <= REACHED_ON_THE_SHEATH
+    assert degrees(found) <= 1.5
 
 
 def test_a_bend_left_out_is_predicted() -> None:
