@@ -33,7 +33,7 @@ from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint
-from cablecomp.runtime.setup import matched
+from cablecomp.runtime.setup import matched, same_joint
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
 
@@ -98,6 +98,8 @@ def run(
     bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=not sim)
     if link is None and not sim:
         raise InputError("--link is missing; give a link file, or --sim for a simulated joint")
+    if link is None:
+        bus = same_joint(bus, [joint.name])
     if comparison:
         _compare(config, joint, bus, wanted, out, seed, 30.0 if duration is None else duration)
         return

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from math import pi, prod
+from math import pi, prod, sqrt
 
 from cablecomp.config import JointConfig
-from cablecomp.control.options import ControlConfig, HealthOptions, MotorModel
+from cablecomp.control.options import CompensatorOptions, ControlConfig, HealthOptions, MotorModel
 from cablecomp.control.stiffness import greatest_load, stiffness_range
 
 _LINK_HZ = 110.0
 _DRIVE_HZ = 95.0
 _DAMPING = 0.8
 _SHAKE = 0.1
+_YIELDS_RAD = 0.1  # in impedance mode, under the greatest load
 _STIFFEST = 3000.0  # Nm/rad: about what drives can be told
 
 
@@ -56,4 +57,10 @@ def control_for(config: JointConfig) -> ControlConfig:
         shake_Nm=0.15 * load,
         lead_rad=max(0.2, 20.0 * widest / ratio),
     )
-    return ControlConfig(motor=motor, health=health)
+    spring = min(load / _YIELDS_RAD, 0.2 * stiffness.low_Nm_per_rad)  # softer than the cable itself
+    moved = inertia + rotor / ratio**2
+    compensator = CompensatorOptions(
+        impedance_stiffness_Nm_per_rad=spring,
+        impedance_damping_Nms_per_rad=2.0 * _DAMPING * sqrt(spring * moved),
+    )
+    return ControlConfig(motor=motor, compensator=compensator, health=health)

@@ -72,16 +72,17 @@ class Ticker:
     """Ticks at `start + k period`, whatever the work between takes: lateness never shifts the grid.
 
     A tick whose successor is already due when it could begin is skipped and counted; rate is kept, phase is
-    kept.
+    kept. `from_s`: what the grid's own time starts from.
     """
 
-    def __init__(self, clock: Clock, period_s: float) -> None:
+    def __init__(self, clock: Clock, period_s: float, from_s: float = 0.0) -> None:
         if not period_s > 0.0:
             raise InputError(f"period is {period_s} s; a time above 0 is accepted")
         self.period_s = period_s
         self.skipped = 0
         self._clock = clock
         self._start = clock.now()
+        self._from = from_s
         self._next = 0
 
     def wait(self) -> Tick:
@@ -94,6 +95,6 @@ class Ticker:
             self._next += late
             self.skipped += late
             due = self._start + self._next * self.period_s
-        tick = Tick(self._next, due - self._start, now - self._start, late)
+        tick = Tick(self._next, due - self._start + self._from, now - self._start + self._from, late)
         self._next += 1
         return tick

@@ -41,7 +41,10 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True)
 class LoopOptions:
-    """How long things may take (s): first data, enabling, the run itself, watching after the stop."""
+    """How long things may take (s): first data, enabling, the run itself, watching after the stop.
+
+    `begin_s`: the time that the run's clock starts from, for an observer that goes on from a snapshot.
+    """
 
     duration_s: float
     listen_s: float = 2.0
@@ -50,6 +53,7 @@ class LoopOptions:
     after_s: float = 0.1
     mode: Mode = Mode.IMPEDANCE
     policy: Policy = QUIET
+    begin_s: float = 0.0
 
 
 AfterTick = Callable[[Tick, Stage], None]
@@ -88,7 +92,7 @@ class Loop:
         self._prepare = prepare
         self._ticker: Ticker | None = None
         self._granted = Granted()
-        self._stage_s = 0.0
+        self._stage_s = options.begin_s
         self._armed_s = 0.0
         self._last_begin = -inf
         self._first_tick: Tick | None = None
@@ -165,7 +169,7 @@ class Loop:
             raise
 
     def _loop(self) -> None:
-        ticker = self._ticker = Ticker(self._clock, self.period_s)
+        ticker = self._ticker = Ticker(self._clock, self.period_s, self.options.begin_s)
         while True:
             tick = ticker.wait()
             begin = perf_counter()
@@ -197,12 +201,12 @@ class Loop:
             joint.listen(now)
         if self._asked_to_stop:
             self._stop(self._asked_to_stop, now)
-        elif all(joint.ready for joint in self.joints) and now >= self.options.settle_s:
+        elif all(joint.ready for joint in self.joints) and now - self._stage_s >= self.options.settle_s:
             self._go(Stage.ENABLING, now)
             for joint in self.joints:
                 self.link.request(joint.setup.place, Request.CLEAR_FAULTS, self.options.mode)
                 self.link.request(joint.setup.place, Request.ENABLE, self.options.mode)
-        elif now > self.options.listen_s:
+        elif now - self._stage_s > self.options.listen_s:
             missing = (
                 ", ".join(self.link.silent(now, self.options.listen_s / 2)) or "a channel that is needed"
             )

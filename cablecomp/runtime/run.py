@@ -22,7 +22,7 @@ from cablecomp.runtime.joint_loop import JointSetup
 from cablecomp.runtime.loop import Loop, LoopOptions, Stage
 from cablecomp.runtime.priority import QUIET, Policy
 from cablecomp.runtime.results import RunReport, TruthTally, result_of
-from cablecomp.runtime.setup import Contestant, joint_setup, references_of
+from cablecomp.runtime.setup import Contestant, joint_setup, references_of, resumed_at_s
 from cablecomp.runtime.simulated import Simulation
 
 
@@ -30,7 +30,7 @@ from cablecomp.runtime.simulated import Simulation
 class RunOptions:
     """How a run is done. `duration_s` None = the protocol's; `stepped`: simulated time, as fast as it
     goes; `out`: folder for recording, predictions, cycles, events, snapshot and `run.json` (None =
-    nothing is written).
+    nothing is written); `resume`: a snapshot to go on from, in its time and history.
     """
 
     duration_s: float | None = None
@@ -96,7 +96,7 @@ def run_joints(
     gains = design_loop(first.config, link.rate_Hz, chosen).gains if given is None else given
     period = 1.0 / link.rate_Hz
     bus: Link = BusLink(link)
-    references = references_of(protocol, mode is not ControlMode.POSITION)
+    references = references_of(protocol, mode is ControlMode.FORCE)
     setups = tuple(
         joint_setup(
             c, mode, bus, control, references, gains, period, bounds=options.bounds, resume=options.resume
@@ -106,7 +106,8 @@ def run_joints(
     duration = protocol.duration_s if options.duration_s is None else options.duration_s
     policy = options.policy if options.policy is not None else (QUIET if options.stepped else Policy())
     clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
-    timing = LoopOptions(duration, mode=_drive_mode(link, first.place), policy=policy)
+    begin = 0.0 if options.resume is None else max(resumed_at_s(s) for s in setups) + period
+    timing = LoopOptions(duration, mode=_drive_mode(link, first.place), policy=policy, begin_s=begin)
     truths = TruthTally([c.name for c in contestants])
 
     def after(tick: Tick, stage: Stage) -> None:
@@ -117,7 +118,7 @@ def run_joints(
 
     def prepare() -> None:
         if options.out is not None:
-            _prepare(options.out, setups)
+            _prepare(options.out, setups, options.resume)
 
     loop = Loop(bus, setups, clock, period, timing, options.out, after, prepare)
     report = loop.run()
@@ -156,7 +157,7 @@ def _simulate(
     since = loop.since_s
     load = protocol.reference(since).joint_torque_Nm if stage is Stage.RUNNING else protocol.start_load_Nm
     for joint in loop.joints:
-        if mode is ControlMode.POSITION:
+        if mode is not ControlMode.FORCE:
             simulation.set_load(joint.setup.place + 1, load)
     simulation.advance(1 + tick.skipped)
     if stage is not Stage.RUNNING:
@@ -169,11 +170,13 @@ def _simulate(
         truths.add(joint.setup.name, truth.joint_position_rad - wanted.joint_position_rad, torque)
 
 
-def _prepare(out: Path, setups: Sequence[JointSetup]) -> None:
+def _prepare(out: Path, setups: Sequence[JointSetup], resume: Path | None) -> None:
     for setup in setups:
         folder = out if len(setups) == 1 else out / setup.name
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from None
+        if resume is not None:  # kept: replayed from there, the recording gives the same predictions
+            (folder / "start.snapshot").write_bytes(resume.read_bytes())
         write_joint(folder / "joint.toml", setup.config, ("the configuration that this run used",))

@@ -120,6 +120,13 @@ def joint_setup(
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
 
 
+def resumed_at_s(setup: JointSetup) -> float:
+    """Time of the last sample that the joint's observer has taken."""
+    observer = setup.compensator.observer
+    assert isinstance(observer, Observer)
+    return float(observer.vector()[-1])
+
+
 def _places(readings: JointReadings, channels: Sequence[str]) -> tuple[int, ...]:
     missing = [name for name in channels if name not in readings.others]
     if missing:
@@ -150,7 +157,7 @@ def references_of(protocol: Protocol, force: bool) -> References:
         nonlocal asked, answer
         if time_s != asked:
             found = protocol.reference(time_s)
-            # In position mode the load is the surroundings' own: the controller is not told.
+            # Except in force mode the load is the surroundings' own: the controller is not told.
             answer = found if force else found._replace(joint_torque_Nm=nan)
             asked = time_s
         return answer

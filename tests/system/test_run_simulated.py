@@ -159,14 +159,14 @@ def test_impedance_yields_by_its_stiffness() -> None:
         load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
     )
     simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
+    push = {"kind": "ramp", "load_Nm": 0.4, "duration_s": 0.5}
     quiet = parse_protocol(
-        {"schema": 1, "name": "rest", "segment": [{"kind": "hold", "duration_s": 3.0}]}, "test"
+        {"schema": 1, "name": "push", "segment": [push, {"kind": "hold", "duration_s": 2.5}]}, "test"
     )
     angles: list[float] = []
 
     def watch(loop: Loop, tick: Tick) -> None:
         if loop.stage is Stage.RUNNING:
-            simulation.set_load(1, 0.4 * min(loop.since_s / 0.5, 1.0))
             angles.append(simulation.truth(1).joint_position_rad)
 
     try:
@@ -209,3 +209,29 @@ def test_asked_to_stop_before_anything_has_come_leaves_a_page_and_no_riddle(tmp_
         simulation.close()
     assert report.ended_well
     assert "Timing and data" in write_run_page(report, "").read_text()
+
+
+def test_a_run_goes_on_from_a_snapshot_and_can_be_replayed_from_there(
+    finished: RunReport, tmp_path: Path
+) -> None:
+    assert finished.folder is not None
+    snapshot = finished.folder / "observer.snapshot"
+    joint, control = load_joint(JOINT), load_control(CONTROL)
+    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=GAINS)})
+    link, control = matched(load_link(LINK), control, own_link=False)
+    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
+    options = RunOptions(0.5, True, tmp_path, resume=snapshot)
+    try:
+        report = run_joint(joint, link, control, REACH, options, simulation)
+    finally:
+        simulation.close()
+    assert report.stop_reason == "time is over"
+    before = pl.read_csv(finished.folder / "recording.csv", comment_prefix="#")["time_s"][-1]
+    went_on = pl.read_csv(tmp_path / "recording.csv", comment_prefix="#")["time_s"]
+    assert before < went_on[0] < before + 0.1
+    observer = Observer(load_joint(tmp_path / "joint.toml"))
+    observer.load(tmp_path / "start.snapshot")
+    blocks = list(open_recording(tmp_path / "recording.csv").blocks())
+    again = np.concatenate([observer.run(block.columns)["deflection_rad"] for block in blocks])
+    live = pl.read_csv(tmp_path / "prediction.csv", infer_schema_length=None)["deflection_rad"].to_numpy()
+    assert live.tobytes() == again.tobytes()
