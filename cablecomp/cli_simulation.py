@@ -33,7 +33,7 @@ def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
         spec = HostedSpec(
             data,
             _bus(wish.link),
-            _bench(wish, torque),
+            _bench(wish, torque, one_sided=data.get("drive", {}).get("circuit") == "open"),
             _motor(motor, torque),
             LinkSpec(motor.output_inertia_kgm2, 0.0, 0.0, motor.output_viscous_Nms_per_rad),
             seed=wish.seed,
@@ -66,7 +66,7 @@ def _motor(motor: MotorModel, torque: float) -> MotorSpec:
     )
 
 
-def _bench(wish: SimulationWish, torque: float) -> BenchConfig:
+def _bench(wish: SimulationWish, torque: float, *, one_sided: bool) -> BenchConfig:
     ends = wish.link.joint[0]
     if ends.motor is None:
         raise InputError(f"joint `{ends.name}` has no motor on this link; add [joint.motor]")
@@ -76,6 +76,13 @@ def _bench(wish: SimulationWish, torque: float) -> BenchConfig:
         )
     device = wish.link.device_of(ends.motor)
     drive = DriveConfig(torque_limit_Nm=torque)
+    if one_sided:  # the pretension pulls at the motor: it needs a brake before it is enabled, and afterwards
+        motor = wish.control.motor
+        drive = DriveConfig(
+            torque_limit_Nm=torque,
+            fault_damping_Nms_per_rad=motor.damping_Nms_per_rad,
+            brake_Nm_per_rad=motor.stiffness_Nm_per_rad,
+        )
     if isinstance(device, MitDevice):
         reply = 0 if ends.motor.reply_id is None else ends.motor.reply_id
         return BenchConfig(

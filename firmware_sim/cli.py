@@ -65,6 +65,7 @@ def make_parser() -> argparse.ArgumentParser:
     p.add_argument("--command-timeout", type=float, default=DriveConfig.command_timeout_s, help="s; 0 = none")
     p.add_argument("--index", type=float, help="incremental motor encoder, its index at this angle (rad)")
     p.add_argument("--fault-damping", type=float, default=0.0, help="Nms/rad; brake of a drive in fault")
+    p.add_argument("--brake", type=float, default=0.0, help="Nm/rad; holds a drive that is not enabled")
     p.add_argument("--status-every", type=int, default=10, help="samples between two JointN_Status")
     p.add_argument("--duration", type=float, default=math.inf, help="end after this many seconds")
     p.add_argument("--until-stdin-closes", action="store_true", help="end when standard input closes")
@@ -82,6 +83,7 @@ def bench_config(options: argparse.Namespace) -> BenchConfig:
         command_timeout_s=options.command_timeout,
         index_position_rad=options.index,
         fault_damping_Nms_per_rad=options.fault_damping,
+        brake_Nm_per_rad=options.brake,
     )
     return BenchConfig(
         protocol=options.protocol,

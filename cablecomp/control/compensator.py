@@ -66,6 +66,14 @@ def ratio_of(config: JointConfig) -> float:
     return prod(s.input_radius_m / s.output_radius_m for s in config.drive.stage)
 
 
+def preload_of(config: JointConfig) -> float:
+    """Torque (Nm, at the input pulley) by which an open circuit's pretension pulls at the motor: r T0, for the
+    external moment is counted from the pretensioned state; 0 in a closed circuit, whose cables balance.
+    """
+    first = config.drive.stage[0]
+    return first.input_radius_m * first.pretension_N if config.drive.circuit == "open" else 0.0
+
+
 class Compensator:
     """Controls one joint; the state is in the open attributes, time comes with the sample.
 
@@ -91,6 +99,7 @@ class Compensator:
         self.gains = gains_of(options, gains)
         self.observer = observer
         self.ratio = ratio_of(config)
+        self.preload_Nm = preload_of(config)
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = Ahead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
@@ -239,7 +248,7 @@ class Compensator:
         friction = m.viscous_Nms_per_rad * velocity
         if m.coulomb_Nm > 0.0:
             friction += m.coulomb_Nm * tanh(velocity / self.options.coulomb_velocity_rad_s)
-        return m.inertia_kgm2 * acceleration + friction - self.ratio * load
+        return m.inertia_kgm2 * acceleration + friction - self.ratio * load - self.preload_Nm
 
     def _command(
         self,

@@ -80,7 +80,8 @@ class Checked(NamedTuple):
 
 class Health:
     """Watches one joint. `needs_torque`, `needs_joint`: channels that the feed-forward lives on;
-    `others`: places of the further channels that the observer reads, in its order.
+    `others`: places of the further channels that the observer reads, in its order; `preload_Nm`: by which an
+    open circuit's pretension pulls at the motor.
 
     Motor position, joint torque, joint position are held at their last plausible value; all else passes
     as it came.
@@ -96,6 +97,7 @@ class Health:
         needs_torque: bool = True,
         needs_joint: bool = False,
         others: tuple[int, ...] = (),
+        preload_Nm: float = 0.0,
     ) -> None:
         o = options
         limit = inf if o.torque_max_Nm is None else o.torque_max_Nm
@@ -112,6 +114,7 @@ class Health:
         self._o = o
         self._most_Nm = limit
         self._ratio = ratio
+        self._preload_Nm = preload_Nm
         self._fresh_s = fresh_s
         self._needs_torque = needs_torque
         self._needs_joint = needs_joint
@@ -233,7 +236,7 @@ class Health:
 
     def _torques(self, motor_torque: float, now_s: float) -> int:
         flags, torque = 0, self.torque.value
-        mismatch = torque + motor_torque / self._ratio
+        mismatch = torque + (motor_torque + self._preload_Nm) / self._ratio
         if mismatch == mismatch:
             self._mean_mismatch += self._share * (mismatch - self._mean_mismatch)
         off = not -self._mismatch_Nm <= self._mean_mismatch <= self._mismatch_Nm

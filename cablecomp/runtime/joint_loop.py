@@ -131,15 +131,16 @@ class JointLoop:
         self._send(SafeCommand(self._here(), 0.0, 0.0, 0))
 
     def hold(self, now_s: float) -> None:
-        """While the drive is being enabled: observe and record, and ask it to stay where it is."""
+        """While the drive is being enabled: observe and record, and ask it to stay where it is, against the
+        pretension of an open circuit."""
         self._cycle(now_s, None)
-        self._send(SafeCommand(self._here(), 0.0, 0.0, 0))
+        self._send(SafeCommand(self._here(), 0.0, -self.setup.compensator.preload_Nm, 0))
 
     def begin(self) -> None:
         """Control starts from where the motor is."""
         self.setup.compensator.reset()
         here = self._here()
-        self._sent = SafeCommand(here, 0.0, 0.0, 0)
+        self._sent = SafeCommand(here, 0.0, -self.setup.compensator.preload_Nm, 0)
 
     def run(self, now_s: float, since_s: float) -> None:
         """One cycle under control; `since_s` = time since control began."""

@@ -115,6 +115,7 @@ def joint_setup(
         needs_torque=sensor,
         needs_joint=both,
         others=_places(bus.joints[c.place], observer.channels),
+        preload_Nm=compensator.preload_Nm,
     )
     limits = GateLimits.of(c.config.limits, age_s=times.motor_stop_s)
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)

@@ -37,6 +37,8 @@ class DriveConfig:
     from the start. `calibrate_on_enable`: asked to enable before the index was found, the drive searches it
     first, then
     enables. `fault_damping_Nms_per_rad` brakes the motor in a fault (shorted windings); 0 lets it coast.
+    `brake_Nm_per_rad` > 0: a holding brake of that stiffness, closed while the drive is neither enabled nor
+    calibrating (damped by the same), as one-sided loads need it.
     """
 
     torque_limit_Nm: float = 18.0
@@ -50,6 +52,7 @@ class DriveConfig:
     search_range_rad: float = 2.0 * math.pi
     calibrate_on_enable: bool = True
     fault_damping_Nms_per_rad: float = 0.0
+    brake_Nm_per_rad: float = 0.0
     position_gain_per_s: float = 20.0
     velocity_gain_Nms_per_rad: float = 0.05
     velocity_integrator_Nm_per_rad: float = 0.0
@@ -98,6 +101,7 @@ class Drive:
         self._last_command_s = now_s
         self._last_raw: float | None = None
         self._checked_raw: float | None = None
+        self._braked_at: float | None = None
         self._integral_Nm = 0.0
         self._search_start: float | None = None
         self._search_sign = 1.0
@@ -187,16 +191,27 @@ class Drive:
             wanted = self._search(now_s)
         elif self.state is DriveState.ENABLED:
             wanted = self._law(dt_s)
-        elif self.state is DriveState.FAULT:
-            wanted = -self.config.fault_damping_Nms_per_rad * self.velocity_rad_s
         else:
-            wanted = 0.0
+            wanted = self._brake()
+        if self.state in (DriveState.CALIBRATING, DriveState.ENABLED):
+            self._braked_at = None
         limit = self.config.torque_limit_Nm
         if abs(wanted) > limit:
             self.flags |= DriveFlag.OVER_TORQUE
             wanted = math.copysign(limit, wanted)
         self._torque_command = wanted
         return wanted
+
+    def _brake(self) -> float:
+        """Torque on a motor that is let go."""
+        c, raw = self.config, self._last_raw
+        damped = self.state is DriveState.FAULT or c.brake_Nm_per_rad > 0.0
+        wanted = -c.fault_damping_Nms_per_rad * self.velocity_rad_s if damped else 0.0
+        if raw is None or c.brake_Nm_per_rad == 0.0:
+            return wanted
+        if self._braked_at is None:
+            self._braked_at = raw
+        return wanted + c.brake_Nm_per_rad * (self._braked_at - raw)
 
     def observe(self, readings: Readings) -> None:
         """Take in readings without acting on them; what `report` then tells is as fresh as they are."""

@@ -13,7 +13,12 @@ from fault_runs import CONFIGS, JOINT, REACH
 
 from cablecomp import cli
 from cablecomp.cli_simulation import start_simulation
+from cablecomp.config import load_joint
+from cablecomp.control.compensator import preload_of
+from cablecomp.control.motors import control_for
+from cablecomp.links.schema import load_link
 from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import SimulationWish
 
 CONTROL = CONFIGS / "control/wrist-capstan.toml"
@@ -160,3 +165,38 @@ def test_the_readme_s_ten_lines_run_as_they_stand(
     monkeypatch.setattr("cablecomp.runtime.run.run_joint", short)
     exec(compile(block, "README.md", "exec"), {})
     assert capsys.readouterr().out.startswith("time is over\n")
+
+
+@pytest.mark.parametrize("mode", ["position", "force", "impedance"])
+def test_an_open_circuit_is_held_by_its_brake_and_run_in_every_mode(mode: str, tmp_path: Path) -> None:
+    """Its pretension pulls at the motor: without brake and counter-torque the joint runs away before control
+    begins.
+    """
+    arguments = [
+        "run",
+        "--config",
+        str(CONFIGS / "joints/snow-open-rig.toml"),
+        "--sim",
+        "--fast",
+        "--no-bounds",
+    ]
+    assert cli.main([*arguments, "--mode", mode, "--duration", "1.5", "--out", str(tmp_path)]) == 0
+    recording = pl.read_csv(tmp_path / "recording.csv", comment_prefix="#")
+    assert abs(recording["joint_position_rad"][:20]).max() < 0.02
+    assert "jumped" not in (tmp_path / "events.jsonl").read_text()
+
+
+def test_the_brake_holds_the_pretension_of_an_open_circuit() -> None:
+    """Its torque at rest is the -r T0 that the compensator takes over from it."""
+    path = CONFIGS / "joints/snow-open-rig.toml"
+    joint = load_joint(path)
+    control = control_for(joint)
+    link, control = matched(load_link(LINK), control, own_link=False)
+    simulation = start_simulation(path, SimulationWish(link, control, off_nominal=False))
+    try:
+        for _ in range(1500):
+            simulation.advance()
+        torque = simulation.bench.joints[0].truth.motor_torque_Nm
+    finally:
+        simulation.close()
+    assert torque == pytest.approx(-preload_of(joint), rel=0.02)
