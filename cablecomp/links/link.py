@@ -77,6 +77,10 @@ class Link(Protocol):
         """Send the step counter (u32, little-endian) on `sync_id`: a simulated bus in stepped time takes one
         step."""
 
+    @property
+    def bus(self) -> BusState:
+        """State of the bus, at next to no cost."""
+
     def status(self) -> LinkStatus:
         """Counts and state of the bus; changes nothing."""
 
@@ -107,8 +111,6 @@ class BusLink:
         self.joints: tuple[JointReadings, ...] = tuple(readings)
         self._drives: tuple[Drive | None, ...] = tuple(drives)
         self._table = dispatch_table(receivers)
-        self._now_s = 0.0
-        self._values = 0
         self._frames = 0
         self._ignored = 0
         self._sent = 0
@@ -120,17 +122,17 @@ class BusLink:
 
     def poll(self, now_s: float) -> int:
         """See `Link.poll`."""
-        self._now_s = now_s
-        self._values = 0
-        self._frames += self._port.drain(self._sink, self._limit)
-        return self._values
+        takers, values = self._table, 0
 
-    def _sink(self, identifier: int, data: bytes) -> None:
-        take = self._table.get(identifier)
-        if take is None:
-            self._ignored += 1
-        else:
-            self._values += take(data, self._now_s)
+        def sink(identifier: int, data: bytes) -> None:
+            nonlocal values
+            if identifier in takers:
+                values += takers[identifier](data, now_s)
+            else:
+                self._ignored += 1
+
+        self._frames += self._port.drain(sink, self._limit)
+        return values
 
     def send(self, joint: int, command: MotorCommand) -> int:
         """See `Link.send`."""
@@ -169,6 +171,11 @@ class BusLink:
         if identifier is None:
             raise InputError(f"link `{self.config.name}`: bus.sync_id is missing; add it to send steps")
         return self._port.send(identifier, (step & 0xFFFF_FFFF).to_bytes(4, "little"))
+
+    @property
+    def bus(self) -> BusState:
+        """See `Link.bus`."""
+        return self._port.state
 
     def status(self) -> LinkStatus:
         """See `Link.status`."""

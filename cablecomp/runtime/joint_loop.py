@@ -205,7 +205,8 @@ class JointLoop:
             self._note(checked.flags, now_s)
         self._count(sample, estimate, since_s)
         self._seen = (now_s, sample, estimate, command, reference, checked.flags)
-        self._record(sample, estimate, command, checked, since_s is not None)
+        if self._folder is not None and s.compensator.observed:
+            self._record(self._folder, sample, estimate, command, checked, since_s is not None)
         self._last_reference = reference
 
     def _judge(self, checked: Checked, now_s: float, period_s: float) -> None:
@@ -272,13 +273,17 @@ class JointLoop:
             tally.torque_count += 1
 
     def _record(
-        self, sample: Sample, estimate: Estimate, command: Command, checked: Checked, controlled: bool
+        self,
+        folder: Path,
+        sample: Sample,
+        estimate: Estimate,
+        command: Command,
+        checked: Checked,
+        controlled: bool,
     ) -> None:
-        if self._folder is None or not self.setup.compensator.observed:
-            return
         if self.log is None:
             comments = (f"cablecomp run, joint {self.setup.name}, configuration joint.toml",)
-            self.log = JointLog(self._folder, sample, self.readings.others, comments)
+            self.log = JointLog(folder, sample, self.readings.others, comments)
         sent, state, wanted = self._sent, self.degraded, self._last_reference
         self.log.append(
             sample,

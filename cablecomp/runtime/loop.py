@@ -25,7 +25,6 @@ from cablecomp.runtime.timing import TimingReport
 
 TIME_IS_OVER = "time is over"
 ASKED_BY_USER = "asked by the user"
-BUS_EVERY = 5  # ticks between two looks at the bus's own state
 COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
 DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
 
@@ -244,10 +243,11 @@ class Loop:
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
         if tick.skipped:
             self.events.add(now, "", f"{tick.skipped} ticks skipped")
-        why = self._asked_to_stop or next(
-            (f"{j.setup.name}: {j.stop_reason}" for j in self.joints if j.stop_reason), ""
-        )
-        if not why and tick.number % BUS_EVERY == 0:
+        why = self._asked_to_stop
+        for joint in self.joints:
+            if joint.stop_reason and not why:
+                why = f"{joint.setup.name}: {joint.stop_reason}"
+        if not why:
             why = self._bus_trouble()
         if not why and since >= self.options.duration_s:
             why = TIME_IS_OVER
@@ -255,12 +255,10 @@ class Loop:
             self._stop(why, now)
 
     def _bus_trouble(self) -> str:
-        status = self.link.status()
-        return (
-            ""
-            if status.bus in (BusState.ACTIVE, BusState.PASSIVE)
-            else f"bus is {status.bus.name.lower()}: {status.fault}"
-        )
+        state = self.link.bus
+        if state is BusState.ACTIVE or state is BusState.PASSIVE:
+            return ""
+        return f"bus is {state.name.lower()}: {self.link.status().fault}"
 
     def _stop(self, why: str, now: float) -> None:
         self.link.stop()
