@@ -17,6 +17,7 @@ from rich.table import Table
 
 from cablecomp import cli_prove, cli_study
 from cablecomp.cli_analysis import register
+from cablecomp.cli_live import LiveRun
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.design import design_loop
@@ -89,6 +90,9 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(help="of simulated noise, true parameters and motions")] = 1,
     nominal: Annotated[bool, typer.Option("--nominal", help="simulated joint exactly as configured")] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
+    ] = False,
 ) -> None:
     """Control a joint over a link, real or simulated; ends with a timing report and a recording that
     `replay` accepts.
@@ -123,11 +127,19 @@ def run(
     try:
         with LiveView(console) as view:
             signal.signal(signal.SIGINT, lambda number, frame: view.press())
-            report = run_joint(joint, bus, wanted, asked, options, simulation, view.watch)
+            beside = LiveRun(joint, bus.rate_Hz, out, view.watch, stepped=fast) if live else None
+            watch = view.watch if beside is None else beside.watch
+            report = run_joint(joint, bus, wanted, asked, options, simulation, watch)
     finally:
         if simulation is not None:
             simulation.close()
+    if beside is not None:
+        report = beside.finish(report)
     _show(report)
+    for path in () if beside is None else beside.kept:
+        console.print(
+            f"mismatch: see {path.with_suffix('.json')}; cablecomp diagnose {path} --config {config}"
+        )
     page = write_run_page(report, joint_text(joint))
     console.print(f"report: {page}")
     if not report.ended_well:

@@ -37,6 +37,13 @@ class Ring:
         self._next = (self._next + 1) % len(self._rows)
         self._count = min(self._count + 1, len(self._rows))
 
+    def extend(self, rows: FloatArray) -> None:
+        """Keep several rows, an array of (rows, channels), oldest first."""
+        rows = rows[-len(self._rows) :]
+        self._rows[(self._next + np.arange(len(rows))) % len(self._rows)] = rows
+        self._next = (self._next + len(rows)) % len(self._rows)
+        self._count = min(self._count + len(rows), len(self._rows))
+
     def columns(self) -> dict[str, FloatArray]:
         """Return the rows kept, oldest first, as columns that a recording is written from."""
         order = (self._next - self._count + np.arange(self._count)) % len(self._rows)

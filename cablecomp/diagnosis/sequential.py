@@ -14,7 +14,7 @@ from cablecomp.errors import InputError
 from cablecomp.identification.autocorrelation import integrated_time, long_run_variance
 from cablecomp.identification.smoothing import FloatArray
 
-Kind = Literal["offset up", "offset down", "wider"]
+Kind = Literal["offset up", "offset down", "wider", "from the start"]
 _KINDS: Final[tuple[Kind, ...]] = ("offset up", "offset down", "wider")
 _STRENGTHS: Final = (0.5, 1.0, 2.0)
 _TAUS: Final = 8.0
@@ -26,12 +26,14 @@ class WatchConfig:
     """What the watch promises and how it learns.
 
     `between_false_alarms_s`: mean time between false alarms is at least this; `learning_samples`:
-    samples after the start that show what is usual (no alarm can come before they are over). Raises
-    InputError if either is too small.
+    samples after the start that show what is usual (no alarm can come before they are over); `indifference`:
+    change of no interest, in units of the usual RMS: the promise holds as long as the mean moves by less
+    and the variance grows by less than the square of it. Raises InputError if one is too small.
     """
 
     between_false_alarms_s: float = 36_000.0
     learning_samples: int = 4_000
+    indifference: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.between_false_alarms_s > 0.0:
@@ -44,15 +46,17 @@ class WatchConfig:
                 "cannot be "
                 "learnt from fewer"
             )
+        if not self.indifference >= 0.0:
+            raise InputError(f"indifference must not be negative, found {self.indifference}; 0 = any change")
 
 
 @dataclass(frozen=True)
 class Alarm:
     """The residual is no longer what it was.
 
-    `at_s`: now; `since_s`: when the evidence began to grow; `kind`; `size_rad`: shift of the mean, or
-    the RMS now; `usual_rad`: RMS while learning; `log_evidence`: natural logarithm of the detector;
-    `threshold`: what it had to pass.
+    `at_s`: now; `since_s`: when the evidence began to grow; `kind` ("from the start": said by `live`, never
+    by `step`); `size_rad`: shift of the mean, or the RMS now; `usual_rad`: RMS while learning;
+    `log_evidence`: natural logarithm of the detector; `threshold`: what it had to pass.
     """
 
     at_s: float
@@ -67,8 +71,8 @@ class Alarm:
 @dataclass(frozen=True)
 class Usual:
     """What learning found: block length (samples), duration (s), mean, sd of block means, mean and sd
-    of the cube root of the block's variance, allowances for not knowing them exactly, RMS, and the
-    threshold on the log evidence.
+    of the cube root of the block's variance, allowances for not knowing them exactly, RMS, the threshold on
+    the log evidence, and what mean and cube root may move by without being of interest, in their sd.
     """
 
     block: int
@@ -82,6 +86,8 @@ class Usual:
     rms: float
     threshold: float
     short_memory: bool
+    idle_mean: float
+    idle_root: float
 
 
 @dataclass
@@ -154,7 +160,7 @@ def _learn(state: WatchState, time_s: float, residual: float) -> None:
     state.count += 1
     if state.count < state.config.learning_samples:
         return
-    state.usual = _usual(state.learnt, time_s - state.first_s, state.config.between_false_alarms_s)
+    state.usual = _usual(state.learnt, time_s - state.first_s, state.config)
     alternatives = len(_KINDS) * len(_STRENGTHS)
     state.evidence = [0.0] * alternatives
     state.since = [time_s] * alternatives
@@ -162,7 +168,7 @@ def _learn(state: WatchState, time_s: float, residual: float) -> None:
     state.blocks = [0] * alternatives
 
 
-def _usual(values: FloatArray, duration_s: float, between_s: float) -> Usual:
+def _usual(values: FloatArray, duration_s: float, config: WatchConfig) -> Usual:
     n = len(values)
     tau = integrated_time(values)
     wanted = max(8, int(np.ceil(_TAUS * tau)))
@@ -175,18 +181,22 @@ def _usual(values: FloatArray, duration_s: float, between_s: float) -> Usual:
     roots = np.cbrt(shaped.var(axis=1))
     root_sd = max(sqrt(long_run_variance(roots)), float(np.std(roots, ddof=1)), 1e-300)
     block_s = max(duration_s, 1e-9) * block / max(1, n - 1)
+    rms = float(np.sqrt(np.mean((values - mean) ** 2)))
+    mean_sd, root = max(sqrt(variance), 1e-300), float(roots.mean())
     return Usual(
         block,
         block_s,
         mean,
-        max(sqrt(variance), 1e-300),
-        float(roots.mean()),
+        mean_sd,
+        root,
         root_sd,
         2.5 / sqrt(blocks),
         1.0 + 2.5 / sqrt(2.0 * blocks),
-        float(np.sqrt(np.mean((values - mean) ** 2))),
-        log(max(between_s / block_s, 2.0)),
+        rms,
+        log(max(config.between_false_alarms_s / block_s, 2.0)),
         wanted <= n // _FEWEST_BLOCKS,
+        config.indifference * rms / mean_sd,
+        float(np.cbrt(root**3 + (config.indifference * rms) ** 2) - root) / root_sd,
     )
 
 
@@ -195,9 +205,13 @@ def _close_block(state: WatchState, usual: Usual, time_s: float, mean: float, sq
     spread = max(square - mean * mean, 0.0)
     wider = (float(np.cbrt(spread)) - usual.root) / usual.root_sd
     index = 0
-    for signal, size in ((z, mean - usual.mean), (-z, mean - usual.mean), (wider, spread)):
+    for signal, idle, size in (
+        (z, usual.idle_mean, mean - usual.mean),
+        (-z, usual.idle_mean, mean - usual.mean),
+        (wider, usual.idle_root, spread),
+    ):
         for strength in _STRENGTHS:
-            gain = strength * (signal - usual.allowance) - 0.5 * (strength * usual.inflation) ** 2
+            gain = strength * (signal - idle - usual.allowance) - 0.5 * (strength * usual.inflation) ** 2
             if state.evidence[index] <= 0.0:
                 state.evidence[index], state.since[index] = 0.0, state.block_s
                 state.sums[index], state.blocks[index] = 0.0, 0

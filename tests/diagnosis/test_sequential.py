@@ -53,6 +53,18 @@ def test_a_change_is_found_and_dated(change: str, kind: str) -> None:
     assert first.threshold == pytest.approx(np.log(3_600.0 / state.usual.duration_s))
 
 
+def test_a_change_of_no_interest_keeps_the_promise() -> None:
+    """The mean may wander within the indifference for ever; a larger change is still found."""
+    noise = autoregressive(np.random.default_rng(4), 60_000, 5.0, SIGMA)
+    time = np.arange(60_000) * STEP_S
+    wander = 0.8 * SIGMA * np.sin(2.0 * np.pi * (time - 4.0) / 9.0) * (time > 4.0)
+    between = 20.0
+    assert len(run(noise + wander, WatchConfig(between, 4_000, 1.0))[1]) <= 60.0 / between
+    assert len(run(noise + wander, WatchConfig(between, 4_000))[1]) > 60.0 / between
+    _, alarms = run(noise + wander + 4.0 * SIGMA * (time > 30.0), WatchConfig(3_600.0, 4_000, 1.0))
+    assert 30.0 < alarms[0].at_s < 31.0
+
+
 def test_nothing_is_said_while_learning_and_gaps_are_passed_over() -> None:
     state = start(WatchConfig(100.0, 1_000))
     assert step(state, 0.0, float("nan")) is None
@@ -72,6 +84,8 @@ def test_unusable_promises_are_refused() -> None:
         WatchConfig(0.0)
     with pytest.raises(InputError, match="400"):
         WatchConfig(10.0, 50)
+    with pytest.raises(InputError, match="indifference"):
+        WatchConfig(10.0, 500, -1.0)
 
 
 def test_the_ring_keeps_the_last_rows_in_order() -> None:
