@@ -67,7 +67,7 @@ def diagnose(
     groups = all_forms(config, setting.around)
     selection = select(setting.problem, setting.calibrated, groups, setting.layout, rng, progress)
     progress("last fit", 0.95)
-    final = finish(setting.problem, selection.model, setting.layout, setting.replicas)
+    final = finish(setting.problem, selection.model, setting.layout)
     unit = setting.problem.sigma * INFLATION
     nuisance = setting.calibrated.J * unit[:, None]
     calibrated = make_series(selection.baseline.residual_rad, setting.problem.sigma, setting.covariates)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +13,6 @@ from cablecomp.diagnosis.blocks import Layout
 from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of, sensitivities, solve
 from cablecomp.diagnosis.forms import PHASE, Form
 from cablecomp.diagnosis.selection import free_shapes
-from cablecomp.errors import InputError
-from cablecomp.identification.misfit import Prepared
 from cablecomp.identification.smoothing import FloatArray
 
 SMALL_SAMPLE = 1.15  # what a sandwich of some twenty blocks underestimates
@@ -42,7 +40,7 @@ class Final:
     at_bound: tuple[str, ...]
 
 
-def finish(problem: Problem, model: Model, layout: Layout, replicas: Sequence[tuple[Prepared, ...]]) -> Final:
+def finish(problem: Problem, model: Model, layout: Layout) -> Final:
     """Free all shapes, fit to all rows, and work out the uncertainties."""
     forms, z = free_shapes(model)
     mask = layout.heldout | layout.training
@@ -51,7 +49,8 @@ def finish(problem: Problem, model: Model, layout: Layout, replicas: Sequence[tu
         forms, found = model.forms, model
     J = sensitivities(problem, forms, found.z, found.residual)
     found = replace(found, J=J)
-    covariance = sandwich(problem, found, layout, _moved(problem, found, replicas))
+    moved = problem.moved(problem.joint(found.c, found.entries())) / (problem.sigma * INFLATION)
+    covariance = sandwich(problem, found, layout, moved)
     n = len(problem.parameters)
     calibration = {
         p.name: Value(p.value(float(v)), abs(p.slope(float(v))) * float(np.sqrt(covariance[k, k])))
@@ -69,19 +68,6 @@ def finish(problem: Problem, model: Model, layout: Layout, replicas: Sequence[tu
         if min(float(v) - p.low, p.high - float(v)) < 1e-3 * (p.high - p.low)
     )
     return Final(config, found, calibration, tuple(effects), found.residual * problem.sigma * INFLATION, edge)
-
-
-def _moved(problem: Problem, model: Model, replicas: Sequence[tuple[Prepared, ...]]) -> FloatArray:
-    """How noise on the inputs moves the model's prediction: one row for each replica, weighted."""
-    config = problem.joint(model.c, model.entries())
-    base = problem.predict(config)
-    found = []
-    for parts in replicas:
-        try:
-            found.append((replace(problem, parts=parts).predict(config) - base) / (problem.sigma * INFLATION))
-        except InputError:
-            continue
-    return np.array(found).reshape(-1, problem.rows)
 
 
 def sandwich(problem: Problem, model: Model, layout: Layout, moved: FloatArray) -> FloatArray:

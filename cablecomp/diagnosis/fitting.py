@@ -28,13 +28,19 @@ INFLATION = 3.0  # noise that passes through friction remembers: some ten sample
 
 @dataclass(frozen=True)
 class Problem:
-    """Recordings to be explained, in weighted form; `simulations` counts the work."""
+    """Recordings to be explained, in weighted form.
+
+    `replicas`: the recordings as they might have been read as well, with other noise on their inputs;
+    `own_rad`: what the joint encoder's own noise leaves, RMS of the rows.
+    """
 
     config: JointConfig
     parameters: tuple[Parameter, ...]
     parts: tuple[Prepared, ...]
     measured: FloatArray
     sigma: FloatArray
+    replicas: tuple[tuple[Prepared, ...], ...]
+    own_rad: float
 
     @property
     def rows(self) -> int:
@@ -58,6 +64,24 @@ class Problem:
     def residual(self, config: JointConfig) -> FloatArray:
         """Measured minus predicted, over the noise with its memory: the weighted residual."""
         return (self.measured - self.predict(config)) / (self.sigma * INFLATION)
+
+    def moved(self, config: JointConfig, count: int | None = None) -> FloatArray:
+        """How noise on the inputs moves a prediction (rad), one row for each replica that can be followed."""
+        base = self.predict(config)
+        found = []
+        for parts in self.replicas[:count]:
+            try:
+                found.append(replace(self, parts=parts).predict(config) - base)
+            except InputError:  # noise alone can ask for what an edge-of-slack joint cannot give
+                continue
+        return np.array(found).reshape(-1, self.rows)
+
+    def noise_rad(self, config: JointConfig, count: int | None = None) -> float:
+        """RMS that noise alone leaves of a perfect model: the encoder's own, and what noisy inputs do to the
+        prediction (friction rectifies noise, inertia differentiates it: so it is simulated).
+        """
+        moved = self.moved(config, count)
+        return float(np.sqrt(self.own_rad**2 + (np.mean(np.var(moved, axis=1)) if len(moved) else 0.0)))
 
 
 @dataclass(frozen=True)
@@ -163,13 +187,14 @@ def solve(
     residual: FloatArray | None = None,
     iterations: int = 6,
     renew: bool = False,
+    firm: float = 1.0,
 ) -> Model | None:
     """Fit from z on the rows of `mask`; J (by differences if not given) follows by Broyden's rule, and is
-    renewed where steps no longer gain, if `renew`.
+    renewed where steps no longer gain, if `renew`. `firm`: weight of the priors, else as stated.
 
     Returns None if the joint cannot follow the start.
     """
-    prior, (low, high) = prior_of(problem, forms), bounds_of(problem, forms)
+    prior, (low, high) = firm * prior_of(problem, forms), bounds_of(problem, forms)
     z = np.clip(z, low, high)
     r = evaluate(problem, forms, z) if residual is None else residual
     if r is None:

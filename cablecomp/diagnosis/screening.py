@@ -26,7 +26,7 @@ from cablecomp.identification.smoothing import FloatArray
 
 Progress = Callable[[str, float], None]
 CLEAR = 0.1  # share of the cost that an effect must remove at once
-WORTH = 2.0  # mean square over the floor from which on a hidden slope is looked for
+HOPELESS = 0.01  # share of the cost below which a linear promise is not followed
 FORCED = (0.5, 0.15)  # sizes that it is else given to begin with, in residuals
 HIDDEN = 0.1  # weight of what calibration can take up of an effect, where its size is chosen
 UNSEEN = 1e-3  # of the noise: an effect whose largest contribution is smaller is not asked further
@@ -173,33 +173,35 @@ def _middle(a: float, b: float, log: bool) -> float:
     return float(np.sqrt(a * b)) if log and a > 0.0 else 0.5 * (a + b)
 
 
-def attempt(problem: Problem, base: Model, group: Sequence[Probe], mask: Mask) -> tuple[Model | None, float]:
+def attempt(
+    problem: Problem, base: Model, group: Sequence[Probe], mask: Mask, thorough: bool
+) -> tuple[Model | None, float]:
     """Fit the effect of a group from its most promising grid point; also the share of the cost that the
     linear answer promised. None if nothing is won.
 
-    Where the linear answer promises little, the effect is given a size and the calibration time to make
-    room for it: a calibration that has paid for a missing effect hides the slope towards it.
+    Where the linear answer promises little, and `thorough`, the effect is given a size and the calibration
+    time to make room for it: a calibration that has paid for a missing effect hides the slope towards it.
     """
     best = max((guess(problem, base, p, mask) for p in group), key=lambda g: g.drop)
     best = refine(problem, base, best, mask, group)
     prior = prior_of(problem, base.forms)
     before = cost(base.residual, base.z, prior, mask)
-    model = fit_guess(problem, base, best, mask)
-    clear = model is not None and _cost(problem, model, mask) < (1.0 - CLEAR) * before
-    if clear or float(np.mean(base.residual[mask] ** 2)) * INFLATION**2 < WORTH:
-        return model, best.drop / before
+    promise = best.drop / before
+    model = fit_guess(problem, base, best, mask) if promise > HOPELESS or thorough else None
+    if not thorough or (model is not None and _cost(problem, model, mask) < (1.0 - CLEAR) * before):
+        return model, promise
     tried = [model] if model is not None else []
     tried += [
         m for p in group for x in _sizes(p.form) if (m := _forced(problem, base, p, x, mask)) is not None
     ]
     tried = [m for m in tried if _cost(problem, m, mask) < before]
-    return min(tried, key=lambda m: _cost(problem, m, mask), default=None), best.drop / before
+    return min(tried, key=lambda m: _cost(problem, m, mask), default=None), promise
 
 
 def _sizes(form: Form) -> tuple[float, ...]:
     """Sizes to begin with, of either sign where the effect has one: friction answers the signs differently."""
     both = not form.phase and form.bounds()[0][0] < 0.0
-    return (*FORCED, *(-x for x in FORCED)) if both else FORCED
+    return (FORCED[0], -FORCED[0]) if both else FORCED
 
 
 def _cost(problem: Problem, model: Model, mask: Mask) -> float:

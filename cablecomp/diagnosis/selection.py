@@ -39,6 +39,9 @@ LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remov
 EFFECTS = 3
 INSTANT_STEPS_S = (2.0, 0.5, 0.15, 0.04, 0.01)
 REACH = 4  # such steps either way that an event is looked for
+WORTH = (2.0, 4.0)  # mean square over the floor for that, in the first round and later
+FLOORED = 6  # replicas by which the floor of a model is found
+UNLIKELY = 2.0  # prior standard deviations
 CAREFULLY = 30  # steps of a careful fit
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
 SURE = 3.0  # standard errors of lead beyond which a rival is refuted
@@ -103,9 +106,11 @@ def select(
     first_probes: list[list[Probe]] = []
     for number in range(EFFECTS):
         left = [g for g in groups if g[0].name not in {f.name for f in current.forms}]
-        probes = probe_all(problem, current, left, progress)
+        start = _start(problem, current, layout)
+        probes = probe_all(problem, start, left, progress)
         first_probes = first_probes or probes
-        folds, asked = _fit_folds(problem, current, probes, layout, progress)
+        thorough = _worth(problem, current, layout, number)
+        folds, asked = _fit_folds(problem, current, start, probes, layout, thorough, progress)
         verdict = _judged(current_fold, folds, both, rng)
         models: dict[str, Model] = {}
         for score in _front_runners(verdict):
@@ -129,7 +134,7 @@ def select(
         current, current_fold = models[best.name], folds[best.name]
         if number > 0:
             current, current_fold = _without(problem, current, current_fold, layout, rng)
-        if _at_noise(current, layout):
+        if _at_noise(problem, current, layout):
             break
     hidden = tuple(hidden_effects(problem, base, first_probes, layout))
     return Selection(baseline, current_fold, current, base, tuple(rounds), layout, first_probes, hidden)
@@ -172,29 +177,70 @@ def _fold(problem: Problem, a: Model, b: Model, layout: Layout) -> Fold:
     return Fold((a, b), np.where(held, a.residual, b.residual) * problem.sigma * INFLATION)
 
 
+def _start(problem: Problem, model: Model, layout: Layout) -> Model:
+    """Where hypotheses are fitted from: the model, or where its calibration has gone too far to be likely,
+    the model with priors as firm as a misfit of this size leaves them.
+
+    A calibration that pays for a missing effect may end in a valley of its own.
+    """
+    mask = layout.heldout | layout.training
+    excess = float(np.mean((model.residual[mask] * INFLATION) ** 2))
+    if excess < 2.0 * NOISE or float(np.max(np.abs(_pulls(problem, model)), initial=0.0)) < UNLIKELY:
+        return model
+    nominal = _nominal(problem, model)
+    found = solve(problem, model.forms, nominal, mask, iterations=CAREFULLY, renew=True, firm=excess)
+    return model if found is None else found
+
+
+def _worth(problem: Problem, model: Model, layout: Layout, number: int) -> bool:
+    """Whether so much is left that effects are looked for which show no slope: from round to round more."""
+    kept = layout.heldout | layout.training
+    left = float(np.mean((model.residual[kept] * INFLATION) ** 2))
+    return left > WORTH[min(number, 1)] * floor_of(problem, model)
+
+
+def _pulls(problem: Problem, model: Model) -> FloatArray:
+    """Calibration in prior standard deviations (0 where there is no prior)."""
+    return np.array([v / p.prior_sd for p, v in zip(problem.parameters, model.c, strict=True)])
+
+
+def _nominal(problem: Problem, model: Model) -> FloatArray:
+    """The model's coordinates, those with a prior put back to nominal."""
+    z = model.z
+    z[: len(model.c)] = [
+        0.0 if np.isfinite(p.prior_sd) else v for p, v in zip(problem.parameters, model.c, strict=True)
+    ]
+    return z
+
+
 def _fit_folds(
     problem: Problem,
     base: Model,
+    start: Model,
     probes: Sequence[Sequence[Probe]],
     layout: Layout,
+    thorough: bool,
     progress: Progress,
 ) -> tuple[dict[str, Fold], dict[str, float]]:
     """Fit every hypothesis to all rows, and the most promising ones to either half."""
     both = layout.heldout | layout.training
-    before = cost(base.residual, base.z, prior_of(problem, base.forms), both)
+    before = _cost(problem, base, both)
     asked: dict[str, float] = {}
     models: dict[str, Model] = {}
-    won: dict[str, float] = {}
     for k, group in enumerate(probes):
         name = group[0].form.name
         progress(f"fitting {name}", k / len(probes))
-        model, asked[name] = attempt(problem, base, group, both)
+        model, asked[name] = attempt(problem, start, group, both, thorough)
         if model is not None:
             models[name] = model
-            won[name] = 1.0 - cost(model.residual, model.z, prior_of(problem, model.forms), both) / before
+    won = {name: 1.0 - _cost(problem, model, both) / before for name, model in models.items()}
     limit = LEAST_SHARE * max(won.values(), default=0.0)
-    chosen = [n for n, v in sorted(won.items(), key=lambda i: -i[1])[:FITTED] if v > limit]
+    chosen = [n for n, v in sorted(won.items(), key=lambda i: -i[1])[:FITTED] if v > max(limit, 0.0)]
     return {name: fold_of(problem, models[name], layout) for name in chosen}, asked
+
+
+def _cost(problem: Problem, model: Model, mask: Mask) -> float:
+    return cost(model.residual, model.z, prior_of(problem, model.forms), mask)
 
 
 def _polish(problem: Problem, fold: Fold, layout: Layout) -> tuple[Model, Fold]:
@@ -281,7 +327,7 @@ def _without(
             continue
         smaller_fold = fold_of(problem, smaller, layout)
         lead = compare(smaller_fold.residual_rad, fold.residual_rad, both, rng)
-        if lead.z < 2.0 or _at_noise(smaller, layout):
+        if lead.z < 2.0 or _at_noise(problem, smaller, layout):
             return smaller, smaller_fold
     return model, fold
 
@@ -325,6 +371,13 @@ def _energy(fold: Fold, problem: Problem, layout: Layout) -> float:
     return float(np.mean((fold.residual_rad[kept] / problem.sigma[kept]) ** 2))
 
 
-def _at_noise(model: Model, layout: Layout) -> bool:
+def floor_of(problem: Problem, model: Model) -> float:
+    """Mean square that noise alone leaves of this model, over the floor of the plain drive; 1 at least."""
+    plain = float(np.mean(problem.sigma**2))
+    return max(1.0, problem.noise_rad(problem.joint(model.c, model.entries()), FLOORED) ** 2 / plain)
+
+
+def _at_noise(problem: Problem, model: Model, layout: Layout) -> bool:
     kept = layout.heldout | layout.training
-    return float(np.mean((model.residual[kept] * INFLATION) ** 2)) < NOISE
+    left = float(np.mean((model.residual[kept] * INFLATION) ** 2))
+    return left < NOISE or left < NOISE * floor_of(problem, model)

@@ -36,8 +36,6 @@ class Setting:
     nominal: Model
     calibrated: Model
     floor_rad: float
-    replicas: tuple[tuple[Prepared, ...], ...]
-    """The recordings as they might have been read as well, with other noise on their inputs."""
 
 
 def set_up(
@@ -65,18 +63,20 @@ def set_up(
         parts,
         np.concatenate([p.columns["joint_position_rad"] for p in parts]),
         np.concatenate([p.sigma_rad for p in parts]),
+        replicas,
+        _own_noise(config, parts),
     )
     guard = max(2, len(problem.measured) // 1000)
     layout = alternate_blocks(views.starts, problem.rows, views.values["load_direction"], guard)
     _start(problem)  # says it if the nominal joint cannot follow
-    floor = _floor(problem, replicas)
+    floor = problem.noise_rad(config)
     problem = replace(problem, sigma=problem.sigma * floor / float(np.sqrt(np.mean(problem.sigma**2))))
     nominal = _start(problem)
     mask = layout.heldout | layout.training
     calibrated = solve(problem, (), nominal.z, mask, iterations=20, renew=True)
     if calibrated is None:
         raise InputError(f"{config.name}: the joint cannot follow the recording with its nominal parameters")
-    return Setting(problem, views, layout, _around(recordings), nominal, calibrated, floor, replicas)
+    return Setting(problem, views, layout, _around(recordings), nominal, calibrated, floor)
 
 
 def _parameters(config: JointConfig) -> tuple[Parameter, ...]:
@@ -102,22 +102,11 @@ def _start(problem: Problem) -> Model:
     return Model((), z, (), residual, np.zeros((problem.rows, len(z))))
 
 
-def _floor(problem: Problem, replicas: Sequence[tuple[Prepared, ...]]) -> float:
-    """RMS that noise alone leaves: the joint encoder's own, and what noisy inputs do to the prediction
-    (friction rectifies noise, so this is simulated).
-    """
-    s = problem.config.sensors
-    own = [
-        _joint_sigma(s.joint_position_noise_rad, s.joint_position_resolution_rad, p) for p in problem.parts
-    ]
-    moved = []
-    base = problem.predict(problem.config)
-    for parts in replicas:
-        try:
-            moved.append(float(np.std(replace(problem, parts=parts).predict(problem.config) - base)))
-        except InputError:  # noise alone can ask for what an edge-of-slack joint cannot give
-            moved.append(0.0)
-    return float(np.sqrt(np.mean(np.square(own)) + np.mean(np.square(moved))))
+def _own_noise(config: JointConfig, parts: Sequence[Prepared]) -> float:
+    """RMS of the joint encoder's noise in the rows, rad."""
+    s = config.sensors
+    each = [_joint_sigma(s.joint_position_noise_rad, s.joint_position_resolution_rad, p) for p in parts]
+    return float(np.sqrt(np.average(np.square(each), weights=[p.rows for p in parts])))
 
 
 def _joint_sigma(noise: float | None, resolution: float | None, part: Prepared) -> float:

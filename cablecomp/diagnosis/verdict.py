@@ -12,11 +12,11 @@ from cablecomp.diagnosis.fitting import INFLATION, Model
 from cablecomp.diagnosis.hidden import grouped
 from cablecomp.diagnosis.judge import compare
 from cablecomp.diagnosis.locate import Location
-from cablecomp.diagnosis.selection import SURE, Selection, all_rows, confidence
+from cablecomp.diagnosis.selection import SURE, Selection, all_rows, confidence, floor_of
 from cablecomp.diagnosis.setting import Setting
 from cablecomp.identification.smoothing import FloatArray
 
-LEFT = 0.1  # share of the mismatch's energy beyond noise that a named effect may leave over
+LEFT = 0.03  # share of the mismatch's energy beyond noise that a named effect may leave over
 STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
 CERTAIN = 2.25  # mean square over the floor that is no noise, wherever it sits
 WEAK = 3.0  # sds below which a fitted amplitude is no finding
@@ -53,7 +53,8 @@ def weigh(
     start = energy(selection.baseline.residual_rad, setting)
     whole = float(np.mean((selection.model.residual * INFLATION) ** 2))
     end = min(energy(selection.final.residual_rad, setting), whole)
-    excess, left = max(start - 1.0, 0.0), max(end - 1.0, 0.0)
+    floor = floor_of(setting.problem, selection.model) if selection.model.forms else 1.0
+    excess, left = max(start - 1.0, 0.0), max(end / floor - 1.0, 0.0)
     accepted = [r for r in selection.rounds if r.accepted is not None]
     hiding = tuple(grouped(selection.hidden))
     if not final.effects:
@@ -68,8 +69,9 @@ def weigh(
             (),
         )
         sure = confidence(rivals)
-        main = form.amplitudes[0].name
-        if abs(values[main].value) < WEAK * values[main].sd:
+        if all(
+            abs(values[p.name].value) < WEAK * values[p.name].sd for p in (*form.amplitudes, *form.further)
+        ):
             continue
         if rivals:
             names = (entry.id, *(n.partition(":")[0] for n, _ in rivals))

@@ -121,7 +121,7 @@ CASES = (
         sizes=(0.0, 10.0),
     ),
     Case(
-        "gravity_or_inertia", ("gravity_load", "inertial_load"), _one_sine, shape=_up_high, sizes=(0.04, 0.12)
+        "gravity_or_inertia", ("gravity_load", "inertial_load"), _one_sine, shape=_up_high, sizes=(0.02, 0.05)
     ),
     Case(
         "thermal_or_relaxation",
