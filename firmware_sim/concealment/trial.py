@@ -21,7 +21,7 @@ from firmware_sim.plant.records import Floats
 
 RECORDINGS = 2
 PAUSE_S = 30.0  # between two recordings
-_ATTEMPTS = 20
+_ATTEMPTS = 80
 _TAUT = 0.02  # of T0, the least tension that a trial may come down to
 _SUSPECTS = {**by_id(CATALOGUE), **by_id(STRANGERS)}
 
