@@ -127,11 +127,13 @@ def without_load(level: str, effects: tuple[str, ...] = FOUND) -> tuple[PathFit,
 
 
 @cache
-def loads_left_out(effects: tuple[str, ...] = FOUND, law: bool = False) -> dict[str, FloatArray]:
-    """Every load left out once; with `law`, what the fit leaves of the other loads by motor angle is taken
+def loads_left_out(
+    effects: tuple[str, ...] = FOUND, law: bool = False, levels: str = LOADS
+) -> dict[str, FloatArray]:
+    """Every load of `levels` left out once; with `law`, what the fit leaves of the other loads by motor angle is taken
     off."""
     found: dict[str, FloatArray] = {}
-    for level in LOADS:
+    for level in levels:
         model, misfits = without_load(level, effects)
         if law:
             train = [n for n in fitted(straight()) if n[-1] != level]

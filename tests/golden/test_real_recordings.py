@@ -2,7 +2,8 @@
 fitted to.
 
 Set CABLECOMP_RECORDINGS to the folder of the recordings; without it these tests are skipped. `pytest -s`
-shows the figures; `python tests/golden/real_recordings.py` prints the README's tables, with baselines.
+shows the figures; `python tests/golden/real_recordings.py` prints the README's tables, with baselines. Left
+out here are the loads and bends at both ends, which are the hardest, and the middle ones; there, every one.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 TRAIN = ("L_4/11", "L_4/14", "L_4/10", "L_2/10", "L_2/12")
+LOADS, BENDS = "024", (0, 120, 240)
 JUDGE = ("L_4/12", "L_2/11", "L_2/13")
 
 
@@ -39,22 +41,22 @@ def test_each_effect_found_on_the_jaw_is_needed_on_recordings_left_out() -> None
         assert without > 1.05 * whole
 
 
-def test_a_load_left_out_is_predicted() -> None:
-    physics, law = jaw.loads_left_out(), jaw.loads_left_out(law=True)
-    for level in jaw.LOADS:
+def test_loads_left_out_are_predicted() -> None:
+    physics, law = jaw.loads_left_out(levels=LOADS), jaw.loads_left_out(law=True, levels=LOADS)
+    for level in LOADS:
         each = [degrees({n: m for n, m in parts.items() if n[-1] == level}) for parts in (physics, law)]
         print(
             f"\n  jaw, load {10 + 10 * int(level)} % left out: {each[0]:.3f}, with the law {each[1]:.3f}",
             end="",
         )
-    print(f"\n  jaw, every load left out once: effects alone {degrees(physics):.3f} deg, one zero per recording "
+    print(f"\n  jaw, these left out: effects alone {degrees(physics):.3f} deg, one zero per recording "
           f"{degrees(files.own_zero(physics)):.3f}; with the law of motor angle {degrees(law):.3f} deg")  # fmt: skip
     assert degrees(law) <= 0.30
     assert degrees(files.own_zero(physics)) <= 0.30
 
 
 def test_the_torques_of_both_ends_agree_with_one_path() -> None:
-    torque = max(jaw.without_load(level)[0].misfit[MOTOR] for level in jaw.LOADS)
+    torque = max(jaw.without_load(level, jaw.FOUND)[0].misfit[MOTOR] for level in LOADS)
     print(f"\n  jaw, motor torque left: {torque * 1e3:.2f} mNm of a loop of +-50 to 70 mNm")
     assert torque < 0.05 * 0.06
 
@@ -82,9 +84,9 @@ def test_one_sheath_drive_for_all_bends() -> None:
     assert degrees(found) <= 1.5
 
 
-def test_a_bend_left_out_is_predicted() -> None:
-    found = sheath.bends_left_out()
+def test_bends_left_out_are_predicted() -> None:
+    found = sheath.bends_left_out(BENDS)
     for bend, misfit in found.items():
         print(f"\n  sheath, {bend} deg left out: {degrees({bend: misfit}):.2f} deg", end="")
-    print(f"\n  sheath, every bend left out once: {degrees(found):.2f} deg")
+    print(f"\n  sheath, these left out: {degrees(found):.2f} deg")
     assert degrees(found) <= 2.5
