@@ -54,7 +54,7 @@ def _one_sine(rng: np.random.Generator, within: Range) -> Course:
     course = draw_course(rng, "moving", within)
     t = course.time_s - course.time_s[0]
     grown = 0.5 - 0.5 * np.cos(math.pi * np.minimum(t / (0.7 * t[-1]), 1.0))
-    joint = float(rng.uniform(0.25, 0.35)) * grown * np.sin(2.0 * math.pi * float(rng.uniform(0.6, 0.9)) * t)
+    joint = float(rng.uniform(0.25, 0.35)) * grown * np.sin(2.0 * math.pi * _SWING_HZ * t)
     load = within.load_Nm * (0.05 + 0.02 * np.sin(2.0 * math.pi * 0.04 * t))
     return replace(course, motor_rad=np.asarray(joint * within.motor_per_joint), load_Nm=np.asarray(load))
 
@@ -79,6 +79,7 @@ def _in_step(joint: DrawnJoint, courses: Sequence[Course]) -> tuple[Course, ...]
     )
 
 
+_SWING_HZ = 0.75  # one for all recordings: at two frequencies inertia shows
 _WARMING_K = 2.5
 _WARMING_S = 8.0
 
