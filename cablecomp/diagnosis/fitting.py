@@ -65,6 +65,11 @@ class Problem:
         """Measured minus predicted, over the noise with its memory: the weighted residual."""
         return (self.measured - self.predict(config)) / (self.sigma * INFLATION)
 
+    def rough(self) -> Problem:
+        """The same rows, each simulated in one step: quicker, and good enough to see what is worth a fit."""
+        parts = tuple(replace(p, inputs=p.means(), each=1) for p in self.parts)
+        return replace(self, parts=parts, replicas=())
+
     def moved(self, config: JointConfig, count: int | None = None) -> FloatArray:
         """How noise on the inputs moves a prediction (rad), one row for each replica that can be followed."""
         base = self.predict(config)
@@ -122,6 +127,12 @@ def evaluate(problem: Problem, forms: Sequence[Form], z: FloatArray) -> FloatArr
     except InputError:
         return None
     return found if np.all(np.isfinite(found)) else None
+
+
+def seen_by(problem: Problem, model: Model) -> Model | None:
+    """The model with its residual as this problem simulates it; None where the joint cannot follow."""
+    found = evaluate(problem, model.forms, model.z)
+    return None if found is None else replace(model, residual=found)
 
 
 def split(

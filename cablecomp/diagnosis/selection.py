@@ -19,6 +19,7 @@ from cablecomp.diagnosis.fitting import (
     evaluate,
     prior_of,
     refit,
+    seen_by,
     solve,
 )
 from cablecomp.diagnosis.forms import Form, FreedForm, freed, has_instant
@@ -100,6 +101,7 @@ def select(
     after each step.
     """
     both = all_rows(layout)
+    rough = problem.rough()
     baseline = fold_of(problem, base, layout)
     current, current_fold = base, baseline
     rounds: list[Round] = []
@@ -107,12 +109,18 @@ def select(
     for number in range(EFFECTS):
         left = [g for g in groups if g[0].name not in {f.name for f in current.forms}]
         start = _start(problem, current, layout)
-        probes = probe_all(problem, start, left, progress)
+        start = seen_by(rough, start) or start
+        probes = probe_all(rough, start, left, progress)
         first_probes = first_probes or probes
         thorough = _worth(problem, current, layout, number)
-        folds, asked = _fit_folds(problem, current, start, probes, layout, thorough, progress)
+        models, asked = _fit_roughly(rough, start, probes, layout, thorough, progress)
+        folds = {
+            name: fold_of(problem, model, layout)
+            for name, rough_one in models.items()
+            if (model := seen_by(problem, rough_one)) is not None
+        }
         verdict = _judged(current_fold, folds, both, rng)
-        models: dict[str, Model] = {}
+        models = {}
         for score in _front_runners(verdict):
             progress(f"fitting {score.name} with its shapes free", 0.9)
             models[score.name], folds[score.name] = _polish(problem, folds[score.name], layout)
@@ -213,18 +221,17 @@ def _nominal(problem: Problem, model: Model) -> FloatArray:
     return z
 
 
-def _fit_folds(
+def _fit_roughly(
     problem: Problem,
-    base: Model,
     start: Model,
     probes: Sequence[Sequence[Probe]],
     layout: Layout,
     thorough: bool,
     progress: Progress,
-) -> tuple[dict[str, Fold], dict[str, float]]:
-    """Fit every hypothesis to all rows, and the most promising ones to either half."""
+) -> tuple[dict[str, Model], dict[str, float]]:
+    """Fit every hypothesis to all rows; returns the most promising ones, and what was promised of each."""
     both = layout.heldout | layout.training
-    before = _cost(problem, base, both)
+    before = _cost(problem, start, both)
     asked: dict[str, float] = {}
     models: dict[str, Model] = {}
     for k, group in enumerate(probes):
@@ -236,7 +243,7 @@ def _fit_folds(
     won = {name: 1.0 - _cost(problem, model, both) / before for name, model in models.items()}
     limit = LEAST_SHARE * max(won.values(), default=0.0)
     chosen = [n for n, v in sorted(won.items(), key=lambda i: -i[1])[:FITTED] if v > max(limit, 0.0)]
-    return {name: fold_of(problem, models[name], layout) for name in chosen}, asked
+    return {name: models[name] for name in chosen}, asked
 
 
 def _cost(problem: Problem, model: Model, mask: Mask) -> float:

@@ -33,6 +33,10 @@ class Prepared:
     inputs: dict[str, FloatArray]
     each: int = 1
 
+    def means(self) -> dict[str, FloatArray]:
+        """The inputs in means of a row."""
+        return {k: group_means(v, self.each) for k, v in self.inputs.items()}
+
     @property
     def rows(self) -> int:
         """Rows that count."""
