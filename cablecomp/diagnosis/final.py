@@ -36,6 +36,8 @@ class Final:
     model: Model
     calibration: Mapping[str, Value]
     effects: tuple[tuple[Form, EffectEntry, Mapping[str, Value]], ...]
+    strength: tuple[float, ...]
+    """Of each effect: its amplitudes together, in standard deviations (root of Wald's statistic)."""
     residual_rad: FloatArray
     at_bound: tuple[str, ...]
 
@@ -56,10 +58,12 @@ def finish(problem: Problem, model: Model, layout: Layout) -> Final:
         p.name: Value(p.value(float(v)), abs(p.slope(float(v))) * float(np.sqrt(covariance[k, k])))
         for k, (p, v) in enumerate(zip(problem.parameters, found.c, strict=True))
     }
-    effects = []
+    effects, strength = [], []
     for form, x in zip(forms, found.x, strict=True):
         own = covariance[n : n + form.size, n : n + form.size]
         effects.append((form, form.entry(list(x)), _values(form, x, own)))
+        size = form.size - len(form.shapes)
+        strength.append(float(np.sqrt(x[:size] @ np.linalg.pinv(own[:size, :size], rcond=1e-10) @ x[:size])))
         n += form.size
     config = problem.joint(found.c, found.entries())
     edge = tuple(
@@ -67,7 +71,8 @@ def finish(problem: Problem, model: Model, layout: Layout) -> Final:
         for p, v in zip(problem.parameters, found.c, strict=True)
         if min(float(v) - p.low, p.high - float(v)) < 1e-3 * (p.high - p.low)
     )
-    return Final(config, found, calibration, tuple(effects), found.residual * problem.sigma * INFLATION, edge)
+    left = found.residual * problem.sigma * INFLATION
+    return Final(config, found, calibration, tuple(effects), tuple(strength), left, edge)
 
 
 def sandwich(problem: Problem, model: Model, layout: Layout, moved: FloatArray) -> FloatArray:

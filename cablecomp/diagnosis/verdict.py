@@ -16,7 +16,7 @@ from cablecomp.diagnosis.selection import SURE, Selection, all_rows, confidence,
 from cablecomp.diagnosis.setting import Setting
 from cablecomp.identification.smoothing import FloatArray
 
-LEFT = 0.03  # share of the mismatch's energy beyond noise that a named effect may leave over
+LEFT = 0.01  # share of the mismatch's energy beyond noise that a named effect may leave over
 STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
 CERTAIN = 2.25  # mean square over the floor that is no noise, wherever it sits
 WEAK = 3.0  # sds below which a fitted amplitude is no finding
@@ -63,22 +63,20 @@ def weigh(
             return Findings("unexplained", (), (), excess, excess)
         return Findings(_plain(setting, selection, rng), (), hiding, excess, excess)
     tied, named = [], []
-    for k, (form, entry, values) in enumerate(final.effects):
+    for k, (form, entry, _) in enumerate(final.effects):
         rivals: Sequence[tuple[str, float]] = next(
             (r.rivals for r in accepted if r.accepted is not None and r.accepted.name == form.name),
             (),
         )
         sure = confidence(rivals)
-        if all(
-            abs(values[p.name].value) < WEAK * values[p.name].sd for p in (*form.amplitudes, *form.further)
-        ):
+        if final.strength[k] < WEAK:
             continue
         if rivals:
             names = (entry.id, *(n.partition(":")[0] for n, _ in rivals))
             tied.append((tuple(dict.fromkeys(names)), _reason(rivals)))
         else:
             named.append((k, sure))
-    leftover = left > max(LEFT * excess, 0.6)
+    leftover = left > max(LEFT * excess, 1.0)
     if leftover:
         return Findings("unexplained", (), tuple(tied), excess, left)
     if not named and not tied:

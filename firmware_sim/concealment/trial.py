@@ -93,7 +93,8 @@ def _draw_confounded(rng: np.random.Generator, wanted: Assignment, case: Case) -
     assert case.shape is not None
     shape = case.shape(rng, scene, true)
     if case.sizes[1] > 1.0:
-        sized: Sized | None = _as_drawn(scene, true, shape, plain_run)
+        drawn = _as_drawn(scene, true, shape, plain_run)
+        sized = drawn if drawn.size >= SMALLEST else None
     else:
         sized = give_size(scene, true, shape, log_uniform(rng, *case.sizes), plain_run)
     if sized is None:
