@@ -45,7 +45,7 @@ FLOORED = 6  # replicas by which the floor of a model is found
 UNLIKELY = 2.0  # prior standard deviations
 CAREFULLY = 30  # steps of a careful fit
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
-SURE = 3.0  # standard errors of lead beyond which a rival is refuted
+SURE = 2.33  # standard errors of lead beyond which a rival is refuted: one in a hundred
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ def weigh(
 
 def _reason(rivals: Sequence[tuple[str, float]]) -> str:
     leads = ", ".join(f"{name} by {z:.1f} standard errors" for name, z in rivals)
-    return f"predictions on held-out data coincide: the best one leads {leads}; {SURE:.0f} are asked for"
+    return f"predictions on held-out data coincide: the best one leads {leads}; {SURE:.1f} are asked for"
 
 
 def _plain(setting: Setting, selection: Selection, rng: np.random.Generator) -> str:
