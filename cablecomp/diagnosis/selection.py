@@ -44,6 +44,7 @@ WORTH = (2.0, 4.0)  # mean square over the floor for that, in the first round an
 FLOORED = 6  # replicas by which the floor of a model is found
 UNLIKELY = 2.0  # prior standard deviations
 CAREFULLY = 30  # steps of a careful fit
+WEAK = 2.0  # sds below which a fitted amplitude is no finding
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
 SURE = 2.33  # standard errors of lead beyond which a rival is refuted: one in a hundred
 
@@ -123,7 +124,9 @@ def select(
         models = {}
         for score in _front_runners(verdict):
             progress(f"fitting {score.name} with its shapes free", 0.9)
-            models[score.name], folds[score.name] = _polish(problem, folds[score.name], layout)
+            whole, fold = _polish(problem, folds[score.name], layout)
+            if _amplitude(problem, whole, layout) > WEAK:  # else its shape alone explains, not the effect
+                models[score.name], folds[score.name] = whole, fold
         if models:
             verdict = _judged(current_fold, folds, both, rng)
         present = _energy(current_fold, problem, layout)
@@ -293,6 +296,19 @@ def _instants_found(problem: Problem, forms: Sequence[Form], z: FloatArray, mask
     return z
 
 
+def _amplitude(problem: Problem, model: Model, layout: Layout) -> float:
+    """Amplitudes of the last effect together, in standard deviations of the fit."""
+    mask = layout.heldout | layout.training
+    form, x = model.forms[-1], model.x[-1]
+    A = model.J[mask].T @ model.J[mask] + np.diag(prior_of(problem, model.forms))
+    scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    covariance = np.linalg.pinv(A / np.outer(scale, scale), rcond=1e-11) / np.outer(scale, scale)
+    first = len(model.z) - form.size
+    size = form.size - (len(form.shapes) if isinstance(form, FreedForm) else 0)
+    own = covariance[first : first + size, first : first + size]
+    return float(np.sqrt(x[:size] @ np.linalg.pinv(own, rcond=1e-10) @ x[:size]))
+
+
 def _placed(problem: Problem, model: Model) -> tuple[tuple[Form, ...], FloatArray, FloatArray]:
     """The model's forms, coordinates and sensitivities, with the instants of its events taken as known."""
     forms: list[Form] = []
@@ -355,13 +371,17 @@ def _rivals(
     """
     unit = problem.sigma * INFLATION
     found = []
+    own = np.sqrt(floor_of(problem, models[best.name]))
     for score in verdict.scores:
         if score.name == best.name or not score.supported:
             continue
-        z = float(compare(folds[score.name].residual_rad, folds[best.name].residual_rad, both, rng).z)
+        # each in its own noise: a model that differentiates noise is not refuted by it
+        rival = np.sqrt(floor_of(problem, models[score.name])) if score.name in models else 1.0
+        first, second = folds[score.name].residual_rad / rival, folds[best.name].residual_rad / own
+        z = float(compare(first, second, both, rng).z)
         if score.name in models:
-            whole = compare(models[score.name].residual * unit, models[best.name].residual * unit, both, rng)
-            z = max(z, float(whole.z))
+            first, second = models[score.name].residual / rival, models[best.name].residual / own
+            z = max(z, float(compare(first * unit, second * unit, both, rng).z))
         if z < SURE:
             found.append((score.name, z))
     return tuple(found)

@@ -117,7 +117,7 @@ CASES = (
         "compliance_or_stiffness",
         ("series_compliance", "EA_N"),
         _slow_small_load,
-        geometry_friction=(3.0, 10.0),
+        geometry_friction=(0.4, 2.0),
         shape=_within_tolerance,
         sizes=(0.0, 10.0),
     ),
