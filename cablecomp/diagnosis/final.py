@@ -12,7 +12,7 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.blocks import Layout
 from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of, sensitivities, solve
 from cablecomp.diagnosis.forms import PHASE, Form
-from cablecomp.diagnosis.selection import free_shapes
+from cablecomp.diagnosis.hypotheses import free_shapes
 from cablecomp.identification.smoothing import FloatArray
 
 SMALL_SAMPLE = 1.15  # what a sandwich of some twenty blocks underestimates

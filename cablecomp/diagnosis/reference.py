@@ -10,9 +10,10 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.fitting import INFLATION, Problem, solve
 from cablecomp.diagnosis.forms import PHASE
+from cablecomp.diagnosis.hypotheses import Fold, all_rows, fold_of
 from cablecomp.diagnosis.judge import judge
 from cablecomp.diagnosis.sealed import Truth
-from cablecomp.diagnosis.selection import LEVEL, Fold, all_rows, fold_of
+from cablecomp.diagnosis.selection import LEVEL
 from cablecomp.diagnosis.setting import Setting, set_up
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError

@@ -10,9 +10,10 @@ import numpy as np
 from cablecomp.diagnosis.final import Final
 from cablecomp.diagnosis.fitting import INFLATION, Model
 from cablecomp.diagnosis.hidden import grouped
+from cablecomp.diagnosis.hypotheses import all_rows, floor_of
 from cablecomp.diagnosis.judge import compare
 from cablecomp.diagnosis.locate import Location
-from cablecomp.diagnosis.selection import SURE, Selection, all_rows, confidence, floor_of
+from cablecomp.diagnosis.selection import SURE, Selection, confidence
 from cablecomp.diagnosis.setting import Setting
 from cablecomp.identification.smoothing import FloatArray
 
