@@ -31,7 +31,8 @@ CAREFUL = 3  # hypotheses that are then fitted with their shapes free
 CLOSE = 0.5  # of the best one's gain, below which a hypothesis is not fitted carefully
 FAR = 10.0  # times what the best one leaves, beyond which a hypothesis is not either
 LEVEL = 0.01  # of a false support, all hypotheses together
-# of the floor's mean square that an effect must remove as well: instants are searched over all rows
+# of the floor's mean square that an effect must remove as well (instants are searched over all rows), and
+# only from where there is more than the floor
 LEAST = 0.08
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
@@ -116,7 +117,7 @@ def select(
             (
                 s
                 for s in verdict.scores
-                if s.supported and s.name in models and s.heldout_gain * present > LEAST
+                if s.supported and s.name in models and s.heldout_gain * present > LEAST and present > 1.0
             ),
             None,
         )
