@@ -64,10 +64,16 @@ def weigh(
             return Findings("unexplained", (), (), excess, excess)
         return Findings(_plain(setting, selection, rng), (), hiding, excess, excess)
     tied, named = [], []
+    joined = {form.name for form, _, _ in final.effects}
     for k, (form, entry, _) in enumerate(final.effects):
+        # a rival that has joined the model is none
         rivals: Sequence[tuple[str, float]] = next(
-            (r.rivals for r in accepted if r.accepted is not None and r.accepted.name == form.name),
-            (),
+            (
+                [rival for rival in r.rivals if rival[0] not in joined]
+                for r in accepted
+                if r.accepted is not None and r.accepted.name == form.name
+            ),
+            [],
         )
         sure = confidence(rivals)
         if final.strength[k] < WEAK:
