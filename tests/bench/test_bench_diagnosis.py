@@ -57,4 +57,4 @@ def test_diagnosis_of_100_000_samples(benchmark: BenchmarkFixture, what: str) ->
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     names = [found.final.effects[k][1].id for k, _ in found.findings.named]
     print(f"\n  {what}: {found.findings.verdict} {names}, peak memory of the process {peak:.2f} GB")
-    assert names == (["routing_friction"] if what == "routing friction" else [])
+    assert names[:1] == (["routing_friction"] if what == "routing friction" else [])
