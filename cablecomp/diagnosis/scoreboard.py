@@ -235,7 +235,8 @@ def as_json(board: Scoreboard) -> dict[str, Any]:
         ],
         "rows": [asdict(r) | {"outcome": r.outcome} for r in board.rows],
     }
-    return _finite(result)  # type: ignore[no-any-return]
+    finite: dict[str, Any] = _finite(result)
+    return finite
 
 
 def _finite(value: Any) -> Any:

@@ -20,8 +20,9 @@ from cablecomp.report.page import Fact, Section
 def scoreboard_table(board: Scoreboard) -> Table:
     """What was reached against what is to be reached, for the terminal."""
     table = Table(title=f"{len(board.rows)} blind trials, seed {board.seed}", title_justify="left")
-    for name, side in (("what", "left"), ("reached", "right"), ("to reach", "right"), ("of", "right")):
-        table.add_column(name, justify=side)  # type: ignore[arg-type]
+    table.add_column("what")
+    for name in ("reached", "to reach", "of"):
+        table.add_column(name, justify="right")
     for t in board.targets:
         colour = {True: "green", False: "red", None: "dim"}[t.ok]
         table.add_row(t.what, f"[{colour}]{_reached(t)}[/]", _asked(t), str(t.of))
