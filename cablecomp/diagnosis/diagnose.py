@@ -154,9 +154,7 @@ def _experiment(
         return best_experiment(models, setting.covariates, setting.floor_rad, setting.around.temperature_degC)
     models = [final.config]
     for round_ in selection.rounds:
-        for name, _ in round_.rivals:
-            half = round_.folds[name].models[0]
-            models.append(problem.joint(half.c, half.entries()))
+        models += [problem.joint(r.model.c, r.model.entries()) for r in round_.rivals]
     return best_experiment(models, setting.covariates, setting.floor_rad, setting.around.temperature_degC)
 
 

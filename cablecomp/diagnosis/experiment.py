@@ -51,46 +51,53 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
     travel = max(high - low, 0.02)
     middle, rate = 0.5 * (low + high), load / 4.0
     start = {"start_position_rad": middle}
+    # every swing comes several times: what is judged on held-out blocks must stand in many of them
+    swings = (load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load)
+    nested = NestedReversals(peaks=(*swings * 3, load), rate=rate)
+    step = (
+        Ramp(duration_s=0.5, load_Nm=load),
+        Hold(duration_s=12.0),
+        Ramp(duration_s=0.5, load_Nm=0.0),
+        Hold(duration_s=12.0),
+        Ramp(duration_s=8.0, load_Nm=-load),
+        Hold(duration_s=8.0),
+    )
+    sweeps = tuple(
+        AngleSweep(
+            from_rad=low + 0.05 * travel,
+            to_rad=high - 0.05 * travel,
+            speed_rad_s=travel / 3.0,
+            load_Nm=v,
+            load_rate_Nm_s=rate,
+            cycles=2,
+        )
+        for v in (0.0, 0.8 * load, -0.8 * load)
+    )
     return [
-        Protocol(name="ramp and hold", segment=(
-            Ramp(duration_s=0.5, load_Nm=load), Hold(duration_s=15.0), Ramp(duration_s=0.5, load_Nm=0.0),
-            Hold(duration_s=15.0), Ramp(duration_s=8.0, load_Nm=-load), Hold(duration_s=10.0),
-            Unload(rate_Nm_s=rate),
-        ), **start),
+        Protocol(name="ramp and hold", segment=(*step, *step, Unload(rate_Nm_s=rate)), **start),
         Protocol(name="rate pair", segment=(
-            RatePair(amplitude=load, rates=(load / 10.0, load * 2.0), dwell_s=2.0),
+            *(RatePair(amplitude=load, rates=(load / 8.0, load * 2.0), dwell_s=2.0) for _ in range(2)),
         ), **start),
-        Protocol(name="nested reversals", segment=(
-            NestedReversals(
-                peaks=(load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load, load), rate=rate
-            ),
-        ), **start),
+        Protocol(name="nested reversals", segment=(nested,), **start),
         Protocol(name="nested reversals at two places", segment=(
-            NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
-            Ramp(duration_s=4.0, position_rad=low + 0.1 * travel),
-            NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
-            Ramp(duration_s=4.0, position_rad=high - 0.1 * travel),
-            NestedReversals(peaks=(load, -load, 0.5 * load, -0.5 * load), rate=rate),
+            nested, Ramp(duration_s=4.0, position_rad=low + 0.1 * travel),
+            nested, Ramp(duration_s=4.0, position_rad=high - 0.1 * travel), nested,
         ), **start),
-        Protocol(name="angle sweeps under three loads", segment=tuple(
-            AngleSweep(
-                from_rad=low + 0.05 * travel, to_rad=high - 0.05 * travel, speed_rad_s=travel / 3.0,
-                load_Nm=v, load_rate_Nm_s=rate, cycles=2,
-            )
-            for v in (0.0, 0.8 * load, -0.8 * load)
-        ), **start),
+        Protocol(name="angle sweeps under three loads", segment=(*sweeps, *sweeps), **start),
         Protocol(name="small and large swings through zero", segment=(
             NestedReversals(
-                peaks=(0.05 * load, -0.05 * load, 0.1 * load, -0.1 * load, load, -load),
+                peaks=(0.05 * load, -0.05 * load, 0.1 * load, -0.1 * load, load, -load) * 3,
                 rate=rate, dwell_s=1.0,
             ),
         ), **start),
         Protocol(name="fast motion, load at rest", segment=(
-            SineSweep(channel="position", amplitude=0.4 * travel, from_Hz=0.2, to_Hz=2.0, duration_s=20.0),
+            *(SineSweep(
+                channel="position", amplitude=share * travel, from_Hz=0.2, to_Hz=2.0, duration_s=20.0,
+            ) for share in (0.4, 0.2)),
         ), **start),
         Protocol(name="wait for the temperature", segment=(
             Ramp(duration_s=4.0, load_Nm=0.8 * load), Wait(duration_s=30.0, why="let the temperature change"),
-            NestedReversals(peaks=(load, -load), rate=rate),
+            NestedReversals(peaks=(load, -load) * 3, rate=rate),
         ), **start),
     ]  # fmt: skip
 

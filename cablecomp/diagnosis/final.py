@@ -7,15 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import t as student
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.blocks import Layout
 from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of, sensitivities, solve
 from cablecomp.diagnosis.forms import PHASE, Form
 from cablecomp.diagnosis.hypotheses import free_shapes
+from cablecomp.diagnosis.valley import TWO_SIDED, walked
 from cablecomp.identification.smoothing import FloatArray
 
-SMALL_SAMPLE = 1.15  # what a sandwich of some twenty blocks underestimates
+LEVERAGE = 0.8  # of one block, beyond which its say in the fit is not counted out further
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def finish(problem: Problem, model: Model, layout: Layout) -> Final:
     J = sensitivities(problem, forms, found.z, found.residual)
     found = replace(found, J=J)
     moved = problem.moved(problem.joint(found.c, found.entries())) / (problem.sigma * INFLATION)
-    covariance = sandwich(problem, found, layout, moved)
+    covariance = walked(problem, found, mask, sandwich(problem, found, layout, moved))
     n = len(problem.parameters)
     calibration = {
         p.name: Value(p.value(float(v)), abs(p.slope(float(v))) * float(np.sqrt(covariance[k, k])))
@@ -79,25 +81,44 @@ def sandwich(problem: Problem, model: Model, layout: Layout, moved: FloatArray) 
     """Covariance of z: curvature of the cost, with the scatter of its gradient.
 
     The larger one counts for each coordinate: the scatter between blocks (dependence inside blocks kept), or
-    what white noise and noise on the inputs (`moved`, its bias included) do to the gradient.
+    what white noise and noise on the inputs (`moved`, its bias included) do to the gradient. It is large enough
+    for 1.96 sd to be a 95 % interval, few as the blocks are.
     """
     mask = layout.heldout | layout.training
     prior = prior_of(problem, model.forms)
     J, r = model.J[mask], model.residual[mask]
     A = J.T @ J + np.diag(prior)
-    scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
-    inverse = np.linalg.pinv(A / np.outer(scale, scale), rcond=1e-11) / np.outer(scale, scale)
+    root = _root(A)
     block = layout.block[mask]
-    scores = np.stack([J[block == b].T @ r[block == b] for b in np.unique(block)])
+    scores = np.stack([_score(J[block == b], r[block == b], root) for b in np.unique(block)])
     scores -= scores.mean(axis=0)
-    count = len(scores)
-    meat = scores.T @ scores * count / max(1, count - 1) + np.diag(prior)
+    known = root.T @ (prior[:, None] * root)
+    scatter = scores.T @ scores * len(scores) / max(1, len(scores) - 1) + known
     pushes = moved[:, mask] @ J
     white = J.T @ J / INFLATION**2 + pushes.T @ pushes / max(1, len(pushes)) + np.diag(prior)
-    by_block, by_noise = inverse @ meat @ inverse, inverse @ white @ inverse
+    by_block, by_noise = root @ scatter @ root.T, root @ (root.T @ white @ root) @ root.T
     grow = np.sqrt(np.maximum(np.diag(by_noise) / np.maximum(np.diag(by_block), 1e-300), 1.0))
-    covariance: FloatArray = by_block * np.outer(grow, grow) * SMALL_SAMPLE**2
+    few = float(student.ppf(0.975, max(1, len(scores) - 1))) / TWO_SIDED
+    covariance: FloatArray = by_block * np.outer(grow, grow) * few**2
     return covariance
+
+
+def _root(A: FloatArray) -> FloatArray:
+    """R with R'A R = 1, so that R R' is the (pseudo-)inverse of A."""
+    scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    values, vectors = np.linalg.eigh(A / np.outer(scale, scale))
+    kept = values > 1e-11 * values[-1]
+    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / scale[:, None])
+
+
+def _score(J: FloatArray, r: FloatArray, root: FloatArray) -> FloatArray:
+    """Gradient of one block in coordinates in which the curvature is 1, as it would be had the block not been
+    fitted: (1 - H)^-1 R'J'r, H = R'J'J R (jackknife; MacKinnon and White, J. Econometrics 29, 1985).
+    """
+    W = J @ root
+    values, vectors = np.linalg.eigh(W.T @ W)
+    out = 1.0 / (1.0 - np.minimum(values, LEVERAGE))
+    return np.asarray(vectors @ (out * (vectors.T @ (W.T @ r))))
 
 
 def _values(form: Form, x: FloatArray, covariance: FloatArray) -> dict[str, Value]:

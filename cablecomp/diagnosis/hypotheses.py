@@ -22,6 +22,7 @@ from cablecomp.diagnosis.fitting import (
 )
 from cablecomp.diagnosis.forms import Form, FreedForm, freed, has_instant
 from cablecomp.diagnosis.screening import Probe, Progress, attempt
+from cablecomp.diagnosis.starts import CAREFULLY, deepest
 from cablecomp.identification.smoothing import FloatArray
 
 FITTED = 7  # hypotheses that are fitted in each round, of all that were asked
@@ -31,7 +32,6 @@ REACH = 4  # such steps either way that an event is looked for
 WORTH = (2.0, 4.0)  # mean square over the floor for that, in the first round and later
 FLOORED = 6  # replicas by which the floor of a model is found
 UNLIKELY = 2.0  # prior standard deviations
-CAREFULLY = 30  # steps of a careful fit
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
 
 
@@ -140,6 +140,7 @@ def polish(problem: Problem, fold: Fold, layout: Layout) -> tuple[Model, Fold]:
     forms, z = free_shapes(start)
     z = _instants_found(problem, forms, z, both)
     whole = solve(problem, forms, z, both, iterations=CAREFULLY, renew=True) or start
+    whole = deepest(problem, whole, both)
     halves = []
     for mask in (layout.training, layout.heldout):
         forms, z, J = _placed(problem, whole)

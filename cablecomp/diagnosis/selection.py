@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from math import erf, sqrt
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cablecomp.diagnosis.blocks import Layout
-from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, seen_by, solve
+from cablecomp.diagnosis.fitting import Model, Problem, seen_by, solve
 from cablecomp.diagnosis.forms import Form
 from cablecomp.diagnosis.hidden import Hidden, hidden_effects
 from cablecomp.diagnosis.hypotheses import (
@@ -25,6 +24,7 @@ from cablecomp.diagnosis.hypotheses import (
     worth_a_search,
 )
 from cablecomp.diagnosis.judge import Score, Verdict, compare, judge
+from cablecomp.diagnosis.rivals import Round, rivals_of, settle
 from cablecomp.diagnosis.screening import Probe, Progress, probe_all
 
 CAREFUL = 3  # hypotheses that are then fitted with their shapes free
@@ -37,22 +37,7 @@ LEAST = 0.08
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
 WEAK = 2.0  # sds below which a fitted amplitude is no finding
-UNRIVALLED = 0.93  # share of names without a rival that were true: 86 of 92 in the blind trials of the README
-SURE = 2.33  # standard errors of lead beyond which a rival is refuted: one in a hundred
-
-
-@dataclass(frozen=True)
-class Round:
-    """One step of the selection: what was asked, what was fitted, the judgement against the model before."""
-
-    base: str
-    verdict: Verdict
-    asked: Mapping[str, float]
-    """Linear drop in cost of every hypothesis, as a share of the residual's energy."""
-    folds: Mapping[str, Fold]
-    accepted: Score | None = None
-    rivals: tuple[tuple[str, float], ...] = ()
-    """Hypotheses that the data do not set apart from the best: name and z of the best one's lead."""
+REST = 1 / 3  # of what is left beyond noise, that the last effect of several may leave over
 
 
 @dataclass(frozen=True)
@@ -89,6 +74,7 @@ def select(
     current, current_fold = base, baseline
     rounds: list[Round] = []
     first_probes: list[list[Probe]] = []
+    reached: list[tuple[Model, Fold, int]] = []
     for number in range(EFFECTS):
         left = [g for g in groups if g[0].name not in {f.name for f in current.forms}]
         start = start_of(problem, current, layout)
@@ -122,15 +108,21 @@ def select(
             ),
             None,
         )
-        rivals = () if best is None else _rivals(best, verdict, folds, models, problem, both, rng)
+        rivals = () if best is None else rivals_of(best, verdict, folds, models, problem, both, rng)
         rounds.append(Round(current.name, verdict, asked, folds, best, rivals))
         if best is None:
             break
         current, current_fold = models[best.name], folds[best.name]
         if number > 0:
             current, current_fold = _without(problem, current, current_fold, layout, rng)
+        reached.append((current, current_fold, len(rounds)))
         if at_noise(problem, current, layout):
             break
+    if reached:
+        current, current_fold, count = _worth_their_place(problem, reached, layout)
+        kept = [r if k < count else replace(r, accepted=None, rivals=()) for k, r in enumerate(rounds)]
+        current, current_fold, settled = settle(problem, current, current_fold, kept, layout, rng)
+        rounds = list(settled)
     hidden = tuple(hidden_effects(problem, base, first_probes, layout))
     return Selection(baseline, current_fold, current, base, tuple(rounds), layout, first_probes, hidden)
 
@@ -178,44 +170,17 @@ def _without(
     return model, fold
 
 
-def _rivals(
-    best: Score,
-    verdict: Verdict,
-    folds: Mapping[str, Fold],
-    models: Mapping[str, Model],
-    problem: Problem,
-    both: Layout,
-    rng: np.random.Generator,
-) -> tuple[tuple[str, float], ...]:
-    """Supported hypotheses over which the best one's lead is not beyond doubt.
+def _worth_their_place(
+    problem: Problem, reached: Sequence[tuple[Model, Fold, int]], layout: Layout
+) -> tuple[Model, Fold, int]:
+    """The model after the last round that left a third or less of what was left beyond noise; that round's
+    number.
 
-    Neither on held-out rows nor with all rows fitted; the second comparison is for events: one that falls
-    into a held-out block cannot be placed by the other half.
+    What is left by a law that is nearly right is nobody's, but one of many effects always fits a part of it.
     """
-    unit = problem.sigma * INFLATION
-    found = []
-    own = np.sqrt(floor_of(problem, models[best.name]))
-    for score in verdict.scores:
-        if score.name == best.name or not score.supported:
-            continue
-        # each in its own noise: a model that differentiates noise is not refuted by it
-        rival = np.sqrt(floor_of(problem, models[score.name])) if score.name in models else 1.0
-        first, second = folds[score.name].residual_rad / rival, folds[best.name].residual_rad / own
-        z = float(compare(first, second, both, rng).z)
-        if score.name in models:
-            first, second = models[score.name].residual / rival, models[best.name].residual / own
-            z = max(z, float(compare(first * unit, second * unit, both, rng).z))
-        if z < SURE:
-            found.append((score.name, z))
-    return tuple(found)
-
-
-def confidence(rivals: Sequence[tuple[str, float]]) -> float:
-    """Probability that the name is right: by the normal law of the leads over rivals; without any, the share of
-    such names that were true in blind trials.
-    """
-    doubt = sum(0.5 * (1.0 - erf(z / sqrt(2.0))) for _, z in rivals)
-    return 1.0 / (1.0 + 2.0 * doubt) if rivals else UNRIVALLED
+    left = [max(_energy(fold, problem, layout) - floor_of(problem, m), 0.0) for m, fold, _ in reached]
+    last = next((k for k in range(len(left) - 1, 0, -1) if left[k] <= REST * left[k - 1]), 0)
+    return reached[last]
 
 
 def _energy(fold: Fold, problem: Problem, layout: Layout) -> float:

@@ -13,6 +13,7 @@ from cablecomp.diagnosis.covariates import Covariates, covariates, join
 from cablecomp.diagnosis.fitting import Model, Problem, evaluate, solve
 from cablecomp.diagnosis.forms import Surroundings
 from cablecomp.diagnosis.replicas import MEASURED, observe, shaken, steps_for
+from cablecomp.diagnosis.starts import CAREFULLY, deepest
 from cablecomp.errors import InputError
 from cablecomp.identification.misfit import Prepared
 from cablecomp.identification.noise import channel_noise
@@ -73,9 +74,10 @@ def set_up(
     problem = replace(problem, sigma=problem.sigma * floor / float(np.sqrt(np.mean(problem.sigma**2))))
     nominal = _start(problem)
     mask = layout.heldout | layout.training
-    calibrated = solve(problem, (), nominal.z, mask, iterations=20, renew=True)
+    calibrated = solve(problem, (), nominal.z, mask, iterations=CAREFULLY, renew=True)
     if calibrated is None:
         raise InputError(f"{config.name}: the joint cannot follow the recording with its nominal parameters")
+    calibrated = deepest(problem, calibrated, mask)
     return Setting(problem, views, layout, _around(recordings), nominal, calibrated, floor)
 
 

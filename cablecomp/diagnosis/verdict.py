@@ -13,13 +13,18 @@ from cablecomp.diagnosis.hidden import grouped
 from cablecomp.diagnosis.hypotheses import all_rows, floor_of
 from cablecomp.diagnosis.judge import compare
 from cablecomp.diagnosis.locate import Location
-from cablecomp.diagnosis.selection import SURE, Selection, confidence
+from cablecomp.diagnosis.rivals import SURE, Rival
+from cablecomp.diagnosis.selection import Selection
 from cablecomp.diagnosis.setting import Setting
 from cablecomp.identification.smoothing import FloatArray
 
 LEFT = 0.01  # share of the mismatch's energy beyond noise that a named effect may leave over
 STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
 CERTAIN = 2.25  # mean square over the floor that is no noise, wherever it sits
+QUIET = 0.4  # mean square over the floor, less 1, up to which nothing is left
+# share of names without a rival that were true in blind trials other than those of the README: where nothing
+# was left, and where something was
+CONFIDENCE = (0.97, 0.80)
 WEAK = 3.0  # sds below which a fitted amplitude is no finding
 
 
@@ -64,25 +69,17 @@ def weigh(
             return Findings("unexplained", (), (), excess, excess)
         return Findings(_plain(setting, selection, rng), (), hiding, excess, excess)
     tied, named = [], []
-    joined = {form.name for form, _, _ in final.effects}
     for k, (form, entry, _) in enumerate(final.effects):
-        # a rival that has joined the model is none
-        rivals: Sequence[tuple[str, float]] = next(
-            (
-                [rival for rival in r.rivals if rival[0] not in joined]
-                for r in accepted
-                if r.accepted is not None and r.accepted.name == form.name
-            ),
-            [],
+        rivals: Sequence[Rival] = next(
+            (r.rivals for r in accepted if r.accepted is not None and r.accepted.name == form.name), ()
         )
-        sure = confidence(rivals)
         if final.strength[k] < WEAK:
             continue
         if rivals:
-            names = (entry.id, *(n.partition(":")[0] for n, _ in rivals))
+            names = (entry.id, *(r.name.partition(":")[0] for r in rivals))
             tied.append((tuple(dict.fromkeys(names)), _reason(rivals)))
         else:
-            named.append((k, sure))
+            named.append((k, CONFIDENCE[int(left > QUIET)]))
     leftover = left > max(LEFT * excess, 1.0)
     if leftover:
         return Findings("unexplained", (), tuple(tied), excess, left)
@@ -91,8 +88,8 @@ def weigh(
     return Findings("explained", tuple(named), tuple(tied), excess, left)
 
 
-def _reason(rivals: Sequence[tuple[str, float]]) -> str:
-    leads = ", ".join(f"{name} by {z:.1f} standard errors" for name, z in rivals)
+def _reason(rivals: Sequence[Rival]) -> str:
+    leads = ", ".join(f"{r.name} by {r.z:.1f} standard errors" for r in rivals)
     return f"predictions on held-out data coincide: the best one leads {leads}; {SURE:.1f} are asked for"
 
 
