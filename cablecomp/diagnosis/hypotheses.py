@@ -22,7 +22,7 @@ from cablecomp.diagnosis.fitting import (
 )
 from cablecomp.diagnosis.forms import Form, FreedForm, freed, has_instant
 from cablecomp.diagnosis.screening import Probe, Progress, attempt
-from cablecomp.diagnosis.starts import CAREFULLY, deepest
+from cablecomp.diagnosis.starts import CAREFULLY, UNLIKELY, deepest, pulls
 from cablecomp.identification.smoothing import FloatArray
 
 FITTED = 7  # hypotheses that are fitted in each round, of all that were asked
@@ -31,7 +31,6 @@ INSTANT_STEPS_S = (2.0, 0.5, 0.15, 0.04, 0.01)
 REACH = 4  # such steps either way that an event is looked for
 WORTH = (2.0, 4.0)  # mean square over the floor for that, in the first round and later
 FLOORED = 6  # replicas by which the floor of a model is found
-UNLIKELY = 2.0  # prior standard deviations
 NOISE = 1.25  # mean square over the floor at which nothing is left to explain
 
 
@@ -72,7 +71,7 @@ def start_of(problem: Problem, model: Model, layout: Layout) -> Model:
     """
     mask = layout.heldout | layout.training
     excess = float(np.mean((model.residual[mask] * INFLATION) ** 2))
-    if excess < 2.0 * NOISE or float(np.max(np.abs(_pulls(problem, model)), initial=0.0)) < UNLIKELY:
+    if excess < 2.0 * NOISE or float(np.max(np.abs(pulls(problem, model)), initial=0.0)) < UNLIKELY:
         return model
     nominal = _nominal(problem, model)
     found = solve(problem, model.forms, nominal, mask, iterations=CAREFULLY, renew=True, firm=excess)
@@ -84,11 +83,6 @@ def worth_a_search(problem: Problem, model: Model, layout: Layout, number: int) 
     kept = layout.heldout | layout.training
     left = float(np.mean((model.residual[kept] * INFLATION) ** 2))
     return left > WORTH[min(number, 1)] * floor_of(problem, model)
-
-
-def _pulls(problem: Problem, model: Model) -> FloatArray:
-    """Calibration in prior standard deviations (0 where there is no prior)."""
-    return np.array([v / p.prior_sd for p, v in zip(problem.parameters, model.c, strict=True)])
 
 
 def _nominal(problem: Problem, model: Model) -> FloatArray:

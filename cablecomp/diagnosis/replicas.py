@@ -39,8 +39,12 @@ def observe(
 ) -> tuple[Prepared, dict[str, Noise]]:
     """Rows to be fitted, each the mean of `each` simulated steps of `finest` samples, and the inputs' noise.
 
+    Samples at the end that fill no row are left out: means of unlike numbers of samples would not compare.
     Raises InputError if a channel is missing.
     """
+    samples = len(columns["time_s"])
+    whole = samples - samples % (finest * each) if samples > finest * each else samples
+    columns = {k: np.asarray(v)[:whole] for k, v in columns.items()}
     part = prepare(columns, config, finest * each, 0.0)
     inputs = {k: group_means(np.asarray(v, dtype=np.float64), finest) for k, v in columns.items()}
     noise = {}

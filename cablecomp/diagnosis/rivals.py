@@ -54,20 +54,30 @@ def rivals_of(
 ) -> tuple[Rival, ...]:
     """Supported hypotheses over which the best one's lead is not beyond doubt."""
     found = []
+    own = candidate(problem, folds[best.name], models[best.name])
     for score in verdict.scores:
         if score.name == best.name or not score.supported:
             continue
         whole = models.get(score.name)
-        z = lead(problem, (models[best.name], folds[best.name]), (whole, folds[score.name]), both, rng)
+        z = lead(problem, own, candidate(problem, folds[score.name], whole), both, rng)
         if z < SURE:
             found.append(Rival(score.name, z, whole or folds[score.name].models[0]))
     return tuple(found)
 
 
+def candidate(problem: Problem, fold: Fold, whole: Model | None) -> tuple[FloatArray, ...]:
+    """Residuals (rad) of a model in units of its own noise: held-out rows, and with all rows fitted if there is
+    such a fit."""
+    if whole is None:
+        return (fold.residual_rad,)
+    own = np.sqrt(floor_of(problem, whole))
+    return fold.residual_rad / own, whole.residual * problem.sigma * INFLATION / own
+
+
 def lead(
     problem: Problem,
-    best: tuple[Model, Fold],
-    rival: tuple[Model | None, Fold],
+    best: Sequence[FloatArray],
+    rival: Sequence[FloatArray],
     both: Layout,
     rng: np.random.Generator,
 ) -> float:
@@ -78,13 +88,7 @@ def lead(
     half. Each counts in its own noise: a model that differentiates noise is not refuted by it. However many the
     rows, a lead of less than `APART` is none: no law is exact to that.
     """
-    unit = problem.sigma * INFLATION
-    own = np.sqrt(floor_of(problem, best[0]))
-    other = 1.0 if rival[0] is None else np.sqrt(floor_of(problem, rival[0]))
-    pairs = [(rival[1].residual_rad / other, best[1].residual_rad / own)]
-    if rival[0] is not None:
-        pairs.append((rival[0].residual / other * unit, best[0].residual / own * unit))
-    return max(_lead(first, second, problem, both, rng) for first, second in pairs)
+    return max(_lead(first, second, problem, both, rng) for first, second in zip(rival, best, strict=False))
 
 
 def _lead(
@@ -116,15 +120,18 @@ def settle(
         others = [r for r in round_.rivals if r.name not in names]
         if best is not None and best.name in names and len(names) > 1 and others:
             place = names.index(best.name)
+            own = candidate(problem, fold, model)
             found: list[Rival] = []
             for rival in others:
                 whole = _in_place(problem, model, place, rival.model, layout)
                 if whole is None:
                     continue
                 other = fold_of(problem, whole, layout)
-                z = lead(problem, (model, fold), (whole, other), both, rng)
+                theirs = candidate(problem, other, whole)
+                z = lead(problem, own, theirs, both, rng)
                 if z < -SURE:
                     model, fold, best, found = whole, other, replace(best, name=rival.name), []
+                    own = theirs
                 elif z < SURE:
                     found.append(Rival(rival.name, z, whole))
             others = found

@@ -11,7 +11,7 @@ import numpy as np
 from cablecomp.diagnosis.fitting import Mask, Model, Problem, bounds_of, cost, evaluate, prior_of
 from cablecomp.identification.smoothing import FloatArray
 
-DIRECTIONS = 3  # the weakest ones are walked
+DIRECTIONS = 2  # the weakest ones are walked
 PACES = 2  # to the end of an interval where the valley is straight
 FARTHEST = 14  # paces at most
 DESCENTS = 3  # to the floor of the valley after each pace

@@ -78,8 +78,8 @@ def test_the_deeper_of_two_valleys_is_found_from_the_shallow_one() -> None:
 
 
 def test_what_is_deepest_already_stays_as_it_is() -> None:
-    problem, model = shaped(lambda z: np.array([z[0] - 0.3, 2.0 * z[1]]), [0.0, 0.0], 10.0)
-    mask = np.ones(2, dtype=np.bool_)
+    problem, model = shaped(lambda z: np.array([z[0] - 0.3, 2.0 * z[1], 1.0]), [0.0, 0.0], 10.0)
+    mask = np.ones(3, dtype=np.bool_)
     found = solve(problem, (), model.z, mask, iterations=30, renew=True)
     assert found is not None
     assert deepest(problem, found, mask) is found
