@@ -21,6 +21,7 @@ from cablecomp.diagnosis.fitting import (
     solve,
 )
 from cablecomp.diagnosis.forms import Form, FreedForm, freed, has_instant
+from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.screening import Probe, Progress, attempt
 from cablecomp.diagnosis.starts import CAREFULLY, UNLIKELY, deepest, pulls
 from cablecomp.identification.smoothing import FloatArray
@@ -107,10 +108,11 @@ def fit_roughly(
     before = _cost(problem, start, both)
     asked: dict[str, float] = {}
     models: dict[str, Model] = {}
+    answers = side_by_side(lambda group: attempt(problem, start, group, both, thorough), probes)
     for k, group in enumerate(probes):
         name = group[0].form.name
         progress(f"fitting {name}", k / len(probes))
-        model, asked[name] = attempt(problem, start, group, both, thorough)
+        model, asked[name] = next(answers)
         if model is not None:
             models[name] = model
     won = {name: 1.0 - _cost(problem, model, both) / before for name, model in models.items()}

@@ -65,35 +65,37 @@ def rivals_of(
     return tuple(found)
 
 
-def candidate(problem: Problem, fold: Fold, whole: Model | None) -> tuple[FloatArray, ...]:
-    """Residuals (rad) of a model in units of its own noise: held-out rows, and with all rows fitted if there is
-    such a fit."""
+@dataclass(frozen=True)
+class Candidate:
+    """Residuals (rad) of one model in units of its own noise: on held-out rows, and with all rows fitted (None
+    if there is no such fit)."""
+
+    heldout_rad: FloatArray
+    fitted_rad: FloatArray | None = None
+
+
+def candidate(problem: Problem, fold: Fold, whole: Model | None) -> Candidate:
+    """A model as its rivals are compared with it: each in its own noise, for a model that differentiates noise is
+    not refuted by it."""
     if whole is None:
-        return (fold.residual_rad,)
+        return Candidate(fold.residual_rad)
     own = np.sqrt(floor_of(problem, whole))
-    return fold.residual_rad / own, whole.residual * problem.sigma * INFLATION / own
+    return Candidate(fold.residual_rad / own, whole.residual * problem.sigma * INFLATION / own)
 
 
 def lead(
-    problem: Problem,
-    best: Sequence[FloatArray],
-    rival: Sequence[FloatArray],
-    both: Layout,
-    rng: np.random.Generator,
+    problem: Problem, best: Candidate, rival: Candidate, both: Layout, rng: np.random.Generator
 ) -> float:
-    """Standard errors by which the best one predicts better: on held-out rows, or with all rows fitted if that
-    is more.
+    """Standard errors by which the best one explains all rows better, or where the rival was not fitted to all,
+    predicts held-out ones better.
 
-    The second comparison is for events: one that falls into a held-out block cannot be placed by the other
-    half. Each counts in its own noise: a model that differentiates noise is not refuted by it. However many the
-    rows, a lead of less than `APART` is none: no law is exact to that.
+    A law that is a little worse when half the rows are to place its instant or its time constant is not refuted
+    by that. However many the rows, a lead of less than `APART` is none: no law is exact to that.
     """
-    return max(_lead(first, second, problem, both, rng) for first, second in zip(rival, best, strict=False))
-
-
-def _lead(
-    first: FloatArray, second: FloatArray, problem: Problem, both: Layout, rng: np.random.Generator
-) -> float:
+    if best.fitted_rad is None or rival.fitted_rad is None:
+        first, second = rival.heldout_rad, best.heldout_rad
+    else:
+        first, second = rival.fitted_rad, best.fitted_rad
     kept = both.heldout
     gap = float(np.mean((first[kept] ** 2 - second[kept] ** 2) / problem.sigma[kept] ** 2))
     z = float(compare(first, second, both, rng).z)

@@ -24,6 +24,7 @@ from cablecomp.diagnosis.hypotheses import (
     worth_a_search,
 )
 from cablecomp.diagnosis.judge import Score, Verdict, compare, judge
+from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.rivals import Round, rivals_of, settle
 from cablecomp.diagnosis.screening import Probe, Progress, probe_all
 
@@ -83,16 +84,16 @@ def select(
         first_probes = first_probes or probes
         thorough = worth_a_search(problem, current, layout, number)
         models, asked = fit_roughly(rough, start, probes, layout, thorough, progress)
-        folds = {
-            name: fold_of(problem, model, layout)
-            for name, rough_one in models.items()
-            if (model := seen_by(problem, rough_one)) is not None
-        }
+        seen = {name: model for name, m in models.items() if (model := seen_by(problem, m)) is not None}
+        halves = side_by_side(lambda model: fold_of(problem, model, layout), list(seen.values()))
+        folds = dict(zip(seen, halves, strict=True))
         verdict = _judged(current_fold, folds, both, rng)
         models = {}
-        for score in _front_runners(verdict):
+        front = _front_runners(verdict)
+        polished = side_by_side(lambda fold: polish(problem, fold, layout), [folds[s.name] for s in front])
+        for score in front:
             progress(f"fitting {score.name} with its shapes free", 0.9)
-            whole, fold = polish(problem, folds[score.name], layout)
+            whole, fold = next(polished)
             if amplitude(problem, whole, layout) > WEAK:
                 models[score.name], folds[score.name] = whole, fold
             else:  # its shape alone explains, not the effect

@@ -70,8 +70,8 @@ def set_up(
     guard = max(2, len(problem.measured) // 1000)
     layout = alternate_blocks(views.starts, problem.rows, views.values["load_direction"], guard)
     _start(problem)  # says it if the nominal joint cannot follow
-    floor = problem.noise_rad(config)
-    problem = replace(problem, sigma=problem.sigma * floor / float(np.sqrt(np.mean(problem.sigma**2))))
+    problem = replace(problem, sigma=_row_noise(problem, config))
+    floor = float(np.sqrt(np.mean(problem.sigma**2)))
     nominal = _start(problem)
     mask = layout.heldout | layout.training
     calibrated = solve(problem, (), nominal.z, mask, iterations=CAREFULLY, renew=True)
@@ -106,13 +106,30 @@ def _start(problem: Problem) -> Model:
 
 def _own_noise(config: JointConfig, parts: Sequence[Prepared]) -> float:
     """RMS of the joint encoder's noise in the rows, rad."""
-    s = config.sensors
-    each = [_joint_sigma(s.joint_position_noise_rad, s.joint_position_resolution_rad, p) for p in parts]
-    return float(np.sqrt(np.average(np.square(each), weights=[p.rows for p in parts])))
+    own = [_joint_sigma(config, p) for p in parts]
+    return float(np.sqrt(np.average(np.square(own), weights=[p.rows for p in parts])))
 
 
-def _joint_sigma(noise: float | None, resolution: float | None, part: Prepared) -> float:
+def _row_noise(problem: Problem, config: JointConfig) -> FloatArray:
+    """1-sigma of every row's residual, rad, the same within a recording: the joint encoder's own noise, and what
+    noise on the inputs does to the prediction there."""
+    moved = problem.moved(config)
+    square = (
+        np.mean((moved - moved.mean(axis=1, keepdims=True)) ** 2, axis=0)
+        if len(moved)
+        else np.zeros(problem.rows)
+    )
+    found, first = [], 0
+    for part in problem.parts:
+        through = float(np.mean(square[first : first + part.rows]))
+        found.append(np.full(part.rows, np.sqrt(_joint_sigma(config, part) ** 2 + through)))
+        first += part.rows
+    return np.concatenate(found)
+
+
+def _joint_sigma(config: JointConfig, part: Prepared) -> float:
     """1-sigma of the joint encoder's group means; white noise averages, quantisation at rest does not."""
+    noise, resolution = config.sensors.joint_position_noise_rad, config.sensors.joint_position_resolution_rad
     if noise is None and resolution is None:
         return float(channel_noise(part.columns["time_s"], part.columns[MEASURED]).sigma)
     white, step = noise or 0.0, (resolution or 0.0) / np.sqrt(12.0)

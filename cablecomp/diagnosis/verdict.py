@@ -90,7 +90,7 @@ def weigh(
 
 def _reason(rivals: Sequence[Rival]) -> str:
     leads = ", ".join(f"{r.name} by {r.z:.1f} standard errors" for r in rivals)
-    return f"predictions on held-out data coincide: the best one leads {leads}; {SURE:.1f} are asked for"
+    return f"they explain these data alike: the best one leads {leads}; {SURE:.1f} are asked for"
 
 
 def _plain(setting: Setting, selection: Selection, rng: np.random.Generator) -> str:

@@ -166,7 +166,7 @@ def load_slowly(drive: Drive, target: Floats, steps: int) -> None:
         share = k / steps
         drive.shafts["gravity_Nm"] = weight * share
         u = before + share * (whole - before)
-        if not advance(drive, u, u, RAMP_STEP_S, 1):
+        if not advance(drive, u, u, RAMP_STEP_S, 1, 0.0):
             raise PlantError("the joint cannot carry its first load; lower it or raise the pretension")
     rest(drive)
 
@@ -204,14 +204,23 @@ def _play(
     drive: Drive, readout: Any, output: int, inputs: Floats, outputs: Floats, steps_per_rad: float
 ) -> int:
     """Step through all samples; returns −1, or the sample at which the wrap ran out (k) or no solution was
-    found (−2 − k)."""
+    found (−2 − k).
+
+    Inertia takes a kink in the motor's angle for a blow: with it the angle is on parabolas between samples.
+    """
     u0 = inputs[0].copy()
+    heavy = np.any(drive.shafts["inertia"] > 0.0)
+    bend, speed = 0.0, 0.0
     for k in range(len(inputs)):
         u1 = inputs[k]
         if k > 0:
             h = u1[TIME] - u0[TIME]
             parts = math.ceil(abs(u1[MOTOR_ANGLE] - u0[MOTOR_ANGLE]) * steps_per_rad)
-            if not advance(drive, u0, u1, h, parts):
+            if heavy and h > 0.0:
+                now = (u1[MOTOR_ANGLE] - u0[MOTOR_ANGLE]) / h
+                bend = (now - speed) * h if k > 1 else 0.0
+                speed = now
+            if not advance(drive, u0, u1, h, parts, bend):
                 return -2 - k
             u0[:] = u1
         else:

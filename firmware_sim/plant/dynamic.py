@@ -256,7 +256,7 @@ class Plant:
             self.time_s += h
             u1[TIME], u1[MOTOR_TORQUE], u1[JOINT_TORQUE] = self.time_s, self._torque, external_torque_Nm
             u1[TEMPERATURE], u1[OTHER] = temperature_degC, other_1
-            if not advance(drive, u0, u1, h, 1):
+            if not advance(drive, u0, u1, h, 1, 0.0):
                 raise PlantError(f"no equilibrium found at {self.time_s:.4f} s")
             u0[:] = u1
         if wrap_exhausted(drive):

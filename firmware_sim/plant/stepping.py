@@ -200,8 +200,11 @@ def restore_state(drive: Drive, nodes_y: Floats) -> None:
 
 
 @njit
-def advance(drive: Drive, u0: Floats, u1: Floats, h: float, parts: int) -> bool:
-    """Go from inputs u0 to u1 in `parts` equal steps, or in more where the iteration asks for it."""
+def advance(drive: Drive, u0: Floats, u1: Floats, h: float, parts: int, bend: float) -> bool:
+    """Go from inputs u0 to u1 in `parts` equal steps, or in more where the iteration asks for it.
+
+    In between, inputs are on a line, and the motor's angle on a parabola with second difference `bend`.
+    """
     y_kept = np.empty_like(drive.nodes.y)
     save_state(drive, y_kept)
     u = np.empty_like(u1)
@@ -212,6 +215,7 @@ def advance(drive: Drive, u0: Floats, u1: Floats, h: float, parts: int) -> bool:
         for j in range(pieces):
             share = (j + 1.0) / pieces
             u[:] = u0 + share * (u1 - u0)
+            u[MOTOR_ANGLE] -= 0.5 * share * (1.0 - share) * bend
             done = solve_step(drive, u, h / pieces, loose)
             if not done:
                 break

@@ -9,7 +9,7 @@ from cablecomp.diagnosis.blocks import Layout, alternate_blocks
 from cablecomp.diagnosis.fitting import Problem
 from cablecomp.diagnosis.hypotheses import all_rows
 from cablecomp.diagnosis.judge import compare
-from cablecomp.diagnosis.rivals import APART, SURE, lead
+from cablecomp.diagnosis.rivals import APART, SURE, Candidate, lead
 
 ROWS = 40_000
 
@@ -31,7 +31,7 @@ def test_a_lead_counts_only_from_a_share_of_the_noise_on(share: float, refuted: 
     wave = sigma * np.sqrt(2.0 * share * APART) * np.sin(np.arange(ROWS) / 40.0)
     rival = best + wave
     assert compare(rival, best, both, rng).z > SURE
-    z = lead(problem, (best,), (rival,), both, rng)
+    z = lead(problem, Candidate(best), Candidate(rival), both, rng)
     assert (z > SURE) == refuted
 
 
@@ -40,5 +40,7 @@ def test_who_trails_has_no_lead() -> None:
     problem, both = ground(1.0)
     good = rng.standard_normal(ROWS)
     poor = good + 0.5 * np.sin(np.arange(ROWS) / 40.0)
-    assert lead(problem, (poor,), (good,), both, rng) < -SURE
-    assert lead(problem, (poor, good), (good, poor), both, rng) > SURE  # the better of two comparisons counts
+    assert lead(problem, Candidate(poor), Candidate(good), both, rng) < -SURE
+    # where both were fitted to all rows, that decides
+    assert lead(problem, Candidate(poor, good), Candidate(good, poor), both, rng) > SURE
+    assert lead(problem, Candidate(poor, good), Candidate(good), both, rng) < -SURE
