@@ -69,8 +69,6 @@ def select(
     """Add effects one at a time while held-out data support it; try to do without the earlier ones
     after each step.
     """
-    both = all_rows(layout)
-    rough = problem.rough()
     baseline = fold_of(problem, base, layout)
     current, current_fold = base, baseline
     rounds: list[Round] = []
@@ -79,41 +77,16 @@ def select(
     for number in range(EFFECTS):
         left = [g for g in groups if g[0].name not in {f.name for f in current.forms}]
         start = start_of(problem, current, layout)
-        start = seen_by(rough, start) or start
-        probes = probe_all(rough, start, left, progress)
+        start = seen_by(problem.rough(), start) or start
+        probes = probe_all(problem.rough(), start, left, progress)
         first_probes = first_probes or probes
         thorough = worth_a_search(problem, current, layout, number)
-        models, asked = fit_roughly(rough, start, probes, layout, thorough, progress)
-        seen = {name: model for name, m in models.items() if (model := seen_by(problem, m)) is not None}
-        halves = side_by_side(lambda model: fold_of(problem, model, layout), list(seen.values()))
-        folds = dict(zip(seen, halves, strict=True))
-        verdict = _judged(current_fold, folds, both, rng)
-        models = {}
-        front = _front_runners(verdict)
-        polished = side_by_side(lambda fold: polish(problem, fold, layout), [folds[s.name] for s in front])
-        for score in front:
-            progress(f"fitting {score.name} with its shapes free", 0.9)
-            whole, fold = next(polished)
-            if amplitude(problem, whole, layout) > WEAK:
-                models[score.name], folds[score.name] = whole, fold
-            else:  # its shape alone explains, not the effect
-                del folds[score.name]
-        if models:
-            verdict = _judged(current_fold, folds, both, rng)
-        present = _energy(current_fold, problem, layout)
-        best = next(
-            (
-                s
-                for s in verdict.scores
-                if s.supported and s.name in models and s.heldout_gain * present > LEAST and present > 1.0
-            ),
-            None,
-        )
-        rivals = () if best is None else rivals_of(best, verdict, folds, models, problem, both, rng)
-        rounds.append(Round(current.name, verdict, asked, folds, best, rivals))
+        models, asked = fit_roughly(problem.rough(), start, probes, layout, thorough, progress)
+        round_, best = _one_round(problem, (current, current_fold), models, asked, layout, rng, progress)
+        rounds.append(round_)
         if best is None:
             break
-        current, current_fold = models[best.name], folds[best.name]
+        current, current_fold = best
         if number > 0:
             current, current_fold = _without(problem, current, current_fold, layout, rng)
         reached.append((current, current_fold, len(rounds)))
@@ -126,6 +99,43 @@ def select(
         rounds = list(settled)
     hidden = tuple(hidden_effects(problem, base, first_probes, layout))
     return Selection(baseline, current_fold, current, base, tuple(rounds), layout, first_probes, hidden)
+
+
+def _one_round(
+    problem: Problem,
+    now: tuple[Model, Fold],
+    rough: Mapping[str, Model],
+    asked: Mapping[str, float],
+    layout: Layout,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[Round, tuple[Model, Fold] | None]:
+    """Judge roughly fitted hypotheses on held-out rows, the front runners again with their shapes free; the
+    round, and the model with the one that is accepted.
+    """
+    both = all_rows(layout)
+    seen = {name: model for name, m in rough.items() if (model := seen_by(problem, m)) is not None}
+    halves = side_by_side(lambda model: fold_of(problem, model, layout), list(seen.values()))
+    folds = dict(zip(seen, halves, strict=True))
+    verdict = _judged(now[1], folds, both, rng)
+    models: dict[str, Model] = {}
+    front = _front_runners(verdict)
+    polished = side_by_side(lambda fold: polish(problem, fold, layout), [folds[s.name] for s in front])
+    for score in front:
+        progress(f"fitting {score.name} with its shapes free", 0.9)
+        whole, fold = next(polished)
+        if amplitude(problem, whole, layout) > WEAK:
+            models[score.name], folds[score.name] = whole, fold
+        else:  # its shape alone explains, not the effect
+            del folds[score.name]
+    if models:
+        verdict = _judged(now[1], folds, both, rng)
+    present = _energy(now[1], problem, layout)
+    able = [s for s in verdict.scores if s.supported and s.name in models]
+    best = next((s for s in able if s.heldout_gain * present > LEAST and present > 1.0), None)
+    rivals = () if best is None else rivals_of(best, verdict, folds, models, problem, both, rng)
+    round_ = Round(now[0].name, verdict, asked, folds, best, rivals)
+    return round_, None if best is None else (models[best.name], folds[best.name])
 
 
 def _judged(base: Fold, folds: Mapping[str, Fold], both: Layout, rng: np.random.Generator) -> Verdict:
