@@ -209,7 +209,8 @@ def floor_of(problem: Problem, model: Model) -> float:
     return max(1.0, problem.noise_rad(problem.joint(model.c, model.entries()), FLOORED) ** 2 / plain)
 
 
-def at_noise(problem: Problem, model: Model, layout: Layout) -> bool:
+def at_noise(problem: Problem, model: Model, layout: Layout, most: float = NOISE) -> bool:
+    """Whether no more than `most` times the floor's mean square is left."""
     kept = layout.heldout | layout.training
     left = float(np.mean((model.residual[kept] * INFLATION) ** 2))
-    return left < NOISE or left < NOISE * floor_of(problem, model)
+    return left < most or left < most * floor_of(problem, model)

@@ -34,9 +34,10 @@ FAR = 10.0  # times what the best one leaves, beyond which a hypothesis is not e
 LEVEL = 0.01  # of a false support, all hypotheses together
 # of the floor's mean square that an effect must remove as well (instants are searched over all rows), and
 # only from where there is more than the floor
-LEAST = 0.08
+LEAST = (0.08, 0.04)  # in the first round, and later
 LEAST_GAIN = 0.02  # share of the held-out mean square that an effect must remove
 EFFECTS = 3
+SILENT = 1.05  # mean square over the floor at which no further effect is looked for
 WEAK = 2.0  # sds below which a fitted amplitude is no finding
 REST = 1 / 3  # of what is left beyond noise, that the last effect of several may leave over
 
@@ -90,7 +91,7 @@ def select(
         if number > 0:
             current, current_fold = _without(problem, current, current_fold, layout, rng)
         reached.append((current, current_fold, len(rounds)))
-        if at_noise(problem, current, layout):
+        if at_noise(problem, current, layout, SILENT):
             break
     if reached:
         current, current_fold, count = _worth_their_place(problem, reached, layout)
@@ -132,7 +133,8 @@ def _one_round(
         verdict = _judged(now[1], folds, both, rng)
     present = _energy(now[1], problem, layout)
     able = [s for s in verdict.scores if s.supported and s.name in models]
-    best = next((s for s in able if s.heldout_gain * present > LEAST and present > 1.0), None)
+    least = LEAST[min(len(now[0].forms), 1)]
+    best = next((s for s in able if s.heldout_gain * present > least and present > 1.0), None)
     rivals = () if best is None else rivals_of(best, verdict, folds, models, problem, both, rng)
     round_ = Round(now[0].name, verdict, asked, folds, best, rivals)
     return round_, None if best is None else (models[best.name], folds[best.name])
