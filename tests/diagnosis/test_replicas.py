@@ -10,7 +10,7 @@ from cablecomp.diagnosis.fitting import INFLATION
 from cablecomp.diagnosis.replicas import observe
 from cablecomp.diagnosis.setting import set_up
 from cablecomp.identification.smoothing import FloatArray, group_means
-from firmware_sim.plant import PlantConfig, simulate
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 JOINT = {
     "schema": 1,
@@ -44,13 +44,16 @@ def test_a_row_and_its_steps_cover_the_same_samples(samples: int) -> None:
     assert part.columns["time_s"][-1] == pytest.approx(time[(samples // 12 - 1) * 12 :][:12].mean())
 
 
+WEIGHT = {"moment_Nm": 1.0, "phase_rad": 0.0}
 NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 2e-3, "motor_position_rad": 1e-5}
 
 
 def recorded(motor: FloatArray, load: FloatArray, seed: int) -> dict[str, FloatArray]:
     """The plant with the nominal values of the joint, read with noise at 100 Hz."""
     time = 0.01 * np.arange(len(load))
-    run = simulate(PlantConfig.from_dict(JOINT), time, motor, load)
+    run = simulate(
+        PlantConfig.from_dict(JOINT), time, motor, load, effects=[EffectSpec("gravity_load", WEIGHT)]
+    )
     rng = np.random.default_rng(seed)
     return {"time_s": time} | {
         name: run.channels()[name] + sigma * rng.standard_normal(len(time)) for name, sigma in NOISE.items()
@@ -58,8 +61,8 @@ def recorded(motor: FloatArray, load: FloatArray, seed: int) -> dict[str, FloatA
 
 
 def test_every_recording_is_weighed_by_the_noise_that_it_has() -> None:
-    """Load and motion, and motion alone: a load at rest says nothing of the compliance that noise passes
-    through."""
+    """Load and motion, and motion under a weight alone: a torque channel at rest says nothing of the compliance
+    that its noise passes through."""
     t = 0.01 * np.arange(2000)
     motor = 0.4 * np.sin(0.9 * t)
     both = [
@@ -67,7 +70,8 @@ def test_every_recording_is_weighed_by_the_noise_that_it_has() -> None:
         recorded(motor, 0.0 * t, 2),
     ]
     stated = {f"{name.rpartition('_')[0]}_noise_{name.rpartition('_')[2]}": v for name, v in NOISE.items()}
-    joint = parse_joint({**JOINT, "tolerance": {"EA_N": 0.02}, "sensors": stated}, "test")
+    known = {"tolerance": {"EA_N": 0.02}, "sensors": stated, "effect": [{"id": "gravity_load", **WEIGHT}]}
+    joint = parse_joint({**JOINT, **known}, "test")
     found = set_up(joint, both, np.random.default_rng(0))
     left = found.calibrated.residual * INFLATION
     first = found.problem.parts[0].rows
