@@ -19,6 +19,7 @@ from cablecomp.diagnosis.setting import Setting
 from cablecomp.identification.smoothing import FloatArray
 
 LEFT = 0.01  # share of the mismatch's energy beyond noise that a named effect may leave over
+MOST = 1 / 3  # share of it that is no explanation, however small the mismatch
 STRUCTURED = 1.5  # mean square over the floor beyond which a located remainder counts
 CERTAIN = 2.25  # mean square over the floor that is no noise, wherever it sits
 QUIET = 0.4  # mean square over the floor, less 1, up to which nothing is left
@@ -80,8 +81,7 @@ def weigh(
             tied.append((tuple(dict.fromkeys(names)), _reason(rivals)))
         else:
             named.append((k, CONFIDENCE[int(left > QUIET)]))
-    leftover = left > max(LEFT * excess, 1.0)
-    if leftover:
+    if left > max(LEFT * excess, 1.0) or left > max(MOST * excess, QUIET):
         return Findings("unexplained", (), tuple(tied), excess, left)
     if not named and not tied:
         return Findings(_plain(setting, selection, rng), (), hiding, excess, left)
