@@ -8,6 +8,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
 
 from cablecomp.config import load_joint
 from cablecomp.diagnosis.live import LiveOptions, LiveWatch
@@ -17,7 +18,7 @@ JOINT = Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml"
 
 
 @pytest.mark.benchmark(group="live")
-def test_one_cycle(benchmark, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_one_cycle(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     """Twenty thousand cycles as quick as they go: worse than a loop, where the worker has time between them."""
     noise = 2e-5 * np.random.default_rng(0).standard_normal(20_000)
     watch = LiveWatch(load_joint(JOINT), 1e-3, tmp_path, LiveOptions(learning_s=4.0))

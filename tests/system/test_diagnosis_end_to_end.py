@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,12 +72,12 @@ def recordings(folder: Path, effects: list[EffectSpec], seed: int) -> list[Path]
     return paths
 
 
-def diagnosed(folder: Path, effects: list[EffectSpec], seed: int) -> dict[str, object]:
+def diagnosed(folder: Path, effects: list[EffectSpec], seed: int) -> dict[str, Any]:
     """The result file of `cablecomp diagnose`."""
     joint = joint_file(folder)
     files = [str(path) for path in recordings(folder, effects, seed)]
     assert main(["diagnose", *files, "--config", str(joint), "--out", str(folder / "out")]) == 0
-    result: dict[str, object] = json.loads((folder / "out/diagnosis.json").read_text())
+    result: dict[str, Any] = json.loads((folder / "out/diagnosis.json").read_text())
     return result
 
 
@@ -86,12 +87,12 @@ def test_concealed_bearing_friction_is_named_measured_and_modelled(tmp_path: Pat
     )
     result = diagnosed(tmp_path, [spec], 11)
     assert result["verdict"] == "explained"
-    (found,) = result["missing_physics"]  # type: ignore[misc]
+    (found,) = result["missing_physics"]
     assert found["effect"] == "bearing_friction"
     torque = found["parameters"]["torque_Nm"]
     assert abs(torque["value"] - 0.02) < 4.0 * torque["sd"] + 0.02 * 0.02
     assert found["heldout_gain"] > 0.5
-    assert result["mismatch"][0]["covariate"] in ("reversal", "velocity", "load_direction")  # type: ignore[index]
+    assert result["mismatch"][0]["covariate"] in ("reversal", "velocity", "load_direction")
     assert (tmp_path / "out/report.html").stat().st_size > 1_000_000
     # the augmented joint runs as it is, and predicts as well as the true drive with its true effect
     truth = joint_file(tmp_path).read_text()
@@ -115,12 +116,12 @@ def test_parameters_off_their_nominal_values_are_no_missing_physics(tmp_path: Pa
     assert result["verdict"] == "recalibrate"
     assert result["missing_physics"] == []
     # nothing rivals the calibration but what its tolerances could conceal
-    assert all("within its tolerance" in group["why"] for group in result["not_excluded"])  # type: ignore[attr-defined]
+    assert all("within its tolerance" in group["why"] for group in result["not_excluded"])
     calibration = result["calibration"]
     for name in ("EA_N", "mu_output", "mu_input"):
-        value = calibration[name]  # type: ignore[index]
+        value = calibration[name]
         assert abs(value["value"] - TRUE[name]) < 4.0 * value["sd"] + 0.01 * TRUE[name]
-    unseen = {entry["effect"] for entry in result["could_be_unseen"]}  # type: ignore[attr-defined]
+    unseen = {entry["effect"] for entry in result["could_be_unseen"]}
     assert {"bearing_friction", "series_compliance", "routing_friction"} <= unseen
 
 
