@@ -18,7 +18,7 @@ from cablecomp.errors import InputError
 from cablecomp.report.scoreboard_page import scoreboard_table, write_scoreboard_page
 
 console = Console()
-_CONCEALMENT = (sys.executable, "-m", "firmware_sim.concealment")
+_TRIALS = (sys.executable, "-m", "firmware_sim.trials")
 
 
 def register(app: typer.Typer) -> None:
@@ -56,7 +56,7 @@ def conceal(out: Path, wish: Wish, told: Callable[[int, int], None]) -> str:
 
     Raises InputError with that process's own line where it fails.
     """
-    command = [*_CONCEALMENT, "--trials", str(wish.trials), "--seed", str(wish.seed), "--kind", wish.kind]
+    command = [*_TRIALS, "--trials", str(wish.trials), "--seed", str(wish.seed), "--kind", wish.kind]
     sha256, last = "", ""
     with subprocess.Popen(
         [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
@@ -77,7 +77,7 @@ def experiment(sealed: Path, trial: int, protocol: Path, out: Path) -> None:
     """Play a proposed experiment on a sealed joint in a process of firmware_sim; only the recording comes
     back."""
     options = {"--sealed": sealed, "--trial": trial, "--protocol": protocol, "--out": out}
-    command = [*_CONCEALMENT, "experiment", *(str(x) for pair in options.items() for x in pair)]
+    command = [*_TRIALS, "experiment", *(str(x) for pair in options.items() for x in pair)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise InputError(_last_line(done.stderr))

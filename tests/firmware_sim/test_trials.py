@@ -1,4 +1,4 @@
-"""Concealment: what is hidden has the size it is said to have, stays hidden, and comes out the same again."""
+"""Blind trials: what is hidden has the size it is said to have, stays hidden, and comes out the same again."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_sim.concealment import assignment, digest, draw_trial, generate, open_truth
-from firmware_sim.concealment.__main__ import main
-from firmware_sim.concealment.courses import KINDS as COURSES
-from firmware_sim.concealment.courses import Range, draw_course
-from firmware_sim.concealment.joints import OFF_NOMINAL, draw_joint
-from firmware_sim.concealment.measures import loop_width
-from firmware_sim.concealment.plan import KINDS, SHARES, Assignment
-from firmware_sim.concealment.sizes import LARGEST, SMALLEST, run_course
-from firmware_sim.concealment.strangers import STRANGERS
-from firmware_sim.concealment.suspects import CATALOGUE, Scene
 from firmware_sim.plant import COARSE, EFFECTS, LISTED, UNLISTED, PlantError
+from firmware_sim.trials import assignment, digest, draw_trial, generate, open_truth
+from firmware_sim.trials.__main__ import main
+from firmware_sim.trials.courses import KINDS as COURSES
+from firmware_sim.trials.courses import Range, draw_course
+from firmware_sim.trials.joints import OFF_NOMINAL, draw_joint
+from firmware_sim.trials.measures import loop_width
+from firmware_sim.trials.plan import KINDS, SHARES, Assignment
+from firmware_sim.trials.sizes import LARGEST, SMALLEST, run_course
+from firmware_sim.trials.strangers import STRANGERS
+from firmware_sim.trials.suspects import CATALOGUE, Scene
 
 
 def test_suspects_are_the_plants_listed_effects_and_strangers_are_not() -> None:

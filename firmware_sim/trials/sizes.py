@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware_sim.concealment.measures import apparent_angle, contribution
-from firmware_sim.concealment.suspects import Scene, Shape
 from firmware_sim.plant import COARSE, EffectSpec, PlantError, PlantRun, Resolution, simulate
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials.measures import apparent_angle, contribution
+from firmware_sim.trials.suspects import Scene, Shape
 
 SMALLEST, LARGEST = 0.02, 0.60  # of the plain loop
 _TRIES = 7

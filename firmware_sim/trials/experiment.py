@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from firmware_sim.concealment.courses import Course, draw_neighbour, draw_temperature
-from firmware_sim.concealment.joints import DrawnJoint
-from firmware_sim.concealment.measures import PlainDrive
-from firmware_sim.concealment.protocol import sample_protocol
-from firmware_sim.concealment.seal import open_truth
-from firmware_sim.concealment.sensors import read_sensors
-from firmware_sim.concealment.sizes import run_course
-from firmware_sim.concealment.suspects import Scene
-from firmware_sim.concealment.trial import PAUSE_S
-from firmware_sim.concealment.writing import write_recording
 from firmware_sim.plant import FINE, EffectSpec, PlantConfig, PlantError, StageConfig
+from firmware_sim.trials.courses import Course, draw_neighbour, draw_temperature
+from firmware_sim.trials.joints import DrawnJoint
+from firmware_sim.trials.measures import PlainDrive
+from firmware_sim.trials.protocol import sample_protocol
+from firmware_sim.trials.seal import open_truth
+from firmware_sim.trials.sensors import read_sensors
+from firmware_sim.trials.sizes import run_course
+from firmware_sim.trials.suspects import Scene
+from firmware_sim.trials.trial import PAUSE_S
+from firmware_sim.trials.writing import write_recording
 
 _LONGEST_S = 1200.0
 

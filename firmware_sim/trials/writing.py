@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from firmware_sim.concealment.joints import DrawnJoint
-from firmware_sim.concealment.sensors import NEIGHBOUR
-from firmware_sim.concealment.sizes import Sized
-from firmware_sim.concealment.trial import Trial
 from firmware_sim.plant import EFFECTS, EffectSpec, PlantConfig
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials.joints import DrawnJoint
+from firmware_sim.trials.sensors import NEIGHBOUR
+from firmware_sim.trials.sizes import Sized
+from firmware_sim.trials.trial import Trial
 
 JOINT_FILE = "joint.toml"
 _DIGITS = {"time_s": "%.6f", "temperature_degC": "%.4f"}

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_sim.concealment import draw_trial, generate, run_experiment
-from firmware_sim.concealment.confounded import CASES
-from firmware_sim.concealment.experiment import sealed_joint
-from firmware_sim.concealment.plan import Assignment
-from firmware_sim.concealment.protocol import sample_protocol
-from firmware_sim.concealment.seal import open_truth
-from firmware_sim.concealment.sizes import run_course
-from firmware_sim.concealment.suspects import Scene
 from firmware_sim.plant import COARSE, EffectSpec, PlantError
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials import draw_trial, generate, run_experiment
+from firmware_sim.trials.confounded import CASES
+from firmware_sim.trials.experiment import sealed_joint
+from firmware_sim.trials.plan import Assignment
+from firmware_sim.trials.protocol import sample_protocol
+from firmware_sim.trials.seal import open_truth
+from firmware_sim.trials.sizes import run_course
+from firmware_sim.trials.suspects import Scene
 
 PROTOCOL = """
 schema = 1

@@ -8,11 +8,11 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from firmware_sim.concealment.plan import assignment
-from firmware_sim.concealment.seal import SEALED, TRUTH, write_seal
-from firmware_sim.concealment.trial import draw_trial
-from firmware_sim.concealment.writing import folder_name, true_model, truth_of, truth_text, write_public
 from firmware_sim.plant import PlantError
+from firmware_sim.trials.plan import assignment
+from firmware_sim.trials.seal import SEALED, TRUTH, write_seal
+from firmware_sim.trials.trial import draw_trial
+from firmware_sim.trials.writing import folder_name, true_model, truth_of, truth_text, write_public
 
 Progress = Callable[[int, int], None]
 """Told how many trials are written, and of how many."""

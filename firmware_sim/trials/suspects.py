@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware_sim.concealment.courses import Course
-from firmware_sim.concealment.joints import DrawnJoint, log_uniform
-from firmware_sim.concealment.measures import PlainDrive
+from firmware_sim.trials.courses import Course
+from firmware_sim.trials.joints import DrawnJoint, log_uniform
+from firmware_sim.trials.measures import PlainDrive
 
 ANY = ("bench", "moving", "reaching")
 TURNING = ("moving", "reaching")

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware_sim.concealment.courses import Course, Range, draw_course
-from firmware_sim.concealment.joints import DrawnJoint
-from firmware_sim.concealment.measures import PlainDrive
-from firmware_sim.concealment.sizes import run_course
-from firmware_sim.concealment.suspects import CATALOGUE, Scene, Shape, by_id
+from firmware_sim.trials.courses import Course, Range, draw_course
+from firmware_sim.trials.joints import DrawnJoint
+from firmware_sim.trials.measures import PlainDrive
+from firmware_sim.trials.sizes import run_course
+from firmware_sim.trials.suspects import CATALOGUE, Scene, Shape, by_id
 
 
 @dataclass(frozen=True)

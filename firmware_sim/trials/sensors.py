@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from firmware_sim.concealment.courses import Course
-from firmware_sim.concealment.joints import DrawnJoint, log_uniform
-from firmware_sim.concealment.measures import PlainDrive
 from firmware_sim.plant import PlantRun, SensorSpec, measure
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials.courses import Course
+from firmware_sim.trials.joints import DrawnJoint, log_uniform
+from firmware_sim.trials.measures import PlainDrive
 
 NEIGHBOUR = "other_neighbour"
 TEMPERATURE_NOISE_K = 0.02

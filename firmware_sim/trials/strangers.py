@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from firmware_sim.concealment.suspects import ANY, TURNING, Scene, Shape, Suspect, _angle, _sign
+from firmware_sim.trials.suspects import ANY, TURNING, Scene, Shape, Suspect, _angle, _sign
 
 
 def _ageing(rng: np.random.Generator, scene: Scene) -> Shape:

@@ -1,4 +1,4 @@
-"""`python -m firmware_sim.concealment`: write blind trials, or run an experiment on a sealed joint.
+"""`python -m firmware_sim.trials`: write blind trials, or run an experiment on a sealed joint.
 
 Trials: `--trials N --seed S --out DIR [--kind KIND] [--workers W]`; progress is printed as `written K of N`,
 then `sha256 HEX`. Experiment: `experiment --sealed FILE --trial K --protocol FILE --out FILE [--seed S]`.
@@ -11,10 +11,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from firmware_sim.concealment.experiment import run_experiment
-from firmware_sim.concealment.generate import generate
-from firmware_sim.concealment.plan import KINDS
 from firmware_sim.plant import PlantError
+from firmware_sim.trials.experiment import run_experiment
+from firmware_sim.trials.generate import generate
+from firmware_sim.trials.plan import KINDS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _trials(given: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(prog="python -m firmware_sim.concealment", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m firmware_sim.trials", description=__doc__)
     parser.add_argument("--trials", type=int, required=True)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True)
@@ -44,7 +44,7 @@ def _trials(given: Sequence[str]) -> int:
 
 
 def _experiment(given: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(prog="python -m firmware_sim.concealment experiment")
+    parser = argparse.ArgumentParser(prog="python -m firmware_sim.trials experiment")
     parser.add_argument("--sealed", type=Path, required=True)
     parser.add_argument("--trial", type=int, required=True)
     parser.add_argument("--protocol", type=Path, required=True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware_sim.concealment.courses import Course
 from firmware_sim.plant import PlantRun
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials.courses import Course
 
 _DEGREE = 7
 _BINS = 24

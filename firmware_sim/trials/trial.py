@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware_sim.concealment.confounded import Case, case_by_name, draw_truth
-from firmware_sim.concealment.courses import KINDS, Course, Range, draw_course
-from firmware_sim.concealment.joints import DrawnJoint, draw_joint, log_uniform
-from firmware_sim.concealment.measures import PlainDrive, plain_measures
-from firmware_sim.concealment.plan import Assignment
-from firmware_sim.concealment.sensors import draw_sensors, noise_floor_rad, read_sensors
-from firmware_sim.concealment.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
-from firmware_sim.concealment.strangers import STRANGERS
-from firmware_sim.concealment.suspects import CATALOGUE, Scene, Shape, Suspect, by_id
 from firmware_sim.plant import FINE, EffectSpec, PlantError, PlantRun
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials.confounded import Case, case_by_name, draw_truth
+from firmware_sim.trials.courses import KINDS, Course, Range, draw_course
+from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
+from firmware_sim.trials.measures import PlainDrive, plain_measures
+from firmware_sim.trials.plan import Assignment
+from firmware_sim.trials.sensors import draw_sensors, noise_floor_rad, read_sensors
+from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
+from firmware_sim.trials.strangers import STRANGERS
+from firmware_sim.trials.suspects import CATALOGUE, Scene, Shape, Suspect, by_id
 
 RECORDINGS = 2
 PAUSE_S = 30.0  # between two recordings

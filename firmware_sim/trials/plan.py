@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware_sim.concealment.confounded import CASES
-from firmware_sim.concealment.strangers import STRANGERS
-from firmware_sim.concealment.suspects import CATALOGUE, Suspect
 from firmware_sim.plant import PlantError
+from firmware_sim.trials.confounded import CASES
+from firmware_sim.trials.strangers import STRANGERS
+from firmware_sim.trials.suspects import CATALOGUE, Suspect
 
 KINDS = ("single", "pair", "nothing", "parameters", "unknown", "confounded")
 SHARES = {"single": 30, "pair": 5, "nothing": 2, "parameters": 4, "unknown": 5, "confounded": 4}
