@@ -17,8 +17,6 @@ from cablecomp.config import load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import Diagnosis, diagnose, report_json, write_diagnosis
 from cablecomp.effects import load_effects
-from cablecomp.identification.bench import bench_recording, evaluate_bench
-from cablecomp.mechanics.design import design_sheet
 from cablecomp.mechanics.jit import is_compiled
 from cablecomp.observer import Observer
 from cablecomp.recording.atomic import atomic_directory
@@ -28,6 +26,8 @@ from cablecomp.report.diagnosis_build import diagnosis_report
 from cablecomp.report.info import bench_table, design_table
 from cablecomp.report.replay_page import write_replay
 from cablecomp.report.theory import write_theory_figures
+from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
+from cablecomp.thesis.design import design_sheet
 
 console = Console()
 Config = Annotated[Path, typer.Option("--config", help="joint configuration (TOML)")]

@@ -11,9 +11,9 @@ from rich.console import Console
 from cablecomp.cli_analysis import hypothesis_bar
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.errors import InputError
-from cablecomp.identification.bench_cycle import Array, Columns, Rigs
-from cablecomp.identification.bench_study import study
 from cablecomp.report.study_page import study_table, write_study
+from cablecomp.thesis.bench.cycle import Array, Columns, Rigs
+from cablecomp.thesis.bench.study import study
 
 console = Console()
 JOINTS = Path(__file__).resolve().parents[1] / "configs/joints"

@@ -10,8 +10,8 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from cablecomp.identification.bench_types import BenchResult, Branch, Measured
-from cablecomp.mechanics.design_types import DesignSheet, StageSheet, WrapUse
+from cablecomp.thesis.bench.types import BenchResult, Branch, Measured
+from cablecomp.thesis.design_types import DesignSheet, StageSheet, WrapUse
 
 _PREFIXES: Final = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 

@@ -9,11 +9,11 @@ from typing import Any
 from plotly.subplots import make_subplots
 from rich.table import Table
 
-from cablecomp.identification.bench_cycle import Signature
-from cablecomp.identification.bench_study import QUESTIONS, THESIS, Finding, Study, answers
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report import page, style
 from cablecomp.report.page import Section
+from cablecomp.thesis.bench.cycle import Signature
+from cablecomp.thesis.bench.study import QUESTIONS, THESIS, Finding, Study, answers
 
 _LEAD = (
     "Snow's thesis (MIT/WHOI, 1993) reports four things of its bench and leaves them open: true mu of loading and "

@@ -8,13 +8,6 @@ from typing import Any
 import numpy as np
 from plotly.subplots import make_subplots
 
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics.closed_forms_stage import (
-    EquivalentStage,
-    cable_change,
-    cable_loading,
-    cable_loading_slope,
-)
 from cablecomp.report import style
 from cablecomp.report.theory_common import (
     HEIGHT,
@@ -30,6 +23,13 @@ from cablecomp.report.theory_common import (
     marker,
     own_line,
     si,
+)
+from cablecomp.thesis.closed_forms import closed
+from cablecomp.thesis.closed_forms.stage import (
+    EquivalentStage,
+    cable_change,
+    cable_loading,
+    cable_loading_slope,
 )
 
 GFS = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, math.inf)

@@ -13,10 +13,10 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 
 from cablecomp.config import JointConfig, Stage
-from cablecomp.mechanics.closed_forms_series import acting_stages
-from cablecomp.mechanics.closed_forms_stage import EquivalentStage
-from cablecomp.mechanics.design import design_sheet
 from cablecomp.report import style
+from cablecomp.thesis.closed_forms.series import acting_stages
+from cablecomp.thesis.closed_forms.stage import EquivalentStage
+from cablecomp.thesis.design import design_sheet
 
 Array = npt.NDArray[np.float64]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.mechanics.closed_forms_closed import closed_loading_normalised, unending_stage
-from cablecomp.mechanics.closed_forms_models import ModelName, choose_model, model_normalised
 from cablecomp.report.theory_common import Array, Figure, Subject, canvas, family, own_line
+from cablecomp.thesis.closed_forms.closed import closed_loading_normalised, unending_stage
+from cablecomp.thesis.closed_forms.models import ModelName, choose_model, model_normalised
 
 GFS = (0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 _TITLES: dict[ModelName, str] = {

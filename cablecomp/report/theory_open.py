@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from cablecomp.mechanics import closed_forms_open as open_
-from cablecomp.mechanics.closed_forms_stage import cable_loading
 from cablecomp.report.theory_common import (
     THESIS,
     Array,
@@ -21,6 +19,8 @@ from cablecomp.report.theory_common import (
     own_line,
     si,
 )
+from cablecomp.thesis.closed_forms import open as open_
+from cablecomp.thesis.closed_forms.stage import cable_loading
 
 GFS = (0.0, 0.1, 1.0, 3.0, 30.0)
 

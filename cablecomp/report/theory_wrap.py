@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from cablecomp.mechanics import closed_forms_wrap as wrap
-from cablecomp.mechanics.closed_forms_closed import closed_tensions_loading
 from cablecomp.report import style
 from cablecomp.report.theory_common import THESIS, Figure, Subject, canvas, hover, line, marker, own_line, si
+from cablecomp.thesis.closed_forms import wrap
+from cablecomp.thesis.closed_forms.closed import closed_tensions_loading
 
 
 def figures(subject: Subject) -> list[Figure]:

@@ -26,9 +26,9 @@ from cablecomp.control.plant_model import (
 from cablecomp.control.shaping import Ahead, Slope
 from cablecomp.control.stiffness import Hysteresis, stiffness_range, to_nlsys
 from cablecomp.errors import InputError
-from cablecomp.mechanics.design import design_sheet
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
+from cablecomp.thesis.design import design_sheet
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 JOINT = load_joint(CONFIGS / "joints/wrist-capstan.toml")

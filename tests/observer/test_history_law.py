@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from observer_joints import joint, pull_unit
+from wrap_energy import friction_work_J, stored_J
 
 from cablecomp.mechanics import arc
-from cablecomp.mechanics.closed_forms_closed import (
+from cablecomp.mechanics.profile import ROWS, V, Y, wrap_commit, wrap_eval, wrap_fill
+from cablecomp.observer import Observer
+from cablecomp.thesis.closed_forms.closed import (
     closed_loading_deflection_rad,
     closed_unloading_deflection_rad,
 )
-from cablecomp.mechanics.closed_forms_open import open_loading_deflection_rad, open_unloading_deflection_rad
-from cablecomp.mechanics.closed_forms_series import (
+from cablecomp.thesis.closed_forms.open import open_loading_deflection_rad, open_unloading_deflection_rad
+from cablecomp.thesis.closed_forms.series import (
     series_loading_deflection_rad,
     series_unloading_deflection_rad,
 )
-from cablecomp.mechanics.closed_forms_stage import equivalent_stage
-from cablecomp.mechanics.energy import friction_work_J, stored_J
-from cablecomp.mechanics.profile import ROWS, V, Y, wrap_commit, wrap_eval, wrap_fill
-from cablecomp.observer import Observer
+from cablecomp.thesis.closed_forms.stage import equivalent_stage
 
 Array = NDArray[np.float64]
 STIFF = 6e11  # N: strains of 1e-10, so that the drums hardly turn and the thesis's locked pulleys are met

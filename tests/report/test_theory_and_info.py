@@ -10,11 +10,11 @@ import pytest
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
-from cablecomp.identification.bench import BenchRecording, evaluate_bench
-from cablecomp.identification.bench_vectors import DriveOnBench
-from cablecomp.mechanics.design import design_sheet
 from cablecomp.report.info import as_text, bench_table, design_table, quantity
 from cablecomp.report.theory import theory_figures, write_theory_figures
+from cablecomp.thesis.bench.evaluate import BenchRecording, evaluate_bench
+from cablecomp.thesis.bench.vectors import DriveOnBench
+from cablecomp.thesis.design import design_sheet
 
 JOINTS = sorted((Path(__file__).parents[2] / "configs" / "joints").glob("*.toml"))
 NUMBERS = ["2.7", "2.8", "3.2", "3.3", "3.4", "4.4", "4.5"] + [f"4.{i}" for i in range(7, 16)]

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from cablecomp.errors import InputError
-from cablecomp.identification.bench_cycle import Bench, Rigs, Signature, Simulate, Traces, by_observer
-from cablecomp.identification.bench_suspects import Suspect, suspects
+from cablecomp.thesis.bench.cycle import Bench, Rigs, Signature, Simulate, Traces, by_observer
+from cablecomp.thesis.bench.suspects import Suspect, suspects
 
 THESIS: Final = Signature(
     true_up=0.047 / 0.043,

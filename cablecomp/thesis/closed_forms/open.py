@@ -11,14 +11,14 @@ import math
 
 import numpy as np
 
-from cablecomp.mechanics.closed_forms_stage import (
+from cablecomp.thesis.closed_forms.stage import (
     EquivalentStage,
     cable_change,
     cable_change_slope,
     cable_loading,
     cable_loading_slope,
 )
-from cablecomp.mechanics.closed_forms_wrap import Array, Number, gap
+from cablecomp.thesis.closed_forms.wrap import Array, Number, gap
 
 
 def open_loading_normalised(m: Number, GF: Number) -> Array:

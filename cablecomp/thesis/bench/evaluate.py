@@ -16,9 +16,9 @@ import numpy as np
 
 from cablecomp.config import Drive, JointConfig
 from cablecomp.errors import InputError
-from cablecomp.identification.bench_friction import BenchData, branch_of, weighted_mean
-from cablecomp.identification.bench_segments import Segment, Smoothed, noise_of, segments_of, trimmed
-from cablecomp.identification.bench_types import (
+from cablecomp.thesis.bench.friction import BenchData, branch_of, weighted_mean
+from cablecomp.thesis.bench.segments import Segment, Smoothed, noise_of, segments_of, trimmed
+from cablecomp.thesis.bench.types import (
     Array,
     BenchRecording,
     BenchResult,
@@ -26,11 +26,11 @@ from cablecomp.identification.bench_types import (
     Measured,
     PulleyFriction,
 )
-from cablecomp.identification.bench_vectors import DriveOnBench
-from cablecomp.mechanics.closed_forms_series import acting_stages
-from cablecomp.mechanics.closed_forms_stage import total_ratio
-from cablecomp.mechanics.design import check_settled
-from cablecomp.mechanics.geometry import sensor_deflection_rad
+from cablecomp.thesis.bench.vectors import DriveOnBench
+from cablecomp.thesis.closed_forms.series import acting_stages
+from cablecomp.thesis.closed_forms.stage import total_ratio
+from cablecomp.thesis.design import check_settled
+from cablecomp.thesis.geometry import sensor_deflection_rad
 
 __all__ = ["BenchRecording", "BenchResult", "Measured", "bench_recording", "evaluate_bench"]
 

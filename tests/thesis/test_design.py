@@ -10,10 +10,10 @@ import pytest
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics import geometry
-from cablecomp.mechanics.closed_forms_stage import equivalent_of
-from cablecomp.mechanics.design import design_sheet
+from cablecomp.thesis import geometry
+from cablecomp.thesis.closed_forms import closed
+from cablecomp.thesis.closed_forms.stage import equivalent_of
+from cablecomp.thesis.design import design_sheet
 
 JOINTS = sorted((Path(__file__).parents[2] / "configs" / "joints").glob("*.toml"))
 CLOSED = "capstan-arm"

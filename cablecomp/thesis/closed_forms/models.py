@@ -10,8 +10,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cablecomp.errors import InputError
-from cablecomp.mechanics.closed_forms_closed import Tensions
-from cablecomp.mechanics.closed_forms_wrap import Array, Number, gap
+from cablecomp.thesis.closed_forms.closed import Tensions
+from cablecomp.thesis.closed_forms.wrap import Array, Number, gap
 
 ModelName = Literal["I", "II", "III"]
 

@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from slip_grid import SlipCable, SlipGrid, closed_history
 
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics import closed_forms_models as models
-from cablecomp.mechanics import closed_forms_open as open_
-from cablecomp.mechanics.closed_forms_stage import EquivalentStage, WrapShare, effective_mu
+from cablecomp.thesis.closed_forms import closed, models
+from cablecomp.thesis.closed_forms import open as open_
+from cablecomp.thesis.closed_forms.stage import EquivalentStage, WrapShare, effective_mu
 
 R, SMALL, L, EA, T0, MU_R, MU_r = 0.04, 0.015, 0.03, 2.5e4, 60.0, 0.12, 0.18
 MU = effective_mu(R, SMALL, MU_R, MU_r)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.mechanics.closed_forms_wrap import Array, Number, signed_mu
+from cablecomp.thesis.closed_forms.wrap import Array, Number, signed_mu
 
 
 def sudden_work_J(tau: Number, mu: Number, radius_m: Number, EA_N: Number, pretension_N: Number) -> Array:

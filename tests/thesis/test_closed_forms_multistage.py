@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from cablecomp.config import Drive, Stage
 from cablecomp.errors import InputError
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics import closed_forms_open as open_
-from cablecomp.mechanics import closed_forms_series as series
-from cablecomp.mechanics.closed_forms_stage import (
+from cablecomp.thesis.closed_forms import closed, series
+from cablecomp.thesis.closed_forms import open as open_
+from cablecomp.thesis.closed_forms.stage import (
     equivalent_of,
     equivalent_stage,
     settled_pretensions_N,

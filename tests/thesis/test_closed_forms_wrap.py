@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from slip_grid import SlipGrid
 
-from cablecomp.mechanics import closed_forms_energy as energy
-from cablecomp.mechanics import closed_forms_wrap as wrap
+from cablecomp.thesis.closed_forms import energy, wrap
 
 MU = 0.15
 

@@ -15,9 +15,9 @@ import numpy.typing as npt
 from cablecomp.config import JointConfig
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.identification.bench import BenchResult, bench_recording, evaluate_bench
-from cablecomp.identification.bench_suspects import Case, Course, Suspect
 from cablecomp.observer import Observer
+from cablecomp.thesis.bench.evaluate import BenchResult, bench_recording, evaluate_bench
+from cablecomp.thesis.bench.suspects import Case, Course, Suspect
 
 Array = npt.NDArray[np.float64]
 Columns = Mapping[str, Array]

@@ -9,7 +9,7 @@ import pytest
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
-from cablecomp.identification.bench import BenchResult, bench_recording, evaluate_bench
+from cablecomp.thesis.bench.evaluate import BenchResult, bench_recording, evaluate_bench
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 JOINTS = Path(__file__).parents[2] / "configs" / "joints"

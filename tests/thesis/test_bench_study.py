@@ -11,10 +11,10 @@ import pytest
 
 from cablecomp.cli_study import by_plant
 from cablecomp.config import load_joint
-from cablecomp.identification.bench_cycle import Bench, Rigs, Signature, by_observer
-from cablecomp.identification.bench_study import answers, best_of
-from cablecomp.identification.bench_suspects import Suspect, suspects
-from cablecomp.identification.bench_vectors import DriveOnBench
+from cablecomp.thesis.bench.cycle import Bench, Rigs, Signature, by_observer
+from cablecomp.thesis.bench.study import answers, best_of
+from cablecomp.thesis.bench.suspects import Suspect, suspects
+from cablecomp.thesis.bench.vectors import DriveOnBench
 
 JOINTS = Path(__file__).parents[2] / "configs" / "joints"
 NAMED = {s.id: s for s in suspects()}

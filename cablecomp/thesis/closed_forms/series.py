@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cablecomp.config import Drive
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics.closed_forms_stage import EquivalentStage, equivalent_of, is_series, stage_ratios
-from cablecomp.mechanics.closed_forms_stage import equivalent_stage as single
-from cablecomp.mechanics.closed_forms_wrap import Array, Number
+from cablecomp.thesis.closed_forms import closed
+from cablecomp.thesis.closed_forms.stage import EquivalentStage, equivalent_of, is_series, stage_ratios
+from cablecomp.thesis.closed_forms.stage import equivalent_stage as single
+from cablecomp.thesis.closed_forms.wrap import Array, Number
 
 
 class GearedStage(NamedTuple):

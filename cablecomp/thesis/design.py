@@ -9,12 +9,12 @@ import numpy as np
 
 from cablecomp.config import Drive, JointConfig, Limits, Stage
 from cablecomp.errors import InputError
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics import closed_forms_open as open_
-from cablecomp.mechanics.closed_forms_energy import efficiency_limit, steady_efficiency
-from cablecomp.mechanics.closed_forms_models import choose_model, pretension_rule
-from cablecomp.mechanics.closed_forms_series import GearedStage, acting_stages
-from cablecomp.mechanics.closed_forms_stage import (
+from cablecomp.thesis.closed_forms import closed
+from cablecomp.thesis.closed_forms import open as open_
+from cablecomp.thesis.closed_forms.energy import efficiency_limit, steady_efficiency
+from cablecomp.thesis.closed_forms.models import choose_model, pretension_rule
+from cablecomp.thesis.closed_forms.series import GearedStage, acting_stages
+from cablecomp.thesis.closed_forms.stage import (
     EquivalentStage,
     equivalent_of,
     is_series,
@@ -22,7 +22,7 @@ from cablecomp.mechanics.closed_forms_stage import (
     stage_ratios,
     total_ratio,
 )
-from cablecomp.mechanics.design_types import DesignSheet, Pretension, StageSheet, WrapUse
+from cablecomp.thesis.design_types import DesignSheet, Pretension, StageSheet, WrapUse
 
 __all__ = ["DesignSheet", "Pretension", "StageSheet", "WrapUse", "check_settled", "design_sheet"]
 

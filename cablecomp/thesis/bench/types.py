@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cablecomp.errors import InputError
-from cablecomp.identification.bench_segments import Segment
+from cablecomp.thesis.bench.segments import Segment
 
 Array = npt.NDArray[np.float64]
 

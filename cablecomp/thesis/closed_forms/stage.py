@@ -12,7 +12,7 @@ import numpy as np
 
 from cablecomp.config import Drive, Stage
 from cablecomp.errors import InputError
-from cablecomp.mechanics.closed_forms_wrap import (
+from cablecomp.thesis.closed_forms.wrap import (
     Array,
     Number,
     loading_shape_of_excess,

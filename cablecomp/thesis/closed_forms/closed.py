@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cablecomp.mechanics.closed_forms_solve import ValueSlope, solve_increasing
-from cablecomp.mechanics.closed_forms_stage import (
+from cablecomp.thesis.closed_forms.solve import ValueSlope, solve_increasing
+from cablecomp.thesis.closed_forms.stage import (
     EquivalentStage,
     cable_change,
     cable_change_slope,
@@ -21,7 +21,7 @@ from cablecomp.mechanics.closed_forms_stage import (
     cable_loading_of_log,
     cable_loading_slope,
 )
-from cablecomp.mechanics.closed_forms_wrap import Array, Number
+from cablecomp.thesis.closed_forms.wrap import Array, Number
 
 _DEEPEST = -680.0  # ln of the smallest tension looked for; below, the cable counts as slack
 

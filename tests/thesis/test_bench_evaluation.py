@@ -10,11 +10,11 @@ import pytest
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
-from cablecomp.identification.bench import BenchRecording, evaluate_bench
-from cablecomp.identification.bench_segments import segments_of
-from cablecomp.identification.bench_vectors import DriveOnBench
-from cablecomp.mechanics.closed_forms_stage import equivalent_of, total_ratio
-from cablecomp.mechanics.geometry import sensor_deflection_rad
+from cablecomp.thesis.bench.evaluate import BenchRecording, evaluate_bench
+from cablecomp.thesis.bench.segments import segments_of
+from cablecomp.thesis.bench.vectors import DriveOnBench
+from cablecomp.thesis.closed_forms.stage import equivalent_of, total_ratio
+from cablecomp.thesis.geometry import sensor_deflection_rad
 
 JOINTS = Path(__file__).parents[2] / "configs" / "joints"
 RATE = 11.0  # the thesis's logger, Hz

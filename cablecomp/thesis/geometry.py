@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cablecomp.errors import InputError
-from cablecomp.mechanics.closed_forms_wrap import Array, Number
+from cablecomp.thesis.closed_forms.wrap import Array, Number
 
 
 def effective_radius_m(pulley_radius_m: float, cable_diameter_m: float) -> float:

@@ -12,10 +12,10 @@ from functools import partial
 import numpy as np
 
 from cablecomp.config import Drive, JointConfig
-from cablecomp.identification.bench_segments import Segment, Smoothed, trimmed
-from cablecomp.identification.bench_types import Array, Branch, EquilibriumPoint, Measured
-from cablecomp.identification.bench_vectors import DriveOnBench, interpolated
-from cablecomp.mechanics.closed_forms_series import acting_stages
+from cablecomp.thesis.bench.segments import Segment, Smoothed, trimmed
+from cablecomp.thesis.bench.types import Array, Branch, EquilibriumPoint, Measured
+from cablecomp.thesis.bench.vectors import DriveOnBench, interpolated
+from cablecomp.thesis.closed_forms.series import acting_stages
 
 _PERTURBED = ("EA_N", "pretension_N", "free_length_m", "output_radius_m", "input_radius_m")
 _ROUNDS = 30

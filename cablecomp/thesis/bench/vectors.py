@@ -18,10 +18,9 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from cablecomp.config import Drive
-from cablecomp.mechanics import closed_forms_closed as closed
-from cablecomp.mechanics import closed_forms_models as models
-from cablecomp.mechanics.closed_forms_series import acting_stages
-from cablecomp.mechanics.closed_forms_stage import EquivalentStage, cable_change, cable_loading
+from cablecomp.thesis.closed_forms import closed, models
+from cablecomp.thesis.closed_forms.series import acting_stages
+from cablecomp.thesis.closed_forms.stage import EquivalentStage, cable_change, cable_loading
 
 Array = npt.NDArray[np.float64]
 

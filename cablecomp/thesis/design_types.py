@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cablecomp.mechanics.closed_forms_models import ModelChoice
-from cablecomp.mechanics.closed_forms_stage import EquivalentStage
+from cablecomp.thesis.closed_forms.models import ModelChoice
+from cablecomp.thesis.closed_forms.stage import EquivalentStage
 
 
 @dataclass(frozen=True)

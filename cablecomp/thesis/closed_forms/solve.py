@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cablecomp.mechanics.closed_forms_wrap import Array
+from cablecomp.thesis.closed_forms.wrap import Array
 
 _ROUNDS = 300
 _NEWTON = 2.0**-33  # after a Newton step this small, relative to x, the error is its square: rounding
