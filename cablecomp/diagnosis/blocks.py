@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cablecomp.errors import InputError
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from cablecomp.errors import InputError
-from cablecomp.identification.noise import channel_noise
-from cablecomp.identification.smoothing import FloatArray, IntArray, Smooth, fit_to_noise, step_s
 from cablecomp.mechanics.jit import njit
+from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.smoothing import FloatArray, IntArray, Smooth, fit_to_noise, step_s
 
 NAMES: Final = (
     "time",

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 FOLDS: Final = 5
 _RIDGE: Final = 1e-3

@@ -25,7 +25,7 @@ from cablecomp.diagnosis.series import Series, make_series
 from cablecomp.diagnosis.setting import Setting, set_up
 from cablecomp.diagnosis.unknown import Description, describe
 from cablecomp.diagnosis.verdict import Findings, weigh
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from cablecomp.control.protocol import (
 )
 from cablecomp.diagnosis.covariates import Covariates
 from cablecomp.errors import InputError
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
 
 STEPS = 2500
 

@@ -15,7 +15,7 @@ from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, prior_of, sen
 from cablecomp.diagnosis.forms import PHASE, Form
 from cablecomp.diagnosis.hypotheses import free_shapes
 from cablecomp.diagnosis.valley import TWO_SIDED, walked
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 LEVERAGE = 0.8  # of one block, beyond which its say in the fit is not counted out further
 

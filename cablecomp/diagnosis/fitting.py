@@ -18,7 +18,7 @@ from cablecomp.diagnosis.forms import Form
 from cablecomp.errors import InputError
 from cablecomp.identification.misfit import Prepared, predicted
 from cablecomp.identification.parameters import OFFSET, Parameter, with_values
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 Mask = np.ndarray[tuple[int], np.dtype[np.bool_]]
 DAMPING = (0.0, 0.1, 1.0, 10.0)  # tried in turn until the misfit falls

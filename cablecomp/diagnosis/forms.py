@@ -16,7 +16,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.effects import Effect, Parameter, catalogue
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 PHASE = "phase_rad"
 INSTANTS = 12

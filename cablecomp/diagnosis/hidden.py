@@ -12,7 +12,7 @@ from cablecomp.diagnosis.blocks import Layout
 from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, evaluate, prior_of
 from cablecomp.diagnosis.screening import Probe
 from cablecomp.identification.parameters import OFFSET
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 SEEN = 2.0  # standard deviations up to which an amplitude is not excluded
 LARGE = 1.5  # noise floors (RMS) that such an effect makes before calibration takes it up

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.identification.smoothing import FloatArray, IntArray
 from cablecomp.mechanics.jit import njit
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
 def lagged(values: FloatArray, time_s: FloatArray, tau_s: float, starts: IntArray) -> FloatArray:

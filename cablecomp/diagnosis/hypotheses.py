@@ -24,7 +24,7 @@ from cablecomp.diagnosis.forms import Form, FreedForm, freed, has_instant
 from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.screening import Probe, Progress, attempt
 from cablecomp.diagnosis.starts import CAREFULLY, UNLIKELY, deepest, pulls
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 FITTED = 7  # hypotheses that are fitted in each round, of all that were asked
 LEAST_SHARE = 0.1  # of the best linear drop that a hypothesis must promise to be fitted

@@ -12,8 +12,8 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from cablecomp.diagnosis.blocks import Layout
-from cablecomp.identification.autocorrelation import integrated_time, long_run_variance
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.autocorrelation import integrated_time, long_run_variance
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _FREEDOM: Final = (3.0, 5.0, 10.0, 30.0, 300.0)
 

@@ -13,7 +13,7 @@ from cablecomp.diagnosis.crossfit import BlockSums, block_sums, gains
 from cablecomp.diagnosis.judge import judge
 from cablecomp.diagnosis.library import Term
 from cablecomp.diagnosis.series import Series
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 MOST_TERMS: Final = 5
 _LEAST_SHARE: Final = 0.02

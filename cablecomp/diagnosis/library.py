@@ -12,7 +12,7 @@ from cablecomp.diagnosis.history import lagged, play
 from cablecomp.diagnosis.periodic import Periodicity
 from cablecomp.diagnosis.series import Series
 from cablecomp.diagnosis.views import elapsed
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _LAGS: Final = (0.02, 0.05, 0.15)
 _RADII: Final = (0.05, 0.15)

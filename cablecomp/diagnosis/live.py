@@ -22,10 +22,10 @@ from cablecomp.diagnosis.ring import Ring, locate_in_ring
 from cablecomp.diagnosis.sequential import Alarm, WatchConfig, start, step
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
-from cablecomp.identification.noise import channel_noise
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.recording.writer import write_canonical
+from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.smoothing import FloatArray
 from cablecomp.signals import Estimate, Sample
 
 FLOORS: Final = 3.0

@@ -11,7 +11,7 @@ from cablecomp.diagnosis.crossfit import BlockSums, block_sums, coefficients, ga
 from cablecomp.diagnosis.segments import segment
 from cablecomp.diagnosis.series import Series, blocks_of, thin
 from cablecomp.diagnosis.views import View, load_path, views
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _ENERGY_SHARE: Final = 0.8
 _TIE: Final = 0.05

@@ -9,7 +9,7 @@ import numpy as np
 
 from cablecomp.diagnosis.series import Series, blocks_of
 from cablecomp.diagnosis.views import contrasts, hats, load_path
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 _MOST: Final = 160
 _HIGHEST: Final = 60.0

@@ -18,7 +18,7 @@ from cablecomp.diagnosis.setting import Setting, set_up
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.identification.parameters import free_parameters
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 _HELD = (PHASE, "time_s", "reference_degC")
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.identification.misfit import Prepared, groups_for, prepare
-from cablecomp.identification.noise import channel_noise
-from cablecomp.identification.smoothing import FloatArray, group_means, keep_corners
+from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.smoothing import FloatArray, group_means, keep_corners
 
 SIMULATED = 20_000  # steps of all recordings together
 MEASURED = "joint_position_rad"  # what is predicted; all other channels are inputs

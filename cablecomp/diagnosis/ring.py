@@ -10,7 +10,7 @@ from cablecomp.diagnosis.covariates import covariates
 from cablecomp.diagnosis.locate import Location, locate
 from cablecomp.diagnosis.series import make_series
 from cablecomp.errors import InputError
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 
 class Ring:

@@ -12,7 +12,7 @@ from cablecomp.diagnosis.fitting import INFLATION, Model, Problem, solve
 from cablecomp.diagnosis.hypotheses import Fold, all_rows, floor_of, fold_of
 from cablecomp.diagnosis.judge import Score, Verdict, compare
 from cablecomp.diagnosis.starts import CAREFULLY
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 SURE = 2.33  # standard errors of lead beyond which a rival is refuted: one in a hundred
 APART = 0.03  # of the noise floor's mean square, by which a rival has to be worse for that

@@ -22,7 +22,7 @@ from cablecomp.diagnosis.fitting import (
     solve,
 )
 from cablecomp.diagnosis.forms import Form
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 Progress = Callable[[str, float], None]
 CLEAR = 0.1  # share of the cost that an effect must remove at once

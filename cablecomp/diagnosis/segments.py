@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cablecomp.identification.autocorrelation import integrated_time
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.autocorrelation import integrated_time
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

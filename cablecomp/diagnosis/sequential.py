@@ -11,8 +11,8 @@ from typing import Final, Literal
 import numpy as np
 
 from cablecomp.errors import InputError
-from cablecomp.identification.autocorrelation import integrated_time, long_run_variance
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.autocorrelation import integrated_time, long_run_variance
+from cablecomp.signal.smoothing import FloatArray
 
 Kind = Literal["offset up", "offset down", "wider", "from the start"]
 _KINDS: Final[tuple[Kind, ...]] = ("offset up", "offset down", "wider")

@@ -10,8 +10,8 @@ import numpy as np
 
 from cablecomp.diagnosis.covariates import Covariates
 from cablecomp.errors import InputError
-from cablecomp.identification.autocorrelation import integrated_time_of_parts
-from cablecomp.identification.smoothing import FloatArray, IntArray
+from cablecomp.signal.autocorrelation import integrated_time_of_parts
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

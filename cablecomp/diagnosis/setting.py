@@ -16,9 +16,9 @@ from cablecomp.diagnosis.replicas import MEASURED, observe, shaken, steps_for
 from cablecomp.diagnosis.starts import CAREFULLY, deepest
 from cablecomp.errors import InputError
 from cablecomp.identification.misfit import Prepared
-from cablecomp.identification.noise import channel_noise
 from cablecomp.identification.parameters import OFFSET, Parameter, free_parameters
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.smoothing import FloatArray
 
 ROWS = 5000  # of all recordings together, after averaging
 REPLICAS = 12

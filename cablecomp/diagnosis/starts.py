@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cablecomp.diagnosis.fitting import INFLATION, Mask, Model, Problem, cost, prior_of, solve
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 STARTS = 8  # of the calibrated drive
 FEW = 4  # of a drive with effects, where its calibration has become unlikely

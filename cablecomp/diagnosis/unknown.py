@@ -16,7 +16,7 @@ from cablecomp.diagnosis.periodic import Periodicity, periodicity, which_angle
 from cablecomp.diagnosis.segments import segment
 from cablecomp.diagnosis.series import Series, blocks_of, thin
 from cablecomp.diagnosis.views import contrasts, elapsed, hats, load_path, products
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 Memory = Literal["memoryless", "remembers time", "remembers motion", "undecided"]
 Parity = Literal["odd", "even", "mixed", "undecided"]

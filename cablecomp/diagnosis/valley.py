@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cablecomp.diagnosis.fitting import Mask, Model, Problem, bounds_of, cost, evaluate, prior_of
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 DIRECTIONS = 2  # the weakest ones are walked
 PACES = 2  # to the end of an interval where the valley is straight

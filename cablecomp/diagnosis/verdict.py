@@ -16,7 +16,7 @@ from cablecomp.diagnosis.locate import Location
 from cablecomp.diagnosis.rivals import SURE, Rival
 from cablecomp.diagnosis.selection import Selection
 from cablecomp.diagnosis.setting import Setting
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 LEFT = 0.01  # share of the mismatch's energy beyond noise that a named effect may leave over
 MOST = 1 / 3  # share of it that is no explanation, however small the mismatch

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.diagnosis.series import Series
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 _INSTANTS: Final = 15
 

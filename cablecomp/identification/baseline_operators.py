@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.mechanics.jit import njit
+from cablecomp.signal.smoothing import FloatArray
 
 
 @njit

@@ -13,8 +13,8 @@ from scipy.optimize import lsq_linear, minimize
 
 from cablecomp.errors import InputError
 from cablecomp.identification.baseline_operators import bouc_wen, plays
-from cablecomp.identification.noise import channel_noise
-from cablecomp.identification.smoothing import FloatArray, fit_to_noise
+from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.smoothing import FloatArray, fit_to_noise
 
 Columns = Mapping[str, FloatArray]
 

@@ -12,10 +12,10 @@ from scipy.optimize import least_squares
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.identification.autocorrelation import integrated_time_of_parts
 from cablecomp.identification.misfit import Columns, Prepared, groups_for, predicted, prepare
 from cablecomp.identification.parameters import OFFSET, Parameter, free_parameters, with_values
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.autocorrelation import integrated_time_of_parts
+from cablecomp.signal.smoothing import FloatArray
 
 Progress = Callable[[str, int], None]
 """Told what is being done, and how many simulations have been run."""

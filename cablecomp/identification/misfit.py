@@ -10,9 +10,9 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.identification.noise import InputNoise, channel_noise, residual_floor
-from cablecomp.identification.smoothing import FloatArray, group_means
 from cablecomp.observer import Observer
+from cablecomp.signal.noise import InputNoise, channel_noise, residual_floor
+from cablecomp.signal.smoothing import FloatArray, group_means
 
 Columns = Mapping[str, FloatArray]
 

@@ -12,9 +12,9 @@ from scipy.optimize import least_squares
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.identification.autocorrelation import integrated_time_of_parts
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.identification.transmission_path import PathModel, PathRecording, path_model, predict_path
+from cablecomp.signal.autocorrelation import integrated_time_of_parts
+from cablecomp.signal.smoothing import FloatArray
 
 Channel = Literal["joint_position_rad", "motor_torque_Nm"]
 JOINT: Final[Channel] = "joint_position_rad"

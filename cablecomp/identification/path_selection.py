@@ -14,7 +14,6 @@ from cablecomp.config import JointConfig
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.identification.path_fit import JOINT, MOTOR, Channel, PathFit, Unknown, fit_path
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.identification.transmission_path import (
     FRICTION,
     BoolArray,
@@ -22,6 +21,7 @@ from cablecomp.identification.transmission_path import (
     predict_path,
     with_path_effects,
 )
+from cablecomp.signal.smoothing import FloatArray
 
 _FREE_KEYS: Final = ("input_radius_m", "EA_N", "pretension_N")
 _HELD: Final = ("load_coefficient",)

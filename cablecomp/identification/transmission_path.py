@@ -19,7 +19,6 @@ from cablecomp.config import JointConfig
 from cablecomp.effects import extend, with_effects
 from cablecomp.errors import InputError
 from cablecomp.identification.parameters import with_values
-from cablecomp.identification.smoothing import FloatArray, IntArray, group_means
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.cable import stacks
@@ -28,6 +27,7 @@ from cablecomp.mechanics.joint import joint_commit
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer import stepper as st
 from cablecomp.observer.observer import REASONS
+from cablecomp.signal.smoothing import FloatArray, IntArray, group_means
 
 FRICTION = "motor_friction_Nm"
 """Coulomb torque between the motor's torque sensor and the cable [N m]."""

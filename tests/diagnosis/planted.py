@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from cablecomp.diagnosis.covariates import Covariates, covariates
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 SIGMA = 2e-5
 

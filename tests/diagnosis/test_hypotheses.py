@@ -14,7 +14,7 @@ from cablecomp.diagnosis.hidden import hidden_effects
 from cablecomp.diagnosis.hypotheses import fit_roughly, fold_of, polish, start_of
 from cablecomp.diagnosis.screening import probe_all
 from cablecomp.diagnosis.setting import Setting, set_up
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 STAGE = {

@@ -9,7 +9,7 @@ from planted import autoregressive
 from cablecomp.diagnosis.blocks import Layout, alternate_blocks, count_reversals
 from cablecomp.diagnosis.judge import compare, effective_size, heldout_gain, judge, predictive_likelihood
 from cablecomp.errors import InputError
-from cablecomp.identification.autocorrelation import integrated_time, long_run_variance
+from cablecomp.signal.autocorrelation import integrated_time, long_run_variance
 
 N = 4_000
 DIRECTION = np.sign(np.sin(np.arange(N) * 2.0 * np.pi / 200.0))

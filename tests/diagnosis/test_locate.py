@@ -14,7 +14,7 @@ from cablecomp.diagnosis.segments import segment
 from cablecomp.diagnosis.series import make_series, thin
 from cablecomp.diagnosis.views import load_path
 from cablecomp.errors import InputError
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 
 @cache

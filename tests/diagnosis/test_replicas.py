@@ -9,7 +9,7 @@ from cablecomp.config import parse_joint
 from cablecomp.diagnosis.fitting import INFLATION
 from cablecomp.diagnosis.replicas import observe
 from cablecomp.diagnosis.setting import set_up
-from cablecomp.identification.smoothing import FloatArray, group_means
+from cablecomp.signal.smoothing import FloatArray, group_means
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 JOINT = {

@@ -9,7 +9,7 @@ from planted import SIGMA, autoregressive, columns
 from cablecomp.diagnosis.ring import Ring, locate_in_ring
 from cablecomp.diagnosis.sequential import Alarm, WatchConfig, WatchState, log_evidence, start, step
 from cablecomp.errors import InputError
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 STEP_S = 1e-3
 

@@ -14,7 +14,7 @@ from cablecomp.diagnosis.history import lagged, play
 from cablecomp.diagnosis.periodic import Periodicity, which_angle
 from cablecomp.diagnosis.series import make_series
 from cablecomp.diagnosis.unknown import Description, describe
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 START = np.zeros(1, dtype=np.int64)
 

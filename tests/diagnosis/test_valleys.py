@@ -14,7 +14,7 @@ from cablecomp.diagnosis.fitting import Model, Problem, evaluate, sensitivities,
 from cablecomp.diagnosis.starts import deepest
 from cablecomp.diagnosis.valley import TWO_SIDED, walked
 from cablecomp.identification.parameters import Parameter
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from cablecomp.identification.path_fit import (
     misfit_of,
 )
 from cablecomp.identification.path_selection import effect_unknowns, loop_of, stage_unknowns
-from cablecomp.identification.smoothing import FloatArray, group_means
 from cablecomp.identification.transmission_path import (
     SHARE,
     STIFFENING,
@@ -33,6 +32,7 @@ from cablecomp.identification.transmission_path import (
     by_travel,
     with_path_effects,
 )
+from cablecomp.signal.smoothing import FloatArray, group_means
 
 FOUND: Final = ("routing_friction", "nonlinear_cable", "bearing_friction")
 """What `select_effects` finds missing from Snow's drive."""

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.recording.reader import read_all
+from cablecomp.signal.smoothing import FloatArray
 
 CONFIGS: Final = Path(__file__).parents[2] / "configs" / "hardware"
 KINDS: Final = ("linear", "polynomial", "bouc-wen", "plays")

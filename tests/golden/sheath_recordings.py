@@ -14,8 +14,8 @@ from cablecomp.config import load_joint
 from cablecomp.identification.baselines import BASELINES
 from cablecomp.identification.path_fit import JOINT, Channel, PathFit, Unknown, fit_path, misfit_of
 from cablecomp.identification.path_selection import stage_unknowns
-from cablecomp.identification.smoothing import FloatArray
 from cablecomp.identification.transmission_path import BEND, PathRecording, by_travel, with_path_effects
+from cablecomp.signal.smoothing import FloatArray
 
 BENDS: Final = (0, 60, 120, 180, 240)
 SCALE: Final[Mapping[Channel, float]] = {JOINT: radians(2.0)}

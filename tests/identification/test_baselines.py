@@ -15,7 +15,7 @@ from cablecomp.identification.baselines import (
     fit_polynomial,
     rmse,
 )
-from cablecomp.identification.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray
 
 TIME = np.arange(4_000) * 5e-3
 

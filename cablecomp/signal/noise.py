@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cablecomp.errors import InputError
-from cablecomp.identification.smoothing import FloatArray, group_means, local_fit
+from cablecomp.signal.smoothing import FloatArray, group_means, local_fit
 
 _FEWEST: Final = 32
 _ORDERS: Final = (2, 3, 4, 5, 6)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from cablecomp.errors import InputError
-from cablecomp.identification.noise import (
+from cablecomp.signal.noise import (
     InputNoise,
     channel_noise,
     grid_step,
     local_sensitivity,
     residual_floor,
 )
-from cablecomp.identification.smoothing import fit_to_noise, local_fit
+from cablecomp.signal.smoothing import fit_to_noise, local_fit
 
 STEP_S = 1e-3
 TIME = np.arange(20_000) * STEP_S

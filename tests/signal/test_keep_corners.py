@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.identification.smoothing import FloatArray, keep_corners, local_fit
+from cablecomp.signal.smoothing import FloatArray, keep_corners, local_fit
 
 SIGMA = 0.01
 
