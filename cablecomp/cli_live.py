@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.live import LiveOptions, LiveWatch
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop, Stage
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import Watch
+from cablecomp.watch.live import LiveOptions, LiveWatch
 
 
 class LiveRun:

@@ -13,9 +13,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from cablecomp.diagnosis.prove import Blind, Wish, prove
 from cablecomp.errors import InputError
 from cablecomp.report.scoreboard_page import scoreboard_table, write_scoreboard_page
+from cablecomp.trials.prove import Blind, Wish, prove
 
 console = Console()
 _TRIALS = (sys.executable, "-m", "firmware_sim.trials")

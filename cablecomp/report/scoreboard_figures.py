@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cablecomp.diagnosis.scoreboard import Rate, Scoreboard
 from cablecomp.report import style
+from cablecomp.trials.scoreboard import Rate, Scoreboard
 
 RIGHT, WRONG, NOTHING = style.CABLE_L, style.CABLE_H, style.BASELINE
 _DECIDABLE = style.PREDICTED

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from cablecomp.diagnosis.scoreboard import Scoreboard, Target, rate
-from cablecomp.diagnosis.scoring import Row
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.report import page
 from cablecomp.report import scoreboard_figures as figures
 from cablecomp.report.page import Fact, Section
+from cablecomp.trials.scoreboard import Scoreboard, Target, rate
+from cablecomp.trials.scoring import Row
 
 
 def scoreboard_table(board: Scoreboard) -> Table:

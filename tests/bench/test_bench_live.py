@@ -11,8 +11,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from cablecomp.config import load_joint
-from cablecomp.diagnosis.live import LiveOptions, LiveWatch
 from cablecomp.signals import Estimate, Sample
+from cablecomp.watch.live import LiveOptions, LiveWatch
 
 JOINT = Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml"
 

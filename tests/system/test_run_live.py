@@ -14,7 +14,6 @@ from cablecomp.config import load_joint
 from cablecomp.config_text import write_joint
 from cablecomp.control.options import load_control
 from cablecomp.control.standard import reaching_protocol
-from cablecomp.diagnosis.live import LiveOptions
 from cablecomp.effects import with_effects
 from cablecomp.links.schema import load_link
 from cablecomp.recording.reader import read_all
@@ -22,6 +21,7 @@ from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import SimulationWish
+from cablecomp.watch.live import LiveOptions
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 JOINT = CONFIGS / "joints/wrist-capstan.toml"

@@ -14,13 +14,13 @@ from typing import Any
 
 from cablecomp.config import load_joint
 from cablecomp.diagnosis.diagnose import diagnose, write_diagnosis
-from cablecomp.diagnosis.reference import Yardstick, measure_truth
-from cablecomp.diagnosis.scoreboard import Scoreboard, as_json, scoreboard
-from cablecomp.diagnosis.scoring import Row, failed_trial, score_trial
-from cablecomp.diagnosis.sealed import Truth, digest, open_sealed
 from cablecomp.errors import CablecompError, InputError
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.reader import read_all
+from cablecomp.trials.reference import Yardstick, measure_truth
+from cablecomp.trials.scoreboard import Scoreboard, as_json, scoreboard
+from cablecomp.trials.scoring import Row, failed_trial, score_trial
+from cablecomp.trials.sealed import Truth, digest, open_sealed
 
 SEALED, COMMITMENT, PUBLIC, VERDICTS = "sealed.zip", "commitment.json", "trials", "verdicts"
 PROTOCOL, SECOND = "next_experiment.toml", "after-experiment"

@@ -18,8 +18,6 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.locate import Location
-from cablecomp.diagnosis.ring import Ring, locate_in_ring
-from cablecomp.diagnosis.sequential import Alarm, WatchConfig, start, step
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_file
@@ -27,6 +25,8 @@ from cablecomp.recording.writer import write_canonical
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.signals import Estimate, Sample
+from cablecomp.watch.ring import Ring, locate_in_ring
+from cablecomp.watch.sequential import Alarm, WatchConfig, start, step
 
 FLOORS: Final = 3.0
 """Noise floors that the residual may have from the start; a friction model fed with noisy signals shows up to 1.5."""

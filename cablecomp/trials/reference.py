@@ -12,13 +12,13 @@ from cablecomp.diagnosis.fitting import INFLATION, Problem, solve
 from cablecomp.diagnosis.forms import PHASE
 from cablecomp.diagnosis.hypotheses import Fold, all_rows, fold_of
 from cablecomp.diagnosis.judge import judge
-from cablecomp.diagnosis.sealed import Truth
 from cablecomp.diagnosis.selection import LEVEL
 from cablecomp.diagnosis.setting import Setting, set_up
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.identification.parameters import free_parameters
 from cablecomp.signal.smoothing import FloatArray
+from cablecomp.trials.sealed import Truth
 
 _HELD = (PHASE, "time_s", "reference_degC")
 

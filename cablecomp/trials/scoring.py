@@ -8,10 +8,10 @@ from math import isfinite, nan, pi
 from typing import Any
 
 from cablecomp.config import EffectEntry
-from cablecomp.diagnosis.reference import Yardstick
-from cablecomp.diagnosis.sealed import TrueEffect, Truth
 from cablecomp.effects import catalogue
 from cablecomp.effects.catalogue import acts_through
+from cablecomp.trials.reference import Yardstick
+from cablecomp.trials.sealed import TrueEffect, Truth
 
 EVENT_SLACK_S = 1.0  # how far beside an interval an event may lie and still count as inside
 SEEN = 1.5  # mean square over the noise floor from which unknown physics can be seen at all

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from planted import SIGMA, autoregressive, columns
 
-from cablecomp.diagnosis.ring import Ring, locate_in_ring
-from cablecomp.diagnosis.sequential import Alarm, WatchConfig, WatchState, log_evidence, start, step
 from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
+from cablecomp.watch.ring import Ring, locate_in_ring
+from cablecomp.watch.sequential import Alarm, WatchConfig, WatchState, log_evidence, start, step
 
 STEP_S = 1e-3
 

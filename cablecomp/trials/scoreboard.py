@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cablecomp.diagnosis.scoring import Row
+from cablecomp.trials.scoring import Row
 
 SIZE_EDGES = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.6001)
 CONFIDENCE_EDGES = (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0001)

@@ -15,15 +15,15 @@ import pytest
 from blind_joint import JOINT, recording
 
 from cablecomp.config_text import joint_text
-from cablecomp.diagnosis.prove import SEALED, Blind, Wish, prove
-from cablecomp.diagnosis.reference import Yardstick, measure_truth
-from cablecomp.diagnosis.scoreboard import Rate, as_json, scoreboard
-from cablecomp.diagnosis.scoring import Row, failed_trial, score_trial
-from cablecomp.diagnosis.sealed import TrueEffect, Truth, digest, open_sealed
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
 from cablecomp.recording.writer import write_canonical
 from cablecomp.report.scoreboard_page import scoreboard_page, scoreboard_table
+from cablecomp.trials.prove import SEALED, Blind, Wish, prove
+from cablecomp.trials.reference import Yardstick, measure_truth
+from cablecomp.trials.scoreboard import Rate, as_json, scoreboard
+from cablecomp.trials.scoring import Row, failed_trial, score_trial
+from cablecomp.trials.sealed import TrueEffect, Truth, digest, open_sealed
 
 SURE = Yardstick(1e-5, 5e-5, True, 0.9, 20.0, 2.5)
 

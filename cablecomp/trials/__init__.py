@@ -1,0 +1,5 @@
+"""Blind trials of the diagnosis: a sealed truth, verdicts reached without it, and the score.
+
+Imports diagnosis and everything below, never the plant that conceals (the command line brings the two together).
+Start reading at `prove.py`.
+"""
