@@ -87,7 +87,7 @@ def _effect(effect: Sized) -> dict[str, Any]:
     }
 
 
-def true_angles(trial: Trial) -> dict[str, Floats]:
+def true_angles(trial: Trial) -> dict[str, Any]:
     """Joint angle of the true drive, of the drive without any effect, and (of several) without each; rad.
 
     `joint_rad_k`, `plain_rad_k`, `without_<effect>_rad_k` on the samples `time_s_k` of recording k = 1, 2, …
