@@ -37,6 +37,13 @@ def _reply_length(device: MitDevice) -> int:
     return 6 if device.family == "katz" else 8
 
 
+def is_register_reply(data: bytes) -> bool:
+    """Whether a Damiao drive answers a register request of somebody's, on the identifier of its states:
+    number, 0, 0x33 (read), 0x55 (write) or 0xAA (save), … Read as a state it would be a disabled drive at the
+    very end of its range."""
+    return data[0] < 0x10 and data[1] == 0 and data[2] in (0x33, 0x55, 0xAA)
+
+
 class MitDrive:
     """Encodes commands and decodes replies of one drive.
 
@@ -95,7 +102,7 @@ class MitDrive:
     def take(self, data: bytes, now_s: float) -> int:
         """Take one reply."""
         stats, readings = self._stats, self._readings
-        if len(data) != self._length:
+        if len(data) != self._length or (self._family == "damiao" and is_register_reply(data)):
             stats.invalid += 1
             return 0
         word = int.from_bytes(data, "big")

@@ -16,8 +16,8 @@ used)."""
 
 
 class Receiver(NamedTuple):
-    """Who takes the frames of an identifier; where several share it, `first_byte & mask == number` tells them
-    apart."""
+    """Who takes the frames of an identifier: all of them where `mask` is 0, else those whose byte 0 says
+    `byte & mask == number`, however many share the identifier."""
 
     identifier: int
     take: Take

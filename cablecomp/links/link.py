@@ -24,16 +24,19 @@ class LinkStatus(NamedTuple):
     """What a link has counted since it was opened, and the state of its bus; `fault` says in words why it is
     not well.
 
-    `frames` came, of which `ignored` belong to no joint and `invalid` were damaged; `lost`, `repeated`,
-    `reordered`, `restarts` by the messages' own counters; `error_frames`, `overflows`, `dropped` as
-    controller, adapter and system tell; `backlogs`: polls that left frames for the next; `sent`,
-    `send_failures` frames; `clipped` commands of which something was saturated.
+    `frames` came, of which `ignored` are of an identifier that nobody here listens to, `foreign` are of one
+    that is listened to but from a device that is none of this link's (another drive's number in byte 0), and
+    `invalid` were damaged or impossible; none of these was taken. `lost`, `repeated`, `reordered`, `restarts`
+    by the messages' own counters; `error_frames`, `overflows`, `dropped` as controller, adapter and system
+    tell; `backlogs`: polls that left frames for the next; `sent`, `send_failures` frames; `clipped` commands
+    of which something was saturated.
     """
 
     bus: BusState
     fault: str
     frames: int
     ignored: int
+    foreign: int
     invalid: int
     lost: int
     repeated: int
@@ -110,7 +113,8 @@ class BusLink:
             receivers += _sensor_receivers(config, ends, joint)
         self.joints: tuple[JointReadings, ...] = tuple(readings)
         self._drives: tuple[Drive | None, ...] = tuple(drives)
-        self._table = dispatch_table(receivers)
+        self._strangers = Strangers()
+        self._table = dispatch_table(receivers, self._strangers)
         self._frames = 0
         self._ignored = 0
         self._sent = 0
@@ -186,6 +190,7 @@ class BusLink:
             port.fault,
             self._frames,
             self._ignored,
+            self._strangers.count,
             port.counters.invalid + sum(m.invalid for m in messages),
             sum(m.lost for m in messages),
             sum(m.repeated for m in messages),
@@ -224,29 +229,39 @@ def make_port(config: LinkConfig) -> Port:
     return serial_port(bus.port, bus.baud)
 
 
-def dispatch_table(receivers: list[Receiver]) -> dict[int, Take]:
-    """Identifier -> who takes it; raises InputError where two would take the same frame."""
+class Strangers:
+    """Counts frames that came on an identifier of ours from a device that is none of ours."""
+
+    __slots__ = ("count",)
+
+    def __init__(self) -> None:
+        self.count = 0
+
+
+def dispatch_table(receivers: list[Receiver], strangers: Strangers) -> dict[int, Take]:
+    """Identifier -> who takes it, whose number in byte 0 is checked however few share the identifier; raises
+    InputError where two would take the same frame."""
     table: dict[int, Take] = {}
     for identifier in {r.identifier for r in receivers}:
         sharing = [r for r in receivers if r.identifier == identifier]
-        if len(sharing) == 1:
-            table[identifier] = sharing[0].take
-            continue
-        numbers = {r.number for r in sharing}
-        masks = {r.mask for r in sharing}
-        if len(masks) != 1 or 0 in masks or len(numbers) != len(sharing):
+        masks, takers = {r.mask for r in sharing}, {r.number: r.take for r in sharing}
+        if len(masks) != 1 or len(takers) != len(sharing) or (0 in masks and len(sharing) > 1):
             raise InputError(
                 f"identifier 0x{identifier & 0x1FFFFFFF:X} is listened to by two joints that cannot be told "
                 "apart; give each device its own node or reply_id"
             )
-        table[identifier] = _shared({r.number: r.take for r in sharing}, masks.pop())
+        mask = masks.pop()
+        table[identifier] = _by_number(takers, mask, strangers) if mask else sharing[0].take
     return table
 
 
-def _shared(takers: dict[int, Take], mask: int) -> Take:
+def _by_number(takers: dict[int, Take], mask: int, strangers: Strangers) -> Take:
     def take(data: bytes, now_s: float) -> int:
         taker = takers.get(data[0] & mask) if data else None
-        return 0 if taker is None else taker(data, now_s)
+        if taker is None:
+            strangers.count += 1
+            return 0
+        return taker(data, now_s)
 
     return take
 

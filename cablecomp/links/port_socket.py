@@ -162,13 +162,16 @@ class MulticastPort(_SocketPort):
     def _take(self, datagram: memoryview, sink: Sink) -> None:
         try:
             fields = msgpack.unpackb(datagram)
-            identifier, data = fields["arbitration_id"], fields["data"]
-            if fields["is_fd"] or len(data) > 8 or not 0 <= identifier <= _EXTENDED_MASK:
+            identifier, data, extended = fields["arbitration_id"], fields["data"], fields["is_extended_id"]
+            # anybody may send to the group, and a frame's takers rely on what they are given
+            if type(identifier) is not int or type(data) is not bytes or fields["is_fd"] or len(data) > 8:
+                raise ValueError
+            if not 0 <= identifier <= (_EXTENDED_MASK if extended else _STANDARD_MASK):
                 raise ValueError
             if fields["is_error_frame"]:
                 self.note_error(identifier, data)
                 return
-            if fields["is_extended_id"]:
+            if extended:
                 identifier |= EXTENDED
             if fields["is_remote_frame"]:
                 identifier |= REMOTE

@@ -143,6 +143,7 @@ class Loop:
             frames=status.frames,
             lost_frames=status.lost,
             invalid_frames=status.invalid,
+            foreign_frames=status.foreign,
             repeated_frames=status.repeated,
             reordered_frames=status.reordered,
             dropped_frames=status.dropped,
@@ -210,6 +211,10 @@ class Loop:
                 ", ".join(self.link.silent(now, self.options.listen_s / 2)) or "a channel that is needed"
             )
             names = ", ".join(j.setup.name for j in self.joints if not j.ready)
+            foreign = self.link.status().foreign
+            missing += (
+                f"; {foreign} frames came from other devices on the same identifiers" if foreign else ""
+            )
             raise DeviceError(
                 f"link `{self.link.config.name}`: nothing from {names} within {self.options.listen_s:g} s "
                 f"(silent: {missing}); check power, wiring, bitrate and node numbers"

@@ -146,7 +146,7 @@ def test_what_came_since_is_what_was_added_since() -> None:
 
 
 def status_with(lost: int) -> LinkStatus:
-    return LinkStatus(BusState.ACTIVE, "", *[0] * 14)._replace(lost=lost)
+    return LinkStatus(BusState.ACTIVE, "", *[0] * 15)._replace(lost=lost)
 
 
 def test_minutes_count_their_own_only() -> None:
