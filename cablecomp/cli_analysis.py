@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cablecomp.config import load_joint
+from cablecomp.config import in_session, load_joint, session_of
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import Diagnosis, diagnose, report_json, write_diagnosis
 from cablecomp.effects import load_effects
@@ -54,9 +54,15 @@ def replay(
     bounds: Annotated[
         bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
     ] = True,
+    session: Annotated[
+        str | None,
+        typer.Option(help="whose own values hold; the [[session]] that names the recording if absent"),
+    ] = None,
 ) -> None:
     """Stream a recording through the observer that the controller runs; compare with what was measured."""
     joint, source = load_joint(config), open_recording(recording)
+    found = session_of(joint, recording, session)
+    joint = in_session(joint, found)
     announce_compilation()
     with progress_bar(f"replay {recording.name}") as told:
         summary = write_replay(
@@ -69,6 +75,8 @@ def replay(
             "best straight line, RMS", f"{1e3 * (summary.baseline_linear_rmse_rad or 0.0):.5g} mrad"
         )
     table.add_row("samples", f"{summary.samples:,}")
+    if joint.sessions:
+        table.add_row("session", "none matches: the joint's own values" if found is None else found.name)
     console.print(table)
     console.print(f"report: {out / 'report.html'}")
 

@@ -21,11 +21,15 @@ def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
     lines += _table("drive", drive)
     for stage in stages:
         lines += _table("drive.stage", stage, array=True)
-    for name in ("tolerance", "sensors", "observer", "limits"):
+    for name in ("tolerance", "sensors", "observer", "limits", "condition"):
         if data.get(name):
             lines += _table(name, data[name])
     for effect in config.effect:
         lines += _table("effect", {"id": effect.id, **effect.parameters}, array=True)
+    for law in data["empirical"]:
+        lines += _table("empirical", law, array=True)
+    for session in data["session"]:
+        lines += _table("session", {k: v for k, v in session.items() if v or k == "own"}, array=True)
     return "\n".join(lines) + "\n"
 
 

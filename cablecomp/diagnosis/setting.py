@@ -143,7 +143,10 @@ def _with_load(columns: Columns, config: JointConfig) -> dict[str, FloatArray]:
     found = dict(columns)
     if config.observer.load == "motor_torque":
         ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))
-        found["joint_torque_Nm"] = -columns["motor_torque_Nm"] / ratio
+        torque = columns["motor_torque_Nm"] - config.sensors.motor_torque_offset_Nm
+        found["joint_torque_Nm"] = -torque / ratio
+    elif config.observer.load == "none":
+        found["joint_torque_Nm"] = np.zeros(len(columns["time_s"]))
     return found
 
 

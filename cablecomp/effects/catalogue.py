@@ -17,8 +17,9 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.effects.base import Change, Effect, Floats, Parameter
+from cablecomp.effects.empirical import empirical_term
 from cablecomp.errors import InputError
-from cablecomp.mechanics.assemble import Extension
+from cablecomp.mechanics.assemble import Extension, Term
 from cablecomp.mechanics.layout import OTHERS
 from cablecomp.mechanics.tables import law_table, plain_law
 
@@ -93,27 +94,36 @@ def extend(config: JointConfig) -> Extension | None:
 
     Raises InputError for an unknown id, an unknown or missing parameter, or a value that the law cannot take.
     """
-    if not config.effect:
+    if not config.effect and not config.empirical:
         return None
     known = sorted(((_look_up(entry.id), entry) for entry in config.effect), key=lambda pair: pair[0].rank)
     changes = [_change(effect, _values(effect, entry, config), config) for effect, entry in known]
     if sum(c.play_share > 0.0 for c in changes) > 1:
         raise InputError(f"{config.name}: effect `strand_friction` is given twice; one is accepted")
     return Extension(
-        terms=tuple(t for change in changes for t in change.terms),
+        terms=(*(t for change in changes for t in change.terms), *_empirical(config)),
         law=_law(changes, config),
         guide_angle=sum(c.guide_angle for c in changes),
         guide_length_m=sum(c.guide_length_m for c in changes),
         extra_length_m=sum(c.extra_length_m for c in changes),
         play_share=sum(c.play_share for c in changes),
-        play_yield_N=max(c.play_yield_N for c in changes),
+        play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
         viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
     )
 
 
 def is_bounded(config: JointConfig) -> bool:
-    """True if all effects of the configuration preserve the order that guaranteed bounds rest on."""
-    return all(_look_up(entry.id).bounded for entry in config.effect)
+    """True if all effects of the configuration preserve the order that guaranteed bounds rest on.
+
+    An empirical law does unless it depends on the joint angle itself.
+    """
+    lawful = all(law.of != "joint_position_rad" for law in config.empirical)
+    return lawful and all(_look_up(entry.id).bounded for entry in config.effect)
+
+
+def _empirical(config: JointConfig) -> list[Term]:
+    others = other_channels(config)
+    return [t for law in config.empirical for t in empirical_term(law, config, others)]
 
 
 def _change(effect: Effect, values: Mapping[str, float], config: JointConfig) -> Change:
@@ -180,14 +190,15 @@ def _place(channel: str, config: JointConfig) -> int:
 
 
 def other_channels(config: JointConfig) -> list[str]:
-    """The further channels that effects of this joint read, in the order in which the kernel gets them."""
+    """The further channels that effects and empirical laws of this joint read, in the order in which the kernel gets them."""
     names: list[str] = []
     for entry in config.effect:
         for key in _look_up(entry.id).texts:
             channel = str(entry.parameters.get(key, ""))
             if channel and channel not in names:
                 names.append(channel)
-    return names
+    names += [law.of for law in config.empirical if law.of.startswith("other_")]
+    return list(dict.fromkeys(names))
 
 
 def _law(changes: Sequence[Change], config: JointConfig) -> Floats | None:

@@ -11,15 +11,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
-from typing import Any, Final
+from typing import Final
 
-from cablecomp.config import JointConfig, Sensors, Stage
+from cablecomp.config import JointConfig, with_values
+from cablecomp.config.values import SENSOR_KEYS, STAGE_KEYS, effect_name
 from cablecomp.errors import InputError
+
+__all__ = ["OFFSET", "Parameter", "free_parameters", "with_values"]
 
 OFFSET: Final = "joint_position_offset_rad"
 _ORDER_OF_MAGNITUDE: Final = log(10.0)
-_STAGE_KEYS: Final = tuple(Stage.model_fields)
-_SENSOR_KEYS: Final = tuple(Sensors.model_fields)
 
 
 @dataclass(frozen=True)
@@ -63,53 +64,23 @@ def free_parameters(
     return tuple(_bounded(p, (bounds or {}).get(p.name)) for p in found)
 
 
-def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig:
-    """The configuration with these values in place of its own (`offset[k]` of single recordings is left
-    out)."""
-    stages = [stage.model_dump() for stage in config.drive.stage]
-    sensors: dict[str, Any] = {}
-    effects = [(e.id, dict(e.parameters)) for e in config.effect]
-    for name, value in values.items():
-        key, _, which = name.partition(".")
-        if name.startswith("effect."):
-            identifier, parameter = _effect_name(name)
-            next(p for i, p in effects if i == identifier)[parameter] = value
-        elif key in _STAGE_KEYS:
-            places = range(len(stages)) if not which else (int(which) - 1,)
-            factor = value / stages[places[0]][key]
-            for place in places:
-                stages[place][key] *= factor
-            stages[places[0]][key] = value
-        elif name in _SENSOR_KEYS:
-            sensors[name] = value
-    drive = config.drive.model_copy(update={"stage": tuple(Stage(**s) for s in stages)})
-    changed = {
-        "drive": drive,
-        "sensors": config.sensors.model_copy(update=sensors),
-        "effect": tuple(type(e)(id=i, **p) for e, (i, p) in zip(config.effect, effects, strict=True)),
-    }
-    return config.model_copy(update=changed)
-
-
 def _parameter(config: JointConfig, name: str) -> Parameter:
     key, _, which = name.partition(".")
     if name.startswith("effect."):
         return _effect_parameter(config, name)
-    if key in _STAGE_KEYS:
+    if key in STAGE_KEYS:
         nominal = getattr(config.drive.stage[_stage_of(config, name, which)], key)
         if nominal is None:
             raise InputError(f"calibration: `{name}` is not stated in {config.name}; add it or leave it out")
         return _positive(name, float(nominal), config.tolerance.get(name, config.tolerance.get(key)))
     if name == "joint_torque_gain":
         return _positive(name, config.sensors.joint_torque_gain, config.tolerance.get(name))
-    if name.partition("[")[0] in _SENSOR_KEYS and name.partition("[")[0].endswith(
-        ("offset_rad", "offset_Nm")
-    ):
+    if name.partition("[")[0] in SENSOR_KEYS and name.partition("[")[0].endswith(("offset_rad", "offset_Nm")):
         nominal = float(getattr(config.sensors, name.partition("[")[0]))
         return _additive(name, nominal, config.tolerance.get(name), 1e-3)
     raise InputError(
         f"calibration: `{name}` is no parameter; accepted are keys of [[drive.stage]] "
-        f"({', '.join(_STAGE_KEYS)}), .N for one stage, sensor offsets, joint_torque_gain, "
+        f"({', '.join(STAGE_KEYS)}), .N for one stage, sensor offsets, joint_torque_gain, "
         "effect.ID.PARAMETER"
     )
 
@@ -123,15 +94,8 @@ def _stage_of(config: JointConfig, name: str, which: str) -> int:
     return int(which) - 1
 
 
-def _effect_name(name: str) -> tuple[str, str]:
-    parts = name.split(".")
-    if len(parts) != 3:
-        raise InputError(f"calibration: `{name}`; effect.ID.PARAMETER is accepted")
-    return parts[1], parts[2]
-
-
 def _effect_parameter(config: JointConfig, name: str) -> Parameter:
-    identifier, key = _effect_name(name)
+    identifier, key = effect_name(name)
     entry = next((e for e in config.effect if e.id == identifier), None)
     if entry is None or key not in entry.parameters:
         raise InputError(f"calibration: `{name}` is not in {config.name}; add the effect with that key first")

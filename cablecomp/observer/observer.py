@@ -59,6 +59,7 @@ class Observer:
         self._breaking = config.drive.stage[-1].breaking_force_N
         self._last_time = -math.inf
         self._source = config.observer.load
+        self._motor_zero = config.sensors.motor_torque_offset_Nm
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
 
     # --- the three ways to use it ---------------------------------------------------------------------------------
@@ -264,7 +265,9 @@ class Observer:
         )
         row[st.IN_LOAD] = sample.joint_torque_Nm
         if self._source == "motor_torque":
-            row[st.IN_LOAD] = -sample.motor_torque_Nm / self._ratio
+            row[st.IN_LOAD] = -(sample.motor_torque_Nm - self._motor_zero) / self._ratio
+        elif self._source == "none":
+            row[st.IN_LOAD] = self._F[st.OFFSET]
         row[st.IN_TEMPERATURE] = sample.temperature_degC
         if self.channels:
             for k, value in enumerate(sample.other[: len(self.channels)]):
@@ -278,7 +281,9 @@ class Observer:
         rows[:, st.IN_TIME] = time
         rows[:, st.IN_MOTOR] = columns["motor_position_rad"]
         if self.config.observer.load == "motor_torque":
-            rows[:, st.IN_LOAD] = -_need(columns, "motor_torque_Nm") / self._ratio
+            rows[:, st.IN_LOAD] = -(_need(columns, "motor_torque_Nm") - self._motor_zero) / self._ratio
+        elif self.config.observer.load == "none":
+            rows[:, st.IN_LOAD] = self._F[st.OFFSET]
         elif self.config.observer.load == "joint_torque":
             rows[:, st.IN_LOAD] = _need(columns, "joint_torque_Nm")
         if "joint_position_rad" in columns:

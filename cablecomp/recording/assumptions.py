@@ -10,6 +10,7 @@ from cablecomp.config import JointConfig, Stage
 _LOAD: Final = {
     "joint_torque": "The load is the measured joint torque",
     "motor_torque": "The load is inferred from the measured motor torque and the drive's transmission",
+    "none": "The joint is taken as free of load",
     "both_encoders": "The load is inferred from both encoders, so the joint position is an input, not a test",
 }
 _PARAMETERS: Final = tuple(name for name, field in Stage.model_fields.items() if field.is_required())
@@ -32,7 +33,9 @@ def _all(config: JointConfig, channels: Collection[str]) -> Iterator[str]:
     yield from _load(config)
     if config.effect:
         yield f"Beyond the plain drive: {', '.join(entry.id for entry in config.effect)}."
-    else:
+    if config.empirical:
+        yield f"Empirical laws, without a physical name: {', '.join(law.id for law in config.empirical)}."
+    if not config.effect:
         yield "Nothing beyond capstan friction (Coulomb) and a linear elastic cable; pulleys are rigid."
     yield from _sensors(config, channels)
 

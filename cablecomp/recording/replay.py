@@ -21,9 +21,10 @@ from cablecomp.recording.streams import LineFit, Moments
 from cablecomp.recording.table import Block, FloatArray, RemarkLog
 
 _NEEDED: Final = {
-    "joint_torque": "joint_torque_Nm",
-    "motor_torque": "motor_torque_Nm",
-    "both_encoders": "joint_position_rad",
+    "joint_torque": ("joint_torque_Nm",),
+    "motor_torque": ("motor_torque_Nm",),
+    "both_encoders": ("joint_position_rad",),
+    "none": (),
 }
 _SAMPLE = re.compile(r"sample (\d+): (.*)", re.DOTALL)
 
@@ -65,7 +66,7 @@ class Sink(Protocol):
 
 def required_channels(config: JointConfig) -> tuple[str, ...]:
     """Return the channels that an observer of this joint cannot do without."""
-    return ("motor_position_rad", _NEEDED[config.observer.load])
+    return ("motor_position_rad", *_NEEDED[config.observer.load])
 
 
 def replay(

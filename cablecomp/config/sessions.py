@@ -1,0 +1,79 @@
+"""Sessions, conditions and empirical laws in a joint configuration.
+
+A session is everything recorded without taking the joint apart or re-mounting it. Some values are each
+session's own: the zeros of the sensors always, the pretension where the cables were set anew.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Final, Self
+
+from pydantic import Field, model_validator
+
+from cablecomp.config.base import Finite, Frozen, Listed, Positive, Text
+
+ZEROS: Final = ("joint_position_offset_rad", "motor_torque_offset_Nm")
+"""What may differ from session to session unless the configuration says otherwise: the zeros."""
+
+
+class Session(Frozen):
+    """One `[[session]]`; without a name (`[session]`) it says what holds for all sessions.
+
+    `own`: names of the parameters that may differ from session to session. `recordings`: patterns of paths
+    (`*` and `?` as in a shell; a folder stands for all that is in it), matched from the right. `values`: what
+    this session's own parameters are, by name.
+    """
+
+    name: str = ""
+    own: Annotated[tuple[Text, ...], Listed] | None = None
+    recordings: Annotated[tuple[Text, ...], Listed] = ()
+    values: dict[str, Finite] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        if not self.name and (self.recordings or self.values):
+            raise ValueError("a session with `recordings` or `values` needs a `name`; add it")
+        return self
+
+    def matches(self, recording: Path) -> bool:
+        """Whether one of the patterns names this recording or a folder that it is in."""
+        places = (recording, *recording.parents)
+        return any(place.match(pattern) for pattern in self.recordings for place in places if place.name)
+
+
+class Empirical(Frozen):
+    """One `[[empirical]]`: a law without a physical name, added to the predicted joint position.
+
+    `id` says what it is; `law` its form; `of` the channel that it depends on. With x = (of - centre)/half_width,
+    the argument in -1..1, the law gives sum of coefficients_rad[k] times the form's k-th function of x.
+    `centre` and `half_width` are in the unit of `of`.
+    """
+
+    id: Text
+    law: Text
+    of: Text
+    centre: Finite = 0.0
+    half_width: Positive = 1.0
+    coefficients_rad: Annotated[tuple[Finite, ...], Listed] = Field(min_length=1)
+
+
+def as_tables(value: Any) -> Any:
+    """`[session]` alone is a list of one; both cannot stand in one TOML file."""
+    return (value,) if isinstance(value, dict) else tuple(value) if isinstance(value, list) else value
+
+
+def check_names(names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise ValueError for a name that is no parameter's: known keys, `KEY.STAGE`, `effect.ID.KEY`, `ID.KEY`."""
+    known = tuple(known)
+    for name in names:
+        head, dot, rest = name.partition(".")
+        if head in known and (not dot or rest.isdigit()):
+            continue
+        if dot and head not in known and rest and not rest.isdigit():
+            continue
+        close = difflib.get_close_matches(head, known, 1)
+        hint = f"did you mean `{close[0]}`?" if close else f"known are {', '.join(known)}, effect.ID.KEY"
+        raise ValueError(f"`{name}` is no parameter; {hint}")

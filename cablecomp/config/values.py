@@ -1,0 +1,78 @@
+"""Values of parameters by name, put into a configuration: calibrated ones, those of a session.
+
+Names: a key of `[[drive.stage]]` moves that value of every stage by one common factor (`EA_N`), `EA_N.2` that
+of stage 2 alone; a key of `[sensors]` (`joint_position_offset_rad`); `effect.ID.KEY` a parameter of the effect
+ID.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from cablecomp.config.schema import JointConfig, Sensors, Stage
+from cablecomp.config.sessions import Session
+from cablecomp.errors import InputError
+
+STAGE_KEYS: Final = tuple(Stage.model_fields)
+SENSOR_KEYS: Final = tuple(Sensors.model_fields)
+
+
+def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig:
+    """The configuration with these values in place of its own (`offset[k]` of single recordings is left
+    out)."""
+    stages = [stage.model_dump() for stage in config.drive.stage]
+    sensors: dict[str, Any] = {}
+    effects = [(e.id, dict(e.parameters)) for e in config.effect]
+    for name, value in values.items():
+        key, _, which = name.partition(".")
+        if name.startswith("effect."):
+            identifier, parameter = effect_name(name)
+            next(p for i, p in effects if i == identifier)[parameter] = value
+        elif key in STAGE_KEYS:
+            places = range(len(stages)) if not which else (int(which) - 1,)
+            factor = value / stages[places[0]][key]
+            for place in places:
+                stages[place][key] *= factor
+            stages[places[0]][key] = value
+        elif name in SENSOR_KEYS:
+            sensors[name] = value
+    drive = config.drive.model_copy(update={"stage": tuple(Stage(**s) for s in stages)})
+    changed = {
+        "drive": drive,
+        "sensors": config.sensors.model_copy(update=sensors),
+        "effect": tuple(type(e)(id=i, **p) for e, (i, p) in zip(config.effect, effects, strict=True)),
+    }
+    return config.model_copy(update=changed)
+
+
+def effect_name(name: str) -> tuple[str, str]:
+    """Id and key of `effect.ID.KEY`; raises InputError if it is not of that form."""
+    parts = name.split(".")
+    if len(parts) != 3:
+        raise InputError(f"calibration: `{name}`; effect.ID.PARAMETER is accepted")
+    return parts[1], parts[2]
+
+
+def session_of(config: JointConfig, recording: Path | None, name: str | None) -> Session | None:
+    """The session by its name, else the one whose patterns match the recording; None if there is none.
+
+    Raises InputError for an unknown name, or if several sessions match.
+    """
+    known = ", ".join(s.name for s in config.sessions) or "none"
+    if name is not None:
+        found = [s for s in config.sessions if s.name == name]
+        if not found:
+            raise InputError(f"--session {name}: {config.name} has no session of that name; it has {known}")
+        return found[0]
+    matching = [s for s in config.sessions if recording is not None and s.matches(recording)]
+    if len(matching) > 1:
+        names = ", ".join(s.name for s in matching)
+        raise InputError(f"{recording}: several sessions claim it ({names}); choose one with --session")
+    return matching[0] if matching else None
+
+
+def in_session(config: JointConfig, session: Session | None) -> JointConfig:
+    """The configuration with the session's own values in place; as it is without a session."""
+    return config if session is None else with_values(config, session.values)

@@ -1,0 +1,155 @@
+"""Sessions, conditions and empirical laws: read, written back, put into force."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cablecomp.config import in_session, load_joint, parse_joint, session_of
+from cablecomp.config_text import joint_text
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+
+JOINT = Path(__file__).parents[2] / "configs/joints/tendon-finger.toml"
+SESSIONS = """
+[condition]
+sheath_bend_rad = "other_sheath_angle_rad"
+[[session]]
+own = ["joint_position_offset_rad", "pretension_N"]
+[[session]]
+name = "monday"
+recordings = ["monday/*.csv"]
+values = {joint_position_offset_rad = 1.5e-3, pretension_N = 31.25}
+[[session]]
+name = "tuesday"
+recordings = ["night"]
+[session.values]
+motor_torque_offset_Nm = -0.004
+"""
+RIPPLE = """
+[[empirical]]
+id = "ripple_by_motor_angle"
+law = "{law}"
+of = "{of}"
+centre = 0.2
+half_width = 0.5
+coefficients_rad = [1e-3, 2e-3, -4e-3, 5e-4]
+"""
+
+
+def config(text: str):
+    return parse_joint(tomllib.loads(JOINT.read_text() + text), "joint.toml")
+
+
+@pytest.mark.parametrize("text", [SESSIONS, "[session]\nown = ['EA_N', 'effect.viscous_slip.x']\n", ""])
+def test_what_is_written_reads_back_as_the_same_configuration(text: str) -> None:
+    joint = config(text + RIPPLE.format(law="fourier", of="motor_position_rad"))
+    assert parse_joint(tomllib.loads(joint_text(joint)), "again") == joint
+    assert parse_joint(joint.model_dump(by_alias=True), "dumped") == joint
+
+
+def test_the_zeros_alone_differ_unless_the_configuration_says_more() -> None:
+    assert config("").session_own == ("joint_position_offset_rad", "motor_torque_offset_Nm")
+    assert config("[session]\nown = []\n").session_own == ()
+    assert config(SESSIONS).session_own == (
+        "joint_position_offset_rad",
+        "pretension_N",
+        "motor_torque_offset_Nm",
+    )
+
+
+def test_a_session_is_found_by_name_or_by_the_recordings_path() -> None:
+    joint = config(SESSIONS)
+    for path, expected in {
+        "data/monday/a.csv": "monday",
+        "monday/a.csv": "monday",
+        "x/night/3/a.mcap": "tuesday",
+        "monday/a.mcap": None,
+        "elsewhere.csv": None,
+    }.items():
+        found = session_of(joint, Path(path), None)
+        assert (found and found.name) == expected, path
+    chosen = session_of(joint, Path("data/monday/a.csv"), "tuesday")
+    assert chosen is not None
+    assert chosen.name == "tuesday"
+    with pytest.raises(InputError, match="no session of that name; it has monday, tuesday"):
+        session_of(joint, None, "wednesday")
+    with pytest.raises(InputError, match="several sessions claim it"):
+        session_of(joint, Path("night/monday/a.csv"), None)
+
+
+def test_a_sessions_values_take_the_place_of_the_joints_own() -> None:
+    joint = config(SESSIONS)
+    monday = in_session(joint, joint.sessions[0])
+    assert monday.drive.stage[0].pretension_N == 31.25
+    assert monday.sensors.joint_position_offset_rad == 1.5e-3
+    assert in_session(joint, joint.sessions[1]).sensors.motor_torque_offset_Nm == -0.004
+    assert in_session(joint, None) == joint
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[session]\nown = ['pretention_N']\n", "did you mean `pretension_N`"),
+        ("[session]\nowns = []\n", "unknown key `session.0.owns`"),
+        ("[[session]]\nrecordings = ['a']\n", "needs a `name`"),
+        ("[[session]]\nname = 'a'\n[[session]]\nname = 'a'\n", "`a` is given twice"),
+        ("[[session]]\nname = 'a'\nvalues = {EA_N = 'x'}\n", "session.0.values.EA_N"),
+        ("[condition]\nbend = 3\n", "condition.bend"),
+        (RIPPLE.format(law="chebyshev", of="motor_position_rad").replace("centre", "center"), "center"),
+    ],
+)
+def test_what_is_wrong_is_named(text: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        config(text)
+
+
+@pytest.mark.parametrize("of", ["motor_position_rad", "other_bend_rad"])
+@pytest.mark.parametrize("law", ["chebyshev", "fourier"])
+def test_an_empirical_law_adds_its_curve_to_the_joint_position(law: str, of: str) -> None:
+    angle = np.linspace(-0.2, 0.7, 50)
+    columns = {
+        "time_s": np.arange(50) * 1e-2,
+        "motor_position_rad": angle if of == "motor_position_rad" else np.zeros(50),
+        "joint_torque_Nm": np.zeros(50),
+        "other_bend_rad": angle,
+    }
+    x, c = (angle - 0.2) / 0.5, [1e-3, 2e-3, -4e-3, 5e-4]
+    if law == "chebyshev":
+        curve = np.polynomial.chebyshev.chebval(np.clip(x, -1.0, 1.0), c)
+    else:
+        turn = np.pi * x
+        curve = c[0] + c[1] * np.sin(turn) + c[2] * np.cos(turn) + c[3] * np.sin(2.0 * turn)
+    plain = Observer(config("")).run(columns)["joint_position_rad"]
+    with_law = Observer(config(RIPPLE.format(law=law, of=of))).run(columns)["joint_position_rad"]
+    np.testing.assert_allclose(with_law - plain, curve, atol=1e-15)
+
+
+@pytest.mark.parametrize(("law", "of"), [("spline", "time_s"), ("fourier", "dwell")])
+def test_an_empirical_law_that_cannot_run_is_refused(law: str, of: str) -> None:
+    with pytest.raises(InputError, match=r"ripple_by_motor_angle.*accepted"):
+        Observer(config(RIPPLE.format(law=law, of=of)))
+
+
+def test_a_joint_free_of_load_needs_no_torque() -> None:
+    columns = {"time_s": np.arange(20) * 1e-2, "motor_position_rad": np.sin(np.arange(20.0))}
+    joint = config('[observer]\nload = "none"\n')
+    zero = {**columns, "joint_torque_Nm": np.zeros(20)}
+    expected = Observer(load_joint(JOINT)).run(zero)["joint_position_rad"]
+    np.testing.assert_array_equal(Observer(joint).run(columns)["joint_position_rad"], expected)
+
+
+def test_the_zero_of_the_motor_torque_is_taken_off_its_reading() -> None:
+    torque = 0.01 * np.sin(np.arange(40) * 0.2)
+    columns = {"time_s": np.arange(40) * 1e-2, "motor_position_rad": np.zeros(40)}
+    source = '[observer]\nload = "motor_torque"\n'
+    plain = Observer(config(source)).run({**columns, "motor_torque_Nm": torque})
+    turned = (source + "[[session]]\nname = 'a'\nvalues = {motor_torque_offset_Nm = 0.25}\n",)
+    joint = config(turned[0])
+    shifted = Observer(in_session(joint, joint.sessions[0])).run(
+        {**columns, "motor_torque_Nm": torque + 0.25}
+    )
+    np.testing.assert_allclose(shifted["joint_position_rad"], plain["joint_position_rad"], atol=1e-15)
