@@ -65,6 +65,11 @@ def pretension_moment(config: JointConfig) -> float:
     return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
 
 
+def input_moment(config: JointConfig) -> float:
+    """r T0 of the input stage [N m]: the natural unit of torque at the motor."""
+    return config.drive.stage[0].input_radius_m * config.drive.stage[0].pretension_N
+
+
 def drum_radius(config: JointConfig) -> float:
     """R of the output stage [m]."""
     return config.drive.stage[-1].output_radius_m

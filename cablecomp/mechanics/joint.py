@@ -19,6 +19,7 @@ def run_terms(P: Floats, I: Ints, S: Floats) -> None:
     S[x + o.X_MOMENT : x + o.X_LENGTH_L + 1] = 0.0
     S[x + o.X_PRETENSION_H : x + o.X_STIFFNESS_L + 1] = 1.0
     S[x + o.X_READING] = 0.0
+    S[x + o.X_MOTOR_MOMENT] = 0.0
     context = S[x : x + o.CONTEXT]
     for k in range(I[o.N_TERMS]):
         t = o.HEADER + o.CIRCUIT * I[o.N_CIRCUITS] + o.TERM * k

@@ -56,10 +56,11 @@ M_TOTAL, M_K, M_Y, M_V, M_C, M_B, M_E, M_W, M_END, M_TAU, MEET = range(11)
     X_TENSION_H, X_TENSION_L, X_RADIUS, X_TEMPERATURE, X_OTHER,
 ) = range(16)  # fmt: skip
 OTHERS = 4
-# ... and what they add to (moments on the output pulley, lengths of cable, factors, the joint encoder's reading)
+# ... and what they add to (moments on the output pulley, lengths of cable, factors, the joint encoder's reading, torque
+# between the motor's torque sensor and the cable)
 (
     X_MOMENT, X_MOMENT_SLOPE, X_LENGTH_H, X_LENGTH_L, X_PRETENSION_H, X_PRETENSION_L, X_STIFFNESS_H, X_STIFFNESS_L,
-    X_READING, X_COMPLIANCE, X_RIGID, CONTEXT,
-) = range(X_OTHER + OTHERS, X_OTHER + OTHERS + 12)  # fmt: skip
+    X_READING, X_COMPLIANCE, X_RIGID, X_MOTOR_MOMENT, CONTEXT,
+) = range(X_OTHER + OTHERS, X_OTHER + OTHERS + 13)  # fmt: skip
 
 STATUS_OK, STATUS_UNWOUND, STATUS_SLACK, STATUS_DIVERGED, STATUS_NAN = range(5)

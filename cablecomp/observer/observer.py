@@ -126,6 +126,9 @@ class Observer:
             "joint_torque_Nm": outs[:, st.OUT_LOAD],
             "tension_h_N": outs[:, st.OUT_T_H],
             "tension_l_N": outs[:, st.OUT_T_L],
+            "tension_h_input_N": outs[:, st.OUT_T_H_IN],
+            "tension_l_input_N": outs[:, st.OUT_T_L_IN],
+            "predicted_motor_torque_Nm": outs[:, st.OUT_MOTOR_TORQUE],
         }
 
     def inverse(self, sample: Sample) -> Estimate:
@@ -320,11 +323,19 @@ class Observer:
         return f"puts {tension:.4g} N on a cable that breaks at {self._breaking:g} N; lower the load or check breaking_force_N"
 
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
-        joint, drive, load, tension_h, tension_l, _ = self._out.tolist()
+        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque = self._out.tolist()
         rigid = self._ratio * sample.motor_position_rad
         shift = joint - drive - rigid
         return Estimate(
-            sample.time_s, joint - rigid, low + shift, high + shift, joint, load, tension_h, tension_l
+            sample.time_s,
+            joint - rigid,
+            low + shift,
+            high + shift,
+            joint,
+            load,
+            tension_h,
+            tension_l,
+            motor_torque,
         )
 
 

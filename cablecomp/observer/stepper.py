@@ -15,7 +15,10 @@ GAIN, OFFSET, CUTOFF, STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, OPTIONS = range
 # one row of inputs
 IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
 # one row of outputs
-OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_WIDTH = range(7)
+(
+    OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_T_H_IN, OUT_T_L_IN, OUT_MOTOR_TORQUE,
+    OUT_WIDTH,
+) = range(10)  # fmt: skip
 
 
 @kernel
@@ -43,6 +46,26 @@ def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, floa
 
 
 @inlined_kernel
+def motor_side(P: Floats, I: Ints, S: Floats, out: Floats) -> None:
+    """Tensions at the input pulley (NaN for a cable that is not there) and the torque that turns it.
+
+    tau_motor = -r (T_h - T_l) + what friction before the cable takes, both tensions at the input pulley.
+    """
+    h = o.HEADER
+    first = I[h + o.C_FIRST_H]
+    q = I[o.S_CABLE] + o.CABLE_STATE * first
+    pull = S[q + o.Q_TENSION_IN]
+    out[OUT_T_H_IN] = pull
+    out[OUT_T_L_IN] = math.nan
+    if I[h + o.C_CLOSED] == 1:
+        q = I[o.S_CABLE] + o.CABLE_STATE * I[h + o.C_FIRST_L]
+        out[OUT_T_L_IN] = S[q + o.Q_TENSION_IN]
+        pull -= S[q + o.Q_TENSION_IN]
+    radius = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * first + o.R_IN]
+    out[OUT_MOTOR_TORQUE] = -radius * pull + S[I[o.S_CONTEXT] + o.X_MOTOR_MOMENT]
+
+
+@inlined_kernel
 def predict(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, F: Floats, row: Floats, out: Floats
 ) -> int:
@@ -64,6 +87,7 @@ def predict(
     out[OUT_T_H] = S[x + o.X_TENSION_H]
     out[OUT_T_L] = S[x + o.X_TENSION_L]
     out[OUT_COMPLIANCE] = S[x + o.X_COMPLIANCE]
+    motor_side(P, I, S, out)
     return status
 
 

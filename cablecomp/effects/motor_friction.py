@@ -1,0 +1,60 @@
+"""Motor friction: what turns before the cable takes torque that the cable never sees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cablecomp.config import JointConfig
+from cablecomp.effects.base import Change, Effect, Parameter, input_moment, term
+from cablecomp.mechanics.layout import X_COMMIT, X_FIRST, X_MOTOR, X_MOTOR_MOMENT, X_MOTOR_OLD
+
+
+@term(parameters=2, state=1)
+def _take(c: Any, p: Any, s: Any) -> None:
+    """p: torque [N m], presliding [rad]; s: z, the elasto-plastic direction of the motor's motion."""
+    z = 0.0 if c[X_FIRST] != 0.0 else s[0]
+    z = min(max(z + (c[X_MOTOR] - c[X_MOTOR_OLD]) / p[1], -1.0), 1.0)
+    c[X_MOTOR_MOMENT] += p[0] * z
+    if c[X_COMMIT] != 0.0:
+        s[0] = z
+
+
+def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    return Change(terms=_take(values["torque_Nm"], values["presliding_rad"]))
+
+
+EFFECT = Effect(
+    id="motor_friction",
+    statement="Between the motor's torque sensor and the cable, friction holds back with a nearly constant torque; the "
+    "motor feels it, the joint does not.",
+    equation="τ_motor = -r (T_h - T_l) + τ_m z, dz = dq_in/δ within -1 <= z <= 1",
+    source="one elasto-plastic (Jenkins) element, the static limit of P. Dahl, A Solid Friction Model, 1968",
+    parameters=(
+        Parameter(
+            "torque_Nm",
+            "N m",
+            0.0,
+            1e-4,
+            1.0,
+            "τ_m, friction torque",
+            log=True,
+            scale=input_moment,
+            minimum=0.0,
+        ),
+        Parameter(
+            "presliding_rad",
+            "rad",
+            0.0,
+            1e-4,
+            0.05,
+            "δ, turn in which the friction builds up",
+            log=True,
+            shape=True,
+            minimum=1e-9,
+        ),
+    ),
+    acts_through=("velocity", "reversal"),
+    bounded=True,
+    change=_change,
+)
