@@ -1,27 +1,9 @@
-"""Real-time hysteresis compensator for cable-driven joints: the public names."""
+"""Real-time hysteresis compensator for cable-driven joints: the public names, each imported when it is first used.
 
-from cablecomp.config import JointConfig, load_joint, parse_joint
-from cablecomp.control.command import Command, Reference
-from cablecomp.control.compensator import Compensator
-from cablecomp.errors import CablecompError, DeviceError, InputError, InternalError
-from cablecomp.observer import ErasePlan, Observer, WrapProfile, plan_erase
-from cablecomp.signals import Estimate, Sample
+Start reading at `observer/observer.py` (the model that runs), `control/compensator.py` (what it is for) or
+`diagnosis/diagnose.py` (what the model lacks); `cablecomp guide` tells the rest.
+"""
 
-__all__ = [
-    "CablecompError",
-    "Command",
-    "Compensator",
-    "DeviceError",
-    "ErasePlan",
-    "Estimate",
-    "InputError",
-    "InternalError",
-    "JointConfig",
-    "Observer",
-    "Reference",
-    "Sample",
-    "WrapProfile",
-    "load_joint",
-    "parse_joint",
-    "plan_erase",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from cablecomp.cli_simulation import start_simulation
+from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.options import ControlConfig, load_control
 from cablecomp.control.protocol import parse_protocol

@@ -12,7 +12,7 @@ import pytest
 from fault_runs import CONFIGS, JOINT, REACH
 
 from cablecomp import cli
-from cablecomp.cli_simulation import start_simulation
+from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.compensator import preload_of
 from cablecomp.control.motors import control_for

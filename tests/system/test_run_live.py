@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cablecomp.cli_live import LiveRun
-from cablecomp.cli_simulation import start_simulation
+from cablecomp.cli.live import LiveRun
+from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.config_text import write_joint
 from cablecomp.control.options import load_control

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from cablecomp.cli_simulation import start_simulation
+from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.options import ControlMode, FeedForward, load_control
 from cablecomp.control.protocol import parse_protocol

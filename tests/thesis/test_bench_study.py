@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cablecomp.cli_study import by_plant
+from cablecomp.cli.study import by_plant
 from cablecomp.config import load_joint
 from cablecomp.thesis.bench.cycle import Bench, Rigs, Signature, by_observer
 from cablecomp.thesis.bench.study import answers, best_of

@@ -6,32 +6,23 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from cablecomp.cli_analysis import hypothesis_bar
+from cablecomp.cli.shared import CONFIGS, console, share_bar
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.errors import InputError
 from cablecomp.report.study_page import study_table, write_study
 from cablecomp.thesis.bench.cycle import Array, Columns, Rigs
 from cablecomp.thesis.bench.study import study
 
-console = Console()
-JOINTS = Path(__file__).resolve().parents[1] / "configs/joints"
-
-
-def register(app: typer.Typer) -> None:
-    """Add this module's command to the application."""
-    app.command("study")(study_bench)
-
 
 def study_bench(
     out: Annotated[Path, typer.Option(help="folder for study.html")] = Path("study"),
 ) -> None:
     """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""
-    opened, closed = (JOINTS / f"snow-{name}-rig.toml" for name in ("open", "closed"))
+    opened, closed = (CONFIGS / f"joints/snow-{name}-rig.toml" for name in ("open", "closed"))
     if not opened.exists():
         raise InputError(f"{opened}: is missing; run the study from a clone of the project")
-    with hypothesis_bar() as told:
+    with share_bar() as told:
         found = study(Rigs(load_joint(opened), load_joint(closed)), by_plant, told)
     console.print(study_table(found))
     console.print(f"report: {write_study(found, out, f'cablecomp study --out {out}')}")

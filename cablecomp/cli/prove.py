@@ -13,17 +13,12 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from cablecomp.cli.shared import console
 from cablecomp.errors import InputError
 from cablecomp.report.scoreboard_page import scoreboard_table, write_scoreboard_page
 from cablecomp.trials.prove import Blind, Wish, prove
 
-console = Console()
 _TRIALS = (sys.executable, "-m", "firmware_sim.trials")
-
-
-def register(app: typer.Typer) -> None:
-    """Add this module's command to the application."""
-    app.command("prove")(prove_blindly)
 
 
 def prove_blindly(

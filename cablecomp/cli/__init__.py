@@ -1,0 +1,10 @@
+"""The command line: each command builds objects, calls them and shows what came of it; no logic of its own.
+
+May import everything, firmware_sim too (it alone); nothing imports it. Start reading at `app.py`, the list of
+commands; every other file is a command, besides `shared.py` (options, progress), `live.py` (`run --live`) and
+`simulation.py` (`--sim`).
+"""
+
+from cablecomp.cli.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,7 @@
+"""`python -m cablecomp.cli`."""
+
+import sys
+
+from cablecomp.cli.app import main
+
+sys.exit(main())

@@ -1,0 +1,116 @@
+"""The list of commands, and how they end: 0 done, 2 bad input, 3 device (also: a run that had to stop the
+joint), 4 our own fault.
+
+A command's module is imported when it is called, so that `--help` need not wait for compilers and solvers.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from typer.core import TyperGroup
+
+from cablecomp.errors import CablecompError, DeviceError, InputError, InternalError
+
+COMMANDS: Final = {
+    "demo": "demo.demo",
+    "run": "run.run",
+    "replay": "replay.replay",
+    "info": "info.info",
+    "design": "design.design",
+    "identify": "identify.identify",
+    "diagnose": "diagnose.diagnose_recordings",
+    "prove": "prove.prove_blindly",
+    "study": "study.study_bench",
+}
+"""Command: its module here and function."""
+
+
+class Commands(TyperGroup):
+    """A group that knows its commands by name and loads one when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names in the order of `COMMANDS`."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command, its module imported; None if there is none of this name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, function = COMMANDS[cmd_name].split(".")
+        single = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+        single.command(cmd_name)(getattr(import_module(f"cablecomp.cli.{module}"), function))
+        return typer.main.get_command(single)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """One line for each command: the first of its docstring, read without importing it."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, first_line(place)) for name, place in COMMANDS.items()])
+
+
+def first_line(place: str) -> str:
+    """First sentence of the docstring of `module.function` in this package."""
+    module, function = place.split(".")
+    tree = ast.parse((Path(__file__).parent / f"{module}.py").read_text(encoding="utf-8"))
+    (found,) = [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == function]
+    return " ".join((ast.get_docstring(found) or "").split("\n\n")[0].split())
+
+
+app = typer.Typer(
+    cls=Commands,
+    help="Real-time hysteresis compensator for cable-driven joints.",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"cablecomp {version('cablecomp')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    shown: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version")
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point: runs a command, turns errors into one line on stderr and an exit code."""
+    try:
+        code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except InputError as error:
+        return _fail(str(error), 2)
+    except DeviceError as error:
+        return _fail(str(error), 3)
+    except InternalError as error:
+        return _fail(f"{error} (a fault of this program: please report it)", 4)
+    except CablecompError as error:
+        return _fail(str(error), 4)
+    except KeyboardInterrupt:
+        return _fail("stopped by the user", 130)
+    except Exception as error:
+        shown = getattr(error, "format_message", None)
+        if shown is None:  # neither ours nor the command line's: a bug, whose traceback is worth having
+            raise
+        return _fail(f"{shown()}; see cablecomp --help", 2)
+
+
+def _fail(text: str, code: int) -> int:
+    print(f"cablecomp: {' '.join(text.split())}", file=sys.stderr)
+    return code

@@ -1,0 +1,90 @@
+"""`cablecomp demo`, and the comparison that `run --compare` makes as well."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from cablecomp.cli.shared import CONFIGS, DEMO_LINK, console
+from cablecomp.cli.simulation import start_simulation
+from cablecomp.config import JointConfig, load_joint
+from cablecomp.config_text import joint_text
+from cablecomp.control.options import ControlConfig, load_control
+from cablecomp.errors import InputError
+from cablecomp.identification.calibrate import calibrate
+from cablecomp.links.schema import LinkConfig, load_link
+from cablecomp.report.compare_page import HEAD, summary_rows, write_comparison
+from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
+from cablecomp.runtime.setup import matched
+from cablecomp.runtime.view import LiveView
+
+DEMO_JOINT, DEMO_CONTROL = CONFIGS / "joints/wrist-capstan.toml", CONFIGS / "control/wrist-capstan.toml"
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="folder for everything that the demonstration leaves")] = Path(
+        "demo"
+    ),
+    seed: Annotated[int, typer.Option(help="of true parameters, noise and motions")] = 1,
+) -> None:
+    """A compensated joint against uncompensated ones, on a simulated bus; ends with where the report lies."""
+    if not DEMO_JOINT.exists():
+        raise InputError(f"{DEMO_JOINT}: is missing; run the demonstration from a clone of the project")
+    joint, wanted = load_joint(DEMO_JOINT), load_control(DEMO_CONTROL)
+    bus, wanted = matched(load_link(DEMO_LINK), wanted, own_link=False)
+    compare_controllers(DEMO_JOINT, joint, bus, wanted, out, seed, 14.0)
+
+
+def compare_controllers(
+    path: Path,
+    joint: JointConfig,
+    bus: LinkConfig,
+    wanted: ControlConfig,
+    out: Path,
+    seed: int,
+    duration_s: float,
+) -> None:
+    """Run motor-side control, linear stiffness and observer side by side on simulated joints; show and write it."""
+    with LiveView(console) as view:
+        signal.signal(signal.SIGINT, lambda number, frame: view.press())
+        found = compare(
+            joint,
+            bus,
+            wanted,
+            lambda wish: start_simulation(path, wish),
+            _calibrated,
+            CompareOptions(out, seed, duration_s, min(10.0, duration_s)),
+            time.perf_counter,
+            view.say,
+            view.watch,
+        )
+    page = write_comparison(found, out, joint_text(found.calibrated.config))
+    _summary(found)
+    console.print(f"report: {page}")
+
+
+def _calibrated(config: JointConfig, columns: Columns) -> Calibrated:
+    found = calibrate(config, [columns])
+    rows = tuple((v.name, f"{v.value:.5g} ± {v.sd:.2g} (nominal {v.nominal:.5g})") for v in found.values)
+    return Calibrated(found.config, rows, found.warnings)
+
+
+def _summary(found: Comparison) -> None:
+    table = Table(title="Joint-side error under unseen motions with load changes")
+    for name in HEAD:
+        table.add_column(name, justify="left" if name == "controller" else "right")
+    for row in summary_rows(found):
+        table.add_row(*row)
+    console.print(table)
+    joint = found.force.joints[0]
+    console.print(
+        f"force without torque sensor: RMS error {joint.true_torque_Nm:.4f} Nm, "
+        f"{100 * found.force_share:.2f} % of range"
+    )
+    for name, words in found.open_loop.timing.rows():
+        console.print(f"{name}: {words}", style="dim")

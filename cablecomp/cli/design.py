@@ -1,0 +1,32 @@
+"""`cablecomp design`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cablecomp.cli.shared import Config, Control, console, control_of
+from cablecomp.config import load_joint
+from cablecomp.control.design import design_loop
+from cablecomp.report.design_page import design_page, design_tables
+
+
+def design(
+    config: Config,
+    rate: Annotated[float, typer.Option(help="loop rate, Hz")] = 1000.0,
+    control: Control = None,
+    out: Annotated[Path | None, typer.Option(help="folder for design.html")] = None,
+) -> None:
+    """Design gains from the drive's stiffness range: margins, hysteresis as a describing function, plots."""
+    joint = load_joint(config)
+    wanted = control_of(control, joint)
+    free = {"load_filter_Hz": None, "load_lead_s": None, "joint_feedback_per_s": None}
+    wanted = wanted.model_copy(update={"compensator": wanted.compensator.model_copy(update=free)})
+    found = design_loop(joint, rate, wanted)
+    console.print(design_tables(found))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "design.html").write_text(design_page(found), encoding="utf-8")
+        console.print(f"plots: {out / 'design.html'}")

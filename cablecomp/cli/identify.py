@@ -1,0 +1,35 @@
+"""`cablecomp identify`."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cablecomp.cli.shared import Config, console
+from cablecomp.config import load_joint
+from cablecomp.recording.reader import read_all
+from cablecomp.report.info import bench_table
+from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
+
+
+def identify(
+    recording: Annotated[Path, typer.Argument(help="bench recording: load ramps with holds")],
+    config: Config,
+    sensor_stiffness: Annotated[
+        float, typer.Option(help="stiffness of torque sensor and coupling, N m/rad (App. A.3)")
+    ] = inf,
+    narrow: Annotated[
+        bool, typer.Option("--narrow", help="tensions of nearly tangent pulleys (App. C)")
+    ] = False,
+) -> None:
+    """True and acting coefficient of friction from a bench recording, the thesis's way."""
+    joint = load_joint(config)
+    bench = bench_recording(read_all(recording).columns, joint)
+    console.print(
+        bench_table(
+            evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)
+        )
+    )

@@ -1,0 +1,28 @@
+"""`cablecomp info`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cablecomp.cli.shared import Config, console
+from cablecomp.config import load_joint
+from cablecomp.report.info import design_table
+from cablecomp.report.theory import write_theory_figures
+from cablecomp.thesis.design import design_sheet
+
+
+def info(
+    config: Config,
+    load: Annotated[
+        float | None, typer.Option(help="worst load on the joint, N m (the configuration's limit if absent)")
+    ] = None,
+    figures: Annotated[Path | None, typer.Option(help="folder for the theory figures of this joint")] = None,
+) -> None:
+    """The design sheet of a joint: stiffness, hysteresis, pretension, wrap, efficiency."""
+    joint = load_joint(config)
+    console.print(design_table(design_sheet(joint, load)))
+    if figures is not None:
+        console.print(f"figures: {write_theory_figures(joint, figures, load)}")

@@ -1,0 +1,52 @@
+"""`cablecomp replay`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from cablecomp.cli.shared import Config, announce_compilation, console
+from cablecomp.config import in_session, load_joint, session_of
+from cablecomp.observer import Observer
+from cablecomp.recording.progress import progress_bar
+from cablecomp.recording.reader import open_recording
+from cablecomp.report.replay_page import write_replay
+
+
+def replay(
+    recording: Annotated[Path, typer.Argument(help="recording (CSV, gzip CSV, Parquet, MCAP)")],
+    config: Config,
+    out: Annotated[Path, typer.Option(help="folder for prediction.csv, replay.json, report.html")] = Path(
+        "replay"
+    ),
+    bounds: Annotated[
+        bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
+    ] = True,
+    session: Annotated[
+        str | None,
+        typer.Option(help="whose own values hold; the [[session]] that names the recording if absent"),
+    ] = None,
+) -> None:
+    """Stream a recording through the observer that the controller runs; compare with what was measured."""
+    joint, source = load_joint(config), open_recording(recording)
+    found = session_of(joint, recording, session)
+    joint = in_session(joint, found)
+    announce_compilation()
+    with progress_bar(f"replay {recording.name}") as told:
+        summary = write_replay(
+            source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), told
+        )
+    table = Table(show_header=False, box=None)
+    if summary.rmse_rad is not None:
+        table.add_row("prediction error, RMS", f"{1e3 * summary.rmse_rad:.5g} mrad")
+        table.add_row(
+            "best straight line, RMS", f"{1e3 * (summary.baseline_linear_rmse_rad or 0.0):.5g} mrad"
+        )
+    table.add_row("samples", f"{summary.samples:,}")
+    if joint.sessions:
+        table.add_row("session", "none matches: the joint's own values" if found is None else found.name)
+    console.print(table)
+    console.print(f"report: {out / 'report.html'}")

@@ -1,0 +1,143 @@
+"""`cablecomp run`."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from cablecomp.cli.live import LiveRun
+from cablecomp.cli.shared import DEMO_LINK, Config, Control, console, control_of
+from cablecomp.config import load_joint
+from cablecomp.config_text import joint_text
+from cablecomp.control.options import ControlMode
+from cablecomp.control.protocol import load_protocol
+from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
+from cablecomp.errors import InputError
+from cablecomp.links.schema import load_link
+from cablecomp.report.run_page import write_run_page
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.setup import matched, same_joint
+from cablecomp.runtime.simulated import Simulation, SimulationWish
+from cablecomp.runtime.view import LiveView
+
+
+def run(
+    config: Config,
+    link: Annotated[
+        Path | None, typer.Option(help="link file (TOML); with --sim a bus inside of the process")
+    ] = None,
+    sim: Annotated[
+        bool, typer.Option("--sim", help="start the simulated joint as well; nothing else is needed")
+    ] = False,
+    control: Control = None,
+    protocol: Annotated[Path | None, typer.Option(help="what is asked for over time (TOML)")] = None,
+    mode: Annotated[ControlMode | None, typer.Option(help="what is controlled")] = None,
+    duration: Annotated[float | None, typer.Option(help="end after this many seconds", min=0.0)] = None,
+    out: Annotated[Path, typer.Option(help="folder for recording, predictions, report")] = Path("run"),
+    fast: Annotated[bool, typer.Option("--fast", help="simulated time, as fast as it goes")] = False,
+    bounds: Annotated[
+        bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
+    ] = True,
+    calibration: Annotated[
+        bool, typer.Option("--calibration", help="the protocol to calibrate from")
+    ] = False,
+    comparison: Annotated[
+        bool, typer.Option("--compare", help="motor-side control, linear stiffness and observer side by side")
+    ] = False,
+    resume: Annotated[Path | None, typer.Option(help="observer snapshot to go on from")] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option(help="fault of the simulated joint, such as drop:p=0.1")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="of simulated noise, true parameters and motions")] = 1,
+    nominal: Annotated[bool, typer.Option("--nominal", help="simulated joint exactly as configured")] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
+    ] = False,
+) -> None:
+    """Control a joint over a link, real or simulated; ends with a timing report and a recording that
+    `replay` accepts.
+    """
+    joint = load_joint(config)
+    wanted = control_of(control, joint)
+    bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=not sim)
+    if link is None and not sim:
+        raise InputError("--link is missing; give a link file, or --sim for a simulated joint")
+    if link is None:
+        bus = same_joint(bus, [joint.name])
+    if comparison:
+        from cablecomp.cli.demo import compare_controllers  # brings the plant
+
+        compare_controllers(config, joint, bus, wanted, out, seed, 30.0 if duration is None else duration)
+        return
+    if mode is not None:
+        wanted = wanted.model_copy(
+            update={"compensator": wanted.compensator.model_copy(update={"mode": mode})}
+        )
+    force = wanted.compensator.mode is ControlMode.FORCE
+    if protocol is not None:
+        asked = load_protocol(protocol)
+    elif calibration:
+        asked = calibration_protocol(joint)
+    else:
+        span = 30.0 if duration is None else max(duration, 30.0)
+        asked = force_protocol(joint, seed, span) if force else reaching_protocol(joint, seed, span)
+    wish = SimulationWish(bus, wanted, 1, not nominal, seed, tuple(fault or ()))
+    simulation = _simulation(config, wish) if sim else None
+    if simulation is not None and asked.mode == "force":
+        simulation.set_wall(1, 0.0)
+    options = RunOptions(duration, fast, out, bounds, resume=resume)
+    try:
+        with LiveView(console) as view:
+            signal.signal(signal.SIGINT, lambda number, frame: view.press())
+            beside = LiveRun(joint, bus.rate_Hz, out, view.watch, stepped=fast) if live else None
+            watch = view.watch if beside is None else beside.watch
+            report = run_joint(joint, bus, wanted, asked, options, simulation, watch)
+    finally:
+        if simulation is not None:
+            simulation.close()
+    if beside is not None:
+        report = beside.finish(report)
+    _show(report)
+    for path in () if beside is None else beside.kept:
+        console.print(
+            f"mismatch: see {path.with_suffix('.json')}; cablecomp diagnose {path} --config {config}"
+        )
+    page = write_run_page(report, joint_text(joint))
+    console.print(f"report: {page}")
+    if not report.ended_well:
+        raise typer.Exit(3)
+
+
+def _simulation(path: Path, wish: SimulationWish) -> Simulation:
+    from cablecomp.cli.simulation import start_simulation  # compiled code: only where a plant is wanted
+
+    return start_simulation(path, wish)
+
+
+def _show(report: RunReport) -> None:
+    table = Table(title=f"Run ended: {report.stop_reason}", show_header=False, box=None)
+    for joint in report.joints:
+        if joint.cycles == 0:
+            table.add_row(joint.name, "never under control")
+            continue
+        true = (
+            ""
+            if joint.true_position_rad != joint.true_position_rad
+            else f", true {1e3 * joint.true_position_rad:.4f}"
+        )
+        table.add_row(f"{joint.name}: position error, RMS", f"{1e3 * joint.position_rad:.4f} mrad{true}")
+        table.add_row(f"{joint.name}: deflection, RMS", f"{1e3 * joint.deflection_rad:.4f} mrad")
+        table.add_row(f"{joint.name}: prediction residual, RMS", f"{1e3 * joint.residual_rad:.4f} mrad")
+        if joint.torque_Nm == joint.torque_Nm:
+            table.add_row(
+                f"{joint.name}: torque error, RMS",
+                f"{joint.torque_Nm:.4f} Nm (true {joint.true_torque_Nm:.4f})",
+            )
+    for name, words in report.timing.rows():
+        table.add_row(name, words)
+    console.print(table)

@@ -1,0 +1,47 @@
+"""What several commands share: options, the console, progress, and where the project's own files lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from cablecomp.config import JointConfig
+from cablecomp.control.motors import control_for
+from cablecomp.control.options import ControlConfig, load_control
+from cablecomp.mechanics.jit import is_compiled
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+DEMO_LINK = CONFIGS / "links/wrist-virtual.toml"
+
+console = Console()
+
+Config = Annotated[Path, typer.Option("--config", help="joint configuration (TOML)")]
+Control = Annotated[
+    Path | None, typer.Option("--control", help="control file (TOML); made up from the joint if absent")
+]
+
+
+def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
+    """The control file, or what the joint itself suggests if there is none."""
+    return control_for(joint) if path is None else load_control(path)
+
+
+def announce_compilation() -> None:
+    """Say so before the first use of this very version compiles its kernels."""
+    if not is_compiled():
+        console.print("compiling the kernels, once for this version (under a minute) ...", style="dim")
+
+
+@contextmanager
+def share_bar() -> Iterator[Callable[[str, float], None]]:
+    """Give a function to be told (what is being tried, share done); the bar goes when it is over."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda what, share: bar.update(task, description=what, completed=share)
