@@ -1,3 +1,5 @@
+__version__: str
+
 from .config import JointConfig as JointConfig
 from .config import load_joint as load_joint
 from .config import parse_joint as parse_joint

@@ -10,17 +10,18 @@ import ast
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperGroup
 
+from cablecomp import __version__
 from cablecomp.errors import CablecompError, DeviceError, InputError, InternalError
 
 COMMANDS: Final = {
     "demo": "demo.demo",
+    "example": "example.copy_example",
     "run": "run.run",
     "replay": "replay.replay",
     "info": "info.info",
@@ -74,7 +75,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"cablecomp {version('cablecomp')}")
+        typer.echo(f"cablecomp {__version__}")
         raise typer.Exit
 
 

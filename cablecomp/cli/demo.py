@@ -10,12 +10,12 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from cablecomp.cli.shared import CONFIGS, DEMO_LINK, console
+from cablecomp.cli.shared import DEMO_LINK, console
 from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlConfig, load_control
-from cablecomp.errors import InputError
+from cablecomp.examples import example
 from cablecomp.identification.calibrate import calibrate
 from cablecomp.links.schema import LinkConfig, load_link
 from cablecomp.report.compare_page import HEAD, summary_rows, write_comparison
@@ -23,7 +23,7 @@ from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Compa
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.view import LiveView
 
-DEMO_JOINT, DEMO_CONTROL = CONFIGS / "joints/wrist-capstan.toml", CONFIGS / "control/wrist-capstan.toml"
+DEMO = "wrist-capstan"
 
 
 def demo(
@@ -33,11 +33,10 @@ def demo(
     seed: Annotated[int, typer.Option(help="of true parameters, noise and motions")] = 1,
 ) -> None:
     """A compensated joint against uncompensated ones, on a simulated bus; ends with where the report lies."""
-    if not DEMO_JOINT.exists():
-        raise InputError(f"{DEMO_JOINT}: is missing; run the demonstration from a clone of the project")
-    joint, wanted = load_joint(DEMO_JOINT), load_control(DEMO_CONTROL)
+    path = example("joints", DEMO)
+    joint, wanted = load_joint(path), load_control(example("control", DEMO))
     bus, wanted = matched(load_link(DEMO_LINK), wanted, own_link=False)
-    compare_controllers(DEMO_JOINT, joint, bus, wanted, out, seed, 14.0)
+    compare_controllers(path, joint, bus, wanted, out, seed, 14.0)
 
 
 def compare_controllers(

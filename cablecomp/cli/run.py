@@ -29,7 +29,10 @@ from cablecomp.runtime.view import LiveView
 def run(
     config: Config,
     link: Annotated[
-        Path | None, typer.Option(help="link file (TOML); with --sim a bus inside of the process")
+        Path | None,
+        typer.Option(
+            help="link file (TOML) or the name of an example; with --sim a bus inside of the process"
+        ),
     ] = None,
     sim: Annotated[
         bool, typer.Option("--sim", help="start the simulated joint as well; nothing else is needed")

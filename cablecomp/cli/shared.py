@@ -14,14 +14,22 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from cablecomp.config import JointConfig
 from cablecomp.control.motors import control_for
 from cablecomp.control.options import ControlConfig, load_control
+from cablecomp.examples import resolve
 from cablecomp.mechanics.jit import is_compiled
 
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
-DEMO_LINK = CONFIGS / "links/wrist-virtual.toml"
+DEMO_LINK = "wrist-virtual"
 
 console = Console()
 
-Config = Annotated[Path, typer.Option("--config", help="joint configuration (TOML)")]
+
+def _joint(path: Path) -> Path:
+    return resolve(path, "joints")
+
+
+Config = Annotated[
+    Path,
+    typer.Option("--config", callback=_joint, help="joint configuration (TOML), or the name of an example"),
+]
 Control = Annotated[
     Path | None, typer.Option("--control", help="control file (TOML); made up from the joint if absent")
 ]

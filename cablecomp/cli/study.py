@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import CONFIGS, console, share_bar
+from cablecomp.cli.shared import console, share_bar
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.errors import InputError
 from cablecomp.report.study_page import study_table, write_study
@@ -19,11 +19,9 @@ def study_bench(
     out: Annotated[Path, typer.Option(help="folder for study.html")] = Path("study"),
 ) -> None:
     """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""
-    opened, closed = (CONFIGS / f"joints/snow-{name}-rig.toml" for name in ("open", "closed"))
-    if not opened.exists():
-        raise InputError(f"{opened}: is missing; run the study from a clone of the project")
+    rigs = Rigs(load_joint("snow-open-rig"), load_joint("snow-closed-rig"))
     with share_bar() as told:
-        found = study(Rigs(load_joint(opened), load_joint(closed)), by_plant, told)
+        found = study(rigs, by_plant, told)
     console.print(study_table(found))
     console.print(f"report: {write_study(found, out, f'cablecomp study --out {out}')}")
 

@@ -11,15 +11,17 @@ from pydantic import BaseModel, ValidationError
 
 from cablecomp.config.schema import JointConfig
 from cablecomp.errors import InputError
+from cablecomp.examples import resolve
 
 M = TypeVar("M", bound=BaseModel)
 
 
-def load_joint(path: Path) -> JointConfig:
-    """Read a joint configuration.
+def load_joint(path: Path | str) -> JointConfig:
+    """Read a joint configuration; a bare name such as `capstan-arm` stands for an example that comes with the project.
 
     Raises InputError with one line that names file, key, what was found, what is accepted.
     """
+    path = resolve(path, "joints")
     return parse_joint(read_toml(path), str(path))
 
 

@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 
 from cablecomp.config import read_toml, validated
 from cablecomp.errors import InputError
+from cablecomp.examples import resolve
 from cablecomp.links.schema_devices import (
     CanSimpleDevice,
     DbcDevice,
@@ -175,9 +176,10 @@ def _tuples(data: Any) -> Any:
     return tuple(_tuples(v) for v in data) if isinstance(data, list) else data
 
 
-def load_link(path: Path) -> LinkConfig:
+def load_link(path: Path | str) -> LinkConfig:
     """Read a link file; raises InputError with one line that names file, key, what was found, what is
-    accepted."""
+    accepted. A bare name such as `mit-udp` stands for an example that comes with the project."""
+    path = resolve(path, "links")
     return parse_link(read_toml(path), str(path), path.parent)
 
 

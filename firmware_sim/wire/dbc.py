@@ -37,8 +37,9 @@ from firmware_sim.firmware import Drive, DriveFlag, DriveReport, Mode, Request, 
 from firmware_sim.wire.base import Answer, Heard
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.packed import PackedMessage
+from firmware_sim.wire.tables import joint_table, render
 
-SHIPPED = Path(__file__).resolve().parents[2] / "configs" / "links" / "cablecomp_joint.dbc"
+SHIPPED = "cablecomp_joint.dbc"
 TARGETS = ("motor_position_target_rad", "motor_velocity_target_rad_s", "motor_torque_target_Nm")
 GAINS = ("kp_Nm_per_rad", "kd_Nms_per_rad")
 CONTROLS = ("request", "control_mode", *GAINS, "torque_limit_Nm")
@@ -62,9 +63,10 @@ class MessageMap:
 
 @dataclass(frozen=True)
 class DbcMap:
-    """Which messages of which table the drive speaks; `requests` maps this maker's numbers to requests."""
+    """Which messages of which table the drive speaks (`path` None: the one that ships); `requests` maps this maker's
+    numbers to requests."""
 
-    path: Path
+    path: Path | None
     command: MessageMap
     control: MessageMap | None
     state: MessageMap
@@ -76,7 +78,7 @@ def shipped_map() -> DbcMap:
     """The map of the table that ships."""
     names = {part: MessageMap(f"Drive{{joint}}_{part.capitalize()}") for part in FIELDS}
     return DbcMap(
-        SHIPPED,
+        None,
         names["command"],
         names["control"],
         names["state"],
@@ -121,17 +123,26 @@ def _message_map(path: Path, name: str, table: Any) -> MessageMap | None:
     return MessageMap(table["message"], signals)
 
 
+def _database(path: Path | None) -> Any:
+    if path is None:  # written anew: an installed package need not bring the file
+        return cantools.database.load_string(render(joint_table(), SHIPPED), "dbc")
+    try:
+        return cantools.database.load_file(path)
+    except OSError as error:
+        raise SimError(f"{path}: cannot be read ({error.strerror}); give a DBC table") from None
+
+
 class _Spoken:
     """One message with its signals tied to fields."""
 
     def __init__(
-        self, database: Any, mapped: MessageMap, accepted: tuple[str, ...], joint: int, path: Path
+        self, database: Any, mapped: MessageMap, accepted: tuple[str, ...], joint: int, where: str
     ) -> None:
         name = mapped.message.format(joint=joint)
         try:
             self.packed = PackedMessage(database.get_message_by_name(name))
         except KeyError:
-            raise SimError(f"{path}: has no message {name}; check the map or the number of joints") from None
+            raise SimError(f"{where}: has no message {name}; check the map or the number of joints") from None
         self.fields = {s.name: mapped.signals.get(s.name, s.name) for s in self.packed.signals}
         self.fields = {signal: target for signal, target in self.fields.items() if target in accepted}
 
@@ -149,17 +160,14 @@ class DbcWire:
 
     def __init__(self, joint: int, mapped: DbcMap | None = None, status_every: int = 10) -> None:
         m = shipped_map() if mapped is None else mapped
-        try:
-            database = cantools.database.load_file(m.path)
-        except OSError as error:
-            raise SimError(f"{m.path}: cannot be read ({error.strerror}); give a DBC table") from None
-        self.command = _Spoken(database, m.command, FIELDS["command"], joint, m.path)
+        database, where = _database(m.path), str(m.path or SHIPPED)
+        self.command = _Spoken(database, m.command, FIELDS["command"], joint, where)
         self.control = (
-            None if m.control is None else _Spoken(database, m.control, FIELDS["control"], joint, m.path)
+            None if m.control is None else _Spoken(database, m.control, FIELDS["control"], joint, where)
         )
-        self.state = _Spoken(database, m.state, FIELDS["state"], joint, m.path)
+        self.state = _Spoken(database, m.state, FIELDS["state"], joint, where)
         self.status = (
-            None if m.status is None else _Spoken(database, m.status, FIELDS["status"], joint, m.path)
+            None if m.status is None else _Spoken(database, m.status, FIELDS["status"], joint, where)
         )
         self.requests = m.requests
         self.status_every = status_every

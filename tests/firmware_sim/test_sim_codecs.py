@@ -29,7 +29,7 @@ from firmware_sim.wire.mit import MODELS, MitWire, decode_command, encode_comman
 from firmware_sim.wire.odrive import OdriveWire
 from firmware_sim.wire.packed import PackedMessage
 from firmware_sim.wire.sensor import read_state, read_status, state_frame, status_frame
-from firmware_sim.wire.tables import tables
+from firmware_sim.wire.shipped import tables
 
 LINKS = Path(__file__).resolve().parents[2] / "configs" / "links"
 AT_REST = Readings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 25.0)
@@ -201,7 +201,7 @@ def test_no_value_survives_the_wire() -> None:
 def test_shipped_tables_are_those_of_the_code() -> None:
     for name, text in tables().items():
         assert (LINKS / name).read_text(encoding="ascii") == text, (
-            f"run python -m firmware_sim.wire.tables {LINKS}"
+            f"run python -m firmware_sim.wire.shipped {LINKS}"
         )
 
 

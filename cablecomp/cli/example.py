@@ -1,0 +1,47 @@
+"""`cablecomp example`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from cablecomp import examples
+from cablecomp.errors import InputError
+
+
+def copy_example(
+    name: Annotated[
+        str | None, typer.Argument(help="such as capstan-arm or links/mit-udp; lists them if absent")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="folder to copy into")] = Path(),
+) -> None:
+    """Copy out a configuration that comes with the project: a joint, a link, a controller; or list them."""
+    console = Console()
+    if name is None:
+        table = Table(show_header=False, box=None)
+        for kind in examples.KINDS:
+            for each in examples.names(kind):
+                table.add_row(f"{kind}/{each}", _about(examples.example(kind, each)))
+        console.print(table)
+        return
+    files = examples.with_companions(examples.find(name))
+    for path in files:
+        target = out / path.name
+        if target.exists() and target.read_bytes() != path.read_bytes():
+            raise InputError(f"{target}: is there already, and differs; remove it or give another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    for path in files:
+        (out / path.name).write_bytes(path.read_bytes())
+        console.print(f"written: {out / path.name}", soft_wrap=True)
+
+
+def _about(path: Path) -> str:
+    """First sentence of the comment at the head of a file, without what it says in brackets."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    head = " ".join(line.removeprefix("#").strip() for line in lines if line.startswith("#"))
+    return re.split(r"(?<=\w\w)\. (?=[A-Z])", re.sub(r" \([^)]*\)", "", head))[0].rstrip(".")

@@ -1,0 +1,62 @@
+"""Configurations that come with the project, by name: in a clone they lie in `configs`, in an installed package beside
+this module.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from cablecomp.errors import InputError
+
+KINDS: Final = ("joints", "links", "control", "scenarios")
+"""Folders of examples."""
+
+
+def folder() -> Path:
+    """Where the examples lie."""
+    installed = Path(__file__).parent / "configs"
+    return installed if installed.is_dir() else Path(__file__).parents[1] / "configs"
+
+
+def names(kind: str) -> tuple[str, ...]:
+    """Names of the examples of one kind, sorted."""
+    return tuple(sorted(path.stem for path in (folder() / kind).glob("*.toml")))
+
+
+def example(kind: str, name: str) -> Path:
+    """Path of an example; raises InputError if there is none of that name."""
+    path = folder() / kind / f"{name}.toml"
+    if not path.is_file():
+        raise InputError(f"no example `{name}` in {kind}; there are {', '.join(names(kind))}")
+    return path
+
+
+def resolve(path: Path | str, kind: str) -> Path:
+    """The path itself, or the example that a bare name (no folder, no suffix, no such file here) stands for."""
+    path = Path(path)
+    bare = path.name == str(path) and not path.suffix and not path.exists()
+    return example(kind, path.name) if bare and path.name in names(kind) else path
+
+
+def find(name: str) -> Path:
+    """Path of the example `NAME` or `KIND/NAME`, with or without `.toml`.
+
+    Raises InputError if there is none, or several of different kinds.
+    """
+    wanted = Path(name).with_suffix("") if name.endswith(".toml") else Path(name)
+    kinds = (str(wanted.parent),) if len(wanted.parts) == 2 else KINDS
+    found = [kind for kind in kinds if wanted.name in names(kind)]
+    if len(found) == 1:
+        return example(found[0], wanted.name)
+    if found:
+        raise InputError(
+            f"`{name}` is several: give {' or '.join(f'{kind}/{wanted.name}' for kind in found)}"
+        )
+    raise InputError(f"no example `{name}`; `cablecomp example` lists them")
+
+
+def with_companions(path: Path) -> tuple[Path, ...]:
+    """The example's file and those of its folder that it names (message tables of a link)."""
+    text = path.read_text(encoding="utf-8")
+    return (path, *(p for p in sorted(path.parent.iterdir()) if f'"{p.name}"' in text))

@@ -1,0 +1,60 @@
+"""Examples that come with the project: each is found by name, loads, and is copied whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cablecomp import examples, load_joint
+from cablecomp.cli import main
+from cablecomp.control.options import load_control
+from cablecomp.errors import InputError
+from cablecomp.links import load_link
+
+LOADERS = {"joints": load_joint, "links": load_link, "control": load_control}
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(kind, name) for kind in LOADERS for name in examples.names(kind)]
+)
+def test_a_copy_of_an_example_loads_as_the_example(kind: str, name: str, tmp_path: Path) -> None:
+    assert main(["example", f"{kind}/{name}", "--out", str(tmp_path)]) == 0
+    copied = LOADERS[kind](tmp_path / f"{name}.toml")
+    original = LOADERS[kind](examples.example(kind, name))
+    changes = {"folder": Path()} if kind == "links" else {}
+    assert copied.model_copy(update=changes) == original.model_copy(update=changes)
+
+
+def test_a_bare_name_stands_for_an_example_unless_such_a_file_is_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert load_joint("capstan-arm") == load_joint(examples.example("joints", "capstan-arm"))
+    assert load_link("mit-udp") == load_link(examples.example("links", "mit-udp"))
+    Path("capstan-arm").write_text("schema = 2\n", encoding="utf-8")
+    with pytest.raises(InputError, match="schema"):
+        load_joint("capstan-arm")
+
+
+def test_a_name_of_two_kinds_is_asked_about(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["example", "wrist-capstan"]) == 2
+    said = capsys.readouterr().err
+    assert "joints/wrist-capstan" in said
+    assert "control/wrist-capstan" in said
+
+
+def test_a_file_that_differs_is_not_overwritten(tmp_path: Path) -> None:
+    mine = tmp_path / "cablecomp_joint.dbc"
+    mine.write_text("mine", encoding="utf-8")
+    assert main(["example", "wrist-virtual", "--out", str(tmp_path)]) == 2
+    assert mine.read_text(encoding="utf-8") == "mine"
+    assert [p.name for p in tmp_path.iterdir()] == [mine.name]
+
+
+def test_every_example_is_listed_with_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["example"]) == 0
+    said = capsys.readouterr().out
+    for kind in examples.KINDS:
+        for name in examples.names(kind):
+            assert f"{kind}/{name} " in said
