@@ -1,4 +1,7 @@
-"""Physics beyond the thesis's drive: one file per effect, found by name."""
+"""Physics beyond the thesis's drive: one file per effect, found by name.
+
+Imports the kernel and the configuration. Start reading at `base.py`, the contract, then any effect.
+"""
 
 from cablecomp.effects.base import Change, Effect, Parameter, term
 from cablecomp.effects.catalogue import catalogue, extend, load_effects, register, with_effects

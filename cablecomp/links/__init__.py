@@ -1,5 +1,8 @@
-"""Joints on CAN buses and serial lines: frames without I/O, ports that read cheaply, devices, and the link
-that joins them."""
+"""Joints on CAN buses and serial lines: frames without I/O, ports that read cheaply, devices, the link that joins them.
+
+Imports configuration, signals and errors. Start reading at `link.py`; a protocol is a pair such as `mit.py` (bytes)
+and `device_mit.py` (what the loop asks of it).
+"""
 
 from cablecomp.links.link import BusLink, Link, LinkStatus
 from cablecomp.links.readings import Age, JointReadings, MessageStats

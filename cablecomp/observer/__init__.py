@@ -1,4 +1,7 @@
-"""The online state of a joint: init, step, peek, snapshot, bounds, erasing history."""
+"""The online state of a joint: init, step, peek, snapshot, bounds, erasing history.
+
+Imports effects, the kernel and the configuration. Start reading at `observer.py`.
+"""
 
 from cablecomp.observer.erase import ErasePlan, plan_erase
 from cablecomp.observer.observer import Observer

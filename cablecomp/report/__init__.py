@@ -1,0 +1,5 @@
+"""Pages, figures and terminal tables of every result; no result is computed here.
+
+Imports everything but the command line. Start reading at `page.py` (what every page is made of), then
+`replay_page.py`.
+"""

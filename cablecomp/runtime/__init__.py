@@ -1,0 +1,5 @@
+"""A joint under control in real time: clock, loop, health of the data, stop, timing report.
+
+Imports control, links and everything below. Start reading at `run.py`, then `loop.py` (all joints of a link) and
+`joint_loop.py` (one joint's cycle).
+"""
