@@ -39,7 +39,7 @@ def can_port(
     if interface == "udp_multicast":
         group = str(channel) if channel is not None else UdpMulticastBus.DEFAULT_GROUP_IPv6
         return MulticastPort(bus, group, options.get("port", 43113), options.get("hop_limit", 1))
-    if interface == "slcan":
+    if interface == "slcan" and os.name == "posix":
         return slcan_port(bus)
     return GenericPort(bus)
 

@@ -167,6 +167,9 @@ class LinePort(PortBase):
                 shut()
             except (OSError, serial.SerialException, can.CanError) as error:
                 self.fault = f"closing failed ({error})"
+        # python-can cannot tell an adapter whose cable is out to close its channel, and then leaves the line
+        # open; with nobody left to hold it, it closes itself.
+        self._port = None
         self._fd = -1
         self.state = BusState.CLOSED
 
@@ -189,19 +192,12 @@ def serial_port(port: str, baud: int) -> LinePort:
 
 
 def slcan_port(bus: Callable[[], Any]) -> LinePort:
-    """slcan text on the line of a python-can slcan bus, which sets the adapter up and opens its channel."""
+    """slcan text on the line of a python-can slcan bus, which sets the adapter up and opens its channel, and
+    tells its file descriptor; where the system has none (Windows), `GenericPort` is for it."""
 
     def attach() -> tuple[Any, Callable[[], None]]:
         opened = bus()
-
-        def shut() -> None:
-            # python-can first tells the adapter to close its channel, which fails once the cable is out.
-            try:
-                opened.shutdown()
-            finally:
-                opened.serialPortOrig.close()
-
-        return opened.serialPortOrig, shut
+        return opened, opened.shutdown
 
     return LinePort(attach, slcan_frames.pack_line, slcan_frames.LineReader())
 

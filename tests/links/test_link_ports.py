@@ -229,7 +229,9 @@ def test_multicast_with_a_stock_client(group: dict[str, object]) -> None:
                     data=data,
                 )
             )
-        client._multicast._socket.sendto(b"\xc1noise", ("239.74.163.2", group["port"]))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noisy:
+            noisy.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+            noisy.sendto(b"\xc1noise", ("239.74.163.2", group["port"]))
         while len(got) < 3 or not port.counters.invalid:
             settle(port._socket.fileno())
             port.drain(got, 100)
@@ -325,6 +327,20 @@ def test_slcan_over_a_terminal() -> None:
         assert (port.counters.invalid, port.counters.overflows) == (1, 1)
         port.close()
         assert heard(master, b"C\r") == b"F\rC\r", "a refusal is asked about once, then the channel is closed"
+
+
+def test_a_pulled_slcan_adapter_leaves_no_file_open() -> None:
+    with terminal() as (master, path):
+        port = can_port("slcan", path, 1_000_000, {"sleep_after_open": 0})
+        before = set(os.listdir("/proc/self/fd")) if os.path.exists("/proc/self/fd") else set()
+        port.open()
+        os.close(master)
+        port.send(1, b"")
+        port.close()
+        assert "failed" in port.fault or "gone" in port.fault
+        assert port.state == BusState.CLOSED
+        if before:
+            assert not set(os.listdir("/proc/self/fd")) - before
 
 
 def test_what_cannot_be_opened_is_said_in_one_line(tmp_path) -> None:
