@@ -17,6 +17,7 @@ from firmware_sim.wire.base import DriveWire
 from firmware_sim.wire.dbc import DbcWire, load_map
 from firmware_sim.wire.mit import MitWire
 from firmware_sim.wire.odrive import OdriveRates, OdriveWire
+from firmware_sim.wire.tables import MOST_JOINTS
 
 PROTOCOLS = ("mit", "odrive", "dbc")
 MakePlant = Callable[[int], PlantLike]
@@ -41,8 +42,8 @@ class BenchConfig:
     def __post_init__(self) -> None:
         if self.protocol not in PROTOCOLS:
             raise SimError(f"protocol {self.protocol!r}; one of {', '.join(PROTOCOLS)} is accepted")
-        if not 1 <= self.joints <= 32:
-            raise SimError(f"{self.joints} joints; 1 to 32 is accepted")
+        if not 1 <= self.joints <= MOST_JOINTS:
+            raise SimError(f"{self.joints} joints; 1 to {MOST_JOINTS} is accepted")
 
 
 def make_wire(config: BenchConfig, number: int) -> DriveWire:

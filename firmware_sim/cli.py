@@ -24,6 +24,7 @@ from firmware_sim.joint import Timing
 from firmware_sim.ports import BUSES, open_port
 from firmware_sim.runner import run_real_time, run_stepped
 from firmware_sim.wire.mit import MODELS
+from firmware_sim.wire.tables import SENSOR_BASE, SENSOR_STRIDE
 
 
 class _Parser(argparse.ArgumentParser):
@@ -138,7 +139,7 @@ def _run(bench: Bench, options: argparse.Namespace) -> int:
         pace=pace,
         sample_period_s=sample_s,
         drive_identifiers=[f"0x{min(j.wire.identifiers()):X}" for j in bench.joints],
-        sensor_identifiers=[f"0x{0x600 + 0x10 * (j.number - 1):X}" for j in bench.joints],
+        sensor_identifiers=[f"0x{SENSOR_BASE + SENSOR_STRIDE * (j.number - 1):X}" for j in bench.joints],
     )
     report = run_real_time(bench, stop, sample_s) if options.stepped is None else run_stepped(bench, stop)
     lost = max(j.lost_s for j in bench.joints)

@@ -17,7 +17,8 @@ from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlConfig, load_control
 from cablecomp.examples import example
 from cablecomp.identification.calibrate import calibrate
-from cablecomp.links.schema import LinkConfig, load_link
+from cablecomp.links.load import load_link
+from cablecomp.links.schema import LinkConfig
 from cablecomp.report.compare_page import HEAD, summary_rows, write_comparison
 from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
 from cablecomp.runtime.setup import matched

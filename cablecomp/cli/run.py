@@ -17,7 +17,7 @@ from cablecomp.control.options import ControlMode
 from cablecomp.control.protocol import load_protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
 from cablecomp.errors import InputError
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint

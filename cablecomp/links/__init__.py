@@ -5,6 +5,7 @@ and `device_mit.py` (what the loop asks of it).
 """
 
 from cablecomp.links.link import BusLink, Link, LinkStatus
+from cablecomp.links.load import load_link, parse_link
 from cablecomp.links.readings import Age, JointReadings, MessageStats
 from cablecomp.links.records import (
     CHANNELS,
@@ -15,7 +16,7 @@ from cablecomp.links.records import (
     Request,
     clip_names,
 )
-from cablecomp.links.schema import LinkConfig, Timeouts, load_link, parse_link
+from cablecomp.links.schema import LinkConfig, Timeouts
 
 __all__ = [
     "CHANNELS",

@@ -8,7 +8,7 @@ from typing import Final
 from cablecomp.errors import InputError
 from cablecomp.links import cansimple
 from cablecomp.links.cansimple import AxisState, Cmd, ControlMode
-from cablecomp.links.devices import Gear, Outgoing, Receiver, Take, chain
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain
 from cablecomp.links.readings import JointReadings, MessageStats
 from cablecomp.links.records import Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd
@@ -37,6 +37,11 @@ _MODES: Final = {
 def extra_channels(device: CanSimpleDevice) -> tuple[str, ...]:
     """Channels beside the common ones that the messages named by the device bring."""
     return tuple(_EXTRAS[d] for d in _EXTRAS if d in (*device.cyclic, *device.polled))
+
+
+def claims(end: MotorEnd) -> tuple[Claim, ...]:
+    """Every command number of the node, used or not: the ODrive answers to all of them."""
+    return tuple(Claim(cansimple.identifier(end.node, n), f"CANSimple command 0x{n:02X}") for n in range(32))
 
 
 class CanSimpleDrive:

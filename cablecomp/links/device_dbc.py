@@ -9,7 +9,7 @@ from cablecomp.errors import InputError
 from cablecomp.links import dbc
 from cablecomp.links.dbc import Field, Layout
 from cablecomp.links.dbc_source import ALWAYS, Entry, Source, Status
-from cablecomp.links.devices import Gear, Outgoing, Receiver, chain
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, chain
 from cablecomp.links.readings import DeviceClock, JointReadings
 from cablecomp.links.records import CHANNELS, DriveState, Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd, SensorEnd
@@ -23,6 +23,15 @@ _QUANTITIES: Final = ("rad", "rad_s", "Nm", "Nm_per_rad", "Nms_per_rad")
 def extra_channels(device: DbcDevice) -> tuple[str, ...]:
     """Channels beside the common ones that the device's messages name."""
     return tuple(c for m in device.message for c in m.channels if c not in CHANNELS)
+
+
+def claims(device: DbcDevice, end: MotorEnd | SensorEnd, folder: Path) -> tuple[Claim, ...]:
+    """Every message that the link names."""
+    names = [m.name for m in device.message] + [r.message for r in device.request.values()]
+    if device.command is not None:
+        names.append(device.command.message)
+    found = [dbc.layout(folder / device.dbc, n.replace("{node}", str(end.node))) for n in names]
+    return tuple(Claim(layout.identifier, f"message {layout.name}") for layout in found)
 
 
 def calibration(end: MotorEnd | SensorEnd, channel: str) -> Linear:

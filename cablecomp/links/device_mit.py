@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from cablecomp.errors import InputError
 from cablecomp.links import mit
-from cablecomp.links.devices import Gear, Outgoing, Receiver
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take
 from cablecomp.links.mit import MitRange, reply_counts, saturation
-from cablecomp.links.mit_profiles import error_text, profile, status_of
+from cablecomp.links.mit_profiles import Family, error_text, profile, status_of
 from cablecomp.links.readings import JointReadings, MessageStats
 from cablecomp.links.records import (
     MOTOR_POSITION,
@@ -37,6 +37,37 @@ def _reply_length(device: MitDevice) -> int:
     return 6 if device.family == "katz" else 8
 
 
+def family_of(device: MitDevice) -> Family:
+    """Whose firmware a device has: as stated, else its model's."""
+    if device.family is not None:
+        return device.family
+    if device.model is None:
+        raise InputError(f"device `{device.id}`: no family; cubemars, damiao or katz are accepted")
+    return profile(device.model).family
+
+
+def reply_receiver(device: MitDevice, end: MotorEnd, take: Take) -> Receiver:
+    """Who takes a drive's replies. Identifier, unless the link gives one: CubeMars the drive number, Damiao
+    drive number + 0x10 (the maker's advice for the master's identifier), Katz 0."""
+    family = family_of(device)
+    default = {"cubemars": end.node, "damiao": end.node + 0x10, "katz": 0}[family]
+    mask = 0x0F if family == "damiao" else 0xFF
+    return Receiver(end.reply_id if end.reply_id is not None else default, take, mask, end.node & mask)
+
+
+def claims(device: MitDevice, end: MotorEnd) -> tuple[Claim, ...]:
+    """Commands to the drive and its replies; raises InputError for a number that is no 11-bit identifier."""
+    if end.node > 0x7FF:
+        raise InputError(
+            f"device `{device.id}`: node {end.node}; 0 to 2047 are accepted (11-bit identifiers)"
+        )
+    reply = reply_receiver(device, end, lambda data, now_s: 0)
+    return (
+        Claim(end.node, "MIT commands"),
+        Claim(reply.identifier, "MIT replies", reply.mask, reply.number),
+    )
+
+
 def is_register_reply(data: bytes) -> bool:
     """Whether a Damiao drive answers a register request of somebody's, on the identifier of its states:
     number, 0, 0x33 (read), 0x55 (write) or 0xAA (save), … Read as a state it would be a disabled drive at the
@@ -47,26 +78,21 @@ def is_register_reply(data: bytes) -> bool:
 class MitDrive:
     """Encodes commands and decodes replies of one drive.
 
-    Reply identifier, unless the link gives one: CubeMars the drive number, Damiao drive number + 0x10 (the
-    maker's advice for the master's identifier), Katz 0. CubeMars and Katz do not say whether the motor mode
-    is on: the state is then what was asked for last, once a reply has come.
+    CubeMars and Katz do not say whether the motor mode is on: the state is then what was asked for last, once
+    a reply has come.
     """
 
     def __init__(self, device: MitDevice, end: MotorEnd, readings: JointReadings) -> None:
         base = profile(device.model) if device.model is not None else None
-        family = device.family if device.family is not None else (base.family if base else None)
-        if family is None:
-            raise InputError(f"device `{device.id}`: no family; cubemars, damiao or katz are accepted")
         given = device.range
         if given is not None:
             self._scale = MitRange(*(getattr(given, name) for name in MitRange._fields))
         elif base is not None:
             self._scale = base.scale
-        self._family = family
+        self._family = family_of(device)
         self._length = _reply_length(device)
         self._node = end.node
-        default = {"cubemars": end.node, "damiao": end.node + 0x10, "katz": 0}[family]
-        self._reply_id = end.reply_id if end.reply_id is not None else default
+        self._receiver = reply_receiver(device, end, self.take)
         self._readings = readings
         self._stats = MessageStats(f"{readings.name}: {device.id} reply")
         readings.messages.append(self._stats)
@@ -96,8 +122,7 @@ class MitDrive:
 
     def receivers(self) -> tuple[Receiver, ...]:
         """See `Drive.receivers`."""
-        mask = 0x0F if self._family == "damiao" else 0xFF
-        return (Receiver(self._reply_id, self.take, mask, self._node & mask),)
+        return (self._receiver,)
 
     def take(self, data: bytes, now_s: float) -> int:
         """Take one reply."""

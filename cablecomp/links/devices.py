@@ -25,6 +25,20 @@ class Receiver(NamedTuple):
     number: int = 0
 
 
+class Claim(NamedTuple):
+    """An identifier that a device sends or takes frames on, and what they are.
+
+    Two devices may share it where both tell themselves apart by byte 0 (same `mask`, not 0, other `number`),
+    or where it is a broadcast of one protocol (same `group`, not empty).
+    """
+
+    identifier: int
+    what: str
+    mask: int = 0
+    number: int = 0
+    group: str = ""
+
+
 class Outgoing(NamedTuple):
     """Frames of one command, and the CLIP_* bits of what had to be saturated."""
 

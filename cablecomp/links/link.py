@@ -6,18 +6,14 @@ from math import inf
 from typing import NamedTuple, Protocol
 
 from cablecomp.errors import InputError
-from cablecomp.links import device_cansimple, device_dbc, device_mit
-from cablecomp.links.device_cansimple import CanSimpleDrive
-from cablecomp.links.device_dbc import DbcDrive, build_sources
-from cablecomp.links.device_mit import MitDrive
 from cablecomp.links.devices import Drive, Receiver, Take
 from cablecomp.links.port_can import can_port
 from cablecomp.links.port_line import serial_port
 from cablecomp.links.ports import Port
+from cablecomp.links.protocols import extra_channels, make_drive, sensor_receivers
 from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import BusState, Mode, MotorCommand, Request
-from cablecomp.links.schema import CanBus, JointEnds, LinkConfig, MotorEnd
-from cablecomp.links.schema_devices import CanSimpleDevice, DbcDevice, MitDevice
+from cablecomp.links.schema import CanBus, LinkConfig
 
 
 class LinkStatus(NamedTuple):
@@ -105,12 +101,12 @@ class BusLink:
         drives: list[Drive | None] = []
         receivers: list[Receiver] = []
         for ends in config.joint:
-            joint = JointReadings(ends.name, _others(config, ends))
-            drive = _make_drive(config, ends, joint)
+            joint = JointReadings(ends.name, extra_channels(config, ends))
+            drive = None if ends.motor is None else make_drive(config, ends.motor, joint)
             readings.append(joint)
             drives.append(drive)
             receivers += drive.receivers() if drive is not None else ()
-            receivers += _sensor_receivers(config, ends, joint)
+            receivers += sensor_receivers(config, ends, joint)
         self.joints: tuple[JointReadings, ...] = tuple(readings)
         self._drives: tuple[Drive | None, ...] = tuple(drives)
         self._strangers = Strangers()
@@ -264,42 +260,3 @@ def _by_number(takers: dict[int, Take], mask: int, strangers: Strangers) -> Take
         return taker(data, now_s)
 
     return take
-
-
-def _others(config: LinkConfig, ends: JointEnds) -> tuple[str, ...]:
-    names: list[str] = []
-    for end in (ends.motor, ends.sensor):
-        if end is None:
-            continue
-        device = config.device_of(end)
-        if isinstance(device, MitDevice):
-            names += device_mit.extra_channels(device)
-        elif isinstance(device, CanSimpleDevice):
-            names += device_cansimple.extra_channels(device)
-        else:
-            names += device_dbc.extra_channels(device)
-    return tuple(dict.fromkeys(names))
-
-
-def _make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> Drive | None:
-    end: MotorEnd | None = ends.motor
-    if end is None:
-        return None
-    device = config.device_of(end)
-    if isinstance(device, MitDevice):
-        return MitDrive(device, end, joint)
-    if isinstance(device, CanSimpleDevice):
-        return CanSimpleDrive(device, end, joint)
-    return DbcDrive(device, end, config.folder, joint)
-
-
-def _sensor_receivers(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> tuple[Receiver, ...]:
-    if ends.sensor is None:
-        return ()
-    device = config.device_of(ends.sensor)
-    if not isinstance(device, DbcDevice):
-        raise InputError(
-            f"joint `{ends.name}`: sensor device `{device.id}` speaks `{device.protocol}`; "
-            "a `dbc` device is accepted"
-        )
-    return build_sources(device, ends.sensor, config.folder, joint)

@@ -12,9 +12,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cablecomp.config import read_toml, validated
-from cablecomp.errors import InputError
-from cablecomp.examples import resolve
 from cablecomp.links.schema_devices import (
     CanSimpleDevice,
     DbcDevice,
@@ -167,24 +164,3 @@ def _distinct(what: str, names: list[str]) -> None:
     twice = next((n for n in names if names.count(n) > 1), None)
     if twice is not None:
         raise ValueError(f"{what} `{twice}` is there twice; distinct names are accepted")
-
-
-def _tuples(data: Any) -> Any:
-    # TOML arrays arrive as lists; the strict models want tuples.
-    if isinstance(data, dict):
-        return {k: _tuples(v) for k, v in data.items()}
-    return tuple(_tuples(v) for v in data) if isinstance(data, list) else data
-
-
-def load_link(path: Path | str) -> LinkConfig:
-    """Read a link file; raises InputError with one line that names file, key, what was found, what is
-    accepted. A bare name such as `mit-udp` stands for an example that comes with the project."""
-    path = resolve(path, "links")
-    return parse_link(read_toml(path), str(path), path.parent)
-
-
-def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkConfig:
-    """Validate a link already read; `where` names it in errors, relative paths start at `folder`."""
-    if "folder" in data:
-        raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
-    return validated(LinkConfig, {**_tuples(data), "folder": folder}, where)

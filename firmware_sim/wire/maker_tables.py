@@ -7,8 +7,8 @@ both with bytes worked out from the manuals.
 
 from __future__ import annotations
 
+from firmware_sim.wire.dbc_text import Message, Signal
 from firmware_sim.wire.mit import model_of
-from firmware_sim.wire.tables import Message, Signal
 
 _AXIS_STATES = (
     (0, "undefined"),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from firmware_sim.wire.dbc_text import render
 from firmware_sim.wire.maker_tables import mit_table, odrive_table
-from firmware_sim.wire.tables import JOINTS, SYNC, joint_table, render, sensor_messages
+from firmware_sim.wire.tables import JOINTS, SYNC, joint_table, sensor_messages
 
 
 def tables() -> dict[str, str]:

@@ -1,63 +1,33 @@
-"""Messages of sensor nodes and drives of cable-driven joints, and any table as text (DBC).
+"""Messages of our own: sensor nodes, drives that a table alone describes, and the step counter.
 
-Identifiers (11-bit) of joint N = 1…8; sensor nodes stay clear of ODrive nodes 0…47 and of MIT drive ids:
+Identifiers (11-bit) of joint N:
 
-| identifier       | message        | from  | what it carries                                               |
-|------------------|----------------|-------|---------------------------------------------------------------|
-| 0x600 + 16 (N-1) | JointN_State   | joint | angle (int32 1e-6 rad), torque (int24 1e-5 Nm), sequence      |
-| 0x601 + 16 (N-1) | JointN_Status  | joint | time (uint32 us), temp. (int16 0.01 degC), flags, sequence |
-| 0x400 + 16 (N-1) | DriveN_Command | host  | targets: motor position, velocity, torque                     |
-| 0x401 + 16 (N-1) | DriveN_Control | host  | state request, control mode, kp, kd, torque limit             |
-| 0x402 + 16 (N-1) | DriveN_State   | drive | motor position, velocity, torque, sequence                    |
-| 0x403 + 16 (N-1) | DriveN_Status  | drive | state, mode, flags, current, temperature, sequence            |
-| 0x700            | Sync           | host  | step number; stepped by sync, every joint takes one step      |
+| identifier      | message              | from  | what it carries                                               |
+|-----------------|----------------------|-------|---------------------------------------------------------------|
+| 0x680 + 2 (N-1) | JointN_State, N ≤ 32 | joint | angle (int32 1e-6 rad), torque (int24 1e-5 Nm), sequence      |
+| 0x681 + 2 (N-1) | JointN_Status        | joint | time (uint32 us), temp. (int16 0.01 degC), flags, sequence    |
+| 0x6C0 + 4 (N-1) | DriveN_Command, N ≤ 8 | host | targets: motor position, velocity, torque                     |
+| 0x6C1 + 4 (N-1) | DriveN_Control       | host  | state request, control mode, kp, kd, torque limit             |
+| 0x6C2 + 4 (N-1) | DriveN_State         | drive | motor position, velocity, torque, sequence                    |
+| 0x6C3 + 4 (N-1) | DriveN_Status        | drive | state, mode, flags, current, temperature, sequence            |
+| 0x700           | Sync                 | host  | step number; stepped by sync, every joint takes one step      |
 
-Intel byte order. JointN_Status goes out with every tenth sample and at once when its flags change; its
-sequence is that of
-the JointN_State sent just before, so that sample's device time is known to the microsecond.
+0x680 to 0x6DF is what CANopen leaves free beside its restricted identifiers and its predefined connection set
+(CiA 301, tables of both), and no MIT drive uses; CANSimple, which spends all identifiers on its 64 nodes, has
+nodes 52 to 54 there, and 56 at Sync. Intel byte order. JointN_Status goes out with every tenth sample and at
+once when its flags change; its sequence is that of the JointN_State sent just before, so that sample's device
+time is known to the microsecond.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from firmware_sim.wire.dbc_text import Message, Signal
 
 JOINTS = 8
-SENSOR_BASE = 0x600
-DRIVE_BASE = 0x400
-STRIDE = 0x10
+MOST_JOINTS = 32
+SENSOR_BASE, SENSOR_STRIDE = 0x680, 2
+DRIVE_BASE, DRIVE_STRIDE = 0x6C0, 4
 SYNC_ID = 0x700
-
-
-class Signal(NamedTuple):
-    """One signal: first bit, length in bits, scale, offset, unit; Intel unless `motorola`, unsigned unless
-    `signed`."""
-
-    name: str
-    start: int
-    length: int
-    scale: float = 1.0
-    unit: str = ""
-    signed: bool = False
-    comment: str = ""
-    values: tuple[tuple[int, str], ...] = ()
-    real: bool = False
-    motorola: bool = False
-    offset: float = 0.0
-    low: float = 0.0
-    high: float = 0.0
-
-
-class Message(NamedTuple):
-    """One message of the table."""
-
-    identifier: int
-    name: str
-    length: int
-    sender: str
-    receiver: str
-    signals: tuple[Signal, ...]
-    comment: str = ""
-
 
 DRIVE_STATES = ((0, "disabled"), (1, "calibrating"), (2, "enabled"), (3, "fault"))
 REQUESTS = (
@@ -82,7 +52,7 @@ DRIVE_FLAGS = (
 
 def sensor_messages(joint: int) -> tuple[Message, ...]:
     """Messages of the joint-side sensor node of joint 1…8."""
-    base, node = SENSOR_BASE + STRIDE * (joint - 1), f"SensorNode{joint}"
+    base, node = SENSOR_BASE + SENSOR_STRIDE * (joint - 1), f"SensorNode{joint}"
     state = (
         Signal(
             "joint_position_rad",
@@ -133,7 +103,7 @@ def sensor_messages(joint: int) -> tuple[Message, ...]:
 
 def drive_messages(joint: int) -> tuple[Message, ...]:
     """Messages of a drive of joint 1…8 that is described by this table alone."""
-    base, node = DRIVE_BASE + STRIDE * (joint - 1), f"Drive{joint}"
+    base, node = DRIVE_BASE + DRIVE_STRIDE * (joint - 1), f"Drive{joint}"
     command = (
         Signal("motor_position_target_rad", 0, 32, 1e-6, "rad", True),
         Signal("motor_velocity_target_rad_s", 32, 16, 2e-3, "rad/s", True),
@@ -195,37 +165,3 @@ def joint_table() -> tuple[Message, ...]:
     """Sensor nodes 1…8, drives 1…8 and Sync: `cablecomp_joint.dbc`."""
     joints = range(1, JOINTS + 1)
     return (*(m for j in joints for m in (*sensor_messages(j), *drive_messages(j))), SYNC)
-
-
-def render(messages: tuple[Message, ...], comment: str) -> str:
-    """DBC text of a table (Vector's format, as cantools reads it)."""
-    nodes = sorted({n for m in messages for n in (m.sender, m.receiver)} - {"Vector__XXX"})
-    blocks = [_message(m) for m in messages]
-    notes = [f'CM_ "{comment}";']
-    values: list[str] = []
-    reals: list[str] = []
-    for m in messages:
-        if m.comment:
-            notes.append(f'CM_ BO_ {m.identifier} "{m.comment}";')
-        for s in m.signals:
-            if s.comment:
-                notes.append(f'CM_ SG_ {m.identifier} {s.name} "{s.comment}";')
-            if s.values:
-                pairs = " ".join(f'{k} "{v}"' for k, v in s.values)
-                values.append(f"VAL_ {m.identifier} {s.name} {pairs} ;")
-            if s.real:
-                reals.append(f"SIG_VALTYPE_ {m.identifier} {s.name} : 1;")
-    head = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: ' + " ".join(nodes)
-    parts = ["\n\n".join([head, *blocks]), "\n".join(notes), "\n".join(values), "\n".join(reals)]
-    return "\n\n".join(p for p in parts if p) + "\n"
-
-
-def _message(message: Message) -> str:
-    lines = [f"BO_ {message.identifier} {message.name}: {message.length} {message.sender}"]
-    for s in message.signals:
-        order, sign = (0 if s.motorola else 1), ("-" if s.signed else "+")
-        lines.append(
-            f" SG_ {s.name} : {s.start}|{s.length}@{order}{sign} ({s.scale:.12g},{s.offset:.12g}) "
-            f'[{s.low:.12g}|{s.high:.12g}] "{s.unit}" {message.receiver}'
-        )
-    return "\n".join(lines)

@@ -15,7 +15,7 @@ from cablecomp.control.command import Reference
 from cablecomp.control.compensator import Compensator
 from cablecomp.control.options import CompensatorOptions, load_control
 from cablecomp.control.standard import reaching_protocol
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.observer import Observer
 from cablecomp.runtime.priority import Policy
 from cablecomp.runtime.results import RunReport

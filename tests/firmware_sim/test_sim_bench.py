@@ -77,7 +77,7 @@ def test_tick_follows_the_callers_time_on_an_absolute_grid() -> None:
     bench = bench_of(port)
     for now in (0.0001, 0.00099, 0.00151, 0.0049, 0.005, 0.0151):
         bench.tick(now)
-    states = [read_state(f) for f in port.take() if f.identifier == 0x600]
+    states = [read_state(f) for f in port.take() if f.identifier == 0x680]
     assert len(states) == 15  # one for each whole millisecond, however the ticks fell
     assert bench.time_s == pytest.approx(0.015, abs=2.6e-4)
 
@@ -104,7 +104,7 @@ def test_stepped_time_moves_by_commands_alone() -> None:
     assert first.time_s == pytest.approx(3e-3)
     assert second.time_s == 0.0
     told = [f.identifier for f in port.take()]
-    assert told == [0x600, 0x601, 0, 0x600, 0x601, 0, 0x600, 0]  # samples first, the reply last
+    assert told == [0x680, 0x681, 0, 0x680, 0x681, 0, 0x680, 0]  # samples first, the reply last
 
 
 def test_stepped_by_sync_moves_all_joints() -> None:
@@ -113,8 +113,8 @@ def test_stepped_by_sync_moves_all_joints() -> None:
     port.arriving = [Frame(1, torque(0.1)), Frame(0x700, b"\0\0\0\0"), Frame(0x700)]
     assert bench.pump() == 2
     assert {joint.time_s for joint in bench.joints} == {2e-3}
-    states = [f.identifier for f in port.take() if f.identifier & 0x60F == 0x600]
-    assert states == [0x600, 0x610, 0x620] * 2
+    states = [f.identifier for f in port.take() if f.identifier in (0x680, 0x682, 0x684)]
+    assert states == [0x680, 0x682, 0x684] * 2
 
 
 def test_the_same_commands_in_stepped_and_in_given_time_give_the_same_samples() -> None:
@@ -130,7 +130,7 @@ def test_the_same_commands_in_stepped_and_in_given_time_give_the_same_samples() 
         stepped.pump()
         ports[1].arriving = [frame]
         ticked.tick((k + 1) * 1e-3)
-    samples = [[f for f in port.take() if f.identifier == 0x600] for port in ports]
+    samples = [[f for f in port.take() if f.identifier == 0x680] for port in ports]
     # in given time the command is heard after the step that it was sent in would have begun: compare on the
     # way there
     assert len(samples[0]) == len(samples[1]) == 200
@@ -183,18 +183,18 @@ def test_dbc_joint_by_the_shipped_table() -> None:
     bench = bench_of(port, protocol="dbc")
     # control: enable, impedance, kp 2.00 / 0.05 = 40, kd 0.100 = 100, no torque limit; target 0.5 rad = 500
     # 000
-    port.arriving = [Frame(0x401, bytes.fromhex("0203280064000000"))]
+    port.arriving = [Frame(0x6C1, bytes.fromhex("0203280064000000"))]
     for k in range(1000):
         bench.tick(k * 1e-3)
-        port.arriving = [Frame(0x400, bytes.fromhex("20A1070000000000"))]
+        port.arriving = [Frame(0x6C0, bytes.fromhex("20A1070000000000"))]
     (joint,) = bench.joints
     assert joint.drive.mode is Mode.IMPEDANCE
     assert joint.drive.setpoint == pytest.approx((0.5, 0.0, 0.0, 2.0, 0.1))
     assert joint.drive.position_rad == pytest.approx(0.5, abs=2e-3)
     told = port.take()
-    states = [f for f in told if f.identifier == 0x402]
+    states = [f for f in told if f.identifier == 0x6C2]
     assert [f.data[7] for f in states] == [(k + 1) % 256 for k in range(len(states))]
-    status = next(f for f in told if f.identifier == 0x403)
+    status = next(f for f in told if f.identifier == 0x6C3)
     assert status.data[0] == 0x32  # enabled, impedance
 
 
@@ -267,5 +267,5 @@ def test_a_wrong_map_is_one_line(tmp_path: Path, text: str, message: str) -> Non
 def test_status_is_read_back_from_the_wire() -> None:
     port = ListPort()
     bench_of(port).tick(1e-3)
-    status = next(f for f in port.take() if f.identifier == 0x601)
+    status = next(f for f in port.take() if f.identifier == 0x681)
     assert read_status(status).error_flags == SensorFlag.STARTED_AFRESH

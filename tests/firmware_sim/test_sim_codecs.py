@@ -177,10 +177,10 @@ def test_odrive_ignores_what_is_too_short() -> None:
 def test_sensor_bytes() -> None:
     # 1.0 rad = 1 000 000 = 0x000F4240; -0.5 Nm = -50 000 = 0xFF3CB0; sequence 7
     frame = state_frame(1, Sample(1.0, -0.5, 7))
-    assert frame == Frame(0x600, bytes.fromhex("40420F00B03CFF07"))
+    assert frame == Frame(0x680, bytes.fromhex("40420F00B03CFF07"))
     # 1 000 000 us, 25.00 degC = 2500 = 0x09C4, flags 0x11, sequence 8; joint 3 is 0x20 further
     status = Status(1_000_000, 25.0, SensorFlag(0x11), 8)
-    assert status_frame(3, status) == Frame(0x621, bytes.fromhex("40420F00C4091108"))
+    assert status_frame(3, status) == Frame(0x685, bytes.fromhex("40420F00C4091108"))
     assert read_status(status_frame(3, status)) == status
 
 
@@ -218,7 +218,7 @@ def test_shipped_tables_read_the_same_bytes_as_the_manuals() -> None:
         odrive.decode_message(0x21, bytes.fromhex("0000000208030000"))["Axis_State"] == "closed_loop_control"
     )
     joint = cantools.database.load_file(LINKS / "cablecomp_joint.dbc")
-    told = joint.decode_message(0x600, bytes.fromhex("40420F00B03CFF07"))
+    told = joint.decode_message(0x680, bytes.fromhex("40420F00B03CFF07"))
     assert told == {"joint_position_rad": 1.0, "joint_torque_Nm": pytest.approx(-0.5), "sequence": 7}
 
 

@@ -117,7 +117,7 @@ def run(spec: str, seconds: float = 0.6, torque: float = 0.0, load: float = 0.3)
 
 
 def states(port: ListPort) -> list:
-    return [(t, read_state(f)) for t, f in port.sent if f.identifier == 0x600]
+    return [(t, read_state(f)) for t, f in port.sent if f.identifier == 0x680]
 
 
 def test_stuck_joint_encoder_stands_still_while_the_joint_moves() -> None:
@@ -141,7 +141,7 @@ def test_stuck_motor_encoder_deceives_the_drive_itself() -> None:
 
 def test_jumping_encoders_are_seen() -> None:
     _, port = run("jump:which=joint,jump=0.4,start=0.3")
-    flags = [read_status(f).error_flags for _, f in port.sent if f.identifier == 0x601]
+    flags = [read_status(f).error_flags for _, f in port.sent if f.identifier == 0x681]
     assert SensorFlag.ENCODER_JUMPED in flags
     bench, _ = run("jump:which=motor,jump=0.4,start=0.3")
     assert bench.joints[0].drive.state is DriveState.FAULT
@@ -190,7 +190,7 @@ def test_reset_in_mid_motion() -> None:
     assert joint.drive.flags & DriveFlag.STARTED_AFRESH
     again = [s.sequence for t, s in states(port) if t > 0.2505]
     assert again[0] == pytest.approx(50, abs=2)  # silent while it boots, counting from its own start
-    flags = [read_status(f) for t, f in port.sent if f.identifier == 0x601 and t > 0.25]
+    flags = [read_status(f) for t, f in port.sent if f.identifier == 0x681 and t > 0.25]
     assert flags[0].device_time_us < 100_000
 
 
@@ -200,7 +200,7 @@ def test_a_fault_of_one_joint_leaves_the_other_alone() -> None:
     for k in range(50):
         bench.tick(k * 1e-3)
     told = {f.identifier for _, f in port.sent}
-    assert told == {0x600, 0x601}
+    assert told == {0x680, 0x681}
 
 
 # ---- text ------------------------------------------------------------------------------------------

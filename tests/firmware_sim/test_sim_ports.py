@@ -63,7 +63,7 @@ def can_conversation(bus: can.BusABC) -> None:
     for _ in range(50):
         bus.send(can.Message(arbitration_id=1, data=HOLD, is_extended_id=False))
         heard = until(lambda: bus.recv(0.5), lambda m: m.arbitration_id == 0)
-        states = [m for m in heard if m.arbitration_id == 0x600]
+        states = [m for m in heard if m.arbitration_id == 0x680]
         assert len(states) == 1
         assert states[0].data[7] == (sequence + 1) % 256
         sequence = states[0].data[7]
@@ -125,7 +125,7 @@ def test_serial_with_pyserial(tmp_path: Path) -> None:
         for k in range(50):
             line.write(encode_record(Frame(1, HOLD)))
             frames = until(told, lambda f: f.identifier == 0)
-            assert [f.data[7] for f in frames if f.identifier == 0x600] == [k]
+            assert [f.data[7] for f in frames if f.identifier == 0x680] == [k]
         assert reader.bad_records == 0
     assert not link.exists()
 
@@ -141,7 +141,7 @@ def test_real_time_keeps_its_grid() -> None:
             return len(counted) > 2000
 
         report = run_real_time(bench, stop, 1e-3, clock=lambda: next(clock))
-        heard = [m for m in iter(lambda: listener.recv(0.0), None) if m.arbitration_id == 0x600]
+        heard = [m for m in iter(lambda: listener.recv(0.0), None) if m.arbitration_id == 0x680]
     elapsed = 2000 * 2 * 0.4e-3  # the loop reads the clock twice a turn
     assert report.ticks + report.skipped == pytest.approx(elapsed / 1e-3, abs=3)
     assert len(heard) == pytest.approx(elapsed / 1e-3, abs=3)
@@ -150,7 +150,7 @@ def test_real_time_keeps_its_grid() -> None:
 def test_real_time_thread_answers_between_its_ticks() -> None:
     with served("virtual:sim_real", stepped=False), can.Bus(interface="virtual", channel="sim_real") as bus:
         bus.send(can.Message(arbitration_id=1, data=ENTER, is_extended_id=False))
-        heard = until(lambda: bus.recv(0.5), lambda m: m.arbitration_id == 0x600 and m.data[7] == 100)
+        heard = until(lambda: bus.recv(0.5), lambda m: m.arbitration_id == 0x680 and m.data[7] == 100)
         assert [m for m in heard if m.arbitration_id == 0]
 
 
@@ -161,12 +161,12 @@ def test_nothing_stale_waits_for_a_client_and_a_new_client_starts_afresh() -> No
     port = SerialPort()
     try:
         for k in range(1000):
-            port.send([Frame(0x600, k.to_bytes(8, "little"))], 0.0)
+            port.send([Frame(0x680, k.to_bytes(8, "little"))], 0.0)
         assert not port.connected
         for _ in range(2):
             with serial.Serial(port.path, timeout=0.2) as line:
-                port.send([Frame(0x601, b"now")], 0.0)
-                assert RecordReader().feed(line.read(100)) == [Frame(0x601, b"now")]
+                port.send([Frame(0x681, b"now")], 0.0)
+                assert RecordReader().feed(line.read(100)) == [Frame(0x681, b"now")]
                 line.write(encode_record(Frame(1, HOLD))[:5])
             assert port.poll(0.0) == []
         assert not port.connected
@@ -179,7 +179,7 @@ def test_a_client_that_does_not_read_costs_frames_not_memory() -> None:
     try:
         with serial.Serial(port.path, timeout=0.2):
             for k in range(20_000):
-                port.send([Frame(0x600, k.to_bytes(8, "little"))], 0.0)
+                port.send([Frame(0x680, k.to_bytes(8, "little"))], 0.0)
             assert port.dropped > 0
     finally:
         port.close()
@@ -231,8 +231,8 @@ def test_serial_noise_costs_records_and_nothing_else(tmp_path: Path) -> None:
             bench.tick(k * 1e-3)
             heard += reader.feed(line.read(4096))
     assert reader.bad_records > 10
-    assert {f.identifier for f in heard} <= {0, 0x600, 0x601}
-    sequences = [f.data[7] for f in heard if f.identifier == 0x600]
+    assert {f.identifier for f in heard} <= {0, 0x680, 0x681}
+    sequences = [f.data[7] for f in heard if f.identifier == 0x680]
     assert sorted(set(sequences)) == sorted(set(range(256)) & set(sequences))
     assert bench.joints[0].drive.state is DriveState.ENABLED
 

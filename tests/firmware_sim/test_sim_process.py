@@ -127,9 +127,9 @@ def test_the_real_plant_in_a_process_of_its_own(tmp_path: Path) -> None:
             reader, frames = RecordReader(), []
             line.write(encode_record(Frame(1, ENTER)) + encode_record(Frame(1, ZERO)) * 100)
             end = time.monotonic() + 20.0
-            while sum(f.identifier == 0x600 for f in frames) < 100 and time.monotonic() < end:
+            while sum(f.identifier == 0x680 for f in frames) < 100 and time.monotonic() < end:
                 frames += reader.feed(line.read(max(line.in_waiting, 1)))
-        states = [f for f in frames if f.identifier == 0x600]
+        states = [f for f in frames if f.identifier == 0x680]
         assert [f.data[7] for f in states] == list(range(100))
         torques = {f.data[4:7] for f in states}
         assert len(torques) > 5  # a changing load, in steps of the sensor's resolution

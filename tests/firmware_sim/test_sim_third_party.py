@@ -36,7 +36,7 @@ ORDERS = {
         (0x2B, bytes.fromhex("0300000001000000")),
         (0x2C, bytes.fromhex("CDCCCC3D00000000")),
     ],
-    "dbc": [(0x401, bytes.fromhex("0203280064000000")), (0x400, bytes.fromhex("20A1070000000000"))],
+    "dbc": [(0x6C1, bytes.fromhex("0203280064000000")), (0x6C0, bytes.fromhex("20A1070000000000"))],
 }
 
 
@@ -93,7 +93,7 @@ def test_logger_records_and_player_replays(tmp_path: Path, suffix: str) -> None:
                 bench.pump()
         again = list(iter(lambda: ear.recv(0.0), None))
         assert bench.joints[0].drive.state is DriveState.ENABLED
-    told = [[bytes(m.data) for m in listened if m.arbitration_id == 0x600] for listened in (heard, again)]
+    told = [[bytes(m.data) for m in listened if m.arbitration_id == 0x680] for listened in (heard, again)]
     assert len(told[0]) == 60
     assert told[0] == told[1]  # the same commands, the same motion, bit for bit
 
@@ -195,7 +195,7 @@ def test_the_command_lines_of_logger_and_player_across_processes(tmp_path: Path)
         logger.wait(10.0)
         logger.stdout.close()
     text = path.read_text()
-    assert text.count(" 600#") == 40
+    assert text.count(" 680#") == 40
     only_host = tmp_path / "host.log"
     only_host.write_text("".join(line for line in text.splitlines(keepends=True) if " 001#" in line))
     port = open_port("udp_multicast:239.74.163.8:43912")

@@ -30,7 +30,7 @@ def test_a_cycle_with_a_mit_drive_and_a_sensor_node(rigs) -> None:
     # 200 of 500 Nm/rad and 2 of 5 Nms/rad are 4095 * 0.4 = 1638 = 666; velocity 0 is 7FF
     assert rig.heard() == [(1, bytes.fromhex("FF FF 7F F6 66 66 6F FF"))]
     rig.tell(0, "01 80 00 7F F7 FF 24 00")
-    rig.tell(0x600, joint_state(-1_234_567, 250_000, 7))
+    rig.tell(0x680, joint_state(-1_234_567, 250_000, 7))
     assert link.poll(3.0) == 6
     assert joint.values[MOTOR_POSITION] == pytest.approx(-12.5 + 25 * 0x8000 / 65535, abs=1e-12)
     assert joint.values[MOTOR_VELOCITY] == pytest.approx(-50 + 100 * 0x7FF / 4095, abs=1e-12)
@@ -59,15 +59,15 @@ def test_a_cycle_with_a_mit_drive_and_a_sensor_node(rigs) -> None:
 def test_device_time_stamps_the_sample_that_it_belongs_to(rigs) -> None:
     rig = rigs("mit-virtual.toml")
     joint = rig.link.joints[0]
-    rig.tell(0x600, joint_state(1, 1, 41))
-    rig.tell(0x601, joint_status(5_000_123, 3125, 0x10, 41))
+    rig.tell(0x680, joint_state(1, 1, 41))
+    rig.tell(0x681, joint_status(5_000_123, 3125, 0x10, 41))
     rig.link.poll(1.0)
     assert joint.device_s[JOINT_POSITION] == pytest.approx(5.000123)
     assert joint.device_s[JOINT_TORQUE] == pytest.approx(5.000123)
     assert joint.values[TEMPERATURE] == pytest.approx(31.25)
     assert joint.sensor_flags == 0x10
-    rig.tell(0x600, joint_state(2, 2, 42))
-    rig.tell(0x601, joint_status(5_009_999, 3125, 0, 41))
+    rig.tell(0x680, joint_state(2, 2, 42))
+    rig.tell(0x681, joint_status(5_009_999, 3125, 0, 41))
     rig.link.poll(1.001)
     assert joint.device_s[JOINT_POSITION] == pytest.approx(5.000123), "that time is of the sample before"
 
@@ -75,10 +75,10 @@ def test_device_time_stamps_the_sample_that_it_belongs_to(rigs) -> None:
 def test_no_value_leaves_the_channel_to_age(rigs) -> None:
     rig = rigs("mit-virtual.toml")
     joint = rig.link.joints[0]
-    rig.tell(0x600, joint_state(1_000_000, -(1 << 23), 1))
+    rig.tell(0x680, joint_state(1_000_000, -(1 << 23), 1))
     assert rig.link.poll(1.0) == 1
     assert joint.age_s(JOINT_TORQUE, 1.0) == math.inf
-    rig.tell(0x600, joint_state(-(1 << 31), 100_000, 2))
+    rig.tell(0x680, joint_state(-(1 << 31), 100_000, 2))
     assert rig.link.poll(2.0) == 1
     assert joint.values[JOINT_POSITION] == 1.0
     assert joint.age_s(JOINT_POSITION, 2.0) == 1.0
@@ -89,8 +89,8 @@ def test_faults_of_the_wire_are_counted_and_nothing_old_is_used(rigs) -> None:
     rig = rigs("mit-virtual.toml")
     link, joint = rig.link, rig.link.joints[0]
     for position, sequence in ((1, 1), (2, 2), (2, 2), (5, 5), (3, 3), (6, 6)):
-        rig.tell(0x600, joint_state(position, 0, sequence))
-    rig.tell(0x600, "00 01")
+        rig.tell(0x680, joint_state(position, 0, sequence))
+    rig.tell(0x680, "00 01")
     rig.tell(0, "01 80 00")
     rig.tell(0x123, "00")
     assert link.poll(1.0) == 8
@@ -104,7 +104,7 @@ def test_faults_of_the_wire_are_counted_and_nothing_old_is_used(rigs) -> None:
 
 def test_silence_is_seen_by_name(rigs) -> None:
     rig = rigs("mit-virtual.toml")
-    rig.tell(0x600, joint_state(1, 0, 1))
+    rig.tell(0x680, joint_state(1, 0, 1))
     rig.link.poll(1.0)
     assert rig.link.silent(1.005, 0.01) == ("joint-1: drive reply", "joint-1: Joint1_Status")
     assert "joint-1: Joint1_State" in rig.link.silent(1.02, 0.01)
@@ -163,7 +163,7 @@ def test_eight_joints_share_one_reply_identifier(rigs) -> None:
     rig = rigs("mit-virtual-8.toml")
     for n in range(1, 9):
         rig.tell(0, bytes([n, n, 0, 0x7F, 0xF7, 0xFF, 20 + n, 0]))
-        rig.tell(0x600 + 0x10 * (n - 1), joint_state(n * 1000, 0, 0))
+        rig.tell(0x680 + 2 * (n - 1), joint_state(n * 1000, 0, 0))
     assert rig.link.poll(1.0) == 8 * 6
     for n, joint in enumerate(rig.link.joints, 1):
         assert joint.values[MOTOR_POSITION] == pytest.approx(-12.5 + 25 * 256 * n / 65535, abs=1e-12)
@@ -207,7 +207,7 @@ def test_a_poll_makes_no_lasting_objects(rigs) -> None:
     def cycles(n: int) -> None:
         for k in range(n):
             rig.tell(0, "01 80 00 7F F7 FF 24 00")
-            rig.tell(0x600, joint_state(k, k, k & 0xFF))
+            rig.tell(0x680, joint_state(k, k, k & 0xFF))
             rig.link.poll(k * 1e-3)
 
     cycles(300)

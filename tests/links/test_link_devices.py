@@ -102,9 +102,9 @@ def test_a_drive_of_a_table(rigs) -> None:
     link, joint = rig.link, rig.link.joints[0]
     link.request(0, Request.ENABLE, Mode.IMPEDANCE)
     # enable = 2, impedance = 3, 200 / 0.05 = 4000, 2 / 0.001 = 2000
-    assert rig.heard() == [(0x401, struct.pack("<BBHHH", 2, 3, 4000, 2000, 0))]
+    assert rig.heard() == [(0x6C1, struct.pack("<BBHHH", 2, 3, 4000, 2000, 0))]
     assert link.send(0, MotorCommand(-1.5, 2.0, 3.25)) == 0
-    assert rig.heard() == [(0x400, struct.pack("<ihh", -1_500_000, 1000, 3250))]
+    assert rig.heard() == [(0x6C0, struct.pack("<ihh", -1_500_000, 1000, 3250))]
     assert link.send(0, MotorCommand(torque_Nm=33.0)) == CLIP_TORQUE
     assert rig.heard()[0][1][6:] == bytes.fromhex("FF 7F")
     with pytest.raises(InputError, match="cannot carry stiffness"):
@@ -114,8 +114,8 @@ def test_a_drive_of_a_table(rigs) -> None:
     assert rig.heard() == []
     # int28 of 1e-6 rad, int12 of 0.025 rad/s, int16 of 1e-3 Nm, sequence
     word = (-1_000_000 & 0xFFFFFFF) | (-40 & 0xFFF) << 28 | (1500 & 0xFFFF) << 40 | 9 << 56
-    rig.tell(0x402, word.to_bytes(8, "little"))
-    rig.tell(0x403, struct.pack("<BHhhB", 0x32, 0x0005, 250, -32768, 9))
+    rig.tell(0x6C2, word.to_bytes(8, "little"))
+    rig.tell(0x6C3, struct.pack("<BHhhB", 0x32, 0x0005, 250, -32768, 9))
     assert link.poll(0.0) == 4
     assert joint.values[MOTOR_POSITION] == pytest.approx(-1.0)
     assert joint.values[MOTOR_VELOCITY] == pytest.approx(-1.0)
@@ -124,4 +124,4 @@ def test_a_drive_of_a_table(rigs) -> None:
     assert math.isnan(joint.values[joint.index("other_motor_temperature_degC")])
     assert link.error_text(0) == "error flags 0x5"
     assert link.stop()
-    assert rig.heard()[0] == (0x401, struct.pack("<BBHHH", 0, 3, 0, 0, 0))
+    assert rig.heard()[0] == (0x6C1, struct.pack("<BBHHH", 0, 3, 0, 0, 0))

@@ -258,9 +258,9 @@ def test_serial_line_and_cable_pull() -> None:
     with terminal() as (master, path):
         port = serial_port(path, 921_600)
         port.open()
-        assert port.send(0x601, b"\xaa\x00")
+        assert port.send(0x681, b"\xaa\x00")
         settle(master)
-        assert os.read(master, 100) == pack_record(0x601, b"\xaa\x00")
+        assert os.read(master, 100) == pack_record(0x681, b"\xaa\x00")
         os.write(master, b"\x55\x55\x00" + pack_record(5, b"\x01") + pack_record(6, b"")[:4])
         settle(port._fd)
         got = Catch()

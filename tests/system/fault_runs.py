@@ -15,7 +15,8 @@ from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.options import ControlConfig, load_control
 from cablecomp.control.protocol import parse_protocol
-from cablecomp.links.schema import LinkConfig, load_link
+from cablecomp.links.load import load_link
+from cablecomp.links.schema import LinkConfig
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
 from cablecomp.runtime.clock import Tick

@@ -16,7 +16,7 @@ from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.compensator import preload_of
 from cablecomp.control.motors import control_for
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import SimulationWish

@@ -13,7 +13,7 @@ from fault_runs import JOINT, REACH, Outcome, nothing_is_lost, run_with, simulat
 
 from cablecomp.config import load_joint
 from cablecomp.errors import DeviceError
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import times_of
 

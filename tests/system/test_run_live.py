@@ -15,7 +15,7 @@ from cablecomp.config_text import write_joint
 from cablecomp.control.options import load_control
 from cablecomp.control.standard import reaching_protocol
 from cablecomp.effects import with_effects
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.recording.reader import read_all
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint

@@ -16,7 +16,7 @@ from cablecomp.config import load_joint
 from cablecomp.control.options import ControlMode, FeedForward, load_control
 from cablecomp.control.protocol import parse_protocol
 from cablecomp.control.standard import force_protocol
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
 from cablecomp.report.replay_page import write_replay

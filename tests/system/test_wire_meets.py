@@ -197,7 +197,7 @@ def test_eight_joints_on_one_bus(meet: Any) -> None:
 
 
 def test_frames_that_the_wire_loses_are_counted_one_by_one(meet: Any) -> None:
-    meeting = meet("mit", "virtual", faults=("drop:p=0.3,direction=tx,id=0x600,mask=0x7FF",))
+    meeting = meet("mit", "virtual", faults=("drop:p=0.3,direction=tx,id=0x680,mask=0x7FF",))
     meeting.link.request(0, Request.ENABLE)
     joint = meeting.link.joints[0]
     for k in range(300):
@@ -217,7 +217,7 @@ def test_frames_that_the_wire_loses_are_counted_one_by_one(meet: Any) -> None:
     ("spec", "field"), [("repeat:p=0.2", "repeated"), ("reorder:spread=0.004", "reordered")]
 )
 def test_repeated_and_reordered_frames_never_turn_time_back(meet: Any, spec: str, field: str) -> None:
-    meeting = meet("mit", "virtual", faults=(f"{spec},direction=tx,id=0x600,mask=0x7FF",))
+    meeting = meet("mit", "virtual", faults=(f"{spec},direction=tx,id=0x680,mask=0x7FF",))
     meeting.link.request(0, Request.ENABLE)
     node = next(m for m in meeting.link.joints[0].messages if m.name.endswith("Joint1_State"))
     newest = -1

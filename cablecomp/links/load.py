@@ -1,0 +1,56 @@
+"""Reading a link file: its keys, and that no two devices of it share an identifier."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from cablecomp.config import read_toml, validated
+from cablecomp.errors import InputError
+from cablecomp.examples import resolve
+from cablecomp.links.devices import Claim
+from cablecomp.links.protocols import claims_of
+from cablecomp.links.schema import LinkConfig
+
+
+def _tuples(data: Any) -> Any:
+    # TOML arrays arrive as lists; the strict models want tuples.
+    if isinstance(data, dict):
+        return {k: _tuples(v) for k, v in data.items()}
+    return tuple(_tuples(v) for v in data) if isinstance(data, list) else data
+
+
+def load_link(path: Path | str) -> LinkConfig:
+    """Read a link file; raises InputError with one line that names file, key, what was found, what is
+    accepted. A bare name such as `mit-udp` stands for an example that comes with the project."""
+    path = resolve(path, "links")
+    return parse_link(read_toml(path), str(path), path.parent)
+
+
+def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkConfig:
+    """Validate a link already read; `where` names it in errors, relative paths start at `folder`. Raises
+    InputError with one line, also where two devices would share an identifier."""
+    if "folder" in data:
+        raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
+    config = validated(LinkConfig, {**_tuples(data), "folder": folder}, where)
+    _check_identifiers(config, where)
+    return config
+
+
+def _check_identifiers(config: LinkConfig, where: str) -> None:
+    """Raise InputError where two devices would send or take frames of the same identifier."""
+    seen: dict[int, list[tuple[str, Claim]]] = {}
+    for owner, claim in claims_of(config):
+        for other, before in seen.setdefault(claim.identifier, []):
+            if other != owner and not _may_share(claim, before):
+                raise InputError(
+                    f"{where}: identifier 0x{claim.identifier & 0x1FFF_FFFF:X} would be used by {other} "
+                    f"({before.what}) and by {owner} ({claim.what}), which cannot be told apart; give one of "
+                    "them another node, reply_id or message table"
+                )
+        seen[claim.identifier].append((owner, claim))
+
+
+def _may_share(a: Claim, b: Claim) -> bool:
+    by_number = a.mask != 0 and a.mask == b.mask and a.number != b.number
+    return by_number or (a.group != "" and a.group == b.group)
