@@ -35,9 +35,10 @@ import cantools.database
 from firmware_sim.errors import SimError
 from firmware_sim.firmware import Drive, DriveFlag, DriveReport, Mode, Request, Setpoint
 from firmware_sim.wire.base import Answer, Heard
+from firmware_sim.wire.dbc_text import render
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.packed import PackedMessage
-from firmware_sim.wire.tables import joint_table, render
+from firmware_sim.wire.tables import joint_table
 
 SHIPPED = "cablecomp_joint.dbc"
 TARGETS = ("motor_position_target_rad", "motor_velocity_target_rad_s", "motor_torque_target_Nm")

@@ -86,7 +86,7 @@ def test_stepped_slcan_across_processes() -> None:
             end = time.monotonic() + 5.0
             while len(sequences) < 30 and time.monotonic() < end:
                 message = bus.recv(0.5)
-                if message is not None and message.arbitration_id == 0x610:
+                if message is not None and message.arbitration_id == 0x682:
                     sequences.append(message.data[7])
         assert sequences == list(range(30))
 
