@@ -7,8 +7,10 @@ A command's module is imported when it is called, so that `--help` need not wait
 from __future__ import annotations
 
 import ast
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -17,13 +19,14 @@ import typer
 from typer.core import TyperGroup
 
 from cablecomp import __version__
-from cablecomp.errors import CablecompError, DeviceError, InputError, InternalError
+from cablecomp.errors import CablecompError, ConfigError, DeviceError, InputError, InternalError, printable
 
 COMMANDS: Final = {
     "demo": "demo.demo",
     "example": "example.copy_example",
     "run": "run.run",
     "replay": "replay.replay",
+    "init": "init.init",
     "info": "info.info",
     "design": "design.design",
     "identify": "identify.identify",
@@ -94,7 +97,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point: runs a command, turns errors into one line on stderr and an exit code."""
     try:
         code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
+        sys.stdout.flush()
         return code if isinstance(code, int) else 0
+    except ConfigError as error:
+        return max(_fail(line, 2) for line in error.lines)
     except InputError as error:
         return _fail(str(error), 2)
     except DeviceError as error:
@@ -105,6 +111,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(str(error), 4)
     except KeyboardInterrupt:
         return _fail("stopped by the user", 130)
+    except BrokenPipeError:  # whoever read our output has enough
+        _drop_output()
+        return 0
+    except OSError as error:  # a full disk, a place that may not be written: what was there stays as it was
+        _drop_output()
+        return _fail(
+            f"{error.filename or 'output'}: {error.strerror}; free some space or choose another place", 2
+        )
+    except MemoryError:
+        return _fail("not enough memory; give a shorter recording", 2)
     except Exception as error:
         shown = getattr(error, "format_message", None)
         if shown is None:  # neither ours nor the command line's: a bug, whose traceback is worth having
@@ -113,5 +129,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"cablecomp: {' '.join(text.split())}", file=sys.stderr)
+    print(f"cablecomp: {printable(text)}", file=sys.stderr)
     return code
+
+
+def _drop_output() -> None:
+    """Let nothing more be tried on a standard output that took no more."""
+    with suppress(OSError, ValueError):
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, sys.stdout.fileno())
+        os.close(nothing)

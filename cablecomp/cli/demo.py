@@ -31,7 +31,7 @@ def demo(
     out: Annotated[Path, typer.Option(help="folder for everything that the demonstration leaves")] = Path(
         "demo"
     ),
-    seed: Annotated[int, typer.Option(help="of true parameters, noise and motions")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="of true parameters, noise and motions")] = 1,
 ) -> None:
     """A compensated joint against uncompensated ones, on a simulated bus; ends with where the report lies."""
     path = example("joints", DEMO)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, Control, console, control_of
-from cablecomp.config import load_joint
+from cablecomp.cli.shared import Config, Control, console, control_of, read_joint
 from cablecomp.control.design import design_loop
+from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.design_page import design_page, design_tables
 
 
@@ -20,13 +20,13 @@ def design(
     out: Annotated[Path | None, typer.Option(help="folder for design.html")] = None,
 ) -> None:
     """Design gains from the drive's stiffness range: margins, hysteresis as a describing function, plots."""
-    joint = load_joint(config)
+    joint = read_joint(config)
     wanted = control_of(control, joint)
     free = {"load_filter_Hz": None, "load_lead_s": None, "joint_feedback_per_s": None}
     wanted = wanted.model_copy(update={"compensator": wanted.compensator.model_copy(update=free)})
     found = design_loop(joint, rate, wanted)
     console.print(design_tables(found))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "design.html").write_text(design_page(found), encoding="utf-8")
+        with atomic_directory(out) as folder:
+            (folder / "design.html").write_text(design_page(found), encoding="utf-8")
         console.print(f"plots: {out / 'design.html'}")

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from cablecomp.cli.shared import Config, announce_compilation, console, share_bar
-from cablecomp.config import load_joint
+from cablecomp.cli.shared import Config, announce_compilation, console, read_joint, share_bar
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import Diagnosis, diagnose, report_json, write_diagnosis
 from cablecomp.effects import load_effects
@@ -24,7 +23,7 @@ def diagnose_recordings(
     out: Annotated[
         Path, typer.Option(help="folder for diagnosis.json, report.html, joint.augmented.toml")
     ] = Path("diagnosis"),
-    seed: Annotated[int, typer.Option(help="of surrogates and resampling")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="of surrogates and resampling")] = 0,
     effects: Annotated[
         list[Path] | None, typer.Option(help="Python file that registers an effect of your own")
     ] = None,
@@ -32,7 +31,7 @@ def diagnose_recordings(
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
     for path in effects or ():
         load_effects(path)
-    joint = load_joint(config)
+    joint = read_joint(config)
     data = {str(path): read_all(path).columns for path in recordings}
     announce_compilation()
     with share_bar() as told:

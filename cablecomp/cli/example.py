@@ -21,7 +21,7 @@ def copy_example(
     out: Annotated[Path, typer.Option(help="folder to copy into")] = Path(),
 ) -> None:
     """Copy out a configuration that comes with the project: a joint, a link, a controller; or list them."""
-    console = Console()
+    console = Console(markup=False, emoji=False)
     if name is None:
         table = Table(show_header=False, box=None)
         for kind in examples.KINDS:

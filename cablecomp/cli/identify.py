@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, console
-from cablecomp.config import load_joint
+from cablecomp.cli.shared import Config, console, read_joint
 from cablecomp.recording.reader import read_all
 from cablecomp.report.info import bench_table
 from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
@@ -26,7 +25,7 @@ def identify(
     ] = False,
 ) -> None:
     """True and acting coefficient of friction from a bench recording, the thesis's way."""
-    joint = load_joint(config)
+    joint = read_joint(config)
     bench = bench_recording(read_all(recording).columns, joint)
     console.print(
         bench_table(

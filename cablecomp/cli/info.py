@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, console
-from cablecomp.config import load_joint
+from cablecomp.cli.shared import Config, console, read_joint
 from cablecomp.report.info import design_table
 from cablecomp.report.theory import write_theory_figures
 from cablecomp.thesis.design import design_sheet
@@ -22,7 +21,7 @@ def info(
     figures: Annotated[Path | None, typer.Option(help="folder for the theory figures of this joint")] = None,
 ) -> None:
     """The design sheet of a joint: stiffness, hysteresis, pretension, wrap, efficiency."""
-    joint = load_joint(config)
+    joint = read_joint(config)
     console.print(design_table(design_sheet(joint, load)))
     if figures is not None:
         console.print(f"figures: {write_theory_figures(joint, figures, load)}")

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from cablecomp.cli.shared import Config, announce_compilation, console
-from cablecomp.config import in_session, load_joint, session_of
+from cablecomp.cli.shared import Config, announce_compilation, console, read_joint
+from cablecomp.config import in_session, session_of
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
 from cablecomp.recording.reader import open_recording
@@ -31,7 +31,7 @@ def replay(
     ] = None,
 ) -> None:
     """Stream a recording through the observer that the controller runs; compare with what was measured."""
-    joint, source = load_joint(config), open_recording(recording)
+    joint, source = read_joint(config), open_recording(recording)
     found = session_of(joint, recording, session)
     joint = in_session(joint, found)
     announce_compilation()

@@ -10,8 +10,7 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.live import LiveRun
-from cablecomp.cli.shared import DEMO_LINK, Config, Control, console, control_of
-from cablecomp.config import load_joint
+from cablecomp.cli.shared import DEMO_LINK, Config, Control, console, control_of, read_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlMode
 from cablecomp.control.protocol import load_protocol
@@ -56,7 +55,7 @@ def run(
     fault: Annotated[
         list[str] | None, typer.Option(help="fault of the simulated joint, such as drop:p=0.1")
     ] = None,
-    seed: Annotated[int, typer.Option(help="of simulated noise, true parameters and motions")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="of simulated noise, true parameters and motions")] = 1,
     nominal: Annotated[bool, typer.Option("--nominal", help="simulated joint exactly as configured")] = False,
     live: Annotated[
         bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
@@ -65,7 +64,7 @@ def run(
     """Control a joint over a link, real or simulated; ends with a timing report and a recording that
     `replay` accepts.
     """
-    joint = load_joint(config)
+    joint = read_joint(config)
     wanted = control_of(control, joint)
     bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=not sim)
     if link is None and not sim:

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, doubts, load_joint
 from cablecomp.control.motors import control_for
 from cablecomp.control.options import ControlConfig, load_control
 from cablecomp.examples import resolve
@@ -19,7 +19,8 @@ from cablecomp.mechanics.jit import is_compiled
 
 DEMO_LINK = "wrist-virtual"
 
-console = Console()
+console = Console(markup=False, emoji=False)
+"""Prints what it is given: a name or a path may look like markup."""
 
 
 def _joint(path: Path) -> Path:
@@ -33,6 +34,15 @@ Config = Annotated[
 Control = Annotated[
     Path | None, typer.Option("--control", help="control file (TOML); made up from the joint if absent")
 ]
+
+
+def read_joint(path: Path) -> JointConfig:
+    """The joint configuration; what it states but hardly means is asked about on standard error."""
+    joint = load_joint(path)
+    asking = Console(stderr=True, markup=False, emoji=False, highlight=False, soft_wrap=True)
+    for words in doubts(joint):
+        asking.print(f"{path}: {words}", style="yellow")
+    return joint
 
 
 def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
@@ -49,7 +59,7 @@ def announce_compilation() -> None:
 @contextmanager
 def share_bar() -> Iterator[Callable[[str, float], None]]:
     """Give a function to be told (what is being tried, share done); the bar goes when it is over."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
         yield lambda what, share: bar.update(task, description=what, completed=share)

@@ -1,9 +1,13 @@
 """Joint configuration: TOML to frozen objects; an unknown key fails."""
 
 from cablecomp.config.base import Finite, NonNegative, Positive
-from cablecomp.config.load import explain, load_joint, parse_joint, read_toml, validated
-from cablecomp.config.schema import Drive, EffectEntry, JointConfig, Limits, ObserverOptions, Sensors, Stage
+from cablecomp.config.doubts import doubts
+from cablecomp.config.drive import Drive, Stage
+from cablecomp.config.load import load_joint, parse_joint, validated
+from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Sensors
+from cablecomp.config.schema import JointConfig
 from cablecomp.config.sessions import Empirical, Session
+from cablecomp.config.toml_file import TomlTable, read_toml
 from cablecomp.config.values import in_session, session_of, with_values
 
 __all__ = [
@@ -19,7 +23,8 @@ __all__ = [
     "Sensors",
     "Session",
     "Stage",
-    "explain",
+    "TomlTable",
+    "doubts",
     "in_session",
     "load_joint",
     "parse_joint",

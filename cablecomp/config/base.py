@@ -18,9 +18,15 @@ class Frozen(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-def _row(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def listed(most: int) -> BeforeValidator:
+    """Take TOML's arrays, which arrive as lists, as the tuples that strict models want; `most` entries."""
+
+    def row(value: Any) -> Any:
+        if isinstance(value, list | tuple) and len(value) > most:
+            raise ValueError(f"{len(value)} entries; at most {most} are accepted")
+        return tuple(value) if isinstance(value, list) else value
+
+    return BeforeValidator(row)
 
 
-Listed = BeforeValidator(_row)
-"""TOML arrays arrive as lists; strict models want tuples."""
+Listed = listed(4096)

@@ -62,18 +62,24 @@ class Empirical(Frozen):
 
 def as_tables(value: Any) -> Any:
     """`[session]` alone is a list of one; both cannot stand in one TOML file."""
-    return (value,) if isinstance(value, dict) else tuple(value) if isinstance(value, list) else value
+    return (value,) if isinstance(value, dict) else value
 
 
-def check_names(names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise ValueError for a name that is no parameter's: known keys, `KEY.STAGE`, `effect.ID.KEY`, `ID.KEY`."""
+def check_names(where: str, names: Iterable[str], known: Iterable[str], stages: int) -> None:
+    """Raise ValueError for names that are no parameters: known keys, `KEY.STAGE`, `effect.ID.KEY`, `ID.KEY`."""
     known = tuple(known)
-    for name in names:
-        head, dot, rest = name.partition(".")
-        if head in known and (not dot or rest.isdigit()):
-            continue
-        if dot and head not in known and rest and not rest.isdigit():
-            continue
-        close = difflib.get_close_matches(head, known, 1)
-        hint = f"did you mean `{close[0]}`?" if close else f"known are {', '.join(known)}, effect.ID.KEY"
-        raise ValueError(f"`{name}` is no parameter; {hint}")
+    bad = [name for name in names if not _is_parameter(name, known, stages)]
+    if bad:
+        close = difflib.get_close_matches(bad[0].partition(".")[0], known, 1)
+        hint = f"did you mean `{close[0]}`?" if close and close[0] not in bad[0] else ""
+        hint = hint or f"known are {', '.join(known)}, KEY.N of stage N, effect.ID.KEY"
+        raise ValueError(
+            f"[{where}]: {', '.join(f'`{name}`' for name in bad[:9])}: no such parameter; {hint}"
+        )
+
+
+def _is_parameter(name: str, known: tuple[str, ...], stages: int) -> bool:
+    head, dot, rest = name.partition(".")
+    if head in known:
+        return not dot or (rest.isdecimal() and len(rest) < 4 and 1 <= int(rest) <= stages)
+    return bool(head and rest) and not rest.isdecimal()

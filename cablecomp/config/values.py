@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from cablecomp.config.schema import JointConfig, Sensors, Stage
+from cablecomp.config.drive import Stage
+from cablecomp.config.options import Sensors
+from cablecomp.config.schema import JointConfig
 from cablecomp.config.sessions import Session
 from cablecomp.errors import InputError
 

@@ -50,8 +50,8 @@ def design_loop(config: JointConfig, rate_Hz: float, wanted: ControlConfig | Non
     """Design filter and gains for a joint at a loop rate; raises InputError if the motor model cannot
     carry any loop.
     """
-    if not rate_Hz > 0.0:
-        raise InputError(f"rate is {rate_Hz} Hz; a number above 0 is accepted")
+    if not 1.0 <= rate_Hz <= 1e5:
+        raise InputError(f"rate is {rate_Hz:g} Hz; 1 to 100 000 Hz is accepted")
     wanted = ControlConfig() if wanted is None else wanted
     stiffness = stiffness_range(config, wanted.load_max_Nm)
     work = DesignWork(config, 1.0 / rate_Hz, wanted, stiffness)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cablecomp.config import read_toml, validated
+from cablecomp.config import TomlTable, read_toml, validated
 from cablecomp.errors import InputError
 from cablecomp.examples import resolve
 from cablecomp.links.devices import Claim
@@ -32,7 +32,8 @@ def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkC
     InputError with one line, also where two devices would share an identifier."""
     if "folder" in data:
         raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
-    config = validated(LinkConfig, {**_tuples(data), "folder": folder}, where)
+    lines = data.lines() if isinstance(data, TomlTable) else None
+    config = validated(LinkConfig, {**_tuples(data), "folder": folder}, where, lines)
     _check_identifiers(config, where)
     return config
 

@@ -3,25 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import math
 import re
 from collections.abc import Iterable, Mapping
-from fractions import Fraction
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from cablecomp.errors import InputError
-
-_LBF = Fraction("4.4482216152605")  # pound-force in N: 0.45359237 kg at 9.80665 m/s2, exact by definition
-_INCH = Fraction("0.0254")
-_KGF = Fraction("9.80665")
-
-
-class Unit(NamedTuple):
-    """canonical value = factor * value + offset."""
-
-    factor: float
-    offset: float = 0.0
+from cablecomp.units import ANGLE, CURRENT, FORCE, SPEED, TEMPERATURE, TIME, TORQUE, Unit
 
 
 class Column(NamedTuple):
@@ -33,60 +21,19 @@ class Column(NamedTuple):
     offset: float
 
 
-def _units(**factors: Fraction | int | str) -> Mapping[str, Unit]:
-    return MappingProxyType({unit: Unit(float(Fraction(factor))) for unit, factor in factors.items()})
-
-
-_TIME = _units(s=1, ms="1/1000", us="1/1000000", ns="1/1000000000", min=60)
-_ANGLE = MappingProxyType(
-    {
-        "rad": Unit(1.0),
-        "mrad": Unit(1e-3),
-        "deg": Unit(math.pi / 180.0),
-        "arcmin": Unit(math.pi / 10800.0),
-        "rev": Unit(2.0 * math.pi),
-    }
-)
-_SPEED = MappingProxyType(
-    {
-        "rad_s": Unit(1.0),
-        "mrad_s": Unit(1e-3),
-        "deg_s": Unit(math.pi / 180.0),
-        "rev_s": Unit(2.0 * math.pi),
-        "rpm": Unit(math.pi / 30.0),
-    }
-)
-_TORQUE = _units(
-    Nm=1,
-    mNm="1/1000",
-    uNm="1/1000000",
-    Ncm="1/100",
-    Nmm="1/1000",
-    kNm=1000,
-    inlbf=_LBF * _INCH,
-    inozf=_LBF * _INCH / 16,
-    ftlbf=_LBF * _INCH * 12,
-    kgfcm=_KGF / 100,
-)
-_CURRENT = _units(A=1, mA="1/1000", uA="1/1000000")
-_FORCE = _units(N=1, mN="1/1000", kN=1000, lbf=_LBF, ozf=_LBF / 16, kgf=_KGF, gf=_KGF / 1000)
-_TEMPERATURE = MappingProxyType(
-    {"degC": Unit(1.0), "K": Unit(1.0, -273.15), "degF": Unit(5.0 / 9.0, -160.0 / 9.0)}
-)
-
 QUANTITIES: Final[Mapping[str, Mapping[str, Unit]]] = MappingProxyType(
     {
-        "time": _TIME,
-        "motor_position": _ANGLE,
-        "joint_position": _ANGLE,
-        "joint_torque": _TORQUE,
-        "motor_torque": _TORQUE,
-        "motor_velocity": _SPEED,
-        "joint_velocity": _SPEED,
-        "motor_current": _CURRENT,
-        "tension_h": _FORCE,
-        "tension_l": _FORCE,
-        "temperature": _TEMPERATURE,
+        "time": TIME,
+        "motor_position": ANGLE,
+        "joint_position": ANGLE,
+        "joint_torque": TORQUE,
+        "motor_torque": TORQUE,
+        "motor_velocity": SPEED,
+        "joint_velocity": SPEED,
+        "motor_current": CURRENT,
+        "tension_h": FORCE,
+        "tension_l": FORCE,
+        "temperature": TEMPERATURE,
     }
 )
 """Accepted units of each quantity; the first one is the canonical one."""

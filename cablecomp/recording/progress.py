@@ -22,7 +22,7 @@ def progress_bar(
     `console` is where to draw (standard error by default).
     """
     bar = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TextColumn("{task.fields[samples]:,} samples"),

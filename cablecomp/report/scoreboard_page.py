@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.table import Table
+from rich.text import Text
 
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.report import page
@@ -25,7 +26,7 @@ def scoreboard_table(board: Scoreboard) -> Table:
         table.add_column(name, justify="right")
     for t in board.targets:
         colour = {True: "green", False: "red", None: "dim"}[t.ok]
-        table.add_row(t.what, f"[{colour}]{_reached(t)}[/]", _asked(t), str(t.of))
+        table.add_row(t.what, Text(_reached(t), colour), _asked(t), str(t.of))
     return table
 
 

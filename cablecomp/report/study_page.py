@@ -8,6 +8,7 @@ from typing import Any
 
 from plotly.subplots import make_subplots
 from rich.table import Table
+from rich.text import Text
 
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report import page, style
@@ -46,7 +47,7 @@ def study_table(study: Study) -> Table:
     for name in ("switched on", "size", *QUESTIONS, "misfit"):
         table.add_column(name, justify="right" if name == "misfit" else "left", no_wrap=name == "switched on")
     for finding in (*study.together, *study.findings):
-        words = [f"[{_COLOURS.get(word, 'yellow')}]{word}[/]" for word in answers(finding)]
+        words = [Text(word, _COLOURS.get(word, "yellow")) for word in answers(finding)]
         name, size = finding.name.replace(" + ", "\n+ "), _size(finding).replace(", ", "\n")
         table.add_row(name, size, *words, f"{finding.misfit:.1f}")
     table.add_row("nothing", "", *("no" for _ in QUESTIONS), f"{study.plain_misfit:.1f}", style="dim")

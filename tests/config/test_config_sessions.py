@@ -94,10 +94,10 @@ def test_a_sessions_values_take_the_place_of_the_joints_own() -> None:
     ("text", "words"),
     [
         ("[session]\nown = ['pretention_N']\n", "did you mean `pretension_N`"),
-        ("[session]\nowns = []\n", "unknown key `session.0.owns`"),
+        ("[session]\nowns = []\n", "unknown key `session.owns`"),
         ("[[session]]\nrecordings = ['a']\n", "needs a `name`"),
         ("[[session]]\nname = 'a'\n[[session]]\nname = 'a'\n", "`a` is given twice"),
-        ("[[session]]\nname = 'a'\nvalues = {EA_N = 'x'}\n", "session.0.values.EA_N"),
+        ("[[session]]\nname = 'a'\nvalues = {EA_N = 'x'}\n", "session.1.values.EA_N"),
         ("[condition]\nbend = 3\n", "condition.bend"),
         (RIPPLE.format(law="chebyshev", of="motor_position_rad").replace("centre", "center"), "center"),
     ],

@@ -1,0 +1,46 @@
+"""The cable drive in a joint configuration: circuit and stages."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from cablecomp.config.base import Frozen, Positive, listed
+
+
+class Stage(Frozen):
+    """One cable stage.
+
+    Radii are effective: bare pulley radius + half the cable diameter. A wrap is the angle from where the cable
+    leaves the pulley at position zero to where it is fixed on it, whole turns included (2.5 turns = 15.708 rad);
+    cable that only passes is none. In a closed circuit both cables have the same wraps.
+    """
+
+    output_radius_m: Positive = Field(description="effective radius of the output pulley, R")
+    input_radius_m: Positive = Field(description="effective radius of the input pulley, r")
+    free_length_m: Positive = Field(
+        description="cable between the pulleys that touches nothing, tangent to tangent"
+    )
+    EA_N: Positive = Field(description="axial stiffness of the cable: load per strain")
+    pretension_N: Positive = Field(description="tension T0 of each cable at rest without load")
+    mu_output: Positive = Field(description="friction coefficient cable on output pulley")
+    mu_input: Positive = Field(description="friction coefficient cable on input pulley")
+    wrap_output_rad: Positive = Field(description="wrap on the output pulley at position zero")
+    wrap_input_rad: Positive = Field(description="wrap on the input pulley at position zero")
+    breaking_force_N: Positive | None = Field(
+        None, description="where the cable breaks; above it a sample is refused"
+    )
+
+
+class Drive(Frozen):
+    """The cable drive, input side first.
+
+    A closed circuit has two cables, h and l, that pull against each other; an open one has a single cable that a
+    load or a spring keeps taut. Stages in series follow one another; parallel ones share the load (Snow's kinds
+    2 and 1).
+    """
+
+    circuit: Literal["open", "closed"] = Field(description="one cable, or two that pull against each other")
+    arrangement: Literal["parallel", "series"] = Field("series", description="of several stages")
+    stage: Annotated[tuple[Stage, ...], listed(16)] = Field(min_length=1)

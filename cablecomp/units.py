@@ -1,0 +1,132 @@
+"""Units and exact factors to SI, by the suffix that names a quantity (`rad`, `Nm`, `s`, ...)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+_LBF = Fraction("4.4482216152605")  # pound-force in N: 0.45359237 kg at 9.80665 m/s2, exact by definition
+_INCH = Fraction("0.0254")
+_KGF = Fraction("9.80665")
+
+
+class Unit(NamedTuple):
+    """SI value = factor * value + offset."""
+
+    factor: float
+    offset: float = 0.0
+
+
+def _units(**factors: Fraction | int | str) -> Mapping[str, Unit]:
+    return MappingProxyType({unit: Unit(float(Fraction(factor))) for unit, factor in factors.items()})
+
+
+TIME: Final = _units(s=1, ms="1/1000", us="1/1000000", ns="1/1000000000", min=60)
+ANGLE: Final = MappingProxyType(
+    {
+        "rad": Unit(1.0),
+        "mrad": Unit(1e-3),
+        "urad": Unit(1e-6),
+        "deg": Unit(math.pi / 180.0),
+        "arcmin": Unit(math.pi / 10800.0),
+        "rev": Unit(2.0 * math.pi),
+    }
+)
+SPEED: Final = MappingProxyType(
+    {
+        "rad_s": Unit(1.0),
+        "mrad_s": Unit(1e-3),
+        "deg_s": Unit(math.pi / 180.0),
+        "rev_s": Unit(2.0 * math.pi),
+        "rpm": Unit(math.pi / 30.0),
+    }
+)
+TORQUE: Final = _units(
+    Nm=1,
+    mNm="1/1000",
+    uNm="1/1000000",
+    Ncm="1/100",
+    Nmm="1/1000",
+    kNm=1000,
+    inlbf=_LBF * _INCH,
+    inozf=_LBF * _INCH / 16,
+    ftlbf=_LBF * _INCH * 12,
+    kgfcm=_KGF / 100,
+)
+CURRENT: Final = _units(A=1, mA="1/1000", uA="1/1000000")
+FORCE: Final = _units(N=1, mN="1/1000", kN=1000, lbf=_LBF, ozf=_LBF / 16, kgf=_KGF, gf=_KGF / 1000)
+TEMPERATURE: Final = MappingProxyType(
+    {"degC": Unit(1.0), "K": Unit(1.0, -273.15), "degF": Unit(5.0 / 9.0, -160.0 / 9.0)}
+)
+LENGTH: Final = _units(m=1, mm="1/1000", um="1/1000000", cm="1/100", km=1000, inch=_INCH, ft=_INCH * 12)
+FREQUENCY: Final = _units(Hz=1, kHz=1000, mHz="1/1000", per_min="1/60")
+
+UNITS: Final[Mapping[str, Mapping[str, Unit]]] = MappingProxyType(
+    {
+        next(iter(table)): table
+        for table in (SPEED, TIME, ANGLE, TORQUE, CURRENT, FORCE, TEMPERATURE, LENGTH, FREQUENCY)
+    }
+)
+"""Quantity (the suffix of a name that says its SI unit) -> unit -> how to reach SI."""
+
+_SPELT: Final = MappingProxyType(
+    {
+        "°": "deg",
+        "degree": "deg",
+        "degrees": "deg",
+        "radian": "rad",
+        "radians": "rad",
+        "turn": "rev",
+        "turns": "rev",
+        "rad/s": "rad_s",
+        "mrad/s": "mrad_s",
+        "deg/s": "deg_s",
+        "°/s": "deg_s",
+        "turns/s": "rev_s",
+        "rev/s": "rev_s",
+        "dps": "deg_s",
+        "N.m": "Nm",
+        "N·m": "Nm",
+        "N m": "Nm",
+        "N*m": "Nm",
+        "mN.m": "mNm",
+        "mN·m": "mNm",
+        "N·mm": "Nmm",
+        "N.mm": "Nmm",
+        "µs": "us",
+        "μs": "us",
+        "sec": "s",
+        "seconds": "s",
+        "second": "s",
+        "msec": "ms",
+        "usec": "us",
+        "nsec": "ns",
+        "amp": "A",
+        "amps": "A",
+        "C": "degC",
+        "°C": "degC",
+        "celsius": "degC",
+        "F": "degF",
+        "°F": "degF",
+        "kelvin": "K",
+        "newton": "N",
+        "in": "inch",
+    }
+)
+"""Ways to write a unit that cannot, or need not, stand in a name."""
+
+
+def unit_named(text: str, table: Mapping[str, Unit]) -> Unit | None:
+    """The unit of a quantity's table that a text means (`deg`, `°`, `degrees`); None if none does."""
+    name = text.strip()
+    return table.get(name) or table.get(_SPELT.get(name, _SPELT.get(name.lower(), "")))
+
+
+def suffix_of(name: str) -> str | None:
+    """The suffix of a name that says its SI unit (`motor_velocity_rad_s` -> `rad_s`); None if it has none."""
+    fitting = [suffix for suffix in UNITS if name.endswith(f"_{suffix}")]
+    found = max(fitting, key=len, default=None)
+    return None if found is None or name.endswith(f"_per_{found}") else found
