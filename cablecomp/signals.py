@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 NAN = float("nan")
@@ -42,3 +43,24 @@ class Estimate(NamedTuple):
     tension_h_N: float
     tension_l_N: float
     motor_torque_Nm: float = NAN
+
+
+class Grid(NamedTuple):
+    """Values that a message can carry: `origin + n step` from `low` to `high`; `step` 0 = any value between."""
+
+    origin: float = 0.0
+    step: float = 0.0
+    low: float = -inf
+    high: float = inf
+
+
+class Wire(NamedTuple):
+    """What a command's message can carry of the motor's position (rad), velocity (rad/s) and torque (Nm)."""
+
+    position: Grid = Grid()
+    velocity: Grid = Grid()
+    torque: Grid = Grid()
+
+
+ANY_WIRE = Wire()
+"""Carries whatever it is given."""

@@ -147,15 +147,15 @@ class Compensator:
 
         `joint_ok` False: the joint encoder's value is not to be trusted, feedback on it rests.
         """
+        self.observed = False
         if self.options.mode is ControlMode.POSITION:
             estimate = self.observer.step(sample)
-            self.estimate = estimate
+            self.estimate, self.observed = estimate, True
             return self._position(sample, reference, feed, estimate, joint_ok)
         before = self.estimate
         if feed.held and before is not None and self.options.torque_from == "encoders":
             # Old readings of one encoder against new ones of the other would be taken for a load:
             # better none.
-            self.observed = False
             return self._force(sample, reference, feed, before)
         estimate = self._known_torque(sample)
         self.estimate, self.observed = estimate, True

@@ -3,13 +3,14 @@ given nothing else."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import inf, isfinite
-from typing import Final, NamedTuple
+from dataclasses import dataclass, replace
+from math import ceil, inf, isfinite
+from typing import Any, Final, NamedTuple
 
 from cablecomp.config import Limits
 from cablecomp.control.command import Command
 from cablecomp.errors import InputError
+from cablecomp.signals import ANY_WIRE, Grid, Wire
 
 NOT_FINITE: Final = 1
 POSITION_LIMITED: Final = 2
@@ -42,6 +43,7 @@ class GateLimits:
     motor, greatest age.
 
     Position target rate in rad/s, torque feed-forward rate in Nm/s; `age_s` is that of the motor position.
+    `wire`: what the message can carry, so that the limits hold for what is read off the wire.
     """
 
     position_min_rad: float = -inf
@@ -52,6 +54,7 @@ class GateLimits:
     torque_rate_Nm_s: float = inf
     lead_max_rad: float = 0.5
     age_s: float = 0.1
+    wire: Wire = ANY_WIRE
 
     def __post_init__(self) -> None:
         for name in ("velocity_max_rad_s", "torque_max_Nm", "position_rate_rad_s", "torque_rate_Nm_s"):
@@ -61,30 +64,69 @@ class GateLimits:
             raise InputError("gate: lead_max_rad and age_s must be above 0")
         if not self.position_min_rad < self.position_max_rad:
             raise InputError("gate: position_min_rad must lie below position_max_rad; exchange them")
+        if _carried(0.0, -self.velocity_max_rad_s, self.velocity_max_rad_s, self.wire.velocity) is None:
+            raise InputError(
+                "gate: the message carries no velocity within the limits; wire.velocity is wrong"
+            )
+        if _carried(0.0, -self.torque_max_Nm, self.torque_max_Nm, self.wire.torque) is None:
+            raise InputError(
+                f"gate: the message carries no torque within +-{self.torque_max_Nm:g} Nm; "
+                "raise motor_torque_max_Nm, or give the drive a finer range"
+            )
 
     @classmethod
-    def of(cls, limits: Limits, **more: float) -> GateLimits:
-        """The joint's own limits, narrowed or completed by `more`."""
-        found: dict[str, float] = {}
-        if limits.motor_position_min_rad is not None:
-            found["position_min_rad"] = limits.motor_position_min_rad
-        if limits.motor_position_max_rad is not None:
-            found["position_max_rad"] = limits.motor_position_max_rad
-        if limits.motor_torque_max_Nm is not None:
-            found["torque_max_Nm"] = limits.motor_torque_max_Nm
-        if limits.motor_velocity_max_rad_s is not None:
-            found["velocity_max_rad_s"] = limits.motor_velocity_max_rad_s
-            found["position_rate_rad_s"] = limits.motor_velocity_max_rad_s
-        return cls(**{**found, **more})
+    def of(cls, limits: Limits, wire: Wire = ANY_WIRE, **more: float) -> GateLimits:
+        """The joint's own limits and what the wire can carry, narrowed or completed by `more`."""
+        own = {
+            "position_min_rad": limits.motor_position_min_rad,
+            "position_max_rad": limits.motor_position_max_rad,
+            "torque_max_Nm": limits.motor_torque_max_Nm,
+            "velocity_max_rad_s": limits.motor_velocity_max_rad_s,
+            "position_rate_rad_s": limits.motor_velocity_max_rad_s,
+        }
+        known: dict[str, Any] = {k: v for k, v in own.items() if v is not None}
+        made = cls(**{**known, **more})
+        return replace(
+            made,
+            wire=wire,
+            position_min_rad=max(made.position_min_rad, wire.position.low),
+            position_max_rad=min(made.position_max_rad, wire.position.high),
+            velocity_max_rad_s=min(made.velocity_max_rad_s, -wire.velocity.low, wire.velocity.high),
+            torque_max_Nm=min(made.torque_max_Nm, -wire.torque.low, wire.torque.high),
+        )
 
 
 class SafeCommand(NamedTuple):
-    """A motor command that has passed the gate, and what the gate had to do to it (0 = nothing)."""
+    """A motor command that has passed the gate, as the wire carries it, and what the gate had to do to it
+    (0 = nothing).
+
+    `spare_rad`, `spare_Nm`: on a wire whose step is coarser than one cycle's reach, the reach saved up
+    since the last step.
+    """
 
     motor_position_rad: float
     motor_velocity_rad_s: float
     motor_torque_Nm: float
     flags: int
+    spare_rad: float = 0.0
+    spare_Nm: float = 0.0
+
+
+def first_command(motor_position_rad: float, limits: GateLimits) -> SafeCommand:
+    """Where the motor is, without velocity and torque: what a drive is told before anything else.
+
+    Raises InputError if the motor stands where no command may send it.
+    """
+    at = motor_position_rad
+    low, high = limits.position_min_rad, limits.position_max_rad
+    carried = _carried(at, low, high, limits.wire.position) if low <= at <= high else None
+    if carried is None:
+        raise InputError(
+            f"the motor stands at {at:.4g} rad, outside of {low:.4g} … {high:.4g} rad; "
+            "move it there by hand, or mend its zero or its limits"
+        )
+    velocity, torque = (_carried(0.0, -inf, inf, grid) or 0.0 for grid in limits.wire[1:])
+    return SafeCommand(carried, velocity, torque, 0)
 
 
 def gate(
@@ -98,40 +140,84 @@ def gate(
     """Pass a command within the limits, cut to them where it is not.
 
     Not finite or stale: the command before is repeated with no velocity and no torque, and the flags
-    hold a bit of `MUST_STOP`. Otherwise position is cut by rate, by distance from where the motor is
-    (which may overrule the rate: it only takes force away), and last by magnitude; velocity and torque
-    by magnitude, torque by rate. `age_s` is the age of `motor_position_rad`.
+    hold a bit of `MUST_STOP`. Otherwise position is cut by distance from where the motor is, by magnitude,
+    and last, so that nothing overrules it, by rate: `|q - q_before| <= rate period`, whatever the motor is
+    said to be at; velocity and torque by magnitude, torque by rate. What comes out is what the wire
+    carries, so all of it holds there. `before`: the last command that was sent; `age_s`: age of
+    `motor_position_rad`.
     """
     q, v, tau = command.motor_position_rad, command.motor_velocity_rad_s, command.motor_torque_Nm
     if not isfinite(q + v + tau + motor_position_rad):
-        return SafeCommand(before.motor_position_rad, 0.0, 0.0, NOT_FINITE)
+        return before._replace(motor_velocity_rad_s=0.0, motor_torque_Nm=0.0, flags=NOT_FINITE)
     if not age_s <= limits.age_s:
-        return SafeCommand(before.motor_position_rad, 0.0, 0.0, STALE)
+        return before._replace(motor_velocity_rad_s=0.0, motor_torque_Nm=0.0, flags=STALE)
     flags = 0
-    last = before.motor_position_rad
-    even = _within(q, last, limits.position_rate_rad_s * period_s)
-    if even != q:
-        flags |= RATE_LIMITED
-    near = _within(even, motor_position_rad, limits.lead_max_rad)
-    if near != even:
+    near = _within(q, motor_position_rad, limits.lead_max_rad)
+    if near != q:
         flags |= FAR_FROM_MOTOR
-    q = near
-    if q < limits.position_min_rad:
-        q = limits.position_min_rad
-    elif q > limits.position_max_rad:
-        q = limits.position_max_rad
-    if q != near:
+    low, high = limits.position_min_rad, limits.position_max_rad
+    inside = low if near < low else high if near > high else near
+    if inside != near:
         flags |= POSITION_LIMITED
+    wire = limits.wire
+    position = _follow(
+        inside, before[0], limits.position_rate_rad_s * period_s, before.spare_rad, low, high, wire.position
+    )
     slow = _within(v, 0.0, limits.velocity_max_rad_s)
     if slow != v:
         flags |= VELOCITY_LIMITED
-    weak = _within(tau, 0.0, limits.torque_max_Nm)
+    most = limits.torque_max_Nm
+    weak = _within(tau, 0.0, most)
     if weak != tau:
         flags |= TORQUE_LIMITED
-    gradual = _within(weak, before.motor_torque_Nm, limits.torque_rate_Nm_s * period_s)
-    if gradual != weak:
+    torque = _follow(
+        weak, before[2], limits.torque_rate_Nm_s * period_s, before.spare_Nm, -most, most, wire.torque
+    )
+    if position.cut or torque.cut:
         flags |= RATE_LIMITED
-    return SafeCommand(q, slow, gradual, flags)
+    if wire.velocity.step > 0.0:
+        slow = _carried(slow, -limits.velocity_max_rad_s, limits.velocity_max_rad_s, wire.velocity) or 0.0
+    return SafeCommand(position.value, slow, torque.value, flags, position.spare, torque.spare)
+
+
+class _Followed(NamedTuple):
+    value: float
+    spare: float
+    cut: bool
+
+
+def _follow(
+    wanted: float, before: float, reach: float, spare: float, low: float, high: float, grid: Grid
+) -> _Followed:
+    """The value nearest to `wanted` that lies within `reach` of the one before, and on the wire."""
+    step = grid.step
+    coarse = step > reach
+    reach += spare
+    even = _within(wanted, before, reach)
+    if step == 0.0:
+        return _Followed(even, 0.0, even != wanted)
+    # the one before is on the wire, so there is always one that may be sent
+    slack = 1e-6 * step
+    carried = _carried(even, max(low, before - reach - slack), min(high, before + reach + slack), grid)
+    value = before if carried is None else carried
+    left = min(reach - abs(value - before), step) if coarse else 0.0
+    return _Followed(value, max(left, 0.0), even != wanted)
+
+
+def _carried(value: float, low: float, high: float, grid: Grid) -> float | None:
+    """The value nearest to `value` that the wire carries within low…high; None if there is none."""
+    origin, step, least, most = grid
+    low, high = max(low, least), min(high, most)
+    if step == 0.0:
+        return min(max(value, low), high) if low <= high else None
+    edge = 1e-6 * step
+    # ties go down, as on the wires themselves
+    found = origin + step * ceil((min(max(value, low), high) - origin) / step - 0.5 - 1e-9)
+    if found > high + edge:
+        found -= step
+    elif found < low - edge:
+        found += step
+    return found if low - edge <= found <= high + edge else None
 
 
 def _within(value: float, middle: float, reach: float) -> float:

@@ -8,12 +8,13 @@ from typing import Final
 from cablecomp.errors import InputError
 from cablecomp.links import cansimple
 from cablecomp.links.cansimple import AxisState, Cmd, ControlMode
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
 from cablecomp.links.readings import JointReadings, MessageStats
 from cablecomp.links.records import Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd
 from cablecomp.links.schema_devices import CanSimpleDevice, OdriveData
 from cablecomp.links.units import Linear
+from cablecomp.signals import Wire
 
 _TURN: Final = 2.0 * pi
 _COMMANDS: Final[dict[OdriveData, Cmd]] = {
@@ -170,8 +171,22 @@ class CanSimpleDrive:
             frame, clipped = cansimple.set_input_torque(self._node, torque)
         return Outgoing((frame, *self._polled), clipped)
 
+    def wire(self) -> Wire:
+        """See `Drive.wire`; feed-forwards beside a position are int16 thousandths, all else is float32."""
+        if self._mode is not Mode.POSITION:
+            return Wire()
+        velocity, torque = (
+            grid(Linear(1000.0 * gain), -32768, 32767) for gain in (self._to_turns_s, self._to_torque)
+        )
+        return Wire(velocity=velocity, torque=torque)
+
+    def ease(self, share: float) -> tuple[Frame, ...] | None:
+        """See `Drive.ease`; an ODrive's gains are its own."""
+        return None
+
     def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
-        """See `Drive.request`; enabling sets mode and limits first; zero needs firmware 0.6."""
+        """See `Drive.request`; enabling sets mode and limits first; zero needs firmware 0.6; what is sent by
+        itself need not be asked for."""
         if mode is not None:
             self._set_mode(mode)
         node, device = self._node, self._device
@@ -184,6 +199,8 @@ class CanSimpleDrive:
             return (*frames, cansimple.set_axis_state(node, AxisState.CLOSED_LOOP))
         if request == Request.DISABLE:
             return (cansimple.set_axis_state(node, AxisState.IDLE),)
+        if request == Request.REPORT:
+            return self._polled
         if request == Request.STOP:
             return (cansimple.estop(node),)
         if request == Request.CALIBRATE:

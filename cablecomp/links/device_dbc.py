@@ -9,12 +9,13 @@ from cablecomp.errors import InputError
 from cablecomp.links import dbc
 from cablecomp.links.dbc import Field, Layout
 from cablecomp.links.dbc_source import ALWAYS, Entry, Source, Status
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, chain
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, chain, grid
 from cablecomp.links.readings import DeviceClock, JointReadings
 from cablecomp.links.records import CHANNELS, DriveState, Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd, SensorEnd
 from cablecomp.links.schema_devices import DbcDevice, DbcMessage, DbcRequest, StateSource
 from cablecomp.links.units import Linear, quantity_of, to_si
+from cablecomp.signals import Grid, Wire
 
 _PARTS: Final = ("position", "velocity", "torque", "stiffness", "damping")
 _QUANTITIES: Final = ("rad", "rad_s", "Nm", "Nm_per_rad", "Nms_per_rad")
@@ -170,7 +171,8 @@ class DbcDrive:
         self._name = readings.name
         self._receivers = build_sources(device, end, folder, readings)
         self._mode = Mode(end.mode)
-        self._gains = (end.stiffness_Nm_per_rad, end.damping_Nms_per_rad)
+        self._gains = self._own = (end.stiffness_Nm_per_rad, end.damping_Nms_per_rad)
+        self._enabled = False
         gear = Gear(end)
         self._to_shaft = (
             gear.position(),
@@ -266,13 +268,32 @@ class DbcDrive:
                     f"leave it None, or give the link's own {self._gains[which - 3]}; nothing was sent"
                 )
 
+    def wire(self) -> Wire:
+        """See `Drive.wire`; a float signal carries any value, and so does what is not sent at all."""
+        grids = [Grid()] * 3
+        for part in self._parts:
+            if part.which < 3 and part.field is None:
+                grids[part.which] = grid(Linear(part.gain, part.offset), part.low, part.high)
+        return Wire(*grids)
+
+    def ease(self, share: float) -> tuple[Frame, ...] | None:
+        """See `Drive.ease`; gains that go with the enable request go with it again."""
+        own, carried = self._own, {part.which for part in self._parts} & {3, 4}
+        enable = self._requests.get("enable")
+        asked = enable is not None and bool({"{stiffness}", "{damping}"} & {*enable.values.values()})
+        if not (carried or asked):
+            return None
+        self._gains = (share * own[0], own[1])
+        return (self._encode_request("enable"),) if asked and self._enabled else ()
+
     def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
-        """See `Drive.request`; `stop` falls back on `disable`."""
+        """See `Drive.request`; `stop` and `report` fall back on `disable`."""
         if mode is not None:
             self._mode = mode
         name = request.value
-        if name == "stop" and "stop" not in self._requests:
+        if name in ("stop", "report") and name not in self._requests:
             name = "disable"
+        self._enabled = name == "enable" or (self._enabled and name not in ("disable", "stop", "reset"))
         return (self._encode_request(name),) if name in self._requests else ()
 
     def _encode_request(self, name: str) -> Frame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cablecomp.errors import InputError
 from cablecomp.links import mit
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
 from cablecomp.links.mit import MitRange, reply_counts, saturation
 from cablecomp.links.mit_profiles import Family, error_text, profile, status_of
 from cablecomp.links.readings import JointReadings, MessageStats
@@ -20,6 +20,8 @@ from cablecomp.links.records import (
 )
 from cablecomp.links.schema import MotorEnd
 from cablecomp.links.schema_devices import MitDevice
+from cablecomp.links.units import Linear
+from cablecomp.signals import Wire
 
 MOTOR_TEMPERATURE = "other_motor_temperature_degC"
 
@@ -99,6 +101,7 @@ class MitDrive:
         self._temperature = readings.index(MOTOR_TEMPERATURE) if self._length == 8 else -1
         self._asked = DriveState.UNKNOWN
         self._mode = Mode(end.mode)
+        self._share = 1.0
         self._prepare(Gear(end), end)
 
     def _prepare(self, gear: Gear, end: MotorEnd) -> None:
@@ -163,7 +166,7 @@ class MitDrive:
         """See `Drive.command`."""
         position_rad, velocity_rad_s, torque_Nm, stiffness, damping = command
         mode = self._mode
-        kp = self._kp if stiffness is None else stiffness * self._to_gain
+        kp = (self._kp if stiffness is None else stiffness * self._to_gain) * self._share
         kd = self._kd if damping is None else damping * self._to_gain
         if mode == Mode.TORQUE:
             kp = kd = 0.0
@@ -180,15 +183,32 @@ class MitDrive:
         )
         return Outgoing((Frame(self._node, data),), clipped)
 
+    def wire(self) -> Wire:
+        """See `Drive.wire`; counts from 0 at the lower end of each range."""
+        p, v, t, _, _ = self._scale
+        counts = ((p, mit.P_TOP), (v, mit.V_TOP), (t, mit.V_TOP))
+        lines = (self._to_position, Linear(self._to_velocity), Linear(self._to_torque))
+        return Wire(
+            *(
+                grid(chain(line, Linear(top / (2 * end), 0.5 * top)), 0, top)
+                for line, (end, top) in zip(lines, counts, strict=True)
+            )
+        )
+
+    def ease(self, share: float) -> tuple[Frame, ...] | None:
+        """See `Drive.ease`; gains go with every command."""
+        self._share = share
+        return ()
+
     def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
         """See `Drive.request`; a CubeMars drive has no frame to clear faults: leaving and entering the mode
-        does it."""
+        does it. A drive answers every frame, so one that is not to move reports when it is told to let go."""
         if mode is not None:
             self._mode = mode
         if request == Request.ENABLE:
             self._asked = DriveState.ENABLED
             return (Frame(self._node, mit.ENTER),)
-        if request in (Request.DISABLE, Request.STOP):
+        if request in (Request.DISABLE, Request.STOP, Request.REPORT):
             self._asked = DriveState.DISABLED
             return (Frame(self._node, mit.EXIT),)
         if request == Request.SET_ZERO:

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 from cablecomp.links.records import Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd
 from cablecomp.links.units import Linear
+from cablecomp.signals import Grid, Wire
 
 Take = Callable[[bytes, float], int]
 """Takes the data of one frame and its arrival time in s; returns how many channel values it brought (0 = not
@@ -59,6 +60,13 @@ class Drive(Protocol):
         """Frames of one request; empty if the protocol has none for it. `mode` None leaves the mode as it
         is."""
 
+    def wire(self) -> Wire:
+        """What a command in the mode last enabled can carry, at the input pulley."""
+
+    def ease(self, share: float) -> tuple[Frame, ...] | None:
+        """Stiffness at `share` (0…1) of its own from now on (damping, which only takes speed away, stays):
+        frames to send at once, none if it goes with every command; None = the drive keeps its own."""
+
     def error_text(self, error: int) -> str:
         """The maker's word for an error code, empty for 0."""
 
@@ -103,6 +111,12 @@ class Gear:
     def gain(self) -> float:
         """Stiffness or damping at the shaft per stiffness or damping at the pulley."""
         return 1.0 / self._ratio**2
+
+
+def grid(counts: Linear, low: int, high: int) -> Grid:
+    """Values x whose counts `n = gain x + offset` are the whole numbers low…high."""
+    ends = sorted(((low - counts.offset) / counts.gain, (high - counts.offset) / counts.gain))
+    return Grid(-counts.offset / counts.gain, 1.0 / abs(counts.gain), *ends)
 
 
 def chain(first: Linear, second: Linear) -> Linear:

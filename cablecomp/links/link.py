@@ -12,8 +12,9 @@ from cablecomp.links.port_line import serial_port
 from cablecomp.links.ports import Port
 from cablecomp.links.protocols import extra_channels, make_drive, sensor_receivers
 from cablecomp.links.readings import JointReadings
-from cablecomp.links.records import BusState, Mode, MotorCommand, Request
+from cablecomp.links.records import NOT_TAKEN, BusState, Mode, MotorCommand, Request
 from cablecomp.links.schema import CanBus, LinkConfig
+from cablecomp.signals import Wire
 
 
 class LinkStatus(NamedTuple):
@@ -61,8 +62,15 @@ class Link(Protocol):
         came."""
 
     def send(self, joint: int, command: MotorCommand) -> int:
-        """Send a command; return the CLIP_* bits of what was saturated; raises InputError on NaN or
-        infinity."""
+        """Send a command; return the CLIP_* bits of what was saturated, with NOT_TAKEN if the bus refused
+        it; raises InputError on NaN or infinity."""
+
+    def wire(self, joint: int) -> Wire:
+        """What commands to a joint can carry in the mode last enabled, at the input pulley."""
+
+    def ease(self, joint: int, share: float) -> bool:
+        """Let a drive act with `share` (0…1) of its stiffness from now on; False = its gains cannot be
+        changed from here."""
 
     def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool:
         """Ask a drive to change state; False = the protocol has no such request, or the bus did not take
@@ -140,12 +148,28 @@ class BusLink:
         if drive is None:
             raise InputError(f"joint `{readings.name}` has no motor on this link; add [joint.motor]")
         frames, clipped = drive.command(command)
+        self._clipped += clipped != 0
         for identifier, data in frames:
-            self._sent += self._port.send(identifier, data)
+            if self._port.send(identifier, data):
+                self._sent += 1
+            else:
+                clipped |= NOT_TAKEN
         readings.sent += 1
         readings.unanswered += 1
-        self._clipped += clipped != 0
         return clipped
+
+    def wire(self, joint: int) -> Wire:
+        """See `Link.wire`."""
+        drive = self._drives[joint]
+        return Wire() if drive is None else drive.wire()
+
+    def ease(self, joint: int, share: float) -> bool:
+        """See `Link.ease`."""
+        drive = self._drives[joint]
+        frames = None if drive is None else drive.ease(share)
+        for identifier, data in frames or ():
+            self._sent += self._port.send(identifier, data)
+        return frames is not None
 
     def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool:
         """See `Link.request`."""

@@ -45,6 +45,8 @@ CLIP_VELOCITY: Final = 2
 CLIP_TORQUE: Final = 4
 CLIP_STIFFNESS: Final = 8
 CLIP_DAMPING: Final = 16
+NOT_TAKEN: Final = 32
+"""Beside the CLIP_* bits: the bus did not take the command; the drive still has the one before."""
 _CLIP_NAMES: Final = ("position", "velocity", "torque", "stiffness", "damping")
 
 
@@ -85,7 +87,8 @@ class Mode(StrEnum):
 
 class Request(StrEnum):
     """What a drive can be asked for besides motion; `STOP` is the protocol's quickest way to a powerless
-    drive."""
+    drive. `REPORT`: say where you are; it never makes a drive move, and where a protocol knows no such
+    question it is one to let go, which is answered."""
 
     ENABLE = "enable"
     DISABLE = "disable"
@@ -94,6 +97,7 @@ class Request(StrEnum):
     CLEAR_FAULTS = "clear_faults"
     SET_ZERO = "set_zero"
     RESET = "reset"
+    REPORT = "report"
 
 
 class MotorCommand(NamedTuple):

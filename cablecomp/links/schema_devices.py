@@ -164,7 +164,8 @@ class DbcDevice(Frozen):
     message: tuple[DbcMessage, ...] = ()
     command: DbcCommand | None = None
     request: dict[
-        Literal["enable", "disable", "stop", "calibrate", "clear_faults", "set_zero", "reset"], DbcRequest
+        Literal["enable", "disable", "stop", "calibrate", "clear_faults", "set_zero", "reset", "report"],
+        DbcRequest,
     ] = Field(default_factory=dict)
 
 

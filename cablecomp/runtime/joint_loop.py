@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
 
 from cablecomp.config import JointConfig
 from cablecomp.control.command import FULL, Command, Feed, Reference
 from cablecomp.control.compensator import Compensator
 from cablecomp.control.degrade import NORMAL, DegradeState, DegradeTimes, Phase, degrade, feed_of
 from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gate_names
+from cablecomp.errors import InputError
 from cablecomp.links.link import Link
-from cablecomp.links.records import CHANNELS, DriveState, MotorCommand, Request
+from cablecomp.links.records import CHANNELS, NOT_TAKEN, DriveState, Mode, MotorCommand
 from cablecomp.runtime.health import Checked, Health, health_names
 from cablecomp.runtime.log import EventLog, JointLog
+from cablecomp.runtime.taking_up import TakingUp
+from cablecomp.runtime.tally import JointTally, View
 from cablecomp.signals import Estimate, Sample
 
 References = Callable[[float], Reference]
@@ -26,6 +28,7 @@ References = Callable[[float], Reference]
 
 _NOTHING_NEW = Feed(0.0, True)
 _NOT_RUNNING = (DriveState.FAULT, DriveState.DISABLED)
+_NONE_YET = Command(nan, nan, nan)
 
 
 @dataclass(frozen=True)
@@ -41,40 +44,6 @@ class JointSetup:
     limits: GateLimits
     times: DegradeTimes
     reference: References
-    stiffness_Nm_per_rad: float | None = None
-    damping_Nms_per_rad: float | None = None
-
-
-class View(NamedTuple):
-    """What the live view shows of a joint."""
-
-    name: str
-    time_s: float
-    phase: Phase
-    sample: Sample
-    estimate: Estimate
-    command: Command
-    reference: Reference
-    flags: int
-
-
-@dataclass
-class JointTally:
-    """Sums over the run, of cycles under control: position error (measured and predicted) and torque error,
-    squared."""
-
-    cycles: int = 0
-    position_square: float = 0.0
-    position_count: int = 0
-    torque_square: float = 0.0
-    torque_count: int = 0
-    residual_square: float = 0.0
-    deflection_square: float = 0.0
-    phases: list[int] = field(default_factory=lambda: [0] * len(Phase))
-
-    def phases_by_name(self) -> dict[str, int]:
-        """Cycles spent in each phase that came up."""
-        return {phase.name.lower(): self.phases[phase] for phase in Phase if self.phases[phase]}
 
 
 class JointLoop:
@@ -98,9 +67,14 @@ class JointLoop:
         self._predicted = nan
         self._flags = 0
         self._gate_flags = 0
+        self._refused = False
         self._period_s = setup.compensator.period_s
         self._offset = setup.config.sensors.joint_position_offset_rad
         self._last_reference = setup.reference(0.0)
+        preload = setup.compensator.preload_Nm
+        self.taking_up = TakingUp(
+            link, setup.place, setup.limits, setup.times.fresh_s, preload, self._period_s
+        )
 
     @property
     def view(self) -> View | None:
@@ -113,45 +87,51 @@ class JointLoop:
         return View(name, now_s, phase, sample, estimate, command, reference, flags)
 
     @property
-    def ready(self) -> bool:
-        """Whether every channel that is needed has come."""
-        return self.checked is not None and self.checked.ready
-
-    @property
     def enabled(self) -> bool:
         """Whether the drive says that it is enabled."""
         return self.readings.state is DriveState.ENABLED
 
     def listen(self, now_s: float) -> None:
-        """Before the drive is enabled: judge what came. A drive left enabled is disabled first; then it gets
-        commands, without effect on a disabled drive, because many drives speak only when spoken to."""
+        """Before anything is commanded: judge what comes, until the drive is known."""
         self.checked = self.setup.health.check(self.readings, now_s)
-        if self.readings.sent == 0:
-            self._link.request(self.setup.place, Request.DISABLE)
-        self._send(SafeCommand(self._here(), 0.0, 0.0, 0))
+        self.taking_up.listen(self.readings, self.checked, now_s)
 
-    def hold(self, now_s: float) -> None:
-        """While the drive is being enabled: observe and record, and ask it to stay where it is, against the
+    def first(self) -> None:
+        """The first command: where the motor is, without force."""
+        assert self.checked is not None
+        self._send(self.taking_up.first(self.checked.sample.motor_position_rad))
+
+    def enable(self, now_s: float, mode: Mode) -> None:
+        """While the drive is taken up: observe and record, and let it take hold where it is, against the
         pretension of an open circuit."""
-        self._cycle(now_s, None)
-        self._send(SafeCommand(self._here(), 0.0, -self.setup.compensator.preload_Nm, 0))
+        command = self._observe(now_s, None)
+        checked = self.checked
+        assert checked is not None
+        self._judge(checked, now_s, drive=False)
+        if not self.stop_reason:
+            motor = checked.sample.motor_position_rad
+            wish = self.taking_up.step(self._sent, motor, self.enabled, mode, now_s)
+            self._pass(wish, checked, now_s)
+        self._finish(command, None)
 
     def begin(self) -> None:
-        """Control starts from where the motor is."""
-        self.setup.compensator.reset()
-        here = self._here()
-        self._sent = SafeCommand(here, 0.0, -self.setup.compensator.preload_Nm, 0)
+        """Control starts from where the motor is held."""
+        compensator = self.setup.compensator
+        compensator.reset()
+        compensator.target_rad = self._sent.motor_position_rad
 
     def run(self, now_s: float, since_s: float) -> None:
         """One cycle under control; `since_s` = time since control began."""
-        self._cycle(now_s, since_s)
-        if not self.stop_reason:
-            self._send(self._sent)
+        command = self._observe(now_s, since_s)
+        checked = self.checked
+        if checked is not None and not self.stop_reason:
+            self._pass(command, checked, now_s)
+        self._finish(command, since_s)
 
     def stand(self, now_s: float) -> None:
         """After the stop: observe and record what has come, command nothing."""
-        if self.ready:
-            self._cycle(now_s, None)
+        if self.checked is not None and self.checked.ready and not self._refused:
+            self._finish(self._observe(now_s, None), None)
 
     def close(self) -> None:
         """Keep the observer's state, finish the logs."""
@@ -165,61 +145,68 @@ class JointLoop:
 
     # ---- inside ----------------------------------------------------------------------------------
 
-    def _here(self) -> float:
-        checked = self.checked
-        return 0.0 if checked is None or not checked.ready else checked.sample.motor_position_rad
-
     def _send(self, safe: SafeCommand) -> None:
-        s = self.setup
-        command = MotorCommand(
-            safe.motor_position_rad,
-            safe.motor_velocity_rad_s,
-            safe.motor_torque_Nm,
-            s.stiffness_Nm_per_rad,
-            s.damping_Nms_per_rad,
-        )
-        self._link.send(s.place, command)
+        """Send it; what the bus does not take has not been sent."""
+        command = MotorCommand(safe.motor_position_rad, safe.motor_velocity_rad_s, safe.motor_torque_Nm)
+        if not self._link.send(self.setup.place, command) & NOT_TAKEN:
+            self._sent = safe
 
-    def _cycle(self, now_s: float, since_s: float | None) -> None:
+    def _observe(self, now_s: float, since_s: float | None) -> Command:
+        """Take in what has come; returns what the compensator asks for. A sample that the observer refuses
+        ends the run: replay would refuse it as well.
+        """
         s = self.setup
         target = self._sent.motor_position_rad if since_s is not None else nan
         checked = s.health.check(self.readings, now_s, self._predicted + self._offset, target)
         self.checked = checked
-        period = self._period_s
         if since_s is not None:
-            self._judge(checked, now_s, period)
-        reference = s.reference(period + (0.0 if since_s is None else since_s))
-        sample = checked.sample
+            self._judge(checked, now_s)
+        reference = s.reference(self._period_s + (0.0 if since_s is None else since_s))
         begin = perf_counter()
         feed = FULL if self.degraded is NORMAL else feed_of(self.degraded)
         if since_s is None and max(checked.motor_age_s, checked.load_age_s) > s.times.fresh_s:
             feed = _NOTHING_NEW
-        command = s.compensator.step(sample, reference, feed, joint_ok=checked.joint_ok)
+        compensator = s.compensator
+        try:
+            command = compensator.step(checked.sample, reference, feed, joint_ok=checked.joint_ok)
+        except InputError as error:
+            self._refused = True
+            self.stop_reason = self.stop_reason or f"the observer refuses what came: {error}"
+            command = _NONE_YET
         self.step_s = perf_counter() - begin
-        estimate = s.compensator.estimate
-        assert estimate is not None
-        self._predicted = estimate.joint_position_rad
-        if since_s is not None and not self.stop_reason:
-            self._pass(command, checked, now_s, period)
+        estimate = compensator.estimate
+        if estimate is not None:
+            self._predicted = estimate.joint_position_rad
+            self._seen = (now_s, checked.sample, estimate, command, reference, checked.flags)
         if checked.flags != self._flags:
             self._note(checked.flags, now_s)
-        self._count(sample, estimate, since_s)
-        self._seen = (now_s, sample, estimate, command, reference, checked.flags)
-        if self._folder is not None and s.compensator.observed:
+        return command
+
+    def _finish(self, command: Command, since_s: float | None) -> None:
+        """Count and record the cycle, once its command has gone out."""
+        seen, checked = self._seen, self.checked
+        if seen is None or checked is None:
+            return
+        _, sample, estimate, _, reference, _ = seen
+        self.tally.phases[self.degraded.phase] += 1
+        if since_s is not None and not self._refused:
+            self.tally.add(self._last_reference, sample.joint_position_rad - self._offset, estimate)
+        if self._folder is not None and self.setup.compensator.observed:
             self._record(self._folder, sample, estimate, command, checked, since_s is not None)
         self._last_reference = reference
 
-    def _judge(self, checked: Checked, now_s: float, period_s: float) -> None:
+    def _judge(self, checked: Checked, now_s: float, *, drive: bool = True) -> None:
         before, s = self.degraded.phase, self.setup
         if (
             self.degraded is NORMAL
             and checked.motor_age_s <= s.times.fresh_s
             and checked.load_age_s <= s.times.fresh_s
             and not checked.fatal
-            and self.readings.state is DriveState.ENABLED
+            and (self.readings.state is DriveState.ENABLED or not drive)
         ):
             return  # nearly always: nothing is amiss
-        self.degraded = degrade(self.degraded, period_s, checked.motor_age_s, checked.load_age_s, s.times)
+        times, period = s.times, self._period_s
+        self.degraded = degrade(self.degraded, period, checked.motor_age_s, checked.load_age_s, times)
         phase = self.degraded.phase
         if phase is not before:
             self._events.add(now_s, s.name, f"{before.name.lower()} -> {phase.name.lower()}")
@@ -228,21 +215,23 @@ class JointLoop:
             self.stop_reason = self.stop_reason or words
         elif checked.fatal:
             self.stop_reason = self.stop_reason or ", ".join(health_names(checked.flags))
-        elif self.readings.state in _NOT_RUNNING:
+        elif drive and self.readings.state in _NOT_RUNNING:
             state = self.readings.state.name.lower()
             self.stop_reason = self.stop_reason or f"drive reports {state} (error {self.readings.error:#x})"
 
-    def _pass(self, command: Command, checked: Checked, now_s: float, period_s: float) -> None:
+    def _pass(self, command: Command, checked: Checked, now_s: float) -> None:
+        """Through the gate, and out."""
         s = self.setup
         position = checked.sample.motor_position_rad
-        safe = gate(command, self._sent, position, checked.motor_age_s, period_s, s.limits)
+        safe = gate(command, self._sent, position, checked.motor_age_s, self._period_s, s.limits)
         if safe.flags & ~self._gate_flags:
             words = ", ".join(gate_names(safe.flags & ~self._gate_flags))
             self._events.add(now_s, s.name, f"gate: {words}")
         self._gate_flags = safe.flags
         if safe.flags & MUST_STOP:
             self.stop_reason = self.stop_reason or f"gate: {', '.join(gate_names(safe.flags & MUST_STOP))}"
-        self._sent = safe
+        else:
+            self._send(safe)
 
     def _note(self, flags: int, now_s: float) -> None:
         fresh, gone = flags & ~self._flags, self._flags & ~flags
@@ -251,26 +240,6 @@ class JointLoop:
             self._events.add(now_s, self.setup.name, ", ".join(health_names(fresh)))
         if gone:
             self._events.add(now_s, self.setup.name, "over: " + ", ".join(health_names(gone)))
-
-    def _count(self, sample: Sample, estimate: Estimate, since_s: float | None) -> None:
-        tally = self.tally
-        tally.phases[self.degraded.phase] += 1
-        if since_s is None:
-            return
-        tally.cycles += 1
-        wanted = self._last_reference
-        measured = sample.joint_position_rad - self._offset
-        if measured == measured:
-            error = measured - wanted.joint_position_rad
-            residual = measured - estimate.joint_position_rad
-            tally.position_square += error * error
-            tally.position_count += 1
-            tally.residual_square += residual * residual
-        tally.deflection_square += estimate.deflection_rad * estimate.deflection_rad
-        torque_error = estimate.joint_torque_Nm - wanted.joint_torque_Nm
-        if torque_error == torque_error:
-            tally.torque_square += torque_error * torque_error
-            tally.torque_count += 1
 
     def _record(
         self,

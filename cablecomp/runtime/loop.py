@@ -14,7 +14,7 @@ from time import perf_counter
 
 from cablecomp.errors import DeviceError
 from cablecomp.links.link import Link
-from cablecomp.links.records import BusState, Mode, Request
+from cablecomp.links.records import BusState, Mode
 from cablecomp.runtime.clock import Clock, Tick, Ticker
 from cablecomp.runtime.histogram import CycleTimes
 from cablecomp.runtime.joint_loop import JointLoop, JointSetup
@@ -40,7 +40,8 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True)
 class LoopOptions:
-    """How long things may take (s): first data, enabling, the run itself, watching after the stop.
+    """How long things may take (s): until data have come that can be believed for `settle_s`, enabling, the
+    run itself, watching after the stop, in which the stop is sent again every `stop_again_s`.
 
     `begin_s`: the time that the run's clock starts from, for an observer that goes on from a snapshot.
     """
@@ -49,6 +50,7 @@ class LoopOptions:
     listen_s: float = 2.0
     enable_s: float = 3.0
     settle_s: float = 0.05
+    stop_again_s: float = 0.01
     after_s: float = 0.1
     mode: Mode = Mode.IMPEDANCE
     policy: Policy = QUIET
@@ -97,6 +99,7 @@ class Loop:
         self._first_tick: Tick | None = None
         self._last_tick: Tick | None = None
         self._asked_to_stop = ""
+        self._stopped_s = -inf
         self._ticks = 0
 
     @property
@@ -191,6 +194,8 @@ class Loop:
         elif self.stage is Stage.RUNNING:
             self._run(tick)
         else:
+            if now - self._stopped_s >= self.options.stop_again_s:
+                self._tell_to_stop(now)
             for joint in self.joints:
                 joint.stand(now)
             return now - self._stage_s >= self.options.after_s
@@ -201,32 +206,39 @@ class Loop:
             joint.listen(now)
         if self._asked_to_stop:
             self._stop(self._asked_to_stop, now)
-        elif all(joint.ready for joint in self.joints) and now - self._stage_s >= self.options.settle_s:
+        elif all(j.taking_up.known_s(now) >= self.options.settle_s for j in self.joints):
             self._go(Stage.ENABLING, now)
             for joint in self.joints:
-                self.link.request(joint.setup.place, Request.CLEAR_FAULTS, self.options.mode)
-                self.link.request(joint.setup.place, Request.ENABLE, self.options.mode)
+                joint.first()
         elif now - self._stage_s > self.options.listen_s:
-            missing = (
-                ", ".join(self.link.silent(now, self.options.listen_s / 2)) or "a channel that is needed"
+            raise DeviceError(f"link `{self.link.config.name}`: {self._what_is_missing(now)}")
+
+    def _what_is_missing(self, now: float) -> str:
+        listened = self.options.listen_s
+        mute = [j for j in self.joints if j.checked is None or not j.checked.ready]
+        if mute:
+            silent = ", ".join(self.link.silent(now, listened / 2)) or "a channel that is needed"
+            if foreign := self.link.status().foreign:
+                silent += f"; {foreign} frames came from other devices on the same identifiers"
+            names = ", ".join(j.setup.name for j in mute)
+            return (
+                f"nothing from {names} within {listened:g} s (silent: {silent}); "
+                "check power, wiring, bitrate and node numbers"
             )
-            names = ", ".join(j.setup.name for j in self.joints if not j.ready)
-            foreign = self.link.status().foreign
-            missing += (
-                f"; {foreign} frames came from other devices on the same identifiers" if foreign else ""
-            )
-            raise DeviceError(
-                f"link `{self.link.config.name}`: nothing from {names} within {self.options.listen_s:g} s "
-                f"(silent: {missing}); check power, wiring, bitrate and node numbers"
-            )
+        known = self.options.settle_s
+        unknown = [j for j in self.joints if not j.taking_up.known_s(now) >= known]
+        why = "; ".join(f"{j.setup.name}: {j.taking_up.why}" for j in unknown)
+        return f"within {listened:g} s there was no drive to be sure of for {known:g} s ({why}); none was enabled"
 
     def _enable(self, now: float) -> None:
         for joint in self.joints:
-            joint.hold(now)
+            joint.enable(now, self.options.mode)
         waited = now - self._stage_s
-        if self._asked_to_stop:
-            self._stop(self._asked_to_stop, now)
-        elif all(joint.enabled for joint in self.joints) and waited >= DISABLE_GRACE * self.period_s:
+        why = self._asked_to_stop or self._joint_trouble() or self._bus_trouble()
+        grace = DISABLE_GRACE * self.period_s
+        if why:
+            self._stop(why, now)
+        elif all(j.taking_up.held and j.taking_up.enabling_s(now) >= grace for j in self.joints):
             for joint in self.joints:
                 joint.begin()
             self._armed_s = now
@@ -248,16 +260,17 @@ class Loop:
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
         if tick.skipped:
             self.events.add(now, "", f"{tick.skipped} ticks skipped")
-        why = self._asked_to_stop
-        for joint in self.joints:
-            if joint.stop_reason and not why:
-                why = f"{joint.setup.name}: {joint.stop_reason}"
-        if not why:
-            why = self._bus_trouble()
+        why = self._asked_to_stop or self._joint_trouble() or self._bus_trouble()
         if not why and since >= self.options.duration_s:
             why = TIME_IS_OVER
         if why:
             self._stop(why, now)
+
+    def _joint_trouble(self) -> str:
+        for joint in self.joints:
+            if joint.stop_reason:
+                return f"{joint.setup.name}: {joint.stop_reason}"
+        return ""
 
     def _bus_trouble(self) -> str:
         state = self.link.bus
@@ -266,10 +279,14 @@ class Loop:
         return f"bus is {state.name.lower()}: {self.link.status().fault}"
 
     def _stop(self, why: str, now: float) -> None:
-        self.link.stop()
+        self._tell_to_stop(now)
         self.stop_reason = why
         self.events.add(now, "", f"stop: {why}")
         self._go(Stage.STOPPING, now)
+
+    def _tell_to_stop(self, now: float) -> None:
+        self.link.stop()
+        self._stopped_s = now
 
     def _go(self, stage: Stage, now: float) -> None:
         self.events.add(now, "", f"{self.stage.name.lower()} -> {stage.name.lower()}")

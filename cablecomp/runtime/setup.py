@@ -117,7 +117,7 @@ def joint_setup(
         others=_places(bus.joints[c.place], observer.channels),
         preload_Nm=compensator.preload_Nm,
     )
-    limits = GateLimits.of(c.config.limits, age_s=times.motor_stop_s)
+    limits = GateLimits.of(c.config.limits, bus.wire(c.place), age_s=times.motor_stop_s)
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
 
 

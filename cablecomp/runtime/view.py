@@ -15,8 +15,9 @@ from rich.text import Text
 from cablecomp.control.degrade import Phase
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.health import health_names
-from cablecomp.runtime.joint_loop import JointLoop, View
+from cablecomp.runtime.joint_loop import JointLoop
 from cablecomp.runtime.loop import ASKED_BY_USER, Loop
+from cablecomp.runtime.tally import View
 
 _COLOURS = {
     Phase.NORMAL: "green",

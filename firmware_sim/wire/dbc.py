@@ -187,7 +187,7 @@ class DbcWire:
         return tuple(spoken.packed.identifier for spoken in heard)
 
     def hear(self, frame: Frame, drive: Drive, now_s: float) -> Heard:
-        """Targets are answered by the state, controls by the status."""
+        """Targets are answered by the state, controls by the status and the state."""
         is_command = frame.identifier == self.command.packed.identifier
         spoken = self.command if is_command else self.control
         if spoken is None or frame.remote or len(frame.data) < spoken.packed.length:
@@ -197,7 +197,7 @@ class DbcWire:
         self._controls(values, drive, now_s)
         if not is_command:
             drive.feed_watchdog(now_s)
-            return Heard((Answer.STATUS,))
+            return Heard((Answer.STATUS, Answer.STATE))
         old = drive.setpoint
         targets = [values.get(n, o) for n, o in zip(TARGETS, old[:3], strict=True)]
         drive.command(Setpoint(targets[0], targets[1], targets[2], self._kp, self._kd), now_s)

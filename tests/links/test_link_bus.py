@@ -17,6 +17,7 @@ from cablecomp.links.records import (
     MOTOR_POSITION,
     MOTOR_TORQUE,
     MOTOR_VELOCITY,
+    NOT_TAKEN,
     TEMPERATURE,
 )
 
@@ -180,7 +181,7 @@ def test_a_closed_link_neither_reads_nor_raises(rigs) -> None:
     rig = rigs("mit-virtual.toml")
     rig.link.close()
     assert rig.link.poll(1.0) == 0
-    assert rig.link.send(0, MotorCommand()) == 0
+    assert rig.link.send(0, MotorCommand()) == NOT_TAKEN
     assert not rig.link.stop()
     status = rig.link.status()
     assert (status.bus, status.sent) == (BusState.CLOSED, 0)

@@ -1,0 +1,221 @@
+"""Before a drive is known nothing goes to it but requests to let go; then it is taken up without a pull. All of it
+as a listener on the wire reads it.
+"""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import can
+import cantools
+import pytest
+from fault_runs import CONFIGS, GAINS, JOINT, REACH, simulated
+from mit_joint import POSITION_STEP, TORQUE_STEP, MitJoint, reply
+
+from cablecomp.config import load_joint
+from cablecomp.control.options import load_control
+from cablecomp.errors import DeviceError
+from cablecomp.links.schema import load_link
+from cablecomp.runtime.clock import Tick
+from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.results import RunReport
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.setup import matched
+from cablecomp.runtime.taking_up import EASE_S
+
+CONTROL = load_control(CONFIGS / "control/wrist-capstan.toml")
+
+
+@pytest.fixture
+def rig():
+    """A link and a joint on a bus of their own; `run` runs it in stepped time."""
+    channel = uuid.uuid4().hex
+    joint = MitJoint(can.Bus(interface="virtual", channel=channel, ignore_config=True))
+    yield Rig(channel, joint)
+    joint.close()
+
+
+class Rig:
+    def __init__(self, channel: str, joint: MitJoint) -> None:
+        self.joint = joint
+        base = load_link(CONFIGS / "links/mit-virtual.toml").redirect("virtual", channel)
+        control = CONTROL.model_copy(update={"compensator": CONTROL.compensator.model_copy(update=GAINS)})
+        self.link, self.control = matched(base, control, own_link=True)
+        self.stages: list[Stage] = []
+
+    def run(self, duration_s: float = 0.3, watch: Callable[[Loop, Tick], None] | None = None) -> RunReport:
+        def each(loop: Loop, tick: Tick) -> None:
+            self.stages.append(loop.stage)
+            if watch is not None:
+                watch(loop, tick)
+
+        options = RunOptions(duration_s, True)
+        return run_joint(load_joint(JOINT), self.link, self.control, REACH, options, self.joint, each)
+
+
+def test_a_drive_left_enabled_far_away_is_taken_up_without_a_pull(rig: Rig) -> None:
+    """At 3 rad, enabled and holding itself there: the first command is there, without stiffness or torque."""
+    joint = rig.joint
+    joint.angle, joint.enabled, joint.last = 3.0, True, joint.last._replace(position=3.0, kp=200.0, kd=2.0)
+    report = rig.run(0.02)
+    assert report.stop_reason == "time is over"
+    assert set(joint.words_before_first_command()) == {"leave"}
+    first = joint.commands[0]
+    assert first.position == pytest.approx(3.0, abs=POSITION_STEP)
+    assert first.kp == 0.0
+    assert abs(first.torque) <= TORQUE_STEP
+    assert abs(first.velocity) <= 100.0 / 4095
+    taking_up = [
+        h for h, s in zip(joint.heard, joint.ticks, strict=True) if rig.stages[s - 1] < Stage.RUNNING
+    ]
+    assert all(abs(h.position - 3.0) < 1e-3 for h in taking_up if not h.word)
+    # nothing but the first steps of the motion, which begins at zero, is left to pull
+    assert joint.angle == pytest.approx(3.0, abs=0.7)
+
+
+def test_stiffness_grows_little_by_little_and_the_target_stays(rig: Rig) -> None:
+    rig.joint.angle = 0.5
+    rig.run(0.02)
+    enter = next(k for k, h in enumerate(rig.joint.heard) if h.word == "enter")
+    commands = [h for h in rig.joint.heard[enter:] if not h.word]
+    eased = [h for h in commands if h.kp < 199.0]
+    assert commands[0].kp == 0.0
+    steps = [b.kp - a.kp for a, b in pairwise(commands)]
+    assert max(steps) <= 200.0 * 1e-3 / EASE_S + 500.0 / 4095
+    assert min(steps) >= 0.0
+    assert {round(h.position, 6) for h in eased} == {round(commands[0].position, 6)}
+    assert all(h.kd == pytest.approx(2.0, abs=1e-2) for h in commands)
+
+
+def test_nothing_is_commanded_before_the_drive_has_spoken_for_a_while(rig: Rig) -> None:
+    joint = rig.joint
+    joint.mute = True
+
+    def watch(loop: Loop, tick: Tick) -> None:
+        joint.mute = tick.now_s < 0.3
+
+    rig.run(0.01, watch)
+    first = next(t for h, t in zip(joint.heard, joint.ticks, strict=True) if not h.word)
+    assert first >= 300 + 50
+    assert set(joint.words_before_first_command()) == {"leave"}
+
+
+def lies(joint: MitJoint, tell: Callable[[float], float]) -> None:
+    joint.tell = tell
+
+
+@pytest.mark.parametrize(
+    ("prepare", "words"),
+    [
+        (lambda j: setattr(j, "mute", True), "nothing from joint-1"),
+        (lambda j: lies(j, lambda a: 0.3 * (j.tick // 2 % 2)), "motor encoder jumped"),
+        (lambda j: lies(j, lambda a: 12.5), "end of what its reply can carry"),
+        (lambda j: lies(j, lambda a: -3.4), r"stands at -3.4 rad, outside of -3.2 … 3.2"),
+        (lambda j: setattr(j, "disturb", lambda j: setattr(j, "mute", j.tick > 20)), "stale"),
+    ],
+)
+def test_a_drive_that_is_not_known_is_never_commanded(rig: Rig, prepare, words: str) -> None:
+    joint = rig.joint
+    prepare(joint)
+    with pytest.raises(DeviceError, match=words):
+        rig.run()
+    assert joint.heard
+    assert {h.word for h in joint.heard} == {"leave"}
+
+
+def test_another_drive_s_replies_are_no_knowledge(rig: Rig) -> None:
+    joint = rig.joint
+    joint.mute = True
+
+    def other(j: MitJoint) -> None:
+        j.bus.send(can.Message(arbitration_id=0, is_extended_id=False, data=reply(2, 1.0)))
+
+    joint.disturb = other
+    with pytest.raises(DeviceError, match="frames came from other devices"):
+        rig.run()
+    assert {h.word for h in joint.heard} == {"leave"}
+
+
+def test_a_motor_that_is_turned_while_it_is_taken_up_is_followed_and_never_pulled_back(rig: Rig) -> None:
+    """By hand at 2 rad/s until it is enabled: there is no jump, and what holds it is where it was let go."""
+    joint = rig.joint
+    angles = {}
+
+    def turned(j: MitJoint) -> None:
+        if not j.enabled:
+            j.speed = 2.0
+        angles[j.tick] = j.angle
+
+    joint.disturb = turned
+    report = rig.run(0.02)
+    assert report.stop_reason == "time is over"
+    for h, tick in zip(joint.heard, joint.ticks, strict=True):
+        if not h.word and h.kp == 0.0:
+            assert h.position == pytest.approx(angles[tick - 1], abs=0.01)
+    held = next(h for h in joint.commands if h.kp > 0.0)
+    stopped = next(t for h, t in zip(joint.heard, joint.ticks, strict=True) if h.kp > 0.0)
+    assert held.position == pytest.approx(angles[stopped], abs=0.02)
+
+
+@pytest.mark.parametrize("link", ["wrist-virtual", "odrive-virtual", "mit-virtual"])
+def test_every_protocol_is_told_where_it_is_before_it_is_enabled(link: str) -> None:
+    """With a zero that lies 0.7 rad off, so that position 0 would be a jump; read by python-can and cantools."""
+    simulation, bus, control = simulated(link)
+    joint = simulation.bench.joints[0]
+    ear = can.Bus(interface="virtual", channel=bus.bus.channel, ignore_config=True)
+    joint.advance_sample()
+    joint.drive.set_position(0.7)
+    ends = bus.joint[0].model_copy(
+        update={"motor": bus.joint[0].motor.model_copy(update={"position_offset_rad": 0.7})}
+    )
+    bus = bus.model_copy(update={"joint": (ends,)})
+    try:
+        report = run_joint(load_joint(JOINT), bus, control, REACH, RunOptions(0.05, True), simulation)
+        targets, enabling, stiffness = spoken(link, ear)
+    finally:
+        simulation.close()
+        ear.shutdown()
+    assert report.stop_reason == "time is over"
+    assert targets[0][1] == pytest.approx(0.7, abs=1e-3)
+    assert targets[0][0] < enabling
+    assert all(abs(b[1] - a[1]) < 0.031 for a, b in pairwise(targets))
+    if link != "odrive-virtual":  # its gains are its own
+        assert stiffness[0] == 0.0
+        assert max(b - a for a, b in pairwise(stiffness)) < 40.0 * 1e-3 / EASE_S + 0.2
+
+
+def spoken(link: str, ear: can.BusABC) -> tuple[list[tuple[int, float]], int, list[float]]:
+    """(place, target in rad at the drive) of every command, place of the request to enable, stiffness in order."""
+    targets, enabling, stiffness, place = [], -1, [], 0
+    names = {"wrist-virtual": "cablecomp_joint", "odrive-virtual": "cablecomp_odrive"}
+    table = (
+        None
+        if link == "mit-virtual"
+        else cantools.database.load_file(Path(CONFIGS) / f"links/{names[link]}.dbc")
+    )
+    while (message := ear.recv(0)) is not None:
+        place += 1
+        identifier, data = message.arbitration_id, bytes(message.data)
+        if link == "mit-virtual" and identifier == 1:
+            if data == b"\xff" * 7 + b"\xfc":
+                enabling = place
+            elif data[:7] != b"\xff" * 7:
+                targets.append((place, int.from_bytes(data[:2], "big") * 25.0 / 65535 - 12.5))
+                stiffness.append(((data[3] & 15) << 8 | data[4]) * 500.0 / 4095)
+        elif link == "odrive-virtual" and identifier == 1 << 5 | 0x0C:
+            values = table.decode_message(identifier, data)
+            targets.append((place, 2.0 * math.pi * next(v for k, v in values.items() if "Pos" in k)))
+        elif link == "odrive-virtual" and identifier == 1 << 5 | 0x07 and data[0] == 8:
+            enabling = place
+        elif link == "wrist-virtual" and identifier == 0x400:
+            targets.append((place, table.decode_message(identifier, data)["motor_position_target_rad"]))
+        elif link == "wrist-virtual" and identifier == 0x401:
+            values = table.decode_message(identifier, data)
+            if values["request"] == "enable":
+                enabling = place if enabling < 0 else enabling
+                stiffness.append(values["kp_Nm_per_rad"])
+    return targets, enabling, stiffness
