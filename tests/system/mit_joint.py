@@ -104,7 +104,7 @@ class MitJoint:
             self.tick += 1
             self.hear()
             self.move()
-            self.say(0x600, struct.pack("<i", round(1e6 * self.angle * RATIO)) + bytes(3) + self.count())
+            self.say(0x680, struct.pack("<i", round(1e6 * self.angle * RATIO)) + bytes(3) + self.count())
             if self.disturb is not None:
                 self.disturb(self)
 

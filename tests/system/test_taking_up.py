@@ -19,7 +19,7 @@ from mit_joint import POSITION_STEP, TORQUE_STEP, MitJoint, reply
 from cablecomp.config import load_joint
 from cablecomp.control.options import load_control
 from cablecomp.errors import DeviceError
-from cablecomp.links.schema import load_link
+from cablecomp.links.load import load_link
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop, Stage
 from cablecomp.runtime.results import RunReport
@@ -211,9 +211,9 @@ def spoken(link: str, ear: can.BusABC) -> tuple[list[tuple[int, float]], int, li
             targets.append((place, 2.0 * math.pi * next(v for k, v in values.items() if "Pos" in k)))
         elif link == "odrive-virtual" and identifier == 1 << 5 | 0x07 and data[0] == 8:
             enabling = place
-        elif link == "wrist-virtual" and identifier == 0x400:
+        elif link == "wrist-virtual" and identifier == 0x6C0:
             targets.append((place, table.decode_message(identifier, data)["motor_position_target_rad"]))
-        elif link == "wrist-virtual" and identifier == 0x401:
+        elif link == "wrist-virtual" and identifier == 0x6C1:
             values = table.decode_message(identifier, data)
             if values["request"] == "enable":
                 enabling = place if enabling < 0 else enabling
