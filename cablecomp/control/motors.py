@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi, prod, sqrt
 
 from cablecomp.config import JointConfig
+from cablecomp.control.gate import GateLimits
 from cablecomp.control.options import CompensatorOptions, ControlConfig, HealthOptions, MotorModel
 from cablecomp.control.stiffness import greatest_load, stiffness_range
 
@@ -12,6 +13,7 @@ _LINK_HZ = 110.0
 _DRIVE_HZ = 95.0
 _DAMPING = 0.8
 _SHAKE = 0.1
+_FASTER = 1.5  # than a target may ever move: no motor that follows one does that
 _YIELDS_RAD = 0.1  # in impedance mode, under the greatest load
 _STIFFEST = 3000.0  # Nm/rad: about what drives can be told
 
@@ -48,7 +50,7 @@ def control_for(config: JointConfig) -> ControlConfig:
     )
     widest = float(abs(stiffness.deflection_rad).max())
     health = HealthOptions(
-        motor_rate_rad_s=60.0 / min(ratio, 1.0),
+        motor_rate_rad_s=_FASTER * GateLimits.of(config.limits).position_rate_rad_s,
         torque_rate_Nm_s=1000.0 * load,
         torque_max_Nm=2.0 * load,
         joint_residual_rad=2.0 * widest,

@@ -26,6 +26,7 @@ from cablecomp.runtime.timing import TimingReport
 TIME_IS_OVER = "time is over"
 ASKED_BY_USER = "asked by the user"
 COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
+LOOK_EVERY = 128  # ticks between two looks at the link's counters
 DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
 
 
@@ -100,6 +101,7 @@ class Loop:
         self._last_tick: Tick | None = None
         self._asked_to_stop = ""
         self._stopped_s = -inf
+        self._backlogs = (0, 0)
         self._ticks = 0
 
     @property
@@ -258,6 +260,8 @@ class Loop:
         if since >= self.minutes.due_s:
             minute = self.minutes.close(self.times, self._skipped, self.link.status())
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
+        if tick.number % LOOK_EVERY == 0:
+            self._backlogs = (self._backlogs[1], self.link.status().backlogs)
         if tick.skipped:
             self.events.add(now, "", f"{tick.skipped} ticks skipped")
         why = self._asked_to_stop or self._joint_trouble() or self._bus_trouble()
@@ -269,8 +273,18 @@ class Loop:
     def _joint_trouble(self) -> str:
         for joint in self.joints:
             if joint.stop_reason:
-                return f"{joint.setup.name}: {joint.stop_reason}"
+                return f"{joint.setup.name}: {joint.stop_reason}{self._flood()}"
         return ""
+
+    def _flood(self) -> str:
+        """What is behind data that come too late: frames that nobody waits for, more than can be read."""
+        status = self.link.status()
+        if status.backlogs == self._backlogs[0]:
+            return ""
+        return (
+            f" (the bus is flooded: {status.backlogs - self._backlogs[0]} polls could not read all that came, "
+            f"{status.ignored + status.foreign} frames were for none of the joints)"
+        )
 
     def _bus_trouble(self) -> str:
         state = self.link.bus

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations, groupby, pairwise
 from math import inf, nan
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cablecomp.config import Limits
+from cablecomp.config import Limits, load_joint
 from cablecomp.control.command import Command
 from cablecomp.control.degrade import (
     NORMAL,
@@ -32,6 +33,7 @@ from cablecomp.control.gate import (
     first_command,
     gate,
 )
+from cablecomp.control.motors import control_for
 from cablecomp.errors import InputError
 from cablecomp.signals import ANY_WIRE, Grid, Wire
 
@@ -218,3 +220,10 @@ def test_times_out_of_order_are_refused() -> None:
     with pytest.raises(InputError, match="fresh <= hold < fade <= stop"):
         checked_times(TIMES._replace(fade_s=0.3))
     assert checked_times(TIMES) == TIMES
+
+
+@pytest.mark.parametrize("name", ["capstan-arm", "wrist-capstan", "snow-closed-rig"])
+def test_no_speed_is_plausible_that_no_target_ever_has(name: str) -> None:
+    joint = load_joint(Path(__file__).parents[2] / f"configs/joints/{name}.toml")
+    rate = GateLimits.of(joint.limits).position_rate_rad_s
+    assert rate < control_for(joint).health.motor_rate_rad_s <= 2.0 * rate

@@ -18,6 +18,7 @@ from mit_joint import POSITION_STEP, TORQUE_STEP, MitJoint, reply
 
 from cablecomp.config import load_joint
 from cablecomp.control.options import load_control
+from cablecomp.control.protocol import Protocol
 from cablecomp.errors import DeviceError
 from cablecomp.links.load import load_link
 from cablecomp.runtime.clock import Tick
@@ -47,14 +48,19 @@ class Rig:
         self.link, self.control = matched(base, control, own_link=True)
         self.stages: list[Stage] = []
 
-    def run(self, duration_s: float = 0.3, watch: Callable[[Loop, Tick], None] | None = None) -> RunReport:
+    def run(
+        self,
+        duration_s: float = 0.3,
+        watch: Callable[[Loop, Tick], None] | None = None,
+        protocol: Protocol = REACH,
+    ) -> RunReport:
         def each(loop: Loop, tick: Tick) -> None:
             self.stages.append(loop.stage)
             if watch is not None:
                 watch(loop, tick)
 
         options = RunOptions(duration_s, True)
-        return run_joint(load_joint(JOINT), self.link, self.control, REACH, options, self.joint, each)
+        return run_joint(load_joint(JOINT), self.link, self.control, protocol, options, self.joint, each)
 
 
 def test_a_drive_left_enabled_far_away_is_taken_up_without_a_pull(rig: Rig) -> None:
