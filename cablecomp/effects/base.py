@@ -141,6 +141,8 @@ class Effect:
     change: Callable[[Mapping[str, float], JointConfig], Change]
     texts: tuple[str, ...] = field(default=())
     """Names of parameters that are text, such as the channel that loads the cable."""
+    rates: bool = False
+    """Its law knows rates within a stroke: a fit has to run it on every sample, not on rows thinned by travel."""
     rank: int = 0
     """Terms run in rising rank; a term that sees the sum of the others (a delay) ranks last."""
 

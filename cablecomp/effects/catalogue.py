@@ -21,7 +21,7 @@ from cablecomp.effects.empirical import empirical_term
 from cablecomp.errors import InputError
 from cablecomp.mechanics.assemble import Extension, Term
 from cablecomp.mechanics.layout import OTHERS
-from cablecomp.mechanics.tables import law_table, plain_law
+from cablecomp.mechanics.tables import law_table, plain_law, stiffening_law
 
 _registered: dict[str, Effect] = {}
 
@@ -214,6 +214,8 @@ def _law(changes: Sequence[Change], config: JointConfig) -> Floats | None:
             c.play_share or c.guide_angle or c.viscous_Ns_per_m_rad or c.moves_pretension for c in changes
         )
         return np.stack([plain_law()] * 3) if inside else None
+    if not by_tension and not by_angle:
+        return np.stack([stiffening_law(stiffening)] * 3)
     stage = config.drive.stage[-1]
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
     tables = []

@@ -75,6 +75,7 @@ EFFECT = Effect(
         ),
     ),
     acts_through=("acceleration",),
+    rates=True,
     bounded=False,
     change=_change,
 )

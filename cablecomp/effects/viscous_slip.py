@@ -37,6 +37,7 @@ EFFECT = Effect(
         ),
     ),
     acts_through=("dwell", "load_rate", "load_direction", "velocity"),
+    rates=True,
     bounded=False,
     change=_change,
 )

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.mechanics.jit import kernel, leaf_kernel
-from cablecomp.mechanics.tables import between, groove, strain
+from cablecomp.mechanics.tables import PLAIN, STIFF, STIFFENING, between, groove, stiffening_strain, strain
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
@@ -37,6 +37,9 @@ ROWS = 6
 _x, _w = np.polynomial.legendre.leggauss(8)
 GAUSS_X = (_x + 1.0) / 2.0
 GAUSS_W = _w / 2.0
+_x, _w = np.polynomial.legendre.leggauss(3)
+SHORT_X = (_x + 1.0) / 2.0
+SHORT_W = _w / 2.0
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
@@ -56,8 +59,10 @@ def piece(
     d = v2 - v1
     if L is None:
         return _piece_plain(dy, d, t1, t2)
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] == PLAIN:
         return _piece_plain(dy, d, t1, t2)
+    if L[0, 0, 0] == STIFF:
+        return _piece_stiff(L[law, 0, STIFFENING], dy, v1, d)
     return _piece_table(L, law, y1, v1, y2, v2)
 
 
@@ -69,6 +74,25 @@ def _piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, floa
     else:  # (1 - exp(-d))/d as a series: the difference of the exponentials would cancel
         grown = dy * t2 * (1.0 - d * (F2 - d * (F3 - d * (F4 - d * (F5 - d * (F6 - d * (F7 - d * F8)))))))
     return grown - dy, grown
+
+
+@kernel
+def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float]:
+    """`piece` for a cable that stiffens under plain friction: Gauss-Legendre quadrature, 3 points on short pieces."""
+    total = slope = 0.0
+    if abs(d) < 0.05:  # its error there is below 1e-13 of the strain
+        for j in range(3):
+            tau = math.exp(v1 + d * SHORT_X[j])
+            e, de = stiffening_strain(b, tau)
+            total += SHORT_W[j] * e
+            slope += SHORT_W[j] * de * tau
+    else:
+        for j in range(8):
+            tau = math.exp(v1 + d * GAUSS_X[j])
+            e, de = stiffening_strain(b, tau)
+            total += GAUSS_W[j] * e
+            slope += GAUSS_W[j] * de * tau
+    return total * dy, slope * dy
 
 
 @kernel

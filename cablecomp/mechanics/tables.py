@@ -2,7 +2,8 @@
 
 `L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count].
 Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `L` is None for the plain drive without any
-extension: the compiler then leaves out all code that a plain drive does not need. In mode 1 row 1 holds u = ln tau
+extension: the compiler then leaves out all code that a plain drive does not need. Mode 2 is the plain friction of mode 0
+with the stiffening law of the head. In mode 1 row 1 holds u = ln tau
 on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) =
 int m_g dy on an even grid of y, row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
@@ -24,12 +25,20 @@ Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
 U_LOW, U_HIGH = -7.0, 2.5
+PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
 STIFFENING = 10  # place in the head of b in EA(T) = EA (1 + b (tau - 1))
 
 
 def plain_law() -> Floats:
     """The law of the thesis (constant mu, constant EA) in the form of a table."""
     return np.zeros((4, 16))
+
+
+def stiffening_law(stiffening: float) -> Floats:
+    """Constant mu with the tangent stiffness EA (1 + stiffening (tau - 1)), in the form of a table."""
+    table = np.zeros((4, 16))
+    table[0, 0], table[0, STIFFENING] = STIFF, stiffening
+    return table
 
 
 def law_table(
@@ -91,7 +100,7 @@ def groove(L: Floats, law: int, y: float) -> float:
     """Friction-weighted angle g(y); y itself for the plain law."""
     if L is None:
         return y
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] != TABLED:
         return y
     return look_up(L, law, 2, L[law, 0, 4], L[law, 0, 5], y)
 
@@ -101,7 +110,7 @@ def between(L: Floats, law: int, y_low: float, y_high: float, share: float) -> f
     """The angle whose groove coordinate lies by `share` between those of y_low and y_high."""
     if L is None:
         return y_low + share * (y_high - y_low)
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] != TABLED:
         return y_low + share * (y_high - y_low)
     low = groove(L, law, y_low)
     return groove_inverse(L, law, low + share * (groove(L, law, y_high) - low), y_low, y_high)
@@ -139,7 +148,7 @@ def v_of_tau(L: Floats, law: int, tau: float) -> float:
     u = math.log(tau)
     if L is None:
         return u
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] != TABLED:
         return u
     return look_up(L, law, 3, L[law, 0, 7], L[law, 0, 8], u)
 
@@ -149,7 +158,7 @@ def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
     """Derivative of `v_of_tau`; 1/tau for the plain law."""
     if L is None:
         return 1.0 / tau
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] != TABLED:
         return 1.0 / tau
     return _slope_table(L, law, tau, v)
 
@@ -169,7 +178,7 @@ def tau_of_v(L: Floats, law: int, v: float) -> float:
     """Tension ratio of the profile variable."""
     if L is None:
         return math.exp(v)
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] != TABLED:
         return math.exp(v)
     return math.exp(look_up(L, law, 1, L[law, 0, 1], L[law, 0, 2], v))
 
@@ -179,7 +188,7 @@ def strain_of_tau(L: Floats, law: int, tau: float) -> tuple[float, float]:
     """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int d tau/(1 + b (tau - 1))."""
     if L is None:
         return tau - 1.0, 1.0
-    if L[0, 0, 0] == 0.0:
+    if L[0, 0, 0] == PLAIN:
         return tau - 1.0, 1.0
     return stiffening_strain(L[law, 0, STIFFENING], tau)
 

@@ -16,7 +16,7 @@ from cablecomp.mechanics.cable import law_of, stacks
 from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
-from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, tau_of_v, v_of_tau
+from cablecomp.mechanics.tables import TABLED, dv_dtau, strain_of_tau, tau_of_v, v_of_tau
 
 Side: TypeAlias = tuple[Floats, Ints, Floats, float]
 """State, stack heights, profiles of one bound, and +1 for the upper, -1 for the lower one."""
@@ -47,7 +47,7 @@ def cable_block(I: Ints, c: int) -> int:
 
 def steepest(L: Floats | None) -> float:
     """Greatest factor by which a law table (None = plain) raises friction over mu, by place and by tension (e^-2..e^2)."""
-    if L is None or L[0, 0, 0] == 0.0:
+    if L is None or L[0, 0, 0] != TABLED:
         return 1.0
     place = float(np.max(np.diff(L[:, 2]) / L[:, 0, 5:6]))
     u = L[0, 1]

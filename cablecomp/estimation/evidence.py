@@ -1,0 +1,219 @@
+"""Recordings as a fit takes them: cleaned inputs, rows thinned by travel, sessions and conditions.
+
+A law that knows no rates is done with a row per so much travel: between two rows motion and load go one way. Holds
+keep a row per so much time. What has no finite reading is bridged for the inputs and does not count for the outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cablecomp.config import JointConfig
+from cablecomp.errors import InputError
+from cablecomp.mechanics.jit import njit
+from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.smoothing import FloatArray, IntArray, group_means, keep_corners
+
+BoolArray = NDArray[np.bool_]
+
+JOINT: Final = "joint_position_rad"
+MOTOR: Final = "motor_torque_Nm"
+OUTPUTS: Final = (JOINT, MOTOR, "tension_h_N", "tension_l_N")
+"""Channels that a model has to account for, where they are recorded."""
+
+NEEDED: Final = ("time_s", "motor_position_rad", JOINT)
+FINE_ROWS: Final = 12_000
+"""Rows of all recordings together at which a law with rates is run."""
+LEAST_FINE: Final = 1_200
+"""Rows that a recording keeps of these, however many there are."""
+SPIKE: Final = 8.0
+"""Deviations (scaled median) from the neighbours beyond which a reading is an outlier."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One recording, ready to be fitted.
+
+    `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are judged, thinned
+    by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time that a judged row stands
+    for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside.
+    """
+
+    name: str
+    session: str
+    condition: Mapping[str, float]
+    columns: Mapping[str, FloatArray]
+    rows: IntArray
+    counted: Mapping[str, BoolArray]
+    weight: FloatArray
+    noise: Mapping[str, float] = field(default_factory=dict)
+    outliers: int = 0
+    samples: int = 0
+    step_s: float = 0.0
+
+    def at_rows(self, name: str) -> FloatArray:
+        """A channel on the judged rows."""
+        return self.columns[name][self.rows]
+
+    def counting_from(self, first: int) -> Evidence:
+        """The same with judged rows before `first` not counted."""
+        later = np.arange(len(self.rows)) >= first
+        return replace(self, counted={k: v & later for k, v in self.counted.items()})
+
+
+def load_channel(config: JointConfig, columns: Mapping[str, FloatArray]) -> str | None:
+    """Channel that holds the load: `joint_torque_Nm`, else the motor's torque where the configuration says so, else none."""
+    if config.observer.load == "motor_torque" and MOTOR in columns:
+        return MOTOR
+    return "joint_torque_Nm" if "joint_torque_Nm" in columns else None
+
+
+def gather(
+    config: JointConfig,
+    name: str,
+    columns: Mapping[str, FloatArray],
+    session: str,
+    *,
+    fine_rows: int,
+    judged_rows: int,
+) -> Evidence:
+    """Clean and thin one recording (canonical channels -> columns).
+
+    Raises InputError where a channel that is needed is missing or has hardly a finite reading.
+    """
+    for key in NEEDED:
+        if key not in columns:
+            raise InputError(f"{name}: channel `{key}` is missing; a diagnosis needs {', '.join(NEEDED)}")
+    raw = {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()}
+    raw = _in_order(name, raw)
+    load = load_channel(config, raw)
+    inputs = [k for k in raw if k not in OUTPUTS or k == load]
+    outliers = 0
+    finite = {k: np.isfinite(raw[k]) for k in OUTPUTS if k in raw}
+    noise: dict[str, float] = {}
+    for key, values in raw.items():
+        if key == "time_s":
+            continue
+        good = np.isfinite(values)
+        if good.sum() < 40:
+            raise InputError(f"{name}: channel `{key}` has {int(good.sum())} finite readings; 40 are needed")
+        spikes = _spikes(values, good)
+        outliers += int(spikes.sum())
+        good &= ~spikes
+        if key in finite:
+            finite[key] &= ~spikes
+        raw[key] = np.interp(raw["time_s"], raw["time_s"][good], values[good])
+        noise[key] = _noise(raw["time_s"][good], values[good])
+    group = max(1, len(raw["time_s"]) // fine_rows)
+    whole = len(raw["time_s"]) // group * group
+    means = {k: group_means(v[:whole], group) for k, v in raw.items()}
+    good_rows = {k: group_means(v[:whole].astype(np.float64), group) > 0.5 for k, v in finite.items()}
+    for key in inputs:
+        if key != "time_s" and np.ptp(means[key]) > 0.0:
+            means[key] = keep_corners(means["time_s"], means[key], noise[key] / np.sqrt(group))
+    if load == MOTOR:
+        good_rows.pop(MOTOR)
+    rows = thinned(means, load, judged_rows)
+    time = means["time_s"][rows]
+    share = np.gradient(time) if len(time) > 1 else np.ones(1)
+    weight = np.sqrt(share / share.mean())
+    return Evidence(
+        name,
+        session,
+        {},
+        means,
+        rows,
+        {k: v[rows] for k, v in good_rows.items()},
+        weight,
+        noise,
+        outliers,
+        len(raw["time_s"]),
+        float(np.median(np.diff(raw["time_s"]))),
+    )
+
+
+def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]:
+    """(fine, judged) rows of each recording, out of its samples and of what all together may have."""
+    total = sum(samples)
+    fine = [max(LEAST_FINE, int(FINE_ROWS * n / total)) for n in samples]
+    return fine, [max(60, min(int(judged * n / total), f)) for n, f in zip(samples, fine, strict=True)]
+
+
+def thinned(columns: Mapping[str, FloatArray], load: str | None, count: int) -> IntArray:
+    """About `count` rows, even in travel (motor, joint and load over their ranges, and a share of time), and every turning
+    point of motor and load in between."""
+    time = columns["time_s"]
+    n = len(time)
+    if n <= count:
+        return np.arange(n)
+    span = float(time[-1] - time[0]) or 1.0
+    travel = np.gradient(time) / span
+    drivers = ["motor_position_rad", *([load] if load else [])]
+    for key in (*drivers, JOINT):
+        values = columns[key]
+        width = float(np.ptp(values))
+        if width > 0.0:
+            step = np.abs(np.gradient(values)) / width
+            travel = travel + step / max(float(step.sum()), 1e-12)
+    total = np.cumsum(travel)
+    even = np.searchsorted(total, np.linspace(total[0], total[-1], count))
+    kept = [even, np.array([0, n - 1])]
+    for key in drivers:
+        kept.append(_turns(columns[key], 0.02 * float(np.ptp(columns[key]))))
+    return np.unique(np.clip(np.concatenate(kept), 0, n - 1)).astype(np.int64)
+
+
+@njit
+def _turns(values: FloatArray, least: float) -> IntArray:
+    """Indices at which the channel turned round by more than `least`."""
+    found = np.zeros(len(values), dtype=np.int64)
+    count, extreme, sign = 0, 0, 0.0
+    for k in range(1, len(values)):
+        move = values[k] - values[extreme]
+        if sign == 0.0:
+            if abs(move) > least:
+                sign = 1.0 if move > 0.0 else -1.0
+                extreme = k
+        elif sign * move > 0.0:
+            extreme = k
+        elif -sign * move > least and least > 0.0:
+            found[count] = extreme
+            count += 1
+            sign, extreme = -sign, k
+    return found[:count]
+
+
+def _in_order(name: str, columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Rows with a finite time, one of each instant."""
+    time = columns["time_s"]
+    kept = np.isfinite(time)
+    kept[1:] &= np.diff(np.maximum.accumulate(np.where(kept, time, -np.inf))) > 0.0
+    if kept.sum() < 40:
+        raise InputError(f"{name}: {int(kept.sum())} samples with a time of their own; 40 are needed")
+    return {k: v[kept] for k, v in columns.items()}
+
+
+def _spikes(values: FloatArray, good: BoolArray) -> BoolArray:
+    """Single readings far off the line through their neighbours, and off what differences usually are."""
+    found = np.zeros(len(values), dtype=np.bool_)
+    place = np.flatnonzero(good)
+    v = values[place]
+    before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
+    both = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    usual = float(np.median(np.abs(np.diff(v, 2)))) / 0.6745 + 1e-300
+    found[place[1:-1]] = (both > SPIKE * usual) & (both > SPIKE * float(np.quantile(both, 0.97)) / 2.0)
+    return found
+
+
+def _noise(time: FloatArray, values: FloatArray) -> float:
+    if np.ptp(values) == 0.0:
+        return 0.0
+    try:
+        return float(channel_noise(time, values).sigma)
+    except InputError:
+        return 0.0

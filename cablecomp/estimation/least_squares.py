@@ -1,0 +1,131 @@
+"""Bounded least squares from one or several starts, and what of a fit is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.signal.autocorrelation import integrated_time_of_parts
+from cablecomp.signal.smoothing import FloatArray
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A solution: coordinates, weighted residual (priors last) and its derivative."""
+
+    problem: Problem
+    x: FloatArray
+    residual: FloatArray
+    J: FloatArray
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares, priors included."""
+        return 0.5 * float(self.residual @ self.residual)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters by name."""
+        return self.problem.values(self.x)
+
+    def at_bound(self) -> tuple[str, ...]:
+        """Parameters that ended on a bound of theirs (a lower bound of zero is an answer, not a bound)."""
+        low, high = self.problem.bounds()
+        found = []
+        for p, x, a, b in zip(self.problem.parameters, self.x, low, high, strict=True):
+            if b - x < 1e-3 * (b - a) or (x - a < 1e-3 * (b - a) and (p.log or p.low != 0.0)):
+                found.append(p.name)
+        return tuple(found)
+
+
+def solve(problem: Problem, x: FloatArray | None = None, evaluations: int = 20) -> Fit:
+    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept."""
+    low, high = problem.bounds()
+    start = problem.start if x is None else x
+    margin = 1e-6 * (high - low)
+    inside = np.clip(start, low + margin, high - margin)
+    if not len(inside):
+        r = problem.residual(inside)
+        return Fit(problem, inside, r, np.empty((len(r), 0)))
+    memory: dict[bytes, FloatArray] = {}
+
+    def residual(x: FloatArray) -> FloatArray:
+        key = x.tobytes()
+        if key not in memory:
+            memory.clear()
+            memory[key] = problem.residual(x)
+        return memory[key]
+
+    found = least_squares(
+        residual,
+        inside,
+        jac=lambda x: problem.jacobian(x, residual(x)),
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=1e-4,
+        xtol=1e-4,
+        gtol=1e-6,
+        max_nfev=evaluations,
+    )
+    return Fit(problem, found.x, found.fun, found.jac)
+
+
+def best_of(problem: Problem, starts: Sequence[FloatArray], rough: int, evaluations: int) -> Fit:
+    """Rough fits from every start, the best carried on: friction leaves more than one valley in the misfit."""
+    fits = [solve(problem, x, rough) for x in starts]
+    best = min(fits, key=lambda f: f.cost)
+    return solve(problem, best.x, evaluations)
+
+
+def weighed(fit: Fit, floor: Weighing) -> Weighing:
+    """What a misfit counts for, out of what this fit leaves: RMS by channel times the root of its memory, never below
+    `floor`; the recordings' zeros by how they scatter (one step of expectation-maximisation)."""
+    problem = fit.problem
+    sigma, zero_sd = {}, {}
+    for c in problem.channels:
+        parts = []
+        for r, m in zip(problem.evidence, problem.left(fit.x, c), strict=True):
+            if c in r.counted and r.counted[c].sum() > 8:
+                parts.append((r.weight * m)[r.counted[c]])
+        whole = np.concatenate(parts)
+        size = float(np.sqrt(np.mean(np.minimum(whole**2, 16.0 * np.median(whole**2) / 0.455))))
+        sigma[c] = max(size * float(np.sqrt(integrated_time_of_parts(parts))), floor.sigma[c])
+        zeros = problem.zeros(fit.x)[c]
+        spread = [
+            float(zeros[r.name][0] - zeros[r.session][0])
+            for r in problem.evidence
+            if sum(q.session == r.session for q in problem.evidence) > 1
+        ]
+        if spread:
+            zero_sd[c] = max(float(np.sqrt(np.mean(np.square(spread)))), floor.zero_sd.get(c, 0.0))
+    return Weighing(sigma, zero_sd)
+
+
+def refit(fit: Fit, weighing: Weighing, evaluations: int = 10) -> Fit:
+    """The same fit with other weights, from where it stands."""
+    return solve(replace(fit.problem, weighing=weighing), fit.x, evaluations)
+
+
+def covariance(fit: Fit) -> FloatArray:
+    """Covariance of x: the inverse of J'J, priors in it; directions that nothing shows stay as wide as their bounds."""
+    J = fit.J
+    if not J.shape[1]:
+        return np.empty((0, 0))
+    low, high = fit.problem.bounds()
+    normal = J.T @ J + np.diag(1.0 / np.maximum(high - low, 1e-9) ** 2)
+    return np.asarray(np.linalg.pinv(normal), dtype=np.float64)
+
+
+def rms_left(fit: Fit, channel: str = JOINT) -> float:
+    """RMS of what the fit leaves of a channel, recordings' own zeros taken off, weighed by time."""
+    parts = [
+        (r.weight * m)[r.counted[channel]]
+        for r, m in zip(fit.problem.evidence, fit.problem.left(fit.x, channel), strict=True)
+        if channel in r.counted
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))

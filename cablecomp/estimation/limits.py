@@ -1,0 +1,14 @@
+"""Numbers that bound a fit: each with its unit and the reason for it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+DECADES: Final = 2.3
+"""Decades either way that a quantity known by order of magnitude may go: two on either side hold what labs call that."""
+OWN_SD: Final = 1.0
+"""Prior sd of a session's own value about the common one, in units of the common one's own prior."""
+STEP: Final = 1e-3
+"""Step of the difference quotients in x: large against round-off and the kinks of friction, small against what matters."""
+HOPELESS: Final = 30.0
+"""Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

@@ -1,0 +1,137 @@
+"""Free parameters of a fit: how each enters the drive, where it may lie, and where it likely does.
+
+Names are those of the configuration (`cablecomp.config.with_values`): a key of `[[drive.stage]]`, of `[sensors]`, or
+`effect.ID.KEY`. `NAME@SESSION` is that session's own value; `NAME~CONDITION` is what NAME gains per unit of a condition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, inf, log
+
+from cablecomp.config import JointConfig
+from cablecomp.effects import Effect
+from cablecomp.effects import Parameter as EffectParameter
+from cablecomp.estimation.limits import DECADES, OWN_SD
+
+DECADE = log(10.0)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One free parameter, fitted as x: value = exp(x) if `log`, else `scale` x.
+
+    `start`, `low`, `high` in the parameter's unit; `centre` and `sd`: its prior, sd in x (infinite = none).
+    """
+
+    name: str
+    start: float
+    low: float
+    high: float
+    log: bool
+    scale: float = 1.0
+    centre: float = 0.0
+    sd: float = inf
+
+    def x(self, value: float) -> float:
+        """The coordinate of a value, inside the bounds."""
+        value = min(max(value, self.low), self.high)
+        return log(value) if self.log else value / self.scale
+
+    def value(self, x: float) -> float:
+        """The value at a coordinate."""
+        return exp(x) if self.log else self.scale * x
+
+    def slope(self, x: float) -> float:
+        """d value / d x."""
+        return exp(x) if self.log else self.scale
+
+    @property
+    def centre_x(self) -> float:
+        """Coordinate of the prior's centre."""
+        return log(self.centre) if self.log else self.centre / self.scale
+
+    @property
+    def base(self) -> str:
+        """The name without session or condition."""
+        return self.name.partition("@")[0].partition("~")[0]
+
+    @property
+    def session(self) -> str | None:
+        """The session whose own value this is, or None."""
+        return self.name.partition("@")[2] or None
+
+    @property
+    def condition(self) -> str | None:
+        """The condition that this is a gain by, or None."""
+        return self.name.partition("~")[2] or None
+
+
+def of_drive(config: JointConfig) -> tuple[Parameter, ...]:
+    """What `[tolerance]` frees of the drive and its sensors: log-normal priors, 1 and more = known to a decade."""
+    found = []
+    for name, tolerance in config.tolerance.items():
+        if tolerance <= 0.0:
+            continue
+        key, _, which = name.partition(".")
+        stage = config.drive.stage[int(which) - 1 if which else 0]
+        nominal = getattr(stage, key, None)
+        if nominal is None:
+            nominal = getattr(config.sensors, key, None)
+        if nominal is None or key.endswith("_offset_rad") or key == "motor_torque_offset_Nm":
+            continue  # zeros are found inside of the fit
+        nominal = float(nominal)
+        if key.endswith("_offset_Nm"):
+            found.append(
+                Parameter(
+                    name, nominal, nominal - 8 * tolerance, nominal + 8 * tolerance, False, tolerance, nominal, 1.0
+                )
+            )
+            continue
+        sd = DECADE if tolerance >= 1.0 else tolerance
+        reach = exp(DECADES * DECADE if tolerance >= 1.0 else 6.0 * tolerance)
+        found.append(Parameter(name, nominal, nominal / reach, nominal * reach, True, 1.0, nominal, sd))
+    return tuple(found)
+
+
+def of_effect(effect: Effect, values: Mapping[str, float], config: JointConfig) -> tuple[Parameter, ...]:
+    """An effect's parameters from these starting values, bounds those of its law and of its prior range."""
+    found = []
+    for p in effect.parameters:
+        if p.name not in values:
+            continue
+        found.append(_of_effect(f"effect.{effect.id}.{p.name}", p, values[p.name], config))
+    return tuple(found)
+
+
+def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig) -> Parameter:
+    low, high = p.bounds(config)
+    span = max(abs(low), abs(high))
+    if p.name == "phase_rad":
+        return Parameter(name, value, -20.0, 20.0, False)
+    if p.name == "time_s":
+        return Parameter(name, value, p.minimum, p.maximum, False)
+    if p.shape and p.log:
+        return Parameter(name, value, max(low / 30.0, p.minimum, 1e-12), min(high * 30.0, p.maximum), True, 1.0,
+                         (low * high) ** 0.5, 1.5 * DECADE)  # fmt: skip
+    if p.shape:
+        return Parameter(name, value, max(low, p.minimum), min(high, p.maximum), False, max(span, 1e-12))
+    one_sided = p.log or low >= 0.0
+    least = max(0.0 if one_sided else low * 3.0, p.minimum)
+    most = min(high * 10.0, p.maximum)
+    scale = abs(value) if value else 0.05 * span
+    return Parameter(name, value, least, most, False, max(scale, 1e-300))
+
+
+def own_of(p: Parameter, sessions: Sequence[str]) -> tuple[Parameter, ...]:
+    """One parameter for each session in place of a common one."""
+    return tuple(
+        Parameter(f"{p.base}@{s}", p.start, p.low, p.high, p.log, p.scale, p.centre, p.sd) for s in sessions
+    )
+
+
+def by_condition(p: Parameter, condition: str, width: float) -> Parameter:
+    """What a parameter gains per unit of a condition whose values lie `width` apart."""
+    size = max(abs(p.start), p.scale if not p.log else p.start) / max(width, 1e-12)
+    return Parameter(f"{p.base}~{condition}", 0.0, -50.0 * size, 50.0 * size, False, size, 0.0, OWN_SD * 10.0)

@@ -1,0 +1,242 @@
+"""The fitting problem: misfits of all output channels of all recordings, zeros found inside, priors beside them.
+
+Minimised over x is  sum_c sum_i (w_i (y_ci - f_ci(x) - zero_c))^2 / s_c^2  +  sum_j ((x_j - centre_j)/sd_j)^2.
+y: measured, f: predicted, s_c: what is usually left in channel c times the root of its memory (so that many rows that
+say the same weigh as what they are). Zeros are linear: a session's is free, a recording's departs from it by some
+`zero_sd`; the motor torque has a slope by motor angle beside it (wires that are wound up). They are projected out
+(variable projection, G. Golub and V. Pereyra 1973).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
+from cablecomp.estimation.limits import HOPELESS, STEP
+from cablecomp.estimation.parameter import Parameter
+from cablecomp.estimation.simulate import Simulator, simulator
+from cablecomp.estimation.standing import standing
+from cablecomp.signal.smoothing import FloatArray, IntArray
+
+History = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """A basis of what the zeros of one channel can do to its weighted rows, and how to read the zeros off."""
+
+    Q: FloatArray
+    R: FloatArray
+    penalty_rows: int
+
+    def project(self, rows: FloatArray) -> FloatArray:
+        """Rows (and the penalties) with the best zeros taken off."""
+        padded = np.concatenate([rows, np.zeros(self.penalty_rows)])
+        return np.asarray(padded - self.Q @ (self.Q.T @ padded), dtype=np.float64)
+
+    def solve(self, rows: FloatArray) -> FloatArray:
+        """The zeros themselves."""
+        padded = np.concatenate([rows, np.zeros(self.penalty_rows)])
+        return np.asarray(np.linalg.lstsq(self.R, self.Q.T @ padded, rcond=None)[0], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero departs from
+    its session's."""
+
+    sigma: Mapping[str, float]
+    zero_sd: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Recordings, a joint, what of it is free."""
+
+    config: JointConfig
+    parameters: tuple[Parameter, ...]
+    evidence: tuple[Evidence, ...]
+    weighing: Weighing
+    histories: History = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_zeros", {c: self._zeros_of(c) for c in self.channels})
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Output channels that count, the joint's angle first."""
+        return tuple(self.weighing.sigma)
+
+    # --- coordinates --------------------------------------------------------------------------------------------------
+
+    @property
+    def start(self) -> FloatArray:
+        """Coordinates of the starting values."""
+        return np.array([p.x(p.start) for p in self.parameters])
+
+    def values(self, x: FloatArray) -> dict[str, float]:
+        """Parameters by name, in their own units."""
+        return {p.name: p.value(float(v)) for p, v in zip(self.parameters, x, strict=True)}
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Bounds of x."""
+        return (
+            np.array([p.x(p.low) for p in self.parameters]),
+            np.array([p.x(p.high) for p in self.parameters]),
+        )
+
+    def with_evidence(self, evidence: Sequence[Evidence]) -> Problem:
+        """The same about other recordings."""
+        return replace(self, evidence=tuple(evidence))
+
+    # --- misfits ------------------------------------------------------------------------------------------------------
+
+    def joint(self, x: FloatArray, recording: Evidence) -> JointConfig:
+        """The joint at x as it stood in this recording."""
+        return standing(self.config, self.values(x), recording)
+
+    def misfits(self, x: FloatArray) -> dict[str, list[FloatArray]]:
+        """Measured less predicted, zeros still in it, on all judged rows, by channel and recording; NaN where the recording
+        lacks the channel. Raises InputError where the drive cannot follow."""
+        values = self.values(x)
+        found: dict[str, list[FloatArray]] = {c: [] for c in self.channels}
+        cache: dict[Any, Simulator] = {}
+        for r in self.evidence:
+            key = self._stand_key(r)
+            if key not in cache:
+                cache[key] = simulator(standing(self.config, values, r))
+            predicted = cache[key].predict(r, self.histories.get(r.name))
+            for c in self.channels:
+                if c in r.columns:
+                    found[c].append(r.at_rows(c) - predicted[c])
+                else:
+                    found[c].append(np.full(len(r.rows), np.nan))
+        return found
+
+    def _stand_key(self, r: Evidence) -> Any:
+        own = any(p.session for p in self.parameters)
+        return (r.session if own else None, *(r.condition[p.condition] for p in self.parameters if p.condition))
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Weighted misfits with their zeros taken off, channel by channel, then the priors."""
+        try:
+            misfits = self.misfits(x)
+            parts = [self._zeros[c].project(self._rows(c, misfits[c])) for c in self.channels]  # type: ignore[attr-defined]
+            data = np.concatenate(parts)
+        except InputError:
+            data = np.full(self._length(), HOPELESS)
+        return np.concatenate([data, self.prior(x)])
+
+    def prior(self, x: FloatArray) -> FloatArray:
+        """Departures from the priors' centres over their sds (0 where there is none)."""
+        return np.array([
+            (v - p.centre_x) / p.sd if np.isfinite(p.sd) else 0.0
+            for p, v in zip(self.parameters, x, strict=True)
+        ])  # fmt: skip
+
+    def jacobian(self, x: FloatArray, base: FloatArray | None = None) -> FloatArray:
+        """d residual / d x by differences, inward at a bound."""
+        here = self.residual(x) if base is None else base
+        low, high = self.bounds()
+        columns = np.empty((len(here), len(x)))
+        for k in range(len(x)):
+            step = STEP if x[k] + STEP <= high[k] else -STEP
+            moved = x.copy()
+            moved[k] += step
+            columns[:, k] = (self.residual(moved) - here) / step
+        return columns
+
+    def zeros(self, x: FloatArray) -> dict[str, dict[str, FloatArray]]:
+        """By channel: the zero (and slope, for the motor torque) of each session, and of each recording, in the channel's
+        unit."""
+        misfits = self.misfits(x)
+        found: dict[str, dict[str, FloatArray]] = {}
+        for c in self.channels:
+            solved = self._zeros[c].solve(self._rows(c, misfits[c]))  # type: ignore[attr-defined]
+            width = 2 if c == MOTOR else 1
+            sessions = self.sessions
+            by_name = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(sessions)}
+            departures = solved[width * len(sessions) :]
+            for r, d in zip(self.evidence, departures if len(departures) else np.zeros(len(self.evidence)), strict=True):
+                own = by_name[r.session].copy()
+                own[0] += d
+                by_name[r.name] = own
+            found[c] = by_name
+        return found
+
+    def left(self, x: FloatArray, channel: str = JOINT, own_zero: bool = True) -> list[FloatArray]:
+        """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions') taken off."""
+        misfits, zeros = self.misfits(x)[channel], self.zeros(x)[channel]
+        parts = []
+        for r, m in zip(self.evidence, misfits, strict=True):
+            zero = zeros[r.name if own_zero else r.session]
+            line = zero[0] + (zero[1] * r.at_rows("motor_position_rad") if len(zero) > 1 else 0.0)
+            parts.append(m - line)
+        return parts
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """The recordings' sessions, in order."""
+        return tuple(dict.fromkeys(r.session for r in self.evidence))
+
+    def spans(self) -> dict[str, slice]:
+        """Where each channel's rows lie in the residual."""
+        found, first = {}, 0
+        for c in self.channels:
+            count = sum(int(r.counted[c].sum()) if c in r.counted else 0 for r in self.evidence)
+            found[c] = slice(first, first + count)
+            first += count + self._zeros[c].penalty_rows  # type: ignore[attr-defined]
+        return found
+
+    def owners(self, channel: str) -> IntArray:
+        """Which recording each counted row of a channel belongs to."""
+        counts = [int(r.counted[channel].sum()) if channel in r.counted else 0 for r in self.evidence]
+        return np.repeat(np.arange(len(counts)), counts)
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _rows(self, channel: str, misfits: Sequence[FloatArray]) -> FloatArray:
+        parts = []
+        for r, m in zip(self.evidence, misfits, strict=True):
+            if channel in r.counted:
+                kept = r.counted[channel]
+                parts.append((r.weight * m)[kept] / self.weighing.sigma[channel])
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    def _length(self) -> int:
+        return sum(s.stop - s.start for s in self.spans().values()) + sum(
+            z.penalty_rows
+            for z in self._zeros.values()  # type: ignore[attr-defined]
+        )
+
+    def _zeros_of(self, channel: str) -> Zeros:
+        sigma, spread = self.weighing.sigma[channel], self.weighing.zero_sd.get(channel, 0.0)
+        width = 2 if channel == MOTOR else 1
+        sessions = self.sessions
+        n_dep = len(self.evidence) if spread > 0.0 else 0
+        blocks = []
+        for k, r in enumerate(self.evidence):
+            if channel not in r.counted:
+                continue
+            kept = r.counted[channel]
+            w = r.weight[kept] / sigma
+            block = np.zeros((len(w), width * len(sessions) + n_dep))
+            first = width * sessions.index(r.session)
+            block[:, first] = w
+            if width == 2:
+                block[:, first + 1] = w * r.at_rows("motor_position_rad")[kept]
+            if n_dep:
+                block[:, width * len(sessions) + k] = w
+            blocks.append(block)
+        matrix = np.vstack(blocks)
+        penalty = np.zeros((n_dep, matrix.shape[1]))
+        for k in range(n_dep):
+            penalty[k, width * len(sessions) + k] = 1.0 / spread
+        Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
+        return Zeros(Q, R, n_dep)
