@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -108,7 +108,7 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
 
 def refit(fit: Fit, weighing: Weighing, evaluations: int = 10) -> Fit:
     """The same fit with other weights, from where it stands."""
-    return solve(replace(fit.problem, weighing=weighing), fit.x, evaluations)
+    return solve(fit.problem.with_weighing(weighing), fit.x, evaluations)
 
 
 def covariance(fit: Fit) -> FloatArray:

@@ -10,5 +10,9 @@ OWN_SD: Final = 1.0
 """Prior sd of a session's own value about the common one, in units of the common one's own prior."""
 STEP: Final = 1e-3
 """Step of the difference quotients in x: large against round-off and the kinks of friction, small against what matters."""
+INSTANT_STEP_S: Final = 0.05
+"""Step of the difference quotient by an event's instant: it has to move over rows that are thinned by travel."""
+INSTANT_REACH_S: Final = 20.0
+"""How far an event's instant may move from where it was found by asking."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

@@ -13,7 +13,7 @@ from math import exp, inf, log
 from cablecomp.config import JointConfig
 from cablecomp.effects import Effect
 from cablecomp.effects import Parameter as EffectParameter
-from cablecomp.estimation.limits import DECADES, OWN_SD
+from cablecomp.estimation.limits import DECADES, INSTANT_REACH_S, INSTANT_STEP_S, OWN_SD, STEP
 
 DECADE = log(10.0)
 
@@ -111,7 +111,7 @@ def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig)
     if p.name == "phase_rad":
         return Parameter(name, value, -20.0, 20.0, False)
     if p.name == "time_s":
-        return Parameter(name, value, p.minimum, p.maximum, False)
+        return Parameter(name, value, value - INSTANT_REACH_S, value + INSTANT_REACH_S, False, INSTANT_STEP_S / STEP)
     if p.shape and p.log:
         return Parameter(name, value, max(low / 30.0, p.minimum, 1e-12), min(high * 30.0, p.maximum), True, 1.0,
                          (low * high) ** 0.5, 1.5 * DECADE)  # fmt: skip

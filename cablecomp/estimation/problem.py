@@ -64,9 +64,11 @@ class Problem:
     evidence: tuple[Evidence, ...]
     weighing: Weighing
     histories: History = field(default_factory=dict)
+    bases: Mapping[str, Zeros] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_zeros", {c: self._zeros_of(c) for c in self.channels})
+        if not self.bases:
+            object.__setattr__(self, "bases", {c: self._zeros_of(c) for c in self.channels})
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -93,7 +95,11 @@ class Problem:
 
     def with_evidence(self, evidence: Sequence[Evidence]) -> Problem:
         """The same about other recordings."""
-        return replace(self, evidence=tuple(evidence))
+        return replace(self, evidence=tuple(evidence), bases={})
+
+    def with_weighing(self, weighing: Weighing) -> Problem:
+        """The same with other weights."""
+        return replace(self, weighing=weighing, bases={})
 
     # --- misfits ------------------------------------------------------------------------------------------------------
 
@@ -125,13 +131,17 @@ class Problem:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Weighted misfits with their zeros taken off, channel by channel, then the priors."""
+        found = self.followed(x)
+        return np.concatenate([np.full(self._length(), HOPELESS), self.prior(x)]) if found is None else found
+
+    def followed(self, x: FloatArray) -> FloatArray | None:
+        """As `residual`; None where the drive cannot follow."""
         try:
             misfits = self.misfits(x)
-            parts = [self._zeros[c].project(self._rows(c, misfits[c])) for c in self.channels]  # type: ignore[attr-defined]
-            data = np.concatenate(parts)
         except InputError:
-            data = np.full(self._length(), HOPELESS)
-        return np.concatenate([data, self.prior(x)])
+            return None
+        parts = [self.bases[c].project(self._rows(c, misfits[c])) for c in self.channels]
+        return np.concatenate([*parts, self.prior(x)])
 
     def prior(self, x: FloatArray) -> FloatArray:
         """Departures from the priors' centres over their sds (0 where there is none)."""
@@ -143,7 +153,7 @@ class Problem:
     def jacobian(self, x: FloatArray, base: FloatArray | None = None) -> FloatArray:
         """d residual / d x by differences, inward at a bound."""
         here = self.residual(x) if base is None else base
-        low, high = self.bounds()
+        high = self.bounds()[1]
         columns = np.empty((len(here), len(x)))
         for k in range(len(x)):
             step = STEP if x[k] + STEP <= high[k] else -STEP
@@ -158,7 +168,7 @@ class Problem:
         misfits = self.misfits(x)
         found: dict[str, dict[str, FloatArray]] = {}
         for c in self.channels:
-            solved = self._zeros[c].solve(self._rows(c, misfits[c]))  # type: ignore[attr-defined]
+            solved = self.bases[c].solve(self._rows(c, misfits[c]))
             width = 2 if c == MOTOR else 1
             sessions = self.sessions
             by_name = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(sessions)}
@@ -191,7 +201,7 @@ class Problem:
         for c in self.channels:
             count = sum(int(r.counted[c].sum()) if c in r.counted else 0 for r in self.evidence)
             found[c] = slice(first, first + count)
-            first += count + self._zeros[c].penalty_rows  # type: ignore[attr-defined]
+            first += count + self.bases[c].penalty_rows
         return found
 
     def owners(self, channel: str) -> IntArray:
@@ -211,8 +221,7 @@ class Problem:
 
     def _length(self) -> int:
         return sum(s.stop - s.start for s in self.spans().values()) + sum(
-            z.penalty_rows
-            for z in self._zeros.values()  # type: ignore[attr-defined]
+            z.penalty_rows for z in self.bases.values()
         )
 
     def _zeros_of(self, channel: str) -> Zeros:

@@ -1,0 +1,112 @@
+"""Parameters that are not the same everywhere: each session's own, or growing with a condition.
+
+Asked out of the derivative of a fit alone: a parameter's column cut by session, or weighted by the condition, is what a
+value of each session's own, or a gain per unit, would do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.screening import anchor
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parameter import Parameter, by_condition, own_of
+from cablecomp.estimation.problem import Problem
+from cablecomp.signal.smoothing import FloatArray
+
+PROMISING = 3
+"""Dependences of a round that are fitted, best first."""
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A parameter (`parameter`, as `with_values` takes it) that depends on `on`: "session", or a condition's name."""
+
+    parameter: str
+    on: str
+
+    @property
+    def name(self) -> str:
+        """For lists and pages."""
+        return f"{self.parameter} by {self.on}"
+
+    def belongs_to(self, term: Any) -> bool:
+        """Whether it is a parameter of this effect."""
+        return hasattr(term, "effect") and self.parameter.startswith(f"effect.{term.effect.id}.")
+
+    def undone(self, problem: Problem) -> Problem:
+        """The problem with one common value again."""
+        if self.on != "session":
+            kept = tuple(p for p in problem.parameters if p.name != f"{self.parameter}~{self.on}")
+            return replace(problem, parameters=kept)
+        own = [p for p in problem.parameters if p.base == self.parameter and p.session]
+        common = replace(own[0], name=self.parameter)
+        first = problem.parameters.index(own[0])
+        kept = [p for p in problem.parameters if p not in own]
+        kept.insert(first, common)
+        return replace(problem, parameters=tuple(kept))
+
+
+def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, float, Problem]]:
+    """The dependences that promise most: each with the cost after a linear step, and the problem that has it."""
+    problem = fit.problem
+    here = anchor(fit)
+    left = here.beyond(fit.residual)
+    energy = float(left @ left)
+    found: list[tuple[Dependence, float, Problem]] = []
+    owners = _owners(problem, len(fit.residual))
+    known = {t.name for t in terms if isinstance(t, Dependence)}
+    for k, p in enumerate(problem.parameters):
+        if p.session or p.condition or p.base.endswith((".time_s", ".phase_rad", "presliding_rad", "arc_length_m")):
+            continue
+        for dependence, columns, changed in _ways(problem, p, fit.J[:, k], owners):
+            if dependence.name in known:
+                continue
+            own = np.column_stack([here.beyond(c) for c in columns])
+            scale = np.linalg.norm(own, axis=0)
+            if not np.all(scale > 1e-9):
+                continue
+            best = np.linalg.lstsq(own / scale, left, rcond=1e-6)[0]
+            cost = 0.5 * float(np.sum((left - own / scale @ best) ** 2))
+            found.append((dependence, cost, changed))
+    found.sort(key=lambda f: f[1])
+    return [f for f in found if 2.0 * f[1] < 0.97 * energy][:PROMISING]
+
+
+def _ways(
+    problem: Problem, p: Parameter, column: FloatArray, owners: FloatArray
+) -> list[tuple[Dependence, list[FloatArray], Problem]]:
+    ways: list[tuple[Dependence, list[FloatArray], Problem]] = []
+    sessions = problem.sessions
+    place = problem.parameters.index(p)
+    if len(sessions) > 1:
+        cut = []
+        for s in sessions[1:]:
+            mine = np.array([e.session == s for e in problem.evidence])
+            inside = (owners >= 0) & mine[np.maximum(owners, 0).astype(np.int64)]
+            cut.append(np.where(inside, column, 0.0))
+        own = own_of(p, sessions)
+        free = (*problem.parameters[:place], *own, *problem.parameters[place + 1 :])
+        ways.append((Dependence(p.name, "session"), cut, replace(problem, parameters=free)))
+    for condition in problem.evidence[0].condition:
+        values = np.array([e.condition[condition] for e in problem.evidence])
+        if len(np.unique(values)) < 3:
+            continue
+        centred = values - values.mean()
+        weight = np.where(owners >= 0, centred[np.maximum(owners, 0).astype(np.int64)], 0.0)
+        gain = by_condition(p, condition, float(np.ptp(values)))
+        free = (*problem.parameters, gain)
+        ways.append((Dependence(p.name, condition), [column * weight], replace(problem, parameters=free)))
+    return ways
+
+
+def _owners(problem: Problem, length: int) -> FloatArray:
+    """Recording of each row of the residual, -1 for penalties and priors."""
+    found = np.full(length, -1.0)
+    for c, span in problem.spans().items():
+        found[span] = problem.owners(c)
+    return found

@@ -1,0 +1,163 @@
+"""Every effect as a hypothesis: where its parameters start, which channel it reads, which shapes are tried first."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cablecomp.config import EffectEntry, JointConfig
+from cablecomp.effects import Effect, Parameter, catalogue
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
+from cablecomp.estimation.parameter import Parameter as Free
+from cablecomp.estimation.parameter import of_effect
+
+PHASE = "phase_rad"
+INSTANT = "time_s"
+INSTANTS = 24
+"""Instants at which an event is asked for at first, over all recordings."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One point to begin from: the effect's parameters by name, texts included; the first amplitude is scaled later."""
+
+    values: Mapping[str, float | str]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One effect (and the channel that it reads), with the points to begin from.
+
+    `name`: its id, with `:channel` where it reads one. `amount`: the parameter that says how much.
+    """
+
+    effect: Effect
+    name: str
+    amount: Parameter
+    starts: tuple[Start, ...]
+    two_sided: bool
+
+    @property
+    def has_instant(self) -> bool:
+        """Whether it is an event."""
+        return any(p.name == INSTANT for p in self.effect.parameters)
+
+    @property
+    def has_phase(self) -> bool:
+        """Whether it has a phase, which goes with the amount as a pair."""
+        return any(p.name == PHASE for p in self.effect.parameters)
+
+    def entry(self, values: Mapping[str, float | str]) -> EffectEntry:
+        """The configuration's entry with these values, inside what the law can take."""
+        inside = {
+            k: (
+                v
+                if isinstance(v, str)
+                else min(max(v, self.effect.parameter(k).minimum), self.effect.parameter(k).maximum)
+            )
+            for k, v in values.items()
+        }
+        return EffectEntry(id=self.effect.id, **inside)
+
+    def neutral(self, values: Mapping[str, float | str]) -> dict[str, float | str]:
+        """The same with its amount switched off."""
+        return {**values, self.amount.name: self.amount.neutral}
+
+    def free(self, values: Mapping[str, float | str], config: JointConfig) -> tuple[Free, ...]:
+        """The parameters to fit, from these values; a second amount that starts neutral may grow."""
+        numbers = {k: v for k, v in values.items() if not isinstance(v, str)}
+        held = _held(self.effect)
+        return of_effect(self.effect, {k: v for k, v in numbers.items() if k not in held}, config)
+
+
+def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
+    """All effects that the configuration does not hold yet and that these recordings could show."""
+    held = {entry.id for entry in config.effect}
+    found = []
+    for effect in catalogue().values():
+        if effect.id in held:
+            continue
+        found += _of_effect(effect, config, evidence)
+    return found
+
+
+def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
+    if effect.id == "thermal_pretension" and not _varies(evidence, "temperature_degC"):
+        return []
+    if effect.id == "motor_friction" and not all(MOTOR in e.counted for e in evidence):
+        return []
+    channels: list[str | None] = [None]
+    if effect.texts:
+        channels = [n for n in _others(evidence) if n not in config.condition.values()]
+    amount = next(p for p in effect.parameters if not p.shape)
+    shapes = [p for p in effect.parameters if p.shape]
+    further = [p for p in effect.parameters if not p.shape and p is not amount]
+    low, high = amount.bounds(config)
+    size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
+    two_sided = not amount.log and low < 0.0
+    found = []
+    for channel in channels:
+        texts: dict[str, float | str] = {} if channel is None else {effect.texts[0]: channel}
+        grids = [_grid(p, config, evidence) for p in shapes]
+        starts = tuple(
+            Start(
+                {
+                    amount.name: size,
+                    **{p.name: v for p, v in zip(shapes, point, strict=True)},
+                    **{p.name: p.neutral for p in further},
+                    **texts,
+                }
+            )
+            for point in itertools.product(*grids)
+        )
+        name = effect.id if channel is None else f"{effect.id}:{channel}"
+        found.append(Hypothesis(effect, name, amount, starts, two_sided))
+    return found
+
+
+def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tuple[float, ...]:
+    low, high = p.bounds(config)
+    if p.name == PHASE:
+        return (0.0, 0.5 * math.pi)
+    if p.name == INSTANT:
+        first = min(float(e.columns["time_s"][0]) for e in evidence)
+        last = max(float(e.columns["time_s"][-1]) for e in evidence)
+        return tuple(first + (last - first) * (k + 0.5) / INSTANTS for k in range(INSTANTS))
+    if p.name == "reference_degC":
+        means = [float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns]
+        return (float(np.mean(means)) if means else 20.0,)
+    if p.name == "arc_length_m":
+        return (0.02 * high, 0.25 * high)
+    if p.name == "presliding_rad":
+        reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
+        return tuple(float(v) for v in np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3))
+    if p.log:
+        return tuple(float(v) for v in np.geomspace(low, high, 5)[1:-1])
+    return (0.5 * (low + high),)
+
+
+def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
+    """The same event asked for at these instants."""
+    base = h.starts[0].values
+    return replace(h, starts=tuple(Start({**base, INSTANT: float(t)}) for t in instants))
+
+
+def _held(effect: Effect) -> tuple[str, ...]:
+    """Parameters that a diagnosis leaves where they start: a bearing's growth with load (the load's own friction grows
+    with it already), the reference of a temperature (the pretension's other half)."""
+    return tuple(p.name for p in effect.parameters if p.name in ("load_coefficient", "reference_degC"))
+
+
+def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
+    return all(channel in e.columns for e in evidence) and max(
+        float(np.ptp(e.columns[channel])) for e in evidence
+    ) > 0.0
+
+
+def _others(evidence: Sequence[Evidence]) -> list[str]:
+    names = [n for n in evidence[0].columns if n.startswith("other_")]
+    return [n for n in names if _varies(evidence, n)]

@@ -1,0 +1,203 @@
+"""How well models predict what they were not fitted to: residuals with a group left out, paired differences, resampling.
+
+With J the derivative of a fit's weighted residual r, H = J'J (priors in it), leaving the rows g out moves the solution by
+a Gauss-Newton step, so that their residual becomes r_g + J_g (H - J_g' J_g)^-1 J_g' r_g. Models are compared by paired
+differences of a Huber score over groups; the scatter between groups is the yardstick (P. Hansen, A. Lunde and J. Nason, The
+Model Confidence Set, Econometrica 79, 2011, for the set of models that cannot be told apart).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.problem import Problem
+from cablecomp.signal.autocorrelation import integrated_time_of_parts
+from cablecomp.signal.smoothing import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Which group each row of the residual belongs to, channel by channel as the residual goes (-1: a penalty row, in none).
+
+    `fold`: groups that are left out together (a recording, a session, a condition; a block where there is one recording).
+    `by`: what the folds are.
+    """
+
+    block: IntArray
+    fold: IntArray
+    by: str
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return int(self.block.max()) + 1
+
+    @property
+    def folds(self) -> int:
+        """Number of folds."""
+        return int(self.fold.max()) + 1
+
+
+def make_groups(fit: Fit, by: str | None = None) -> Groups:
+    """Blocks of a few memories of the remainder's, within recordings; folds of whole recordings, sessions or conditions
+    where there are enough of them, else of alternating blocks."""
+    problem = fit.problem
+    owners = [problem.owners(c) for c in problem.channels]
+    counts = np.bincount(owners[0], minlength=len(problem.evidence))
+    by = by or ("recording" if len(problem.evidence) >= 4 else "block")
+    spans = problem.spans()
+    first_rows = fit.residual[spans[problem.channels[0]]]
+    parts = [first_rows[owners[0] == k] for k in range(len(problem.evidence)) if counts[k] > 8]
+    memory = integrated_time_of_parts(parts)
+    least, most = LIMITS.blocks
+    total = int(np.clip(counts.sum() / (LIMITS.memory * memory), least, most))
+    blocks, folds = [], []
+    for c, own in zip(problem.channels, owners, strict=True):
+        block = np.full(len(own), -1, dtype=np.int64)
+        first = 0
+        for k in range(len(problem.evidence)):
+            here = own == k
+            n = int(here.sum())
+            each = max(1, round(total * counts[k] / max(counts.sum(), 1)))
+            # by time, so that a block holds all channels of its time
+            place = np.linspace(0, each, n, endpoint=False).astype(np.int64)
+            block[here] = first + place
+            first += each
+        fold = own if by == "recording" else _fold_of(problem, own, block, by)
+        penalty = np.full(problem.bases[c].penalty_rows, -1, dtype=np.int64)
+        blocks += [block, penalty]
+        folds += [fold, penalty]
+    return Groups(np.concatenate(blocks), np.concatenate(folds), by)
+
+
+def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntArray:
+    if by == "session":
+        names = problem.sessions
+        return np.array([names.index(e.session) for e in problem.evidence])[own]
+    if by == "condition":
+        keys = [tuple(e.condition.values()) for e in problem.evidence]
+        known = list(dict.fromkeys(keys))
+        return np.array([known.index(k) for k in keys])[own]
+    return np.asarray(block % 6, dtype=np.int64)
+
+
+def left_out(fit: Fit, groups: Groups) -> FloatArray:
+    """Weighted residual of every data row with its fold left out of the fit (one Gauss-Newton step each)."""
+    n = len(groups.fold)
+    r, J = fit.residual[:n].copy(), fit.J[:n]
+    free = _free(fit)
+    J, H = J[:, free], fit.J[:, free].T @ fit.J[:, free]
+    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    for g in range(groups.folds):
+        here = groups.fold == g
+        Jg, rg = J[here] / scale, fit.residual[:n][here]
+        if not Jg.shape[1] or not len(rg):
+            continue
+        rest = H / np.outer(scale, scale) - Jg.T @ Jg
+        rest += 1e-9 * np.eye(len(rest))
+        try:
+            step = np.linalg.solve(rest, Jg.T @ rg)
+        except np.linalg.LinAlgError:
+            continue
+        r[here] = rg + Jg @ step
+    return r
+
+
+def _free(fit: Fit) -> IntArray:
+    """Parameters that are not on a bound; an event's instant is read from all rows, a block left out cannot place it."""
+    low, high = fit.problem.bounds()
+    margin = 1e-4 * (high - low)
+    instant = np.array([p.base.endswith(".time_s") for p in fit.problem.parameters], dtype=np.bool_)
+    return np.flatnonzero((fit.x > low + margin) & (fit.x < high - margin) & ~instant)
+
+
+def huber(r: FloatArray, scale: float) -> FloatArray:
+    """Huber's loss over half: r^2 within `tail` scales, linear beyond, in units of the scale's square."""
+    z = np.abs(r) / max(scale, 1e-300)
+    k = LIMITS.tail
+    return np.where(z < k, z**2, 2.0 * k * z - k * k)
+
+
+@dataclass(frozen=True)
+class Lead:
+    """How much better one model predicts than another.
+
+    `gain`: share of the worse one's loss that it takes off. `z`: the difference over what the better one's own remainder
+    makes of it by chance. `z_blocks`: over its scatter between blocks. `by_block`: the difference of each block.
+    """
+
+    gain: float
+    z: float
+    z_blocks: float
+    by_block: FloatArray
+
+
+def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
+    """Paired comparison on left-out residuals.
+
+    With d the difference of the two residuals and r the better one's, the losses differ by sum d^2 + 2 sum r d: the first
+    is what the better one explains, the second is chance, and scatters by the blocks' sums of r d.
+    """
+    here = groups.block >= 0
+    a, b, block = better[here], worse[here], groups.block[here]
+    scale = float(np.median(np.abs(a))) / 0.6745
+    la, lb = huber(a, scale), huber(b, scale)
+    difference = np.bincount(block, lb - la, minlength=groups.blocks)
+    total = float(np.sum(difference))
+    spread = difference - difference.mean()
+    error = sqrt(float(np.sum(spread**2)) * len(difference) / max(len(difference) - 1, 1))
+    r, d = np.clip(a / scale, -LIMITS.tail, LIMITS.tail), np.clip((b - a) / scale, -30.0, 30.0)
+    chance = np.bincount(block, r * d, minlength=groups.blocks)
+    noise = 2.0 * sqrt(float(np.sum(chance**2)) * len(chance) / max(len(chance) - 1, 1))
+    return Lead(
+        total / max(float(np.sum(lb)), 1e-300), total / max(noise, 1e-300), total / max(error, 1e-300), difference
+    )
+
+
+def selected_in(differences: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:
+    """Share of resampled bodies of blocks in which each model is the best."""
+    if not differences:
+        return {}
+    names = list(differences)
+    table = np.stack([differences[n] for n in names])
+    draws = rng.multinomial(table.shape[1], np.full(table.shape[1], 1.0 / table.shape[1]), LIMITS.resamples)
+    best = np.argmax(table @ draws.T, axis=0)
+    return {n: float(np.mean(best == k)) for k, n in enumerate(names)}
+
+
+def confidence_set(losses: Mapping[str, FloatArray], rng: np.random.Generator) -> tuple[str, ...]:
+    """Models that cannot be told from the best by their losses per block (T_max elimination, bootstrap over blocks).
+
+    Written out here because the libraries that have it bring pandas and statsmodels with them.
+    """
+    names = list(losses)
+    table = np.stack([losses[n] for n in names])
+    count = table.shape[1]
+    draws = rng.multinomial(count, np.full(count, 1.0 / count), LIMITS.resamples) / count
+    while len(names) > 1:
+        relative = table - table.mean(axis=0)
+        mean = relative.mean(axis=1)
+        boot = draws @ relative.T - mean
+        error = np.sqrt(np.mean(boot**2, axis=0)) + 1e-300
+        t = mean / error
+        p = float(np.mean(np.max(boot / error, axis=1) >= t.max()))
+        if p >= LIMITS.rival:
+            break
+        worst = int(np.argmax(t))
+        names.pop(worst)
+        table = np.delete(table, worst, axis=0)
+    return tuple(names)
+
+
+def mean_square(r: FloatArray, groups: Groups, span: slice) -> float:
+    """Mean square of the data rows of one channel."""
+    here = np.zeros(len(r), dtype=np.bool_)
+    here[span] = True
+    here &= groups.block >= 0
+    return float(np.mean(r[here] ** 2))

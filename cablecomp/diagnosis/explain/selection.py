@@ -1,0 +1,279 @@
+"""Forward selection: asked cheaply, fitted roughly, the promising ones to the end, the best by data left out; then done without
+what is not missed.
+
+Besides effects, a round tries dependences: a parameter that is each session's own, or grows with a condition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.scores import (
+    Groups,
+    Lead,
+    confidence_set,
+    huber,
+    lead,
+    left_out,
+    selected_in,
+)
+from cablecomp.diagnosis.explain.screening import Anchor, Answer, anchor, ask_all, rough
+from cablecomp.diagnosis.parallel import side_by_side
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.least_squares import Fit, rms_left, solve
+from cablecomp.estimation.problem import Problem
+from cablecomp.signal.smoothing import FloatArray
+
+Progress = Callable[[str, float], None]
+Term = Hypothesis | Dependence
+"""What a round may add to a model."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A drive with what was added to it, fitted; its residual with each fold left out."""
+
+    terms: tuple[Term, ...]
+    fit: Fit
+    left_out: FloatArray
+
+    @property
+    def name(self) -> str:
+        """Names of what was added, joined."""
+        return " + ".join(t.name for t in self.terms) or "calibrated drive"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One hypothesis of a round: its model, its lead over the model before, share of resampled data in which it was best."""
+
+    term: Term
+    model: Model
+    lead: Lead
+    selected_in: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """One step: what was promised (cost before over cost after a linear step, by name), what was fitted, what was taken."""
+
+    base: Model
+    promised: Mapping[str, float]
+    tried: tuple[Tried, ...]
+    accepted: Tried | None
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The calibrated drive, the rounds, the final model; answers of the first round (how much each effect could show)."""
+
+    baseline: Model
+    rounds: tuple[Round, ...]
+    final: Model
+    groups: Groups
+    answers: tuple[Answer, ...] = field(default=())
+
+
+def select(
+    baseline: Fit,
+    nominal: Fit | None,
+    pool: Sequence[Hypothesis],
+    groups: Groups,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> Selection:
+    """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is not missed.
+
+    `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to the effect
+    begins there.
+    """
+    first = Model((), baseline, left_out(baseline, groups))
+    beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
+    rounds: list[Round] = []
+    answers: tuple[Answer, ...] = ()
+    best = first
+    for number in range(LIMITS.rounds):
+        candidates: list[tuple[Round, Tried]] = []
+        for model, start in beam:
+            round_, answered = _one_round(model, start, pool, groups, rng, progress, number)
+            answers = answers or answered
+            rounds.append(round_)
+            candidates += [(round_, t) for t in round_.tried]
+        ranked = sorted(candidates, key=lambda c: _loss(c[1].model, best, groups))
+        fresh: list[Model] = []
+        for _, t in ranked:
+            known = {frozenset(x.name for x in m.terms) for m in fresh}
+            if frozenset(x.name for x in t.model.terms) not in known:
+                fresh.append(t.model)
+        if not fresh:
+            break
+        step = lead(fresh[0].left_out, best.left_out, groups)
+        if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
+            break
+        best = fresh[0]
+        if quiet(best.fit):
+            break
+        most = LIMITS.close * _loss(best, best, groups)
+        beam = [(m, None) for m in fresh[: LIMITS.beam] if m is best or _loss(m, best, groups) < most]
+    final = _pruned(best, groups)
+    return Selection(first, tuple(rounds), final, groups, answers)
+
+
+def _one_round(
+    model: Model,
+    nominal: Fit | None,
+    pool: Sequence[Hypothesis],
+    groups: Groups,
+    rng: np.random.Generator,
+    progress: Progress,
+    number: int,
+) -> tuple[Round, tuple[Answer, ...]]:
+    here = anchor(model.fit)
+    anchors = [here] if nominal is None else [here, anchor(nominal)]
+    names = {t.name for t in model.terms}
+    ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
+    left = [h for h in pool if h.name not in names and (h.effect.id not in ids or h.effect.texts)]
+    done = number / LIMITS.rounds
+
+    def answer(h: Hypothesis) -> Answer | None:
+        progress(f"asking {h.name}", done)
+        return ask_all(anchors, h)
+
+    answers = [a for a in side_by_side(answer, left) if a is not None]
+    dependences = [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
+    before = 0.5 * float(model.fit.residual @ model.fit.residual)
+    promised = {a.hypothesis.name: before / max(a.cost, 1e-12) for a in answers}
+    promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
+    roughs = list(side_by_side(lambda a: rough(a), answers))
+    ranked: list[tuple[float, Term, Problem, FloatArray]] = [
+        (f.cost, a.hypothesis, f.problem, f.x) for f, a in zip(roughs, answers, strict=True)
+    ]
+    for d, cost, problem in dependences:
+        ranked.append((cost, d, problem, _placed(model.fit, problem)))
+    ranked.sort(key=lambda c: c[0])
+    top = ranked[0][0] if ranked else 0.0
+    chosen = [
+        c for k, c in enumerate(ranked[: LIMITS.promising]) if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
+    ]
+
+    def finish(c: tuple[float, Term, Problem, FloatArray]) -> Model | None:
+        progress(f"fitting {c[1].name}", done)
+        try:
+            fit = solve(c[2], c[3], 12)
+        except InputError:
+            return None
+        return Model((*model.terms, c[1]), fit, left_out(fit, groups))
+
+    models = [m for m in side_by_side(finish, chosen) if m is not None]
+    leads = {m.terms[-1].name: lead(m.left_out, model.left_out, groups) for m in models}
+    shares = selected_in({n: v.by_block for n, v in leads.items()}, rng)
+    tried = [Tried(m.terms[-1], m, leads[m.terms[-1].name], shares[m.terms[-1].name]) for m in models]
+    tried.sort(key=lambda t: -t.lead.gain)
+    good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
+    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(answers)
+
+
+def quiet(fit: Fit) -> bool:
+    """Whether all that is left of every channel is its sensor's noise."""
+    problem = fit.problem
+    for c in problem.channels:
+        noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
+        if rms_left(fit, c) > np.sqrt(LIMITS.quiet) * noise:
+            return False
+    return True
+
+
+def _placed(fit: Fit, problem: Problem) -> FloatArray:
+    """Coordinates of a changed problem: what has the same name, or the same base, stands where it stood."""
+    before = dict(zip((p.name for p in fit.problem.parameters), fit.problem.values(fit.x).values(), strict=True))
+    return np.array([p.x(before.get(p.name, before.get(p.base, p.start) if not p.condition else 0.0)) for p in problem.parameters])
+
+
+def _loss(model: Model, reference: Model, groups: Groups) -> float:
+    """Loss on data left out, in units of the reference's remainder (so that models compare by one yardstick)."""
+    here = groups.block >= 0
+    scale = float(np.median(np.abs(reference.left_out[here]))) / 0.6745
+    return float(np.sum(huber(model.left_out[here], scale)))
+
+
+def without(model: Model, term: Term, groups: Groups) -> Model | None:
+    """The model without one of its terms, refitted."""
+    kept = tuple(t for t in model.terms if t is not term)
+    problem = _stripped(model.fit.problem, term)
+    start = _placed(model.fit, problem)
+    try:
+        fit = solve(problem, start, 10)
+    except InputError:
+        return None
+    return Model(kept, fit, left_out(fit, groups))
+
+
+def _stripped(problem: Problem, term: Term) -> Problem:
+    if isinstance(term, Dependence):
+        return term.undone(problem)
+    entries = tuple(e for e in problem.config.effect if not _is(e.id, e.parameters, term))
+    free = tuple(p for p in problem.parameters if not p.name.startswith(f"effect.{term.effect.id}."))
+    return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
+
+
+def _is(identifier: str, parameters: Mapping[str, object], term: Hypothesis) -> bool:
+    channel = term.name.partition(":")[2]
+    return identifier == term.effect.id and (not channel or channel in parameters.values())
+
+
+def _pruned(model: Model, groups: Groups) -> Model:
+    """Leave out, weakest first, every term whose absence costs less than an effect has to bring."""
+    while len(model.terms) > 1:
+        weakest: tuple[float, Model] | None = None
+        for term in model.terms[:-1]:
+            if any(isinstance(t, Dependence) and t.belongs_to(term) for t in model.terms):
+                continue
+            smaller = without(model, term, groups)
+            if smaller is None:
+                continue
+            step = lead(model.left_out, smaller.left_out, groups)
+            if (step.z < LIMITS.z or step.gain < LIMITS.gain) and (weakest is None or step.gain < weakest[0]):
+                weakest = (step.gain, smaller)
+        if weakest is None:
+            return model
+        model = weakest[1]
+    return model
+
+
+def rivals(
+    model: Model, term: Hypothesis, pool: Sequence[Hypothesis], groups: Groups, rng: np.random.Generator
+) -> tuple[tuple[str, ...], dict[str, Lead]]:
+    """Effects that stand in for a term as well (its model confidence set, itself left out), and the term's lead over each
+    that was tried in its place."""
+    base = without(model, term, groups)
+    if base is None:
+        return (), {}
+    here = anchor(base.fit)
+    names = {t.name for t in model.terms}
+    answers = [a for a in side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names]) if a]
+    roughs = sorted(zip(side_by_side(lambda a: rough(a), answers), answers, strict=True), key=lambda p: p[0].cost)
+    losses: dict[str, FloatArray] = {term.name: _block_losses(model, model, groups)}
+    leads: dict[str, Lead] = {}
+    chosen = roughs[: LIMITS.promising // 2]
+    fits = side_by_side(lambda p: solve(p[0].problem, p[0].x, 10), chosen)
+    for fit, (_, a) in zip(fits, chosen, strict=True):
+        other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
+        leads[a.hypothesis.name] = lead(model.left_out, other.left_out, groups)
+        losses[a.hypothesis.name] = _block_losses(other, model, groups)
+    kept = confidence_set(losses, rng)
+    return tuple(n for n in kept if n != term.name), leads
+
+
+def _block_losses(model: Model, reference: Model, groups: Groups) -> FloatArray:
+    here = groups.block >= 0
+    scale = float(np.median(np.abs(reference.left_out[here]))) / 0.6745
+    return np.bincount(groups.block[here], huber(model.left_out[here], scale), minlength=groups.blocks)
+
+
+__all__ = ["Anchor", "Model", "Round", "Selection", "Tried", "rivals", "select", "without"]

@@ -1,0 +1,61 @@
+"""Every number that steers a verdict, in one frozen place: its unit, the reason for it, and which trials set it.
+
+"Trials" are those of `firmware_sim.trials.make`; seeds named here were used to set numbers and judge nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The verdict's numbers; `LIMITS` are those in force."""
+
+    rows: int = 1200
+    """Judged rows of all recordings together while hypotheses are compared: a friction loop is told from another by
+    its shape, which some hundred rows a stroke hold; cost is in proportion."""
+    rows_each: int = 80
+    """Judged rows that a recording has at least, however many recordings there are: four strokes of twenty."""
+    rounds: int = 5
+    """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
+    promising: int = 6
+    """Hypotheses of a round that are fitted to the end, best first (trials seed 101: the true one was among the first
+    four of the rough answers wherever it was found at all)."""
+    beam: int = 2
+    """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
+    hopeless: float = 4.0
+    """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
+    close: float = 2.0
+    """The second model is carried on where its loss on data left out is less than this many times the best one's."""
+    quiet: float = 1.15
+    """Mean square over the sensors' noise at which nothing further is asked: what is left is noise."""
+    z: float = 3.0
+    """Standard errors of the paired held-out difference that an effect must show: one in 700 by chance, about twenty asked."""
+    gain: float = 0.06
+    """Share of the held-out square of what is left that an effect must take off to be looked at as a name: below it, laws of
+    another form and calibration trade places."""
+    tail: float = 3.0
+    """Standard deviations of the remainder beyond which a misfit counts linearly (Huber): outliers decide nothing."""
+    memory: float = 2.0
+    """Blocks are this many times as long as the remainder remembers, so that blocks are nearly independent."""
+    blocks: tuple[int, int] = (12, 60)
+    """Fewest and most blocks of all recordings together: fewer have no scatter, more are dependent."""
+    resamples: int = 400
+    """Draws of blocks for `selected_in` and for the model confidence set."""
+    rival: float = 0.10
+    """Level of the model confidence set: models that are as good in a tenth of resampled bodies of data stay in."""
+    final_share: float = 0.15
+    """Share of the data that nothing is chosen or fitted on."""
+    history: float = 0.15
+    """Part of what is usually left over that an unknown history may still move the joint by where rows count."""
+    history_most: float = 0.4
+    """Share of a recording that may be given up to an unknown history."""
+    structured: float = 1.5
+    """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
+    name: float = 0.5
+    """Confidence from which an effect is named; weaker ones are candidates."""
+
+
+LIMITS: Final = Thresholds()
