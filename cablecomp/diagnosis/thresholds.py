@@ -18,6 +18,9 @@ class Thresholds:
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
     rows_each: int = 80
     """Judged rows that a recording has at least, however many recordings there are: four strokes of twenty."""
+    search_weight: float = 0.5
+    """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
+    the calibration do not stand in the way of a better law."""
     rounds: int = 5
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
     promising: int = 6
@@ -25,6 +28,8 @@ class Thresholds:
     four of the rough answers wherever it was found at all)."""
     beam: int = 2
     """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
+    worth_rates: float = 1.04
+    """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on every sample."""
     hopeless: float = 4.0
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0

@@ -64,6 +64,7 @@ class Problem:
     evidence: tuple[Evidence, ...]
     weighing: Weighing
     histories: History = field(default_factory=dict)
+    fine: bool = False
     bases: Mapping[str, Zeros] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -97,6 +98,10 @@ class Problem:
         """The same about other recordings."""
         return replace(self, evidence=tuple(evidence), bases={})
 
+    def finely(self) -> Problem:
+        """The same, run on every fine row, as laws with rates need it."""
+        return replace(self, fine=True)
+
     def with_weighing(self, weighing: Weighing) -> Problem:
         """The same with other weights."""
         return replace(self, weighing=weighing, bases={})
@@ -116,7 +121,7 @@ class Problem:
         for r in self.evidence:
             key = self._stand_key(r)
             if key not in cache:
-                cache[key] = simulator(standing(self.config, values, r))
+                cache[key] = simulator(standing(self.config, values, r), self.fine)
             predicted = cache[key].predict(r, self.histories.get(r.name))
             for c in self.channels:
                 if c in r.columns:

@@ -96,7 +96,11 @@ def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray
     return columns["joint_torque_Nm"]
 
 
-def simulator(joint: JointConfig) -> Simulator:
-    """Set the joint up; raises InputError for values that its laws cannot take."""
-    fine = any(catalogue()[e.id].rates for e in joint.effect)
+def knows_rates(joint: JointConfig) -> bool:
+    """Whether an effect of the joint has to be run on every sample."""
+    return any(catalogue()[e.id].rates for e in joint.effect)
+
+
+def simulator(joint: JointConfig, fine: bool = False) -> Simulator:
+    """Set the joint up, to run on judged rows or on all fine ones; raises InputError for values that its laws cannot take."""
     return Simulator(joint, assemble(joint, extend(joint)), tuple(other_channels(joint)), fine)

@@ -20,6 +20,7 @@ from cablecomp.mechanics.tables import between, groove, tau_of_v, v_of_tau
 from cablecomp.mechanics.viscous import W_END, W_HEAD, block_of
 
 LEAST_TAU = 1e-6
+FOLLOWED = 1e-4  # share of the pretension up to which a change waits: far below what any tolerance knows of it
 LONGEST = 0.06  # rise of a straight piece that still stays straight enough when a tension is added
 TOUCH = 1e-12
 
@@ -30,7 +31,7 @@ def retension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: i
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     q = I[o.S_CABLE] + o.CABLE_STATE * c
     g = factor / S[q + o.Q_T0]
-    if abs(g - 1.0) < 1e-9:
+    if abs(g - 1.0) < FOLLOWED:
         return
     S[q + o.Q_T0] = factor
     if I[o.NODES] > 0:

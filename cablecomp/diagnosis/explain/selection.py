@@ -26,8 +26,8 @@ from cablecomp.diagnosis.explain.screening import Anchor, Answer, anchor, ask_al
 from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, rms_left, solve
-from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
 Progress = Callable[[str, float], None]
@@ -42,6 +42,8 @@ class Model:
     terms: tuple[Term, ...]
     fit: Fit
     left_out: FloatArray
+    by_thinning: float = 1.0
+    """Loss of the model before on thinned rows over that on every sample, where this one alone runs on every sample."""
 
     @property
     def name(self) -> str:
@@ -93,7 +95,11 @@ def select(
     `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to the effect
     begins there.
     """
-    first = Model((), baseline, left_out(baseline, groups))
+    sharp = searching(baseline)
+    first = reweighed(Model((), baseline, left_out(baseline, groups)), sharp, groups)
+    if nominal is not None:
+        problem = nominal.problem.with_weighing(sharp)
+        nominal = Fit(problem, nominal.x, problem.residual(nominal.x), problem.jacobian(nominal.x))
     beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
     rounds: list[Round] = []
     answers: tuple[Answer, ...] = ()
@@ -113,14 +119,17 @@ def select(
                 fresh.append(t.model)
         if not fresh:
             break
-        step = lead(fresh[0].left_out, best.left_out, groups)
+        round_, tried = ranked[0]
+        step = tried.lead if round_.base is best else lead(tried.model.left_out, best.left_out, groups)
         if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
             break
-        best = fresh[0]
+        most = LIMITS.close * _loss(fresh[0], fresh[0], groups)
+        kept = [m for m in fresh[: LIMITS.beam] if _loss(m, fresh[0], groups) < most]
+        sharper = searching(fresh[0].fit)
+        best = reweighed(fresh[0], sharper, groups)
         if quiet(best.fit):
             break
-        most = LIMITS.close * _loss(best, best, groups)
-        beam = [(m, None) for m in fresh[: LIMITS.beam] if m is best or _loss(m, best, groups) < most]
+        beam = [(best, None), *((reweighed(m, sharper, groups), None) for m in kept[1:])]
     final = _pruned(best, groups)
     return Selection(first, tuple(rounds), final, groups, answers)
 
@@ -134,8 +143,7 @@ def _one_round(
     progress: Progress,
     number: int,
 ) -> tuple[Round, tuple[Answer, ...]]:
-    here = anchor(model.fit)
-    anchors = [here] if nominal is None else [here, anchor(nominal)]
+    anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
     names = {t.name for t in model.terms}
     ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
     left = [h for h in pool if h.name not in names and (h.effect.id not in ids or h.effect.texts)]
@@ -146,8 +154,12 @@ def _one_round(
         return ask_all(anchors, h)
 
     answers = [a for a in side_by_side(answer, left) if a is not None]
-    dependences = [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
     before = 0.5 * float(model.fit.residual @ model.fit.residual)
+    fine = _finely(model, groups) if any(_wants_rates(a, model, before) for a in answers) else None
+    if fine is not None:
+        there = [anchor(fine.fit)]
+        answers = [(ask_all(there, a.hypothesis) or a) if _wants_rates(a, model, before) else a for a in answers]
+    dependences = [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
     promised = {a.hypothesis.name: before / max(a.cost, 1e-12) for a in answers}
     promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
     roughs = list(side_by_side(lambda a: rough(a), answers))
@@ -168,15 +180,50 @@ def _one_round(
             fit = solve(c[2], c[3], 12)
         except InputError:
             return None
-        return Model((*model.terms, c[1]), fit, left_out(fit, groups))
+        ratio = 1.0
+        if fine is not None and fit.problem.fine:
+            ratio = _loss(model, model, groups) / max(_loss(fine, model, groups), 1e-300)
+        return Model((*model.terms, c[1]), fit, left_out(fit, groups), ratio)
 
     models = [m for m in side_by_side(finish, chosen) if m is not None]
-    leads = {m.terms[-1].name: lead(m.left_out, model.left_out, groups) for m in models}
+    leads = {
+        m.terms[-1].name: lead(
+            m.left_out, fine.left_out if fine is not None and m.fit.problem.fine else model.left_out, groups
+        )
+        for m in models
+    }
     shares = selected_in({n: v.by_block for n, v in leads.items()}, rng)
     tried = [Tried(m.terms[-1], m, leads[m.terms[-1].name], shares[m.terms[-1].name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
     good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
     return Round(model, promised, tuple(tried), good[0] if good else None), tuple(answers)
+
+
+def searching(fit: Fit) -> Weighing:
+    """Weights for a search beyond this fit: a part of what it leaves of each channel, never below the sensor's noise."""
+    problem = fit.problem
+    sigma = {}
+    for c in problem.channels:
+        noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
+        sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise, 1e-12)
+    spread = {c: max(problem.weighing.zero_sd.get(c, 0.0), 0.1 * sigma[c]) for c in problem.channels}
+    return Weighing(sigma, spread)
+
+
+def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
+    """The model refitted with other weights."""
+    fit = refit(model.fit, weighing, 6)
+    return replace(model, fit=fit, left_out=left_out(fit, groups))
+
+
+def _wants_rates(a: Answer, model: Model, before: float) -> bool:
+    return a.hypothesis.effect.rates and not model.fit.problem.fine and before / max(a.cost, 1e-12) > LIMITS.worth_rates
+
+
+def _finely(model: Model, groups: Groups) -> Model:
+    """The model run on every sample: what a law with rates is compared with."""
+    fit = solve(model.fit.problem.finely(), model.fit.x, 4)
+    return Model(model.terms, fit, left_out(fit, groups))
 
 
 def quiet(fit: Fit) -> bool:
@@ -199,7 +246,7 @@ def _loss(model: Model, reference: Model, groups: Groups) -> float:
     """Loss on data left out, in units of the reference's remainder (so that models compare by one yardstick)."""
     here = groups.block >= 0
     scale = float(np.median(np.abs(reference.left_out[here]))) / 0.6745
-    return float(np.sum(huber(model.left_out[here], scale)))
+    return model.by_thinning * float(np.sum(huber(model.left_out[here], scale)))
 
 
 def without(model: Model, term: Term, groups: Groups) -> Model | None:
