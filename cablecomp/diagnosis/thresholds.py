@@ -59,6 +59,8 @@ class Thresholds:
     """Share of a recording that may be given up to an unknown history."""
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
+    recalibrate: float = 0.9
+    """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     name: float = 0.5
     """Confidence from which an effect is named; weaker ones are candidates."""
 

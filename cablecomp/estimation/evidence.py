@@ -41,7 +41,8 @@ class Evidence:
 
     `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are judged, thinned
     by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time that a judged row stands
-    for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside.
+    for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside;
+    `shift_s`: what was added to the recording's own clock.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Evidence:
     outliers: int = 0
     samples: int = 0
     step_s: float = 0.0
+    shift_s: float = 0.0
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""

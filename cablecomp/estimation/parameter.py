@@ -85,7 +85,14 @@ def of_drive(config: JointConfig) -> tuple[Parameter, ...]:
         if key.endswith("_offset_Nm"):
             found.append(
                 Parameter(
-                    name, nominal, nominal - 8 * tolerance, nominal + 8 * tolerance, False, tolerance, nominal, 1.0
+                    name,
+                    nominal,
+                    nominal - 8 * tolerance,
+                    nominal + 8 * tolerance,
+                    False,
+                    tolerance,
+                    nominal,
+                    1.0,
                 )
             )
             continue
@@ -111,7 +118,9 @@ def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig)
     if p.name == "phase_rad":
         return Parameter(name, value, -20.0, 20.0, False)
     if p.name == "time_s":
-        return Parameter(name, value, value - INSTANT_REACH_S, value + INSTANT_REACH_S, False, INSTANT_STEP_S / STEP)
+        return Parameter(
+            name, value, value - INSTANT_REACH_S, value + INSTANT_REACH_S, False, INSTANT_STEP_S / STEP
+        )
     if p.shape and p.log:
         return Parameter(name, value, max(low / 30.0, p.minimum, 1e-12), min(high * 30.0, p.maximum), True, 1.0,
                          (low * high) ** 0.5, 1.5 * DECADE)  # fmt: skip

@@ -132,7 +132,10 @@ class Problem:
 
     def _stand_key(self, r: Evidence) -> Any:
         own = any(p.session for p in self.parameters)
-        return (r.session if own else None, *(r.condition[p.condition] for p in self.parameters if p.condition))
+        return (
+            r.session if own else None,
+            *(r.condition[p.condition] for p in self.parameters if p.condition),
+        )
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Weighted misfits with their zeros taken off, channel by channel, then the priors."""
@@ -178,7 +181,9 @@ class Problem:
             sessions = self.sessions
             by_name = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(sessions)}
             departures = solved[width * len(sessions) :]
-            for r, d in zip(self.evidence, departures if len(departures) else np.zeros(len(self.evidence)), strict=True):
+            for r, d in zip(
+                self.evidence, departures if len(departures) else np.zeros(len(self.evidence)), strict=True
+            ):
                 own = by_name[r.session].copy()
                 own[0] += d
                 by_name[r.name] = own

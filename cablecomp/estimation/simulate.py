@@ -80,7 +80,9 @@ class Simulator:
             rows[:, st.IN_TEMPERATURE] = columns["temperature_degC"]
         for k, name in enumerate(self.others):
             if name not in columns:
-                raise InputError(f"{recording.name}: channel `{name}` is missing, which an effect reads; record it")
+                raise InputError(
+                    f"{recording.name}: channel `{name}` is missing, which an effect reads; record it"
+                )
             rows[:, st.IN_OTHER + k] = columns[name]
         return rows if kept is None else np.ascontiguousarray(rows[kept])
 

@@ -20,7 +20,9 @@ from cablecomp.mechanics.tables import between, groove, tau_of_v, v_of_tau
 from cablecomp.mechanics.viscous import W_END, W_HEAD, block_of
 
 LEAST_TAU = 1e-6
-FOLLOWED = 1e-4  # share of the pretension up to which a change waits: far below what any tolerance knows of it
+FOLLOWED = (
+    1e-4  # share of the pretension up to which a change waits: far below what any tolerance knows of it
+)
 LONGEST = 0.06  # rise of a straight piece that still stays straight enough when a tension is added
 TOUCH = 1e-12
 

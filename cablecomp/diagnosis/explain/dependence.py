@@ -61,7 +61,11 @@ def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, fl
     owners = _owners(problem, len(fit.residual))
     known = {t.name for t in terms if isinstance(t, Dependence)}
     for k, p in enumerate(problem.parameters):
-        if p.session or p.condition or p.base.endswith((".time_s", ".phase_rad", "presliding_rad", "arc_length_m")):
+        if (
+            p.session
+            or p.condition
+            or p.base.endswith((".time_s", ".phase_rad", "presliding_rad", "arc_length_m"))
+        ):
             continue
         for dependence, columns, changed in _ways(problem, p, fit.J[:, k], owners):
             if dependence.name in known:

@@ -128,13 +128,17 @@ def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tu
         last = max(float(e.columns["time_s"][-1]) for e in evidence)
         return tuple(first + (last - first) * (k + 0.5) / INSTANTS for k in range(INSTANTS))
     if p.name == "reference_degC":
-        means = [float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns]
+        means = [
+            float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns
+        ]
         return (float(np.mean(means)) if means else 20.0,)
     if p.name == "arc_length_m":
         return (0.02 * high, 0.25 * high)
     if p.name == "presliding_rad":
         reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
-        return tuple(float(v) for v in np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3))
+        return tuple(
+            float(v) for v in np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
+        )
     if p.log:
         return tuple(float(v) for v in np.geomspace(low, high, 5)[1:-1])
     return (0.5 * (low + high),)
@@ -153,9 +157,10 @@ def _held(effect: Effect) -> tuple[str, ...]:
 
 
 def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
-    return all(channel in e.columns for e in evidence) and max(
-        float(np.ptp(e.columns[channel])) for e in evidence
-    ) > 0.0
+    return (
+        all(channel in e.columns for e in evidence)
+        and max(float(np.ptp(e.columns[channel])) for e in evidence) > 0.0
+    )
 
 
 def _others(evidence: Sequence[Evidence]) -> list[str]:

@@ -156,7 +156,10 @@ def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
     chance = np.bincount(block, r * d, minlength=groups.blocks)
     noise = 2.0 * sqrt(float(np.sum(chance**2)) * len(chance) / max(len(chance) - 1, 1))
     return Lead(
-        total / max(float(np.sum(lb)), 1e-300), total / max(noise, 1e-300), total / max(error, 1e-300), difference
+        total / max(float(np.sum(lb)), 1e-300),
+        total / max(noise, 1e-300),
+        total / max(error, 1e-300),
+        difference,
     )
 
 

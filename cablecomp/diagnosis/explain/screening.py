@@ -88,9 +88,7 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     return _answer(here, h, values, cost, d, size)
 
 
-def _best(
-    here: Anchor, h: Hypothesis
-) -> tuple[float, dict[str, float | str], FloatArray, float] | None:
+def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], FloatArray, float] | None:
     """(cost, values with the linear amount, contribution of the size asked, that size) of the best start."""
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)

@@ -158,8 +158,12 @@ def _one_round(
     fine = _finely(model, groups) if any(_wants_rates(a, model, before) for a in answers) else None
     if fine is not None:
         there = [anchor(fine.fit)]
-        answers = [(ask_all(there, a.hypothesis) or a) if _wants_rates(a, model, before) else a for a in answers]
-    dependences = [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
+        answers = [
+            (ask_all(there, a.hypothesis) or a) if _wants_rates(a, model, before) else a for a in answers
+        ]
+    dependences = (
+        [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
+    )
     promised = {a.hypothesis.name: before / max(a.cost, 1e-12) for a in answers}
     promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
     roughs = list(side_by_side(lambda a: rough(a), answers))
@@ -171,7 +175,9 @@ def _one_round(
     ranked.sort(key=lambda c: c[0])
     top = ranked[0][0] if ranked else 0.0
     chosen = [
-        c for k, c in enumerate(ranked[: LIMITS.promising]) if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
+        c
+        for k, c in enumerate(ranked[: LIMITS.promising])
+        if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
     ]
 
     def finish(c: tuple[float, Term, Problem, FloatArray]) -> Model | None:
@@ -217,7 +223,11 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
 
 
 def _wants_rates(a: Answer, model: Model, before: float) -> bool:
-    return a.hypothesis.effect.rates and not model.fit.problem.fine and before / max(a.cost, 1e-12) > LIMITS.worth_rates
+    return (
+        a.hypothesis.effect.rates
+        and not model.fit.problem.fine
+        and before / max(a.cost, 1e-12) > LIMITS.worth_rates
+    )
 
 
 def _finely(model: Model, groups: Groups) -> Model:
@@ -238,8 +248,15 @@ def quiet(fit: Fit) -> bool:
 
 def _placed(fit: Fit, problem: Problem) -> FloatArray:
     """Coordinates of a changed problem: what has the same name, or the same base, stands where it stood."""
-    before = dict(zip((p.name for p in fit.problem.parameters), fit.problem.values(fit.x).values(), strict=True))
-    return np.array([p.x(before.get(p.name, before.get(p.base, p.start) if not p.condition else 0.0)) for p in problem.parameters])
+    before = dict(
+        zip((p.name for p in fit.problem.parameters), fit.problem.values(fit.x).values(), strict=True)
+    )
+    return np.array(
+        [
+            p.x(before.get(p.name, before.get(p.base, p.start) if not p.condition else 0.0))
+            for p in problem.parameters
+        ]
+    )
 
 
 def _loss(model: Model, reference: Model, groups: Groups) -> float:
@@ -303,8 +320,12 @@ def rivals(
         return (), {}
     here = anchor(base.fit)
     names = {t.name for t in model.terms}
-    answers = [a for a in side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names]) if a]
-    roughs = sorted(zip(side_by_side(lambda a: rough(a), answers), answers, strict=True), key=lambda p: p[0].cost)
+    answers = [
+        a for a in side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names]) if a
+    ]
+    roughs = sorted(
+        zip(side_by_side(lambda a: rough(a), answers), answers, strict=True), key=lambda p: p[0].cost
+    )
     losses: dict[str, FloatArray] = {term.name: _block_losses(model, model, groups)}
     leads: dict[str, Lead] = {}
     chosen = roughs[: LIMITS.promising // 2]

@@ -1,0 +1,81 @@
+"""The joint that a diagnosis ends with: common values, each session's own, laws without a name; replay and controller run it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cablecomp.config import Empirical, JointConfig, Session
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.selection import Model
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.standing import standing, value_of
+
+STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
+
+
+def augmented_joint(
+    config: JointConfig, model: Model, laws: Sequence[Empirical], names: Sequence[str]
+) -> JointConfig:
+    """The configuration with what was fitted. Several sessions, or a parameter that depends on something: a `[[session]]`
+    for each way in which the drive stood, which claims its recordings."""
+    fit = model.fit
+    zeros = fit.problem.zeros(fit.x)
+    tied = any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)
+    sessions = fit.problem.sessions
+    first = fit.problem.evidence[0]
+    common = standing(fit.problem.config, fit.values, first)
+    joint = common.model_copy(
+        update={"empirical": (*config.empirical, *laws), "tolerance": dict(config.tolerance)}
+    )
+    if len(sessions) == 1 and not tied:
+        return _with_zeros(joint, _zeros_of(zeros, sessions[0]))
+    entries = [Session(own=tuple(config.session_own))]
+    for session in sessions:
+        mine = [e for e in fit.problem.evidence if e.session == session]
+        ways = {tuple(e.condition.values()) for e in mine} if tied else {()}
+        for way in sorted(ways):
+            members = [e for e in mine if not tied or tuple(e.condition.values()) == way]
+            stood = standing(fit.problem.config, fit.values, members[0])
+            label = session + "".join(
+                f" {k} {v:.4g}" for k, v in zip(members[0].condition, way, strict=False)
+            )
+            entries.append(
+                Session(
+                    name=label,
+                    recordings=_patterns(members, names, session, tied),
+                    values={**_zeros_of(zeros, session), **_own(stood, common, fit)},
+                )
+            )
+    return joint.model_copy(update={"session": tuple(entries)})
+
+
+def _patterns(members: Sequence[Evidence], names: Sequence[str], session: str, tied: bool) -> tuple[str, ...]:
+    if not tied and all(session in n.split("/") for n in names if n in {e.name for e in members}):
+        return (session,)
+    return tuple("/".join(e.name.split("/")[-2:]) for e in members)
+
+
+def _zeros_of(zeros: Mapping[str, Mapping[str, Sequence[float]]], session: str) -> dict[str, float]:
+    found = {"joint_position_offset_rad": float(zeros[JOINT][session][0])}
+    if MOTOR in zeros:
+        found["motor_torque_offset_Nm"] = float(zeros[MOTOR][session][0])
+    return found
+
+
+def _with_zeros(joint: JointConfig, zeros: Mapping[str, float]) -> JointConfig:
+    return joint.model_copy(update={"sensors": joint.sensors.model_copy(update=dict(zeros))})
+
+
+def _own(stood: JointConfig, common: JointConfig, fit: Fit) -> dict[str, float]:
+    """What of the drive differs where it stood so."""
+    found = {}
+    names = [*STAGE_OWN, *(p.base for p in fit.problem.parameters if p.session or p.condition)]
+    names += [
+        f"effect.{e.id}.{k}" for e in common.effect for k, v in e.parameters.items() if isinstance(v, float)
+    ]
+    for name in dict.fromkeys(names):
+        here, there = value_of(stood, name), value_of(common, name)
+        if here != there:
+            found[name] = here
+    return found

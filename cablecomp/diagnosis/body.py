@@ -1,0 +1,114 @@
+"""Several recordings as one body of evidence: sessions, conditions, one clock, what is kept for the end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
+from typing import Literal
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import Evidence, gather, rows_for
+from cablecomp.signal.smoothing import FloatArray
+
+Sessions = Literal["folder", "each", "one"]
+Columns = Mapping[str, FloatArray]
+FINAL_EVERY = 6
+"""Of eight recordings and more, every sixth is kept for the end."""
+FEW = 8
+"""Recordings below which the end of each is kept instead."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """`used`: what is fitted and chosen on. `final`: what nothing is fitted or chosen on. `names`: all, in order."""
+
+    names: tuple[str, ...]
+    used: tuple[Evidence, ...]
+    final: tuple[Evidence, ...]
+    final_by: str
+
+    @property
+    def sessions(self) -> dict[str, list[str]]:
+        """Recordings of each session."""
+        found: dict[str, list[str]] = {}
+        for e in (*self.used, *(f for f in self.final if f.name not in {u.name for u in self.used})):
+            found.setdefault(e.session, []).append(e.name)
+        return found
+
+
+def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | None = None) -> dict[str, str]:
+    """The session of each recording: as `[[session]]` claims it, else its folder (`each`: its own, `one`: all together)."""
+    found = {}
+    for name in names:
+        claimed = [s.name for s in config.sessions if s.matches(Path(name))] if mode is None else []
+        folder = PurePath(name).parent.name
+        if claimed:
+            found[name] = claimed[0]
+        elif mode == "each":
+            found[name] = PurePath(name).name
+        else:
+            found[name] = "all" if mode == "one" else (folder or "all")
+    return found
+
+
+def gather_body(
+    config: JointConfig,
+    recordings: Mapping[str, Columns],
+    mode: Sessions | None = None,
+    rows: int | None = None,
+) -> Body:
+    """Clean and thin all recordings; raises InputError for one that lacks what is needed."""
+    names = list(recordings)
+    if not names:
+        raise InputError("no recording was given; a diagnosis needs one or more")
+    sessions = session_names(config, names, mode)
+    samples = [len(recordings[n]["time_s"]) if "time_s" in recordings[n] else 0 for n in names]
+    wanted = LIMITS.rows if rows is None else rows
+    fine, judged = rows_for(samples, max(wanted, LIMITS.rows_each * len(names)))
+    found = []
+    after = -np.inf
+    for name, f, j in zip(names, fine, judged, strict=True):
+        e = gather(config, name, recordings[name], sessions[name], fine_rows=f, judged_rows=j)
+        e = replace(e, condition=_conditions(config, e))
+        begin, end = float(e.columns["time_s"][0]), float(e.columns["time_s"][-1])
+        if begin < after:  # every recording starts its own clock: one goes on after the other
+            shift = after + 1.0 - begin
+            e = replace(e, columns={**e.columns, "time_s": e.columns["time_s"] + shift}, shift_s=shift)
+            end += shift
+        after = end
+        found.append(e)
+    used, final, by = _kept_for_the_end(found)
+    return Body(tuple(names), used, final, by)
+
+
+def _conditions(config: JointConfig, e: Evidence) -> dict[str, float]:
+    values = {}
+    for condition, channel in config.condition.items():
+        if channel not in e.columns:
+            raise InputError(
+                f"{e.name}: channel `{channel}` is missing, which [condition] `{condition}` names; record it"
+            )
+        values[condition] = float(np.median(e.columns[channel]))
+    return values
+
+
+def _kept_for_the_end(found: Sequence[Evidence]) -> tuple[tuple[Evidence, ...], tuple[Evidence, ...], str]:
+    """Whole recordings where there are eight or more, else the end of each."""
+    if len(found) >= FEW:
+        final = [e for k, e in enumerate(found) if k % FINAL_EVERY == FINAL_EVERY // 2]
+        used = [e for e in found if e not in final]
+        lost = {e.session for e in final} - {e.session for e in used}
+        used += [e for e in final if e.session in lost]
+        return tuple(used), tuple(e for e in final if e.session not in lost), "recording"
+    used, final = [], []
+    for e in found:
+        last = int((1.0 - LIMITS.final_share) * len(e.rows))
+        early = np.arange(len(e.rows)) < last
+        used.append(replace(e, counted={k: v & early for k, v in e.counted.items()}))
+        final.append(replace(e, counted={k: v & ~early for k, v in e.counted.items()}))
+    return tuple(used), tuple(final), "block"

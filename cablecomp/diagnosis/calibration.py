@@ -1,0 +1,131 @@
+"""The drive as it is, calibrated within its tolerances: weights, zeros, where histories are forgotten, what noise alone leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.history import forgotten
+from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
+from cablecomp.estimation.parameter import Parameter, of_drive, own_of
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.signal.smoothing import FloatArray, keep_corners
+
+ZEROS = ("joint_position_offset_rad", "motor_torque_offset_Nm")
+"""Names in `[session] own` that are found inside of the fit, by session, always."""
+REPLICAS = 2
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """`fit`: the calibrated drive. `nominal`: the drive as configured, evaluated. `lost_rows`: judged rows given up to unknown
+    histories. `floor_rad`: RMS that the sensors' noise alone leaves. `floor`: least weights."""
+
+    fit: Fit
+    nominal: Fit
+    floor: Weighing
+    floor_rad: float
+    lost_rows: int
+
+
+def calibrate_drive(
+    config: JointConfig, evidence: Sequence[Evidence], rng: np.random.Generator
+) -> Calibrated:
+    """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one."""
+    parameters = _parameters(config, evidence)
+    problem = Problem(config, parameters, tuple(evidence), first_weights(config, evidence))
+    problem.misfits(problem.start)  # a recording that the nominal drive cannot follow is said, not fitted
+    floor = _floor(evidence, problem.channels)
+    fit = solve(problem, evaluations=15)
+    fit = refit(fit, weighed(fit, floor), 10)
+    before = sum(int(e.counted[JOINT].sum()) for e in evidence)
+    size = rms_left(fit)
+    cut, constant = [], []
+    for e in fit.problem.evidence:
+        found = forgotten(fit.problem, fit.x, e, LIMITS.history * size)
+        cut.append(e.counting_from(found.first))
+        constant.append(found.constant_rad)
+    floor = Weighing(
+        floor.sigma, {**floor.zero_sd, JOINT: max(floor.zero_sd[JOINT], float(np.mean(constant)))}
+    )
+    problem = fit.problem.with_evidence(cut)
+    fit = solve(problem, fit.x, 10)
+    floor_rad = noise_floor(fit, rng)
+    seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
+    fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
+    for _ in range(2):
+        fit = refit(fit, weighed(fit, floor), 8)
+    here = fit.problem.start
+    nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))
+    lost = before - sum(int(e.counted[JOINT].sum()) for e in cut)
+    return Calibrated(fit, nominal, floor, floor_rad, lost)
+
+
+def _parameters(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[Parameter, ...]:
+    """What `[tolerance]` frees; what `[session] own` names is each session's."""
+    sessions = tuple(dict.fromkeys(e.session for e in evidence))
+    own = [n for n in config.session_own if n not in ZEROS]
+    free = list(of_drive(config))
+    if len(sessions) > 1:
+        for name in own:
+            for p in [p for p in free if p.name == name]:
+                place = free.index(p)
+                free[place : place + 1] = own_of(p, sessions)
+    return tuple(free)
+
+
+def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing:
+    """Weights before anything is known: a third of what a straight line by motor angle leaves of each output channel."""
+    load = load_channel(config, evidence[0].columns)
+    sigma = {}
+    for c in OUTPUTS:
+        if c == load or not all(c in e.counted for e in evidence):
+            continue
+        y = np.concatenate([e.at_rows(c) - e.at_rows(c).mean() for e in evidence])
+        q = np.concatenate([e.at_rows("motor_position_rad") for e in evidence])
+        A = np.column_stack((np.ones_like(q), q - q.mean()))
+        left = y - A @ np.linalg.lstsq(A, y, rcond=None)[0] if c == JOINT else y
+        sigma[c] = 0.3 * float(np.std(left)) + 1e-9
+    return Weighing(sigma, {c: 0.3 * s for c, s in sigma.items()})
+
+
+def _floor(evidence: Sequence[Evidence], channels: Sequence[str]) -> Weighing:
+    sigma = {c: max(float(np.mean([e.noise.get(c, 0.0) for e in evidence])), 1e-9) for c in channels}
+    return Weighing(sigma, {c: 0.1 * s for c, s in sigma.items()})
+
+
+def noise_floor(fit: Fit, rng: np.random.Generator) -> float:
+    """RMS [rad] that noise alone leaves of a row: the joint encoder's own, and what noisy inputs do to the prediction
+    (friction remembers noise: so it is simulated, noise put on the cleaned inputs and cleaned off again)."""
+    problem = fit.problem
+    moved = []
+    base = problem.misfits(fit.x)[JOINT]
+    for _ in range(REPLICAS):
+        try:
+            other = problem.with_evidence([_shaken(e, rng) for e in problem.evidence]).misfits(fit.x)[JOINT]
+        except InputError:
+            continue
+        moved += [np.std(a - b) ** 2 for a, b in zip(base, other, strict=True)]
+    own = float(
+        np.mean(
+            [e.noise[JOINT] ** 2 / max(1.0, e.samples / len(e.columns["time_s"])) for e in problem.evidence]
+        )
+    )
+    return float(np.sqrt(own + (float(np.mean(moved)) if moved else 0.0)))
+
+
+def _shaken(e: Evidence, rng: np.random.Generator) -> Evidence:
+    columns = dict(e.columns)
+    group = max(1.0, e.samples / len(e.columns["time_s"]))
+    for name in ("motor_position_rad", "joint_torque_Nm", MOTOR):
+        sigma = e.noise.get(name, 0.0) / np.sqrt(group)
+        if name in columns and sigma > 0.0 and name not in e.counted:
+            noisy: FloatArray = columns[name] + sigma * rng.standard_normal(len(columns[name]))
+            columns[name] = keep_corners(columns["time_s"], noisy, sigma)
+    return replace(e, columns=columns)

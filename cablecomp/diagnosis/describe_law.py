@@ -1,0 +1,88 @@
+"""Laws without a physical name: what is left of the joint angle as a series in one channel, kept if it holds on data left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cablecomp.config import Empirical
+from cablecomp.diagnosis.explain.scores import Groups, Lead, lead
+from cablecomp.diagnosis.explain.selection import Model
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.signal.smoothing import FloatArray
+
+TERMS = 10
+"""Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a drum is."""
+RIDGE = 1e-3
+CHANNELS = ("motor_position_rad", "joint_torque_Nm")
+
+
+@dataclass(frozen=True)
+class Found:
+    """A law that holds, as the configuration has it, and its lead over the model without it."""
+
+    law: Empirical
+    lead: Lead
+
+
+def empirical_laws(model: Model, groups: Groups) -> list[Found]:
+    """The series that hold, best first, each fitted to what the ones before left."""
+    problem = model.fit.problem
+    span = problem.spans()[JOINT]
+    count = len(problem.owners(JOINT))
+    rows = slice(span.start, span.start + count)
+    sigma = problem.weighing.sigma[JOINT]
+    weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
+    left = model.left_out[rows].copy()
+    fold, block = groups.fold[rows], groups.block[rows]
+    here = Groups(block, fold, groups.by)
+    found: list[Found] = []
+    while True:
+        best: Found | None = None
+        gone: FloatArray | None = None
+        for channel in CHANNELS:
+            if any(f.law.of == channel for f in found) or not all(
+                channel in e.columns for e in problem.evidence
+            ):
+                continue
+            x = np.concatenate([e.at_rows(channel)[e.counted[JOINT]] for e in problem.evidence])
+            centre, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
+            if half <= 0.0:
+                continue
+            T = (
+                np.polynomial.chebyshev.chebvander((x - centre) / half, TERMS)[:, 1:]
+                * (weight / sigma)[:, None]
+            )
+            predicted = _crossed(T, left, fold)
+            step = lead(left - predicted, left, here)
+            if step.z > LIMITS.z and step.gain > LIMITS.gain and (best is None or step.gain > best.lead.gain):
+                coefficients = _ridge(T, left)
+                name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace(
+                    "position", "angle"
+                )
+                law = Empirical(
+                    id=name, law="chebyshev", of=channel, centre=centre, half_width=half,
+                    coefficients_rad=(0.0, *(float(c) for c in coefficients)),
+                )  # fmt: skip
+                best, gone = Found(law, step), predicted
+        if best is None or gone is None:
+            return found
+        found.append(best)
+        left = left - gone
+
+
+def _ridge(T: FloatArray, y: FloatArray) -> FloatArray:
+    scale = RIDGE * float(np.trace(T.T @ T)) / T.shape[1]
+    return np.asarray(np.linalg.solve(T.T @ T + scale * np.eye(T.shape[1]), T.T @ y), dtype=np.float64)
+
+
+def _crossed(T: FloatArray, y: FloatArray, fold: Sequence[int] | FloatArray) -> FloatArray:
+    """Prediction of each fold from the others."""
+    predicted = np.zeros(len(y))
+    for k in np.unique(fold):
+        out = np.asarray(fold) == k
+        predicted[out] = T[out] @ _ridge(T[~out], y[~out])
+    return predicted

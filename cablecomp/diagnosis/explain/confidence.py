@@ -1,0 +1,82 @@
+"""How probable it is that a name is right: a logistic model of the evidence of the case, learnt on trials.
+
+p = 1/(1 + exp(-(b + sum_k w_k (f_k - centre_k)/scale_k))). The features are those below; weights, centres and scales are in
+`confidence.json` beside this file, with the trials they were learnt on; `python -m cablecomp.trials.learn` learns them anew.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+FEATURES: Final = (
+    "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "share_total", "rivals",
+    "follows", "at_bound",
+)  # fmt: skip
+_FILE: Final = Path(__file__).with_name("confidence.json")
+
+
+@dataclass(frozen=True)
+class Logistic:
+    """Weights of the standardised features."""
+
+    bias: float
+    weight: Mapping[str, float]
+    centre: Mapping[str, float]
+    scale: Mapping[str, float]
+
+    def probability(self, evidence: Mapping[str, float]) -> float:
+        """Probability that the name is right."""
+        total = self.bias
+        for name, w in self.weight.items():
+            total += w * (evidence[name] - self.centre[name]) / self.scale[name]
+        return 1.0 / (1.0 + math.exp(-min(max(total, -30.0), 30.0)))
+
+
+@cache
+def learnt() -> Logistic:
+    """The model that ships."""
+    data = json.loads(_FILE.read_text())
+    return Logistic(float(data["bias"]), data["weight"], data["centre"], data["scale"])
+
+
+def features(
+    *,
+    gain: float,
+    z: float,
+    z_blocks: float,
+    selected_in: float,
+    lead_gain: float,
+    lead_z: float,
+    share_left: float,
+    share_total: float,
+    rivals: int,
+    follows: float,
+    at_bound: bool,
+) -> dict[str, float]:
+    """The evidence of one name.
+
+    `gain`, `z`, `z_blocks`: of the model over the one without the effect, on data left out. `selected_in`: share of
+    resampled data in which it is the best of its round. `lead_gain`, `lead_z`: over the nearest rival in its place.
+    `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
+    the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`: share of the
+    remainder that still follows what the effect acts through. `at_bound`: one of its parameters is on a bound.
+    """
+    return {
+        "log_gain": math.log10(max(gain, 1e-3)),
+        "log_z": math.log10(max(z, 0.1)),
+        "z_blocks": min(max(z_blocks, -3.0), 10.0),
+        "selected_in": selected_in,
+        "lead_gain": min(max(lead_gain, -1.0), 1.0),
+        "lead_z": min(max(lead_z, -3.0), 10.0),
+        "share_left": min(max(share_left, 0.0), 1.0),
+        "share_total": min(max(share_total, 0.0), 1.0),
+        "rivals": float(min(rivals, 4)),
+        "follows": follows,
+        "at_bound": float(at_bound),
+    }

@@ -1,0 +1,83 @@
+"""What the history before the first sample, which nobody recorded, may still do to a prediction.
+
+The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke); rows count
+from where these runs agree but for a constant, and how far the constants differ is how far a recording's zero may
+depart from its session's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.simulate import load_of, simulator
+from cablecomp.signal.smoothing import FloatArray
+
+CUTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+"""Shares of a recording that may be given up."""
+LEG = 12
+"""Rows of one leg of an assumed past."""
+
+
+@dataclass(frozen=True)
+class Forgotten:
+    """From which judged row on a recording's past no longer matters, how far it may still move the joint from there (RMS,
+    rad, a constant apart), and how far the constants differ (rad)."""
+
+    first: int
+    left_rad: float
+    constant_rad: float
+
+
+def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
+    """Assumed pasts (motor angle, load): to the greatest load seen and back either way, in from either end of the stroke."""
+    motor = recording.columns["motor_position_rad"]
+    load = np.broadcast_to(
+        np.asarray(load_of(problem.config, recording.columns), dtype=np.float64), motor.shape
+    )
+    q, m = float(motor[0]), float(load[0])
+    top = float(np.max(np.abs(load)))
+    for side in (top, -top):
+        if top > 0.0 and side != m:
+            legs = np.concatenate([np.linspace(0.0, side, LEG), np.linspace(side, m, LEG)])
+            yield np.column_stack((np.full(len(legs), q), legs))
+    for end in (float(motor.max()), float(motor.min())):
+        if abs(end - q) > 1e-9:
+            yield np.column_stack((np.linspace(end, q, 2 * LEG), np.full(2 * LEG, m)))
+
+
+def forgotten(problem: Problem, x: FloatArray, recording: Evidence, tolerance_rad: float) -> Forgotten:
+    """Where the past is forgotten to within `tolerance_rad`; the best cut there is if it is nowhere."""
+    made = simulator(problem.joint(x, recording))
+    try:
+        base = made.predict(recording)[JOINT]
+    except InputError:
+        return Forgotten(0, 0.0, 0.0)
+    runs = []
+    for past in pasts(problem, recording):
+        try:
+            runs.append(made.predict(recording, past)[JOINT] - base)
+        except InputError:
+            continue  # a past that the drive could not have had
+    if not runs:
+        return Forgotten(0, 0.0, 0.0)
+    apart = np.stack(runs)
+    best: tuple[float, int] | None = None
+    for share in CUTS:
+        first = int(share * apart.shape[1])
+        later = apart[:, first:]
+        left = float(np.sqrt(np.mean((later - later.mean(axis=1, keepdims=True)) ** 2)))
+        if left <= tolerance_rad:
+            best = (left, first)
+            break
+        if best is None or left < 0.7 * best[0]:
+            best = (left, first)
+    assert best is not None
+    left, first = best
+    constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
+    return Forgotten(first, left, constant)
