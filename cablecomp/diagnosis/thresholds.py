@@ -23,6 +23,10 @@ class Thresholds:
     the calibration do not stand in the way of a better law."""
     rounds: int = 5
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
+    promise: float = 0.98
+    """Cost after a linear step over the cost before, above which a hypothesis is not tried at all."""
+    rough: int = 5
+    """Evaluations (residual and derivative) of a first fit from each anchor."""
     promising: int = 6
     """Hypotheses of a round that are fitted to the end, best first (trials seed 101: the true one was among the first
     four of the rough answers wherever it was found at all)."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.limits import HOPELESS
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray
@@ -44,7 +45,10 @@ class Fit:
 
 
 def solve(problem: Problem, x: FloatArray | None = None, evaluations: int = 20) -> Fit:
-    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept."""
+    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept.
+
+    Raises InputError if the drive cannot follow the recordings where the fit begins and ends.
+    """
     low, high = problem.bounds()
     start = problem.start if x is None else x
     margin = 1e-6 * (high - low)
@@ -72,6 +76,8 @@ def solve(problem: Problem, x: FloatArray | None = None, evaluations: int = 20) 
         gtol=1e-6,
         max_nfev=evaluations,
     )
+    if np.all(found.fun[: len(found.fun) - len(found.x)] == HOPELESS):
+        problem.misfits(found.x)
     return Fit(problem, found.x, found.fun, found.jac)
 
 

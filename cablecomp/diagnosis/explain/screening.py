@@ -1,8 +1,8 @@
 """Ask every hypothesis cheaply: how far would the misfit fall, by one or two simulations beside a fitted model.
 
 At an anchor (a fit, or the nominal drive) with residual r and derivative J, an effect's contribution d = r(0) - r(a) at a
-size a that is worth seeing tells the cost after a joint linear step. A few damped steps with the same derivative
-(a chord method, improved by Broyden's rank-one update) then fit it roughly, at one simulation a step.
+size a that is worth seeing tells the cost after a joint linear step. What promises anything is then fitted for a few steps
+from each anchor: where calibration has paid for a missing effect, the way there begins at the nominal drive.
 """
 
 from __future__ import annotations
@@ -11,18 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
-
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import INSTANT, PHASE, Hypothesis, Start, at_instants
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
-
-STEPS = 5
-"""Damped steps of a rough fit."""
-
 
 @dataclass(frozen=True)
 class Anchor:
@@ -184,45 +178,17 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
     return _answer(here, h, values, cost, d, size)
 
 
-def rough(answer: Answer, steps: int = STEPS) -> Fit:
-    """A few damped steps from an answer, the derivative kept and improved by what each step shows."""
-    problem, x, J = answer.problem, answer.x, answer.J.copy()
-    low, high = problem.bounds()
-    x = np.clip(x, low, high)
-    r = problem.residual(x)
-    data = len(r) - len(x)
-    for k, p in enumerate(problem.parameters):
-        J[data + k, k] = 1.0 / p.sd if np.isfinite(p.sd) else 0.0
-    for k in np.flatnonzero(np.sum(J[:data] ** 2, axis=0) == 0.0):  # shapes: asked once
-        step = 0.05 if x[k] + 0.05 <= high[k] else -0.05
-        moved = x.copy()
-        moved[k] += step
-        J[:, k] = (problem.residual(moved) - r) / step
-    cost, damping = 0.5 * float(r @ r), 1e-3
-    for _ in range(steps):
-        scale = np.sqrt(np.maximum(np.sum(J**2, axis=0), 1e-12))
-        A = np.vstack([J, np.diag(np.sqrt(damping) * scale)])
-        b = np.concatenate([-r, np.zeros(len(x))])
-        step = lsq_linear(A, b, bounds=(low - x - 1e-12, high - x + 1e-12), max_iter=30).x
-        trial = np.clip(x + step, low, high)
-        new = problem.residual(trial)
-        reached = 0.5 * float(new @ new)
-        moved = trial - x
-        square = float(moved @ moved)
-        if square < 1e-14:
-            break
-        J = J + np.outer(new - r - J @ moved, moved) / square
-        if reached < cost:
-            done = cost - reached < 1e-3 * cost
-            x, r, cost, damping = trial, new, reached, max(damping * 0.2, 1e-4)
-            if done:
-                break
-        else:
-            damping = max(damping * 20.0, 1e-2)
-    return Fit(problem, x, r, J)
+def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
+    """What a hypothesis promises at each anchor, best first."""
+    return sorted((a for a in (ask(here, h) for here in anchors) if a is not None), key=lambda a: a.cost)
 
 
-def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> Answer | None:
-    """The better of what a hypothesis promises at each anchor."""
-    answers = [a for a in (ask(here, h) for here in anchors) if a is not None]
-    return min(answers, key=lambda a: a.cost, default=None)
+def rough(answers: Sequence[Answer], evaluations: int) -> Fit | None:
+    """The best of short fits from where each anchor's answer begins; None if none can be followed."""
+    fits = []
+    for a in answers:
+        try:
+            fits.append(solve(a.problem, a.x, evaluations))
+        except InputError:
+            continue
+    return min(fits, key=lambda f: f.cost, default=None)

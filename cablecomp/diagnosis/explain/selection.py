@@ -149,26 +149,30 @@ def _one_round(
     left = [h for h in pool if h.name not in names and (h.effect.id not in ids or h.effect.texts)]
     done = number / LIMITS.rounds
 
-    def answer(h: Hypothesis) -> Answer | None:
+    def answer(h: Hypothesis) -> list[Answer]:
         progress(f"asking {h.name}", done)
         return ask_all(anchors, h)
 
-    answers = [a for a in side_by_side(answer, left) if a is not None]
+    answers = [a for a in side_by_side(answer, left) if a]
     before = 0.5 * float(model.fit.residual @ model.fit.residual)
-    fine = _finely(model, groups) if any(_wants_rates(a, model, before) for a in answers) else None
+    fine = _finely(model, groups) if any(_wants_rates(a[0], model, before) for a in answers) else None
     if fine is not None:
         there = [anchor(fine.fit)]
-        answers = [
-            (ask_all(there, a.hypothesis) or a) if _wants_rates(a, model, before) else a for a in answers
-        ]
+        answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], model, before) else a for a in answers]
     dependences = (
         [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
     )
-    promised = {a.hypothesis.name: before / max(a.cost, 1e-12) for a in answers}
+    promised = {a[0].hypothesis.name: before / max(a[0].cost, 1e-12) for a in answers}
     promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
-    roughs = list(side_by_side(lambda a: rough(a), answers))
+    worth = [a for a in answers if a[0].cost < LIMITS.promise * before]
+
+    def begin(a: list[Answer]) -> Fit | None:
+        progress(f"trying {a[0].hypothesis.name}", done)
+        return rough(a, LIMITS.rough)
+
+    roughs = side_by_side(begin, worth)
     ranked: list[tuple[float, Term, Problem, FloatArray]] = [
-        (f.cost, a.hypothesis, f.problem, f.x) for f, a in zip(roughs, answers, strict=True)
+        (f.cost, a[0].hypothesis, f.problem, f.x) for f, a in zip(roughs, worth, strict=True) if f is not None
     ]
     for d, cost, problem in dependences:
         ranked.append((cost, d, problem, _placed(model.fit, problem)))
@@ -183,7 +187,7 @@ def _one_round(
     def finish(c: tuple[float, Term, Problem, FloatArray]) -> Model | None:
         progress(f"fitting {c[1].name}", done)
         try:
-            fit = solve(c[2], c[3], 12)
+            fit = solve(c[2], c[3], 15)
         except InputError:
             return None
         ratio = 1.0
@@ -202,7 +206,7 @@ def _one_round(
     tried = [Tried(m.terms[-1], m, leads[m.terms[-1].name], shares[m.terms[-1].name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
     good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
-    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(answers)
+    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(a[0] for a in answers)
 
 
 def searching(fit: Fit) -> Weighing:
@@ -320,22 +324,30 @@ def rivals(
         return (), {}
     here = anchor(base.fit)
     names = {t.name for t in model.terms}
-    answers = [
-        a for a in side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names]) if a
-    ]
-    roughs = sorted(
-        zip(side_by_side(lambda a: rough(a), answers), answers, strict=True), key=lambda p: p[0].cost
-    )
+    before = 0.5 * float(base.fit.residual @ base.fit.residual)
+    asked = side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names])
+    answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
+    fitted = side_by_side(lambda a: rough(a, LIMITS.rough), answers)
+    roughs = sorted(((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost)
     losses: dict[str, FloatArray] = {term.name: _block_losses(model, model, groups)}
     leads: dict[str, Lead] = {}
     chosen = roughs[: LIMITS.promising // 2]
-    fits = side_by_side(lambda p: solve(p[0].problem, p[0].x, 10), chosen)
+    fits = side_by_side(lambda p: _tried(p[0]), chosen)
     for fit, (_, a) in zip(fits, chosen, strict=True):
+        if fit is None:
+            continue
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         leads[a.hypothesis.name] = lead(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = _block_losses(other, model, groups)
     kept = confidence_set(losses, rng)
     return tuple(n for n in kept if n != term.name), leads
+
+
+def _tried(fit: Fit) -> Fit | None:
+    try:
+        return solve(fit.problem, fit.x, 10)
+    except InputError:
+        return None
 
 
 def _block_losses(model: Model, reference: Model, groups: Groups) -> FloatArray:
