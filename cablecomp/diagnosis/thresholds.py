@@ -40,8 +40,9 @@ class Thresholds:
     """The second model is carried on where its loss on data left out is less than this many times the best one's."""
     quiet: float = 1.15
     """Mean square over the sensors' noise at which nothing further is asked: what is left is noise."""
-    z: float = 3.0
-    """Standard errors of the paired held-out difference that an effect must show: one in 700 by chance, about twenty asked."""
+    z: float = 2.5
+    """Standard errors of the paired held-out difference that an effect must show to enter the model; whether it is named is
+    its confidence's matter (one in 160 by chance, about twenty asked)."""
     gain: float = 0.06
     """Share of the held-out square of what is left that an effect must take off to be looked at as a name: below it, laws of
     another form and calibration trade places."""

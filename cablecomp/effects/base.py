@@ -143,6 +143,8 @@ class Effect:
     """Names of parameters that are text, such as the channel that loads the cable."""
     rates: bool = False
     """Its law knows rates within a stroke: a fit has to run it on every sample, not on rows thinned by travel."""
+    posture: bool = False
+    """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
     rank: int = 0
     """Terms run in rising rank; a term that sees the sum of the others (a delay) ranks last."""
 

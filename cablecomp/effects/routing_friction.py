@@ -38,5 +38,6 @@ EFFECT = Effect(
     ),
     acts_through=("reversal", "load_direction", "velocity", "load"),
     bounded=False,
+    posture=True,
     change=_change,
 )

@@ -8,16 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from cablecomp.diagnosis.explain.screening import anchor
+from cablecomp.effects import catalogue
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter, by_condition, own_of
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
+PER_SESSION: Final = ("pretension_N", "mu_output", "mu_input")
+"""What of the drive mounting it anew may change: how tight the cables are, how they run in their grooves."""
+POSTURES: Final = ("_rad", "_deg", "_m")
+"""Ends of the names of conditions that say how the path lies."""
 PROMISING = 3
 """Dependences of a round that are fitted, best first."""
 
@@ -51,6 +56,17 @@ class Dependence:
         return replace(problem, parameters=tuple(kept))
 
 
+def may_depend(parameter: str, condition: str) -> bool:
+    """Whether a parameter may change with a condition: with a posture, the pretension and what acts along the path; with
+    anything else (a temperature, an age), every amount."""
+    if not condition.endswith(POSTURES):
+        return not parameter.endswith(("_rad", "_m", "_s"))
+    if parameter.startswith("effect."):
+        effect = catalogue()[parameter.split(".")[1]]
+        return effect.posture and not effect.parameter(parameter.split(".")[2]).shape
+    return parameter == "pretension_N"
+
+
 def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, float, Problem]]:
     """The dependences that promise most: each with the cost after a linear step, and the problem that has it."""
     problem = fit.problem
@@ -61,11 +77,7 @@ def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, fl
     owners = _owners(problem, len(fit.residual))
     known = {t.name for t in terms if isinstance(t, Dependence)}
     for k, p in enumerate(problem.parameters):
-        if (
-            p.session
-            or p.condition
-            or p.base.endswith((".time_s", ".phase_rad", "presliding_rad", "arc_length_m"))
-        ):
+        if p.session or p.condition:
             continue
         for dependence, columns, changed in _ways(problem, p, fit.J[:, k], owners):
             if dependence.name in known:
@@ -87,7 +99,8 @@ def _ways(
     ways: list[tuple[Dependence, list[FloatArray], Problem]] = []
     sessions = problem.sessions
     place = problem.parameters.index(p)
-    if len(sessions) > 1:
+    several = min(sum(e.session == s for e in problem.evidence) for s in sessions) > 1
+    if len(sessions) > 1 and several and p.base in PER_SESSION:
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])
@@ -98,7 +111,7 @@ def _ways(
         ways.append((Dependence(p.name, "session"), cut, replace(problem, parameters=free)))
     for condition in problem.evidence[0].condition:
         values = np.array([e.condition[condition] for e in problem.evidence])
-        if len(np.unique(values)) < 3:
+        if len(np.unique(values)) < 3 or not may_depend(p.base, condition):
             continue
         centred = values - values.mean()
         weight = np.where(owners >= 0, centred[np.maximum(owners, 0).astype(np.int64)], 0.0)

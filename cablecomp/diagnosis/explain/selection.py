@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences
+from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import (
     Groups,
@@ -27,6 +27,7 @@ from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
+from cablecomp.estimation.parameter import by_condition
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -171,11 +172,14 @@ def _one_round(
         return rough(a, LIMITS.rough)
 
     roughs = side_by_side(begin, worth)
-    ranked: list[tuple[float, Term, Problem, FloatArray]] = [
-        (f.cost, a[0].hypothesis, f.problem, f.x) for f, a in zip(roughs, worth, strict=True) if f is not None
-    ]
+    ranked: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    for f, a in zip(roughs, worth, strict=True):
+        if f is not None:
+            ranked.append((f.cost, (a[0].hypothesis,), f.problem, f.x))
+    for found in side_by_side(lambda c: _by_conditions(c), list(ranked)):
+        ranked += found
     for d, cost, problem in dependences:
-        ranked.append((cost, d, problem, _placed(model.fit, problem)))
+        ranked.append((cost, (d,), problem, _placed(model.fit, problem)))
     ranked.sort(key=lambda c: c[0])
     top = ranked[0][0] if ranked else 0.0
     chosen = [
@@ -184,8 +188,8 @@ def _one_round(
         if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
     ]
 
-    def finish(c: tuple[float, Term, Problem, FloatArray]) -> Model | None:
-        progress(f"fitting {c[1].name}", done)
+    def finish(c: tuple[float, tuple[Term, ...], Problem, FloatArray]) -> Model | None:
+        progress(f"fitting {c[1][0].name}", done)
         try:
             fit = solve(c[2], c[3], 15)
         except InputError:
@@ -193,17 +197,18 @@ def _one_round(
         ratio = 1.0
         if fine is not None and fit.problem.fine:
             ratio = _loss(model, model, groups) / max(_loss(fine, model, groups), 1e-300)
-        return Model((*model.terms, c[1]), fit, left_out(fit, groups), ratio)
+        return Model((*model.terms, *c[1]), fit, left_out(fit, groups), ratio)
 
     models = [m for m in side_by_side(finish, chosen) if m is not None]
     leads = {
-        m.terms[-1].name: lead(
+        m.name: lead(
             m.left_out, fine.left_out if fine is not None and m.fit.problem.fine else model.left_out, groups
         )
         for m in models
     }
     shares = selected_in({n: v.by_block for n, v in leads.items()}, rng)
-    tried = [Tried(m.terms[-1], m, leads[m.terms[-1].name], shares[m.terms[-1].name]) for m in models]
+    first = len(model.terms)
+    tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
     good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
     return Round(model, promised, tuple(tried), good[0] if good else None), tuple(a[0] for a in answers)
@@ -248,6 +253,33 @@ def quiet(fit: Fit) -> bool:
         if rms_left(fit, c) > np.sqrt(LIMITS.quiet) * noise:
             return False
     return True
+
+
+def _by_conditions(
+    c: tuple[float, tuple[Term, ...], Problem, FloatArray],
+) -> list[tuple[float, tuple[Term, ...], Problem, FloatArray]]:
+    """The same effect with an amount that grows with a condition, for each condition of three values and more."""
+    cost, (term,), problem, x = c
+    assert isinstance(term, Hypothesis)
+    found = []
+    for condition in problem.evidence[0].condition:
+        values = [e.condition[condition] for e in problem.evidence]
+        if len(set(values)) < 3:
+            continue
+        name = f"effect.{term.effect.id}.{term.amount.name}"
+        amount = next((p for p in problem.parameters if p.name == name), None)
+        if amount is None or not may_depend(name, condition):
+            continue
+        here = replace(amount, start=max(amount.value(float(x[problem.parameters.index(amount)])), amount.scale))
+        gain = by_condition(here, condition, float(np.ptp(values)))
+        changed = replace(problem, parameters=(*problem.parameters, gain))
+        try:
+            fit = solve(changed, np.append(x, gain.x(0.3 * here.start / float(np.ptp(values)))), LIMITS.rough)
+        except InputError:
+            continue
+        if fit.cost < LIMITS.promise * cost:
+            found.append((fit.cost, (term, Dependence(name, condition)), fit.problem, fit.x))
+    return found
 
 
 def _placed(fit: Fit, problem: Problem) -> FloatArray:
