@@ -27,9 +27,9 @@ OUTPUTS: Final = (JOINT, MOTOR, "tension_h_N", "tension_l_N")
 """Channels that a model has to account for, where they are recorded."""
 
 NEEDED: Final = ("time_s", "motor_position_rad", JOINT)
-FINE_ROWS: Final = 12_000
+FINE_ROWS: Final = 6_000
 """Rows of all recordings together at which a law with rates is run."""
-LEAST_FINE: Final = 1_200
+LEAST_FINE: Final = 1_000
 """Rows that a recording keeps of these, however many there are."""
 SPIKE: Final = 8.0
 """Deviations (scaled median) from the neighbours beyond which a reading is an outlier."""
@@ -111,7 +111,7 @@ def gather(
             finite[key] &= ~spikes
         raw[key] = np.interp(raw["time_s"], raw["time_s"][good], values[good])
         noise[key] = _noise(raw["time_s"][good], values[good])
-    group = max(1, len(raw["time_s"]) // fine_rows)
+    group = max(1, -(-len(raw["time_s"]) // fine_rows))
     whole = len(raw["time_s"]) // group * group
     means = {k: group_means(v[:whole], group) for k, v in raw.items()}
     good_rows = {k: group_means(v[:whole].astype(np.float64), group) > 0.5 for k, v in finite.items()}

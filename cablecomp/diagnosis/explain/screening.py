@@ -7,7 +7,7 @@ from each anchor: where calibration has paid for a missing effect, the way there
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +52,15 @@ class Answer:
     J: FloatArray
     length: float
     amount: float
+    place: int = 0
+    """Which of the anchors it was asked at."""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The effect's own parameters where the answer begins, by full name."""
+        mine = f"effect.{self.hypothesis.effect.id}."
+        found = self.problem.values(self.x)
+        return {k: v for k, v in found.items() if k.startswith(mine)}
 
 
 def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
@@ -180,15 +189,24 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
 
 def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     """What a hypothesis promises at each anchor, best first."""
-    return sorted((a for a in (ask(here, h) for here in anchors) if a is not None), key=lambda a: a.cost)
+    asked = [ask(here, h) for here in anchors]
+    return sorted((replace(a, place=k) for k, a in enumerate(asked) if a is not None), key=lambda a: a.cost)
 
 
-def rough(answers: Sequence[Answer], evaluations: int) -> Fit | None:
-    """The best of short fits from where each anchor's answer begins; None if none can be followed."""
+def rough(answers: Sequence[Answer], evaluations: int, cold: Mapping[str, float] | None = None) -> Fit | None:
+    """The best of short fits from where each anchor's answer begins; None if none can be followed.
+
+    `cold`: values to begin from as well, the drive at its nominal ones: effects that were added one after the other may sit in
+    a valley of their own.
+    """
     fits = []
-    for a in answers:
+    starts = [(a.problem, a.x) for a in answers]
+    if cold is not None:
+        problem = answers[0].problem
+        starts.append((problem, np.array([p.x(cold.get(p.name, p.start)) for p in problem.parameters])))
+    for problem, x in starts:
         try:
-            fits.append(solve(a.problem, a.x, evaluations))
+            fits.append(solve(problem, x, 3 if problem.fine else evaluations))
         except InputError:
             continue
     return min(fits, key=lambda f: f.cost, default=None)

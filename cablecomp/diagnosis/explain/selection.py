@@ -27,7 +27,7 @@ from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
-from cablecomp.estimation.parameter import by_condition
+from cablecomp.estimation.parameter import DECADE, by_condition
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -104,12 +104,15 @@ def select(
     beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
     rounds: list[Round] = []
     answers: tuple[Answer, ...] = ()
+    cold: dict[str, float] | None = None
     best = first
     for number in range(LIMITS.rounds):
         candidates: list[tuple[Round, Tried]] = []
         for model, start in beam:
-            round_, answered = _one_round(model, start, pool, groups, rng, progress, number)
-            answers = answers or answered
+            round_, answered = _one_round(model, start, pool, groups, rng, progress, number, cold)
+            if not answers:
+                answers = answered
+                cold = _cold(answered, baseline)
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
         ranked = sorted(candidates, key=lambda c: _loss(c[1].model, best, groups))
@@ -143,6 +146,7 @@ def _one_round(
     rng: np.random.Generator,
     progress: Progress,
     number: int,
+    cold: Mapping[str, float] | None,
 ) -> tuple[Round, tuple[Answer, ...]]:
     anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
     names = {t.name for t in model.terms}
@@ -165,11 +169,11 @@ def _one_round(
     )
     promised = {a[0].hypothesis.name: before / max(a[0].cost, 1e-12) for a in answers}
     promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
-    worth = [a for a in answers if a[0].cost < LIMITS.promise * before]
+    worth = [a for a in answers if cold is not None or a[0].cost < LIMITS.promise * before]
 
     def begin(a: list[Answer]) -> Fit | None:
         progress(f"trying {a[0].hypothesis.name}", done)
-        return rough(a, LIMITS.rough)
+        return rough(a, LIMITS.rough, cold)
 
     roughs = side_by_side(begin, worth)
     ranked: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
@@ -211,7 +215,7 @@ def _one_round(
     tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
     good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
-    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(a[0] for a in answers)
+    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(x for a in answers for x in a)
 
 
 def searching(fit: Fit) -> Weighing:
@@ -229,6 +233,17 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     """The model refitted with other weights."""
     fit = refit(model.fit, weighing, 6)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
+
+
+def _cold(answers: Sequence[Answer], baseline: Fit) -> dict[str, float] | None:
+    """Where every effect would begin beside the nominal drive; None where the drive is known better than by order of magnitude
+    (calibration then stays in its valley)."""
+    if not any(p.sd >= DECADE for p in baseline.problem.parameters if np.isfinite(p.sd)):
+        return None
+    found: dict[str, float] = {}
+    for a in sorted(answers, key=lambda a: a.place):
+        found |= a.values
+    return found
 
 
 def _wants_rates(a: Answer, model: Model, before: float) -> bool:
