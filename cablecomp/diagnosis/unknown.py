@@ -198,13 +198,14 @@ def _parity(ask: _Questions) -> tuple[Parity, float, float]:
 def _path(ask: _Questions) -> Path:
     values = ask.series.covariates.values
     load = values["load"]
-    if float(np.ptp(np.abs(load))) < 0.2 * float(np.max(np.abs(load))):
+    top = float(np.max(np.abs(load)))
+    if not top > 0.0 or float(np.ptp(np.abs(load))) < 0.2 * top:
         return "undecided"
     q = values.get("joint_angle", values["motor_angle"])
     direction = np.column_stack((values["load_direction"], ask.series.covariates.motion_direction))
     shape = np.column_stack((contrasts(hats(q, 9)), direction, contrasts(hats(values["velocity"], 5))))
-    relative = np.abs(load) / float(np.max(np.abs(load)))
-    signed = load / float(np.max(np.abs(load)))
+    relative = np.abs(load) / top
+    signed = load / top
     fixed = ask.gain(shape)
     scaled = ask.gain(relative[:, None] * direction, signed[:, None] * shape, signed[:, None])
     both = ask.gain(shape, relative[:, None] * direction, signed[:, None] * shape, signed[:, None])

@@ -1,4 +1,4 @@
-"""Figures of the diagnosis page."""
+"""Figures of the diagnosis page. Angles of a page stand in one unit, `unit`."""
 
 from __future__ import annotations
 
@@ -7,34 +7,23 @@ from typing import Any, Final
 
 import numpy as np
 from plotly.subplots import make_subplots
-from scipy.signal import welch
 
 from cablecomp.diagnosis.covariates import UNITS
+from cablecomp.diagnosis.result import Tested, Traces
 from cablecomp.report import style
-from cablecomp.report.diagnosis_view import FloatArray, Hypothesis, RecordingView
-from cablecomp.report.replay_figures import Scale, scale
+from cablecomp.report.diagnosis_words import covariate as words
+from cablecomp.report.diagnosis_words import plain
+from cablecomp.report.replay_figures import Scale
+from cablecomp.signal.smoothing import FloatArray
 
 BEFORE: Final = style.RESIDUAL
 AFTER: Final = style.PREDICTED
+NAMED, WEAK, NOT = style.CABLE_L, "#b7791f", style.translucent(style.BASELINE, 0.6)
 _MEASURED: Final = style.translucent(style.MEASURED, 0.45)
-_HELD: Final = "rgba(107, 79, 187, 0.08)"
+_UNSEEN: Final = "rgba(107, 79, 187, 0.10)"
 _TIME: Final = style.label("time", "s")
-_MOST_POINTS: Final = 4_000
-_WORDS: Final[Mapping[str, str]] = {
-    "load_direction": "direction of the load",
-    "load_rate": "rate of the load",
-    "dwell": "time since the load stopped",
-    "reversal": "load since the last reversal",
-    "motor_angle": "motor angle",
-    "joint_angle": "joint angle",
-}
-
-
-def words(covariate: str) -> str:
-    """Return a covariate's name in plain words."""
-    if covariate.startswith("other:"):
-        return f"channel {covariate.removeprefix('other:')}"
-    return _WORDS.get(covariate, covariate)
+_MOST_INTERVALS: Final = 40
+_MOST_TRIED: Final = 24
 
 
 def unit_of(covariate: str) -> str:
@@ -42,10 +31,24 @@ def unit_of(covariate: str) -> str:
     return UNITS.get(covariate, "")
 
 
+def at_a_glance(trace: Traces, unit: Scale, share: float = 0.35) -> Any:
+    """Deflection over the end of a recording: measured, before, after; the errors below."""
+    time = trace.covariates["time"]
+    shown = time >= time[-1] - share * (time[-1] - time[0])
+    fig = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06)
+    fig.update_layout(template=style.template(), height=400, margin={"l": 60, "r": 44, "t": 34, "b": 46})
+    _deflections(fig, trace, shown, unit)
+    _residuals(fig, trace, shown, unit, row=2)
+    for begin, end in _stretches(trace, shown):
+        fig.add_vrect(x0=begin, x1=end, fillcolor=_UNSEEN, line_width=0)
+    style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
+    return style.axes(fig, _TIME, style.label("error", unit.unit), row=2, col=1)
+
+
 def shares(mismatch: Sequence[Mapping[str, Any]]) -> Any:
     """Share of the mismatch that each covariate accounts for, ranked; pale bars are not beyond chance."""
     shown = list(mismatch)[:9][::-1]
-    fig = style.figure(80 + 34 * len(shown), margin={"l": 190, "r": 40, "t": 30, "b": 46})
+    fig = style.figure(80 + 34 * len(shown), margin={"l": 190, "r": 44, "t": 30, "b": 46})
     colours = [BEFORE if e["p_value"] < 0.05 else style.translucent(style.BASELINE, 0.6) for e in shown]
     fig.add_bar(
         x=[100.0 * e["share"] for e in shown],
@@ -62,85 +65,71 @@ def shares(mismatch: Sequence[Mapping[str, Any]]) -> Any:
     return style.axes(fig, style.label("share of the mismatch's energy", "%"), "")
 
 
-def overlay(view: RecordingView, intervals: Sequence[Sequence[float]]) -> Any:
-    """Deflection over time: measured, before, after; residuals below with the intervals of the
-    mismatch; the load.
-    """
-    time, keep = view.covariates["time"], _thin(view)
-    deflection = view.measured_rad - view.rigid_rad
-    unit, small = _unit(deflection), _unit(view.residual_before)
-    fig = make_subplots(
-        rows=3, cols=1, shared_xaxes=True, row_heights=[0.46, 0.32, 0.22], vertical_spacing=0.05
-    )
-    fig.update_layout(template=style.template(), height=680, hovermode="x")
-    x = time[keep]
-    for values, name, colour, width in (
-        (view.measured_rad, "measured", _MEASURED, 3.4),
-        (view.before_rad, "before", BEFORE, 1.3),
-        (view.after_rad, "after", AFTER, 1.5),
-    ):
-        style.curve(fig, x, ((values - view.rigid_rad) * unit.factor)[keep], name, colour, width, row=1)
-    style.curve(fig, x, (view.residual_before * small.factor)[keep], "residual before", BEFORE, 1.0, row=2)
-    style.curve(fig, x, (view.residual_after * small.factor)[keep], "residual after", AFTER, 1.0, row=2)
-    style.curve(fig, x, view.covariates["load"][keep], "load", style.LOAD, 1.3, row=3)
-    for begin, end in list(intervals)[:40]:
+def overlay(trace: Traces, intervals: Sequence[Sequence[float]], unit: Scale) -> Any:
+    """Deflection over time: measured, before, after; residuals below with the intervals of the mismatch; the load."""
+    time, load = trace.covariates["time"], trace.covariates["load"]
+    loaded = bool(np.ptp(load) > 0.0)
+    rows = 3 if loaded else 2
+    heights = [0.46, 0.32, 0.22] if loaded else [0.58, 0.42]
+    fig = make_subplots(rows=rows, cols=1, shared_xaxes=True, row_heights=heights, vertical_spacing=0.05)
+    fig.update_layout(template=style.template(), height=640 if loaded else 520, hovermode="x")
+    everything = np.ones(len(time), dtype=np.bool_)
+    _deflections(fig, trace, everything, unit)
+    _residuals(fig, trace, everything, unit, row=2)
+    if loaded:
+        style.curve(fig, time, load, "load", style.LOAD, 1.3, row=3)
+        style.axes(fig, "", style.label("load", "N·m"), row=3, col=1)
+    for begin, end in list(intervals)[:_MOST_INTERVALS]:
         fig.add_vrect(x0=begin, x1=end, fillcolor=style.translucent(BEFORE, 0.10), line_width=0, row=2, col=1)
-    for begin, end in _stretches(view) if view.heldout.mean() < 0.8 else ():
-        fig.add_vrect(x0=begin, x1=end, fillcolor=_HELD, line_width=0, row=1, col=1)
+    for begin, end in _stretches(trace, everything):
+        fig.add_vrect(x0=begin, x1=end, fillcolor=_UNSEEN, line_width=0, row=1, col=1)
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
-    style.axes(fig, "", style.label("residual", small.unit), row=2, col=1)
-    style.axes(fig, _TIME, style.label("load", "N·m"), row=3, col=1)
+    style.axes(fig, "", style.label("error", unit.unit), row=2, col=1)
+    fig.update_xaxes(title_text=_TIME, row=rows, col=1)
     return fig
 
 
-def loops(view: RecordingView) -> Any:
-    """Deflection against load, the measured loop beneath, before on the left, after on the right."""
-    keep = _thin(view)
-    deflection = view.measured_rad - view.rigid_rad
-    unit = _unit(deflection)
+def loops(trace: Traces, unit: Scale) -> Any:
+    """Deflection against load (or motor angle, where that is what moves), before on the left, after on the right."""
+    deflection = trace.measured_rad - trace.rigid_rad
+    moves = np.ptp(trace.rigid_rad) > np.ptp(deflection) or not np.ptp(trace.covariates["load"]) > 0.0
+    name = "motor_angle" if moves else "load"
+    x = trace.covariates[name]
     fig = make_subplots(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
     fig.update_layout(template=style.template(), height=430)
-    load = view.covariates["load"][keep]
-    for column, (values, name, colour) in enumerate(
-        ((view.before_rad, "before", BEFORE), (view.after_rad, "after", AFTER)), start=1
-    ):
-        measured = (deflection * unit.factor)[keep]
-        style.curve(fig, load, measured, "measured", _MEASURED, 3.0, row=1, col=column, legend=column == 1)
-        predicted = ((values - view.rigid_rad) * unit.factor)[keep]
-        style.curve(fig, load, predicted, name, colour, 1.3, row=1, col=column)
-        style.axes(
-            fig,
-            style.label("load", "N·m"),
-            style.label("deflection", unit.unit) if column == 1 else "",
-            row=1,
-            col=column,
-        )
+    pairs = ((trace.before_rad, "before", BEFORE), (trace.after_rad, "after", AFTER))
+    for column, (values, label, colour) in enumerate(pairs, start=1):
+        first = column == 1
+        measured = deflection * unit.factor
+        style.curve(fig, x, measured, "measured", _MEASURED, 3.0, row=1, col=column, legend=first)
+        predicted = (values - trace.rigid_rad) * unit.factor
+        style.curve(fig, x, predicted, label, colour, 1.3, row=1, col=column)
+        y = style.label("deflection", unit.unit) if first else ""
+        style.axes(fig, style.label(words(name), unit_of(name)), y, row=1, col=column)
     return fig
 
 
-def energy_map(views: Sequence[RecordingView], covariate: str, noise_rad: float) -> Any:
-    """RMS residual over time and a covariate, in noise floors, before (above) and after (below), one
-    colour scale.
-    """
-    time = _clock(views)
-    values = np.concatenate([view.covariates[covariate] for view in views])
+def energy_map(traces: Sequence[Traces], covariate: str, floor_rad: float) -> Any:
+    """RMS residual over time and a covariate, in noise floors, before (above) and after (below), one colour scale."""
+    time = np.concatenate([t.covariates["time"] for t in traces])
+    values = np.concatenate([t.covariates[covariate] for t in traces])
     maps = []
     edges_t, edges_c = np.linspace(time.min(), time.max(), 61), _edges(values)
-    for residual in (_joined(views, "residual_before"), _joined(views, "residual_after")):
+    for residual in (_joined(traces, "before_rad"), _joined(traces, "after_rad")):
         power, _, _ = np.histogram2d(time, values, bins=(edges_t, edges_c), weights=residual**2)
         count, _, _ = np.histogram2d(time, values, bins=(edges_t, edges_c))
         with np.errstate(invalid="ignore", divide="ignore"):
-            maps.append(np.sqrt(power / np.where(count > 0, count, np.nan)).T / noise_rad)
+            maps.append(np.sqrt(power / np.where(count > 0, count, np.nan)).T / floor_rad)
     top = float(np.nanquantile(maps[0], 0.98))
     fig = make_subplots(
         rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.08, subplot_titles=("before", "after")
     )
-    fig.update_layout(template=style.template(), height=520)
+    fig.update_layout(template=style.template(), height=460, margin={"l": 64, "r": 44, "t": 40, "b": 50})
     for row, energy in enumerate(maps, start=1):
         fig.add_heatmap(
             x=np.round(0.5 * (edges_t[1:] + edges_t[:-1]), 4),
             y=np.round(0.5 * (edges_c[1:] + edges_c[:-1]), 6),
-            z=np.round(energy, 3),
+            z=np.round(energy, 3).astype(np.float32),
             zmin=0.0,
             zmax=max(top, 2.0),
             colorscale=style.SEQUENCE,
@@ -150,31 +139,29 @@ def energy_map(views: Sequence[RecordingView], covariate: str, noise_rad: float)
             row=row,
             col=1,
         )
-        style.axes(
-            fig, _TIME if row == 2 else "", style.label(words(covariate), unit_of(covariate)), row=row, col=1
-        )
+        x = _TIME if row == 2 else ""
+        style.axes(fig, x, style.label(words(covariate), unit_of(covariate)), row=row, col=1)
     return fig
 
 
-def along(views: Sequence[RecordingView], covariate: str, noise_rad: float) -> Any:
+def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scale) -> Any:
     """Mean residual along a covariate, loading and unloading apart, before and after, with the floor."""
-    values = np.concatenate([view.covariates[covariate] for view in views])
-    before, after = _joined(views, "residual_before"), _joined(views, "residual_after")
+    values = np.concatenate([t.covariates[covariate] for t in traces])
     direction = np.concatenate(
-        [view.covariates.get("load_direction", np.zeros(len(view.measured_rad))) for view in views]
+        [t.covariates.get("load_direction", np.zeros(len(t.measured_rad))) for t in traces]
     )
-    unit = _unit(before)
-    fig = style.figure(420, margin={"l": 64, "r": 24, "t": 74, "b": 52})
+    fig = style.figure(460, margin={"l": 64, "r": 44, "t": 60, "b": 50})
     fig.add_hrect(
-        y0=-noise_rad * unit.factor,
-        y1=noise_rad * unit.factor,
+        y0=-floor_rad * unit.factor,
+        y1=floor_rad * unit.factor,
         fillcolor="rgba(100, 116, 139, 0.15)",
         line_width=0,
     )
     groups = [("loading", direction > 0.0, "solid"), ("unloading", direction < 0.0, "dot")]
     if covariate == "load_direction" or not np.any(direction != 0.0):
         groups = [("", np.ones(len(values), dtype=np.bool_), "solid")]
-    for residual, name, colour in ((before, "before", BEFORE), (after, "after", AFTER)):
+    for key, name, colour in (("before_rad", "before", BEFORE), ("after_rad", "after", AFTER)):
+        residual = _joined(traces, key)
         for way, mask, dash in groups:
             if np.count_nonzero(mask) < 20:
                 continue
@@ -187,76 +174,81 @@ def along(views: Sequence[RecordingView], covariate: str, noise_rad: float) -> A
     return style.axes(
         fig,
         style.label(words(covariate), unit_of(covariate)),
-        style.label("mean residual", unit.unit),
+        style.label("mean error", unit.unit),
     )
 
 
-def spectra(views: Sequence[RecordingView], noise_rad: float) -> Any:
-    """Amplitude spectral density of the residual before and after, and that of white noise of the
-    floor's size.
-    """
-    fig = style.figure(390)
-    longest = max(views, key=lambda view: len(view.measured_rad))
-    time = longest.covariates["time"]
-    step = float(np.median(np.diff(time)))
-    size = int(min(len(time), max(256, len(time) // 8)))
-    for residual, name, colour in (
-        (longest.residual_before, "before", BEFORE),
-        (longest.residual_after, "after", AFTER),
+def tried(entries: Sequence[Tested], rounds: Mapping[str, int]) -> Any:
+    """Share of what was left that each hypothesis takes off data left out; `rounds`: number of the model it stood beside."""
+    shown = sorted(entries, key=lambda t: (rounds[t.beside], -t.heldout_gain))[:_MOST_TRIED][::-1]
+    fig = style.figure(96 + 24 * len(shown), margin={"l": 270, "r": 50, "t": 50, "b": 46})
+    for outcome, colour in (("named", NAMED), ("candidate", WEAK), ("not needed", NOT)):
+        own = [t for t in shown if t.outcome == outcome]
+        if own:
+            fig.add_bar(
+                x=[100.0 * t.heldout_gain for t in own],
+                y=[f"{rounds[t.beside]} · {plain(t.name)}" for t in own],
+                orientation="h",
+                marker_color=colour,
+                name=outcome,
+                text=[f"z {t.z:.1f}" for t in own],
+                textposition="outside",
+                cliponaxis=False,
+                hovertext=[f"beside {t.beside}" for t in own],
+            )
+    order = [f"{rounds[t.beside]} · {plain(t.name)}" for t in shown]
+    fig.update_yaxes(categoryorder="array", categoryarray=order)
+    lowest = min([0.0, *(100.0 * t.heldout_gain for t in shown)])
+    fig.update_xaxes(range=[max(-30.0, 1.1 * lowest), 112])
+    fig.update_layout(bargap=0.3, showlegend=True)
+    return style.axes(fig, style.label("taken off what was left, data left out", "%"), "")
+
+
+def dependence(points: Mapping[str, float], parameter: str, on: str) -> Any:
+    """Values of a parameter by session, or over a condition whose values are the keys, with the law that ties them."""
+    fig = style.figure(320)
+    if on == "session":
+        fig.add_scatter(
+            x=list(points), y=list(points.values()), mode="markers", marker={"size": 9, "color": AFTER}
+        )
+    else:
+        x = np.array([float(k) for k in points])
+        order = np.argsort(x)
+        y = np.array(list(points.values()))
+        fig.add_scatter(
+            x=x[order],
+            y=y[order],
+            mode="lines+markers",
+            marker={"size": 8},
+            line={"color": AFTER, "width": 2},
+        )
+    return style.axes(fig, on, parameter)
+
+
+def residual(trace: Traces, key: str) -> FloatArray:
+    """Measured minus predicted, `key` one of `before_rad`, `after_rad`."""
+    return np.asarray(trace.measured_rad - getattr(trace, key), dtype=np.float64)
+
+
+def _deflections(fig: Any, trace: Traces, shown: Any, unit: Scale) -> None:
+    x = trace.covariates["time"][shown]
+    for values, name, colour, width in (
+        (trace.measured_rad, "measured", _MEASURED, 3.4),
+        (trace.before_rad, "before", BEFORE, 1.3),
+        (trace.after_rad, "after", AFTER, 1.5),
     ):
-        frequency, power = welch(residual, 1.0 / step, nperseg=size)
-        used = frequency > 0.0
-        style.curve(fig, frequency[used], np.sqrt(power[used]), name, colour, 1.5)
-    floor = noise_rad * np.sqrt(2.0 * step)
-    ends = np.array([1.0 / (size * step), 0.5 / step])
-    style.curve(fig, ends, np.full(2, floor), "noise floor, white", style.MUTED, 1.2, dash="dash")
-    fig.update_xaxes(type="log")
-    fig.update_yaxes(type="log", exponentformat="power")
-    return style.axes(fig, style.label("frequency", "Hz"), style.label("residual", "rad/√Hz"))
+        style.curve(fig, x, ((values - trace.rigid_rad) * unit.factor)[shown], name, colour, width, row=1)
 
 
-def hypotheses(entries: Sequence[Hypothesis]) -> Any:
-    """Share of the held-out mean square that each hypothesis removes, with two standard deviations."""
-    shown = [entry for entry in entries if np.isfinite(entry.heldout_gain)][:20][::-1]
-    fig = style.figure(90 + 26 * len(shown), margin={"l": 270, "r": 30, "t": 30, "b": 46})
-    colours = {"named": style.CABLE_L, "unnamed": style.translucent(style.BASELINE, 0.75)}
-    fig.add_bar(
-        x=[100.0 * entry.heldout_gain for entry in shown],
-        y=[entry.name.replace("_", " ") for entry in shown],
-        orientation="h",
-        marker_color=[colours["named" if entry.outcome == "named" else "unnamed"] for entry in shown],
-        error_x={
-            "type": "data", "array": [200.0 * entry.gain_sd for entry in shown],
-            "thickness": 1.2, "width": 3, "color": style.MUTED,
-        },
-        hovertext=[entry.why for entry in shown],
-    )  # fmt: skip
-    lowest = min([0.0, *(100.0 * entry.heldout_gain for entry in shown)])
-    fig.update_xaxes(range=[max(-30.0, 1.1 * lowest), 104])
-    fig.update_layout(bargap=0.3)
-    return style.axes(fig, style.label("held-out mean square removed", "%"), "")
+def _residuals(fig: Any, trace: Traces, shown: Any, unit: Scale, row: int) -> None:
+    x = trace.covariates["time"][shown]
+    for key, colour in (("before_rad", BEFORE), ("after_rad", AFTER)):
+        y = (residual(trace, key) * unit.factor)[shown]
+        style.curve(fig, x, y, f"error {key[:-4]}", colour, 1.0, row=row, legend=False)
 
 
-def _thin(view: RecordingView) -> slice:
-    return slice(None, None, max(1, len(view.measured_rad) // _MOST_POINTS))
-
-
-def _unit(values: FloatArray) -> Scale:
-    return scale(float(np.quantile(np.abs(values), 0.99)))
-
-
-def _joined(views: Sequence[RecordingView], name: str) -> FloatArray:
-    return np.concatenate([getattr(view, name) for view in views])
-
-
-def _clock(views: Sequence[RecordingView]) -> FloatArray:
-    """Times of several recordings one after the other."""
-    out, end = [], 0.0
-    for view in views:
-        time = view.covariates["time"]
-        out.append(time if len(views) == 1 else time - time[0] + end)
-        end = float(out[-1][-1])
-    return np.concatenate(out)
+def _joined(traces: Sequence[Traces], key: str) -> FloatArray:
+    return np.concatenate([residual(t, key) for t in traces])
 
 
 def _edges(values: FloatArray) -> FloatArray:
@@ -279,13 +271,15 @@ def _binned(values: FloatArray, residual: FloatArray) -> tuple[FloatArray, Float
     return centres, np.bincount(index, residual, len(edges) - 1)[used] / count[used]
 
 
-def _stretches(view: RecordingView) -> list[tuple[float, float]]:
-    """Times of the held-out stretches."""
-    held = np.concatenate(([False], view.heldout, [False]))
-    starts = np.flatnonzero(held[1:] & ~held[:-1])
-    ends = np.flatnonzero(held[:-1] & ~held[1:]) - 1
-    time = view.covariates["time"]
-    return [(float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True)]
+def _stretches(trace: Traces, shown: Any) -> list[tuple[float, float]]:
+    """Times of the stretches that nothing was fitted to."""
+    out = np.concatenate(([False], ~np.asarray(trace.counted) & shown, [False]))
+    starts = np.flatnonzero(out[1:] & ~out[:-1])
+    ends = np.flatnonzero(out[:-1] & ~out[1:]) - 1
+    time = trace.covariates["time"]
+    long = 0.01 * float(time[-1] - time[0])  # a reading set aside is no stretch
+    found = [(float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True)]
+    return [(a, b) for a, b in found if b - a > long]
 
 
 def _p(value: float) -> str:

@@ -1,29 +1,33 @@
-"""Numbers of the diagnosis page: values with their uncertainty, RMSE before and after, calibration."""
+"""Tables of the diagnosis page and how its numbers are written."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from cablecomp.diagnosis.result import Tested, Traces
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.report import page
-from cablecomp.report.diagnosis_view import DiagnosisView
-from cablecomp.report.replay_figures import scale
+from cablecomp.report.diagnosis_figures import residual
+from cablecomp.report.diagnosis_words import plain, short
+from cablecomp.report.replay_figures import Scale
 
 
-def title(view: DiagnosisView, effect: str) -> str:
-    """Return an effect's title, or its id in words."""
-    note = view.notes.get(effect)
-    return note.title if note is not None else effect.replace("_", " ")
-
-
-def angle(value_rad: float) -> str:
-    """Return an angle in the unit in which it reads well; NaN is a dash."""
-    if value_rad != value_rad:
+def angle(value_rad: float | None, unit: Scale) -> str:
+    """Return an angle in the page's unit; None and NaN are a dash."""
+    if value_rad is None or value_rad != value_rad:
         return "–"
-    unit = scale(abs(value_rad))
     return page.number(value_rad * unit.factor, unit.unit)
+
+
+def unit_for(result: Mapping[str, Any]) -> Scale:
+    """The unit of all angles of a page: that in which the calibrated drive's error reads well."""
+    size = known(result["baseline"]["heldout_rmse_rad"])
+    return next(
+        (s for s in (Scale(1.0, "rad"), Scale(1e3, "mrad")) if size * s.factor >= 0.3), Scale(1e6, "µrad")
+    )
 
 
 def known(value: float | None) -> float:
@@ -50,56 +54,95 @@ def interval(value: float, sd: float) -> str:
     return f"{page.number(value - 1.96 * sd, digits=4)} … {page.number(value + 1.96 * sd, digits=4)}"
 
 
-def numbers(view: DiagnosisView) -> str:
-    """Return RMSE before and after, over all samples and held out, as a whole and by recording."""
-    rows = []
-    for recording in view.recordings:
-        for name, mask in (("fitted", ~recording.heldout), ("held out", recording.heldout)):
-            if not np.any(mask):
-                continue
-            before, after = (
-                float(np.sqrt(np.mean(residual[mask] ** 2)))
-                for residual in (recording.residual_before, recording.residual_after)
-            )
-            rows.append(
-                (
-                    recording.name,
-                    name,
-                    int(mask.sum()),
-                    angle(before),
-                    angle(after),
-                    f"{before / max(after, 1e-300):.2f}",
-                )
-            )
-    result = view.result
-    whole = [
+def errors(result: Mapping[str, Any], unit: Scale) -> str:
+    """RMS errors of the joint angle before and after, and of the other channels."""
+    by = result["heldout"]["by"]
+    rows = [
         (
-            "all",
-            name,
-            "",
-            angle(result["baseline"][key]),
-            angle(result["augmented"][key]),
+            words,
+            angle(result["baseline"][key], unit),
+            angle(result["augmented"][key], unit),
             _ratio(result, key),
         )
-        for name, key in (("every sample", "rmse_rad"), ("held out", "heldout_rmse_rad"))
+        for words, key in (
+            (f"{by}s left out in turn", "heldout_rmse_rad"),
+            ("kept for the end, never used", "final_rmse_rad"),
+            ("fitted", "rmse_rad"),
+        )
     ]
-    headers = ("recording", "samples of", "count", "RMSE before", "RMSE after", "before / after")
-    table = page.table(headers, whole)
-    return table + (
-        page.fold("by recording", page.table(headers, rows)) if len(rows) > 2 else page.table(headers, rows)
-    )
+    for name, entry in result["channels"].items():
+        before, after = known(entry["baseline_rmse"]), known(entry["augmented_rmse"])
+        ratio = f"{before / after:.2f}" if after > 0.0 else "–"
+        rows.append((f"{name}, fitted", page.number(before), page.number(after), ratio))
+    return page.table(("joint angle, RMS on data", "before", "after", "before / after"), rows)
+
+
+def by_recording(traces: Sequence[Traces], unit: Scale) -> str:
+    """RMS error of each recording: on what counted in the fit, and on the rest."""
+    rows = []
+    for trace in traces:
+        for name, mask in (("fitted", np.asarray(trace.counted)), ("not fitted", ~np.asarray(trace.counted))):
+            if np.count_nonzero(mask) < 3:
+                continue
+            before, after = (
+                float(np.sqrt(np.mean(residual(trace, key)[mask] ** 2)))
+                for key in ("before_rad", "after_rad")
+            )
+            rows.append((short(trace.name), trace.session, name, angle(before, unit), angle(after, unit)))
+    return page.table(("recording", "session", "rows", "RMS before", "RMS after"), rows)
 
 
 def _ratio(result: Mapping[str, Any], key: str) -> str:
-    after = float(result["augmented"][key])
-    return f"{float(result['baseline'][key]) / after:.2f}" if after > 0.0 else "–"
+    after = known(result["augmented"][key])
+    return f"{known(result['baseline'][key]) / after:.2f}" if after > 0.0 else "–"
 
 
-def calibration(entries: Mapping[str, Mapping[str, float | None]]) -> str:
-    """Return nominal and calibrated values side by side."""
+def calibration(entries: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return nominal and calibrated values side by side, those of all sessions."""
     rows = []
     for name, entry in entries.items():
-        nominal, value, sd = (known(entry.get(key)) for key in ("nominal", "value", "sd"))
+        if entry["session"] is not None:
+            continue
+        nominal, value, sd = (known(entry[key]) for key in ("nominal", "value", "sd"))
         change = f"{100.0 * (value / nominal - 1.0):+.1f} %" if np.isfinite(nominal) and nominal else "–"
         rows.append((name, page.number(nominal, digits=5), with_sd(value, sd), change.replace("-", "−")))
-    return page.table(("parameter", "nominal", "calibrated", "change"), rows)
+    return page.table(("parameter", "configured", "calibrated", "change"), rows) if rows else ""
+
+
+def by_session(entries: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return each session's own values, one row per session; empty where there are none."""
+    own = {name: entry for name, entry in entries.items() if entry["session"] is not None}
+    names = list(dict.fromkeys(name.partition("@")[0] for name in own))
+    sessions = list(dict.fromkeys(entry["session"] for entry in own.values()))
+    rows = [
+        (
+            s,
+            *(
+                with_sd(known(e["value"]), known(e["sd"])) if (e := own.get(f"{n}@{s}")) else "–"
+                for n in names
+            ),
+        )
+        for s in sessions
+    ]
+    return page.table(("session", *names), rows) if rows else ""
+
+
+def rejected(tested: Sequence[Tested], rounds: Mapping[str, int]) -> str:
+    """Every hypothesis that was fitted and why it is not named."""
+    rows = []
+    for t in sorted(tested, key=lambda t: (rounds[t.beside], -t.heldout_gain)):
+        rows.append((rounds[t.beside], plain(t.name), f"{100 * t.heldout_gain:.1f} %", f"{t.z:.1f}",
+                     f"{100 * t.selected_in:.0f} %", t.outcome, _why(t, tested)))  # fmt: skip
+    heads = ("step", "hypothesis", "takes off", "z", "best in resamples", "outcome", "why")
+    return page.table(heads, rows)
+
+
+def _why(t: Tested, tested: Sequence[Tested]) -> str:
+    if t.outcome != "not needed":
+        return ""
+    if t.heldout_gain < LIMITS.gain:
+        return f"takes off less than {100 * LIMITS.gain:g} % of what is left"
+    if t.z < LIMITS.z:
+        return f"z = {t.z:.1f}: chance does as much; {LIMITS.z:g} is asked for"
+    best = max((o for o in tested if o.beside == t.beside), key=lambda o: o.heldout_gain)
+    return f"{plain(best.name)} takes off more" if best is not t else "with the others known it is not missed"

@@ -104,7 +104,7 @@ def ratios_figure(study: Study) -> Any:
         1, 6, shared_yaxes=True, horizontal_spacing=0.012, subplot_titles=[_wrapped(t) for _, t in _NUMBERS]
     )
     fig.update_layout(template=style.template(), height=110 + 24 * len(shown), showlegend=False)
-    fig.update_layout(margin={"l": 330, "r": 16, "t": 96, "b": 40})
+    fig.update_layout(margin={"l": 330, "r": 44, "t": 96, "b": 40})
     fig.update_annotations(font_size=12)
     for k, (key, _) in enumerate(_NUMBERS, start=1):
         values = [getattr(f.signature, key) for f in shown]

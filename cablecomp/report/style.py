@@ -68,7 +68,8 @@ def template() -> Any:
             "xaxis": axis,
             "yaxis": axis,
             "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
-            "margin": {"l": 64, "r": 24, "t": 40, "b": 52},
+            "margin": {"l": 64, "r": 44, "t": 40, "b": 52},
+            "modebar": {"orientation": "v"},  # in the margin, on neither legend nor curves
             "hovermode": "closest",
             "hoverlabel": {"font": {"family": FONT, "size": 12}},
         }

@@ -183,7 +183,7 @@ def affected_wrap(subject: Subject) -> Figure:
     m = np.linspace(0.0, max(4.0, 1.1 * subject.m_peak), 300)
     fig = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.09)
     fig.update_layout(
-        template=style.template(), height=HEIGHT + 60, margin={"l": 64, "r": 28, "t": 74, "b": 52}
+        template=style.template(), height=HEIGHT + 60, margin={"l": 64, "r": 44, "t": 74, "b": 52}
     )
     least = min(wrap.mu_wrap for wrap in subject.stage.wraps)
     for row, name in ((1, "eased"), (2, "tightened")):

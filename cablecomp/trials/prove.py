@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from cablecomp.config import load_joint
-from cablecomp.diagnosis.diagnose import diagnose, write_diagnosis
+from cablecomp.diagnosis.diagnose import diagnose
+from cablecomp.diagnosis.result import write_diagnosis
 from cablecomp.errors import CablecompError, InputError
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.reader import read_all

@@ -1,0 +1,157 @@
+"""The first screen of the diagnosis page: what is missing, how sure, how much better, what remains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import Any, Final
+
+import numpy as np
+
+from cablecomp.diagnosis.result import Diagnosis, Traces
+from cablecomp.report import diagnosis_figures as figures
+from cablecomp.report import page, style
+from cablecomp.report.diagnosis_tables import angle, known
+from cablecomp.report.diagnosis_words import (
+    ANSWERS,
+    dependences,
+    depends,
+    number,
+    plain,
+    sentence,
+    short,
+    values_of,
+)
+from cablecomp.report.page import Fact, Section, Tone
+from cablecomp.report.replay_figures import Scale
+
+_TONES: Final[Mapping[str, Tone]] = {
+    "consistent": "good", "recalibrate": "warn", "explained": "good", "partly explained": "good",
+    "unexplained": "bad",
+}  # fmt: skip
+_MOST_OLD: Final = 8
+
+
+def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
+    """The answer: names or new values on the left, measured, before and after on the right, numbers below."""
+    words = f'<p class="verdict {_TONES[d.verdict]}">{escape(sentence(d.verdict))}</p>'
+    words += page.paragraph(ANSWERS[d.verdict])
+    words += "".join(_missing(m) for m in result["missing_physics"])
+    words += "".join(_law(law) for law in dependences(result) if not _of_a_name(law, result))
+    if not result["missing_physics"]:
+        words += _without_a_name(result)
+    words += page.paragraph(_left(result, unit))
+    trace = shown_first(d)
+    picture = ""
+    if trace is not None:
+        seen = _unseen(result) if not np.all(trace.counted) else ""
+        picture = page.figure(figures.at_a_glance(trace, unit), f"The end of {short(trace.name)}.{seen}")
+    return Section("Answer", _STYLE + f'<div class="answer"><div>{words}</div><div>{picture}</div></div>'
+                   + page.facts(_facts(result, unit)) + page.bullets(d.warnings))  # fmt: skip
+
+
+def shown_first(d: Diagnosis) -> Traces | None:
+    """The recording to look at: where calibration alone leaves most."""
+    return max(d.traces, key=lambda t: float(np.mean(figures.residual(t, "before_rad") ** 2)), default=None)
+
+
+def _missing(m: Mapping[str, Any]) -> str:
+    sure, gain = 100.0 * known(m["confidence"]), 100.0 * known(m["heldout_gain"])
+    lines = "; ".join(values_of(m))
+    law = page.paragraph(f"{depends(m['depends_on'])}.") if m["depends_on"] else ""
+    return (
+        f'<div class="missing"><h3>{escape(sentence(plain(m["effect"])))}</h3>'
+        f'<div class="sure"><i style="width:{sure:.0f}%"></i></div>'
+        f"<p><b>{sure:.0f} %</b> sure of the name; takes <b>{gain:.0f} %</b> off the held-out square.</p>"
+        f'<p class="values">{escape(lines)}</p>{law}</div>'
+    )
+
+
+def _law(law: Mapping[str, Any]) -> str:
+    head = f"{law['parameter']} differs between sessions" if law["on"] == "session" else depends(law)
+    return f'<div class="missing"><h3>{escape(head)}</h3></div>'
+
+
+def _of_a_name(law: Mapping[str, Any], result: Mapping[str, Any]) -> bool:
+    """Whether the law is said with the effect that it belongs to."""
+    return any(
+        m["depends_on"] and m["depends_on"]["parameter"] == law["parameter"]
+        for m in result["missing_physics"]
+    )
+
+
+def _without_a_name(result: Mapping[str, Any]) -> str:
+    """Old and new values of a recalibration; what a consistent or unexplained verdict rests on else."""
+    if result["verdict"] == "recalibrate":
+        moved = [(n, e) for n, e in result["calibration"].items() if e["nominal"] is not None]
+        moved.sort(key=lambda p: -abs(p[1]["value"] - p[1]["nominal"]) / max(known(p[1]["sd"]), 1e-300))
+        rows = [(n, number(e["nominal"], 5), number(e["value"], 5), number(e["sd"], 2)) for n, e in moved]
+        return page.table(("parameter", "configured", "now", "±"), rows[:_MOST_OLD])
+    if result["candidates"]:
+        c = result["candidates"][0]
+        return page.paragraph(
+            f"Nearest: {plain(c['effect'])} ({100 * c['confidence']:.0f} %). Against it: {c['why_not_named']}."
+        )
+    return ""
+
+
+def _left(result: Mapping[str, Any], unit: Scale) -> str:
+    remainder = result["remainder"]
+    size = angle(remainder["rmse_rad"], unit)
+    if not remainder["structured"]:
+        return f"What remains, {size} RMS, follows nothing that was asked."
+    share = 100.0 * known(remainder["share"])
+    text = str(remainder["description"]).partition(";")[0]
+    return f"What remains: {size} RMS, {share:.0f} % of the calibrated drive's square; it {text}."
+
+
+def _unseen(result: Mapping[str, Any]) -> str:
+    return " Shaded: kept for the end, nothing was fitted there." if result["heldout"]["final"] else ""
+
+
+def _facts(result: Mapping[str, Any], unit: Scale) -> Iterator[Fact]:
+    by, before, after = result["heldout"]["by"], result["baseline"], result["augmented"]
+    for words, key in (
+        (f"{by}s left out in turn", "heldout_rmse_rad"),
+        ("kept for the end", "final_rmse_rad"),
+    ):
+        if before[key] is None:
+            continue
+        remark = "RMS error of the joint angle, before → after"
+        yield Fact(
+            sentence(words),
+            _arrow(before[key], known(after[key]), unit),
+            remark,
+            _tone(before[key], after[key]),
+        )
+    if before["heldout_rmse_rad"] and result["missing_physics"]:
+        gain = 1.0 - (known(after["heldout_rmse_rad"]) / before["heldout_rmse_rad"]) ** 2
+        yield Fact("Square removed", f"{100.0 * gain:.0f} %", "on data left out in turn", "good")
+    if result["repeatability_rad"] is not None:
+        yield Fact("The machine repeats to", angle(result["repeatability_rad"], unit), "what the data allow")
+    yield Fact("Sensors' noise", angle(result["noise_floor_rad"], unit), "as it shows in the joint angle")
+
+
+def _arrow(before: float, after: float, unit: Scale) -> str:
+    if before == after:
+        return angle(before, unit)
+    return f"{page.number(before * unit.factor)} → {angle(after, unit)}"
+
+
+def _tone(before: float, after: float | None) -> Tone:
+    return "good" if after is not None and after < 0.9 * before else "plain"
+
+
+_STYLE: Final = f"""<style>
+.answer {{ display: grid; grid-template-columns: minmax(0, 5fr) minmax(0, 6fr); gap: 22px; }}
+@media (max-width: 860px) {{ .answer {{ grid-template-columns: minmax(0, 1fr); }} }}
+.verdict {{ font-size: 25px; font-weight: 650; margin: 0 0 4px; }}
+.verdict.good {{ color: #0b8a6f; }} .verdict.warn {{ color: #b7791f; }} .verdict.bad {{ color: #c8102e; }}
+.missing {{ border-left: 4px solid #0b8a6f; padding: 2px 0 2px 14px; margin: 0 0 12px; }}
+.missing p {{ margin: 2px 0; }} .values {{ color: {style.MUTED}; font-size: 13.5px; overflow-wrap: anywhere; }}
+.sure {{ height: 5px; background: {style.RULE}; border-radius: 3px; max-width: 260px; }}
+.sure i {{ display: block; height: 5px; background: #0b8a6f; border-radius: 3px; }}
+h3 {{ font-size: 16px; margin: 10px 0 4px; }} h3 code {{ font-size: 13px; font-weight: 400; color: {style.MUTED}; }}
+.equation {{ font: 16px/1.7 {style.MONO}; background: #f8fafc; border-left: 4px solid {style.PREDICTED};
+  padding: 8px 16px; margin: 6px 0 12px; overflow-x: auto; border-radius: 0 8px 8px 0; }}
+</style>"""
