@@ -39,8 +39,8 @@ def at_a_glance(trace: Traces, unit: Scale, share: float = 0.35) -> Any:
     fig.update_layout(template=style.template(), height=400, margin={"l": 60, "r": 44, "t": 34, "b": 46})
     _deflections(fig, trace, shown, unit)
     _residuals(fig, trace, shown, unit, row=2)
-    for begin, end in _stretches(trace, shown):
-        fig.add_vrect(x0=begin, x1=end, fillcolor=_UNSEEN, line_width=0)
+    unseen = _stretches(trace, shown)
+    fig.update_layout(shapes=[*_bands(unseen, _UNSEEN, 1), *_bands(unseen, _UNSEEN, 2)])
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
     return style.axes(fig, _TIME, style.label("error", unit.unit), row=2, col=1)
 
@@ -79,10 +79,8 @@ def overlay(trace: Traces, intervals: Sequence[Sequence[float]], unit: Scale) ->
     if loaded:
         style.curve(fig, time, load, "load", style.LOAD, 1.3, row=3)
         style.axes(fig, "", style.label("load", "N·m"), row=3, col=1)
-    for begin, end in list(intervals)[:_MOST_INTERVALS]:
-        fig.add_vrect(x0=begin, x1=end, fillcolor=style.translucent(BEFORE, 0.10), line_width=0, row=2, col=1)
-    for begin, end in _stretches(trace, everything):
-        fig.add_vrect(x0=begin, x1=end, fillcolor=_UNSEEN, line_width=0, row=1, col=1)
+    where = _bands(list(intervals)[:_MOST_INTERVALS], style.translucent(BEFORE, 0.10), 2)
+    fig.update_layout(shapes=[*where, *_bands(_stretches(trace, everything), _UNSEEN, 1)])
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
     style.axes(fig, "", style.label("error", unit.unit), row=2, col=1)
     fig.update_xaxes(title_text=_TIME, row=rows, col=1)
@@ -269,6 +267,18 @@ def _binned(values: FloatArray, residual: FloatArray) -> tuple[FloatArray, Float
     used = count > 3
     centres = np.bincount(index, values, len(edges) - 1)[used] / count[used]
     return centres, np.bincount(index, residual, len(edges) - 1)[used] / count[used]
+
+
+def _bands(stretches: Sequence[Sequence[float]], colour: str, row: int) -> list[dict[str, Any]]:
+    """Stretches of time shaded over the height of one row (shapes at once: one at a time takes plotly a second)."""
+    axis = "" if row == 1 else str(row)
+    return [
+        {
+            "type": "rect", "x0": begin, "x1": end, "xref": f"x{axis}", "y0": 0, "y1": 1, "yref": f"y{axis} domain",
+            "fillcolor": colour, "line": {"width": 0}, "layer": "below",
+        }
+        for begin, end in stretches
+    ]  # fmt: skip
 
 
 def _stretches(trace: Traces, shown: Any) -> list[tuple[float, float]]:
