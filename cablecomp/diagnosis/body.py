@@ -86,6 +86,20 @@ def gather_body(
     return Body(tuple(names), used, final, by)
 
 
+def spread(evidence: Sequence[Evidence], most: int) -> tuple[Evidence, ...]:
+    """At most about `most` recordings, even in order, every session and condition among them."""
+    if len(evidence) <= most:
+        return tuple(evidence)
+    chosen = {int(k) for k in np.linspace(0, len(evidence) - 1, most)}
+    seen = {(evidence[k].session, *evidence[k].condition.values()) for k in chosen}
+    for k, e in enumerate(evidence):
+        key = (e.session, *e.condition.values())
+        if key not in seen:
+            seen.add(key)
+            chosen.add(k)
+    return tuple(e for k, e in enumerate(evidence) if k in chosen)
+
+
 def _conditions(config: JointConfig, e: Evidence) -> dict[str, float]:
     values = {}
     for condition, channel in config.condition.items():

@@ -11,7 +11,7 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
-from cablecomp.estimation.history import forgotten
+from cablecomp.estimation.history import forgotten, full_swing
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
 from cablecomp.estimation.parameter import Parameter, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -49,7 +49,7 @@ def calibrate_drive(
     cut, constant = [], []
     for e in fit.problem.evidence:
         found = forgotten(fit.problem, fit.x, e, LIMITS.history * size)
-        cut.append(e.counting_from(found.first))
+        cut.append(e.counting_from(max(found.first, full_swing(fit.problem, e, LIMITS.history_most))))
         constant.append(found.constant_rad)
     floor = Weighing(
         floor.sigma, {**floor.zero_sd, JOINT: max(floor.zero_sd[JOINT], float(np.mean(constant)))}

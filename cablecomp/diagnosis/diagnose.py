@@ -10,7 +10,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.augmented import augmented_joint
-from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
+from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, spread
 from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
 from cablecomp.diagnosis.covariates import Covariates, covariates, join
 from cablecomp.diagnosis.describe_law import Found, empirical_laws
@@ -18,7 +18,7 @@ from cablecomp.diagnosis.errors_left import errors_of
 from cablecomp.diagnosis.experiment import best_experiment
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.scores import left_out, make_groups
+from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
 from cablecomp.diagnosis.explain.selection import Model, Progress, Selection, select
 from cablecomp.diagnosis.explain.verdict import Weighed, weigh
 from cablecomp.diagnosis.locate import Location, locate
@@ -30,7 +30,7 @@ from cablecomp.diagnosis.unknown import describe
 from cablecomp.diagnosis.unseen import could_be_unseen
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence, load_channel
-from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, weighed
+from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve, weighed
 from cablecomp.estimation.simulate import load_of
 from cablecomp.estimation.standing import value_of
 from cablecomp.signal.smoothing import FloatArray
@@ -59,12 +59,21 @@ def diagnose(
     seen = [_covariates(config, e) for e in drive.fit.problem.evidence]
     before = _series(drive.fit, seen, drive.floor_rad)
     location = locate(before, rng, _sensitivities(drive.fit))
-    groups = make_groups(drive.fit)
     pool = hypotheses(config, body.used)
-    selection = select(drive.fit, drive.nominal, pool, groups, rng, progress)
+    searched = spread(drive.fit.problem.evidence, LIMITS.searched)
+    whole = len(searched) == len(drive.fit.problem.evidence)
+    begin_fit = drive.fit if whole else solve(drive.fit.problem.with_evidence(searched), drive.fit.x, 6)
+    nominal = drive.nominal if whole else _at_start(begin_fit)
+    groups = make_groups(begin_fit)
+    selection = select(begin_fit, nominal, pool, groups, rng, progress)
     progress("last fit", 0.9)
-    final = _settled(selection, drive)
-    selection = replace(selection, final=final)
+    selection = replace(selection, final=_settled(selection.final, drive, groups))
+    final = selection.final
+    if not whole and final.terms:
+        everything = final.fit.problem.with_evidence(drive.fit.problem.evidence)
+        groups = make_groups(drive.fit)
+        fit = solve(everything, final.fit.x, 12)
+        final = _settled(Model(final.terms, fit, left_out(fit, groups)), drive, groups)
     after = _series(final.fit, seen, drive.floor_rad)
     rest = locate(after, rng, _sensitivities(final.fit))
     share_left = _share_left(drive, final)
@@ -138,13 +147,19 @@ def _from_where(body: Body, cut: Sequence[Evidence]) -> tuple[Evidence, ...]:
     return tuple(e.counting_from(min(first, len(e.rows) // 2)) for e in body.final)
 
 
-def _settled(selection: Selection, drive: Calibrated) -> Model:
-    """The final model fitted with weights that its own remainder asks for, so that its uncertainties mean something."""
-    model = selection.final
+def _at_start(fit: Fit) -> Fit:
+    """The nominal drive about the same recordings, evaluated."""
+    problem = fit.problem
+    x = problem.start
+    return Fit(problem, x, problem.residual(x), problem.jacobian(x))
+
+
+def _settled(model: Model, drive: Calibrated, groups: Groups) -> Model:
+    """The model fitted with weights that its own remainder asks for, so that its uncertainties mean something."""
     fit = model.fit
     for _ in range(2):
         fit = refit(fit, weighed(fit, drive.floor), 10)
-    return replace(model, fit=fit, left_out=left_out(fit, selection.groups))
+    return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
 def _covariates(config: JointConfig, e: Evidence) -> Covariates:

@@ -16,13 +16,17 @@ class Thresholds:
     rows: int = 1200
     """Judged rows of all recordings together while hypotheses are compared: a friction loop is told from another by
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
-    rows_each: int = 80
-    """Judged rows that a recording has at least, however many recordings there are: four strokes of twenty."""
+    rows_each: int = 120
+    """Judged rows that a recording has at least, however many recordings there are: six strokes of twenty."""
+    searched: int = 12
+    """Recordings among which hypotheses are compared, spread over sessions and order; the final model is fitted to all."""
     search_weight: float = 0.5
     """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
     the calibration do not stand in the way of a better law."""
     rounds: int = 5
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
+    zero: float = 0.7
+    """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row counts for."""
     promise: float = 0.98
     """Cost after a linear step over the cost before, above which a hypothesis is not tried at all."""
     rough: int = 5
@@ -30,9 +34,11 @@ class Thresholds:
     promising: int = 6
     """Hypotheses of a round that are fitted to the end, best first (trials seed 101: the true one was among the first
     four of the rough answers wherever it was found at all)."""
+    tried_later: int = 9
+    """Hypotheses of a later round that are tried, by what they promise."""
     beam: int = 2
     """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
-    worth_rates: float = 1.04
+    worth_rates: float = 1.08
     """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on every sample."""
     hopeless: float = 4.0
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""

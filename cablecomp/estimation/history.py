@@ -51,6 +51,26 @@ def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
             yield np.column_stack((np.linspace(end, q, 2 * LEG), np.full(2 * LEG, m)))
 
 
+def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
+    """First judged row after a swing over nine tenths of the range and a turn: friction on the path, too, has by then slid one
+    way through and begun to slide the other. The motor's swing where it moves, else the load's; 0 where there is none
+    within the share `most` of the recording."""
+    motor = recording.at_rows("motor_position_rad")
+    load = np.broadcast_to(
+        np.asarray(load_of(problem.config, recording.columns), dtype=np.float64), recording.columns["time_s"].shape
+    )[recording.rows]
+    ratio = np.prod([s.input_radius_m / s.output_radius_m for s in problem.config.drive.stage])
+    moves = np.ptp(motor) * ratio > 0.3 * np.ptp(recording.at_rows(JOINT))
+    driver = motor if moves else load
+    away = np.abs(driver - driver[0])
+    if not away.max() > 0.0:
+        return 0
+    farthest = np.maximum.accumulate(away)
+    turned = (farthest >= 0.9 * away.max()) & (farthest - away >= 0.02 * away.max())
+    first = int(np.argmax(turned)) if turned.any() else 0
+    return first if first <= most * len(motor) else 0
+
+
 def forgotten(problem: Problem, x: FloatArray, recording: Evidence, tolerance_rad: float) -> Forgotten:
     """Where the past is forgotten to within `tolerance_rad`; the best cut there is if it is nowhere."""
     made = simulator(problem.joint(x, recording))

@@ -51,6 +51,17 @@ class Hypothesis:
         """Whether it has a phase, which goes with the amount as a pair."""
         return any(p.name == PHASE for p in self.effect.parameters)
 
+    @property
+    def trades(self) -> bool:
+        """Whether it trades places with calibration and other effects of its kind: friction and stiffness in the load's path."""
+        plain = not (self.has_instant or self.has_phase or self.effect.texts or self.effect.rates)
+        return plain and bool({"load", "reversal"} & set(self.effect.acts_through)) and not self.groove
+
+    @property
+    def groove(self) -> bool:
+        """Whether it depends on the place in the groove."""
+        return "joint_angle" in self.effect.acts_through
+
     def entry(self, values: Mapping[str, float | str]) -> EffectEntry:
         """The configuration's entry with these values, inside what the law can take."""
         inside = {

@@ -204,9 +204,10 @@ def rough(answers: Sequence[Answer], evaluations: int, cold: Mapping[str, float]
     if cold is not None:
         problem = answers[0].problem
         starts.append((problem, np.array([p.x(cold.get(p.name, p.start)) for p in problem.parameters])))
-    for problem, x in starts:
+    for k, (problem, x) in enumerate(starts):
+        wanted = 3 if problem.fine else evaluations if k < len(answers) else evaluations + 3
         try:
-            fits.append(solve(problem, x, 3 if problem.fine else evaluations))
+            fits.append(solve(problem, x, wanted))
         except InputError:
             continue
     return min(fits, key=lambda f: f.cost, default=None)

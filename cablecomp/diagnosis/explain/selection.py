@@ -6,6 +6,7 @@ Besides effects, a round tries dependences: a parameter that is each session's o
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -26,6 +27,7 @@ from cablecomp.diagnosis.explain.screening import Anchor, Answer, anchor, ask_al
 from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import MOTOR
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
 from cablecomp.estimation.parameter import DECADE, by_condition
 from cablecomp.estimation.problem import Problem, Weighing
@@ -90,11 +92,12 @@ def select(
     groups: Groups,
     rng: np.random.Generator,
     progress: Progress,
+    budget_s: float = 60.0,
 ) -> Selection:
     """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is not missed.
 
     `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to the effect
-    begins there.
+    begins there. `budget_s`: no round is begun after so much time.
     """
     sharp = searching(baseline)
     first = reweighed(Model((), baseline, left_out(baseline, groups)), sharp, groups)
@@ -104,38 +107,48 @@ def select(
     beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
     rounds: list[Round] = []
     answers: tuple[Answer, ...] = ()
-    cold: dict[str, float] | None = None
+    cold = _cold(pool, baseline)
     best = first
-    for number in range(LIMITS.rounds):
+    begin = time.monotonic()
+    for number in range(0 if quiet(baseline) else LIMITS.rounds):
+        if number and time.monotonic() - begin > budget_s:
+            break
         candidates: list[tuple[Round, Tried]] = []
         for model, start in beam:
             round_, answered = _one_round(model, start, pool, groups, rng, progress, number, cold)
-            if not answers:
-                answers = answered
-                cold = _cold(answered, baseline)
+            answers = answers or answered
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
-        ranked = sorted(candidates, key=lambda c: _loss(c[1].model, best, groups))
-        fresh: list[Model] = []
-        for _, t in ranked:
-            known = {frozenset(x.name for x in m.terms) for m in fresh}
-            if frozenset(x.name for x in t.model.terms) not in known:
-                fresh.append(t.model)
+        good = [t for _, t in candidates if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
+        fresh = _distinct(sorted((t.model for t in good), key=lambda m: _loss(m, best, groups)))
         if not fresh:
-            break
-        round_, tried = ranked[0]
-        step = tried.lead if round_.base is best else lead(tried.model.left_out, best.left_out, groups)
-        if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
             break
         most = LIMITS.close * _loss(fresh[0], fresh[0], groups)
         kept = [m for m in fresh[: LIMITS.beam] if _loss(m, fresh[0], groups) < most]
         sharper = searching(fresh[0].fit)
-        best = reweighed(fresh[0], sharper, groups)
+        carried = [reweighed(m, sharper, groups) for m in kept]
+        rival = best if best.fit.problem.fine == carried[0].fit.problem.fine else None
+        if rival is None or _better(carried[0], reweighed(rival, sharper, groups), groups):
+            best = carried[0]
         if quiet(best.fit):
             break
-        beam = [(best, None), *((reweighed(m, sharper, groups), None) for m in kept[1:])]
+        beam = [(m, None) for m in carried]
     final = _pruned(best, groups)
     return Selection(first, tuple(rounds), final, groups, answers)
+
+
+def _distinct(models: Sequence[Model]) -> list[Model]:
+    """Each set of terms once, the first of its kind."""
+    found: dict[frozenset[str], Model] = {}
+    for m in models:
+        found.setdefault(frozenset(t.name for t in m.terms), m)
+    return list(found.values())
+
+
+def _better(model: Model, than: Model, groups: Groups) -> bool:
+    """Whether a model is worth its further terms."""
+    step = lead(model.left_out, than.left_out, groups)
+    return step.z > LIMITS.z and step.gain > LIMITS.gain
 
 
 def _one_round(
@@ -169,11 +182,15 @@ def _one_round(
     )
     promised = {a[0].hypothesis.name: before / max(a[0].cost, 1e-12) for a in answers}
     promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
-    worth = [a for a in answers if cold is not None or a[0].cost < LIMITS.promise * before]
+    trades = cold is not None and number > 0
+    worth = [a for a in answers if a[0].cost < LIMITS.promise * before or (trades and a[0].hypothesis.trades)]
+    if number > 0:
+        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later]
+    promising = max(LIMITS.promising - 2 * number, LIMITS.promising // 2)
 
     def begin(a: list[Answer]) -> Fit | None:
         progress(f"trying {a[0].hypothesis.name}", done)
-        return rough(a, LIMITS.rough, cold)
+        return rough(a, LIMITS.rough, cold if a[0].hypothesis.trades else None)
 
     roughs = side_by_side(begin, worth)
     ranked: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
@@ -188,7 +205,7 @@ def _one_round(
     top = ranked[0][0] if ranked else 0.0
     chosen = [
         c
-        for k, c in enumerate(ranked[: LIMITS.promising])
+        for k, c in enumerate(ranked[:promising])
         if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
     ]
 
@@ -225,7 +242,11 @@ def searching(fit: Fit) -> Weighing:
     for c in problem.channels:
         noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
         sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise, 1e-12)
-    spread = {c: max(problem.weighing.zero_sd.get(c, 0.0), 0.1 * sigma[c]) for c in problem.channels}
+    # zeros may not take up what an effect could explain: an offset that follows the load is a compliance
+    spread = {
+        c: float(np.clip(problem.weighing.zero_sd.get(c, 0.0), 0.1 * sigma[c], LIMITS.zero * sigma[c]))
+        for c in problem.channels
+    }
     return Weighing(sigma, spread)
 
 
@@ -235,14 +256,19 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
-def _cold(answers: Sequence[Answer], baseline: Fit) -> dict[str, float] | None:
+def _cold(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
     """Where every effect would begin beside the nominal drive; None where the drive is known better than by order of magnitude
     (calibration then stays in its valley)."""
     if not any(p.sd >= DECADE for p in baseline.problem.parameters if np.isfinite(p.sd)):
         return None
+    evidence = baseline.problem.evidence
+    torque = [float(np.std(e.columns[c])) for e in evidence for c in (MOTOR, "joint_torque_Nm") if c in e.columns]
     found: dict[str, float] = {}
-    for a in sorted(answers, key=lambda a: a.place):
-        found |= a.values
+    for h in pool:
+        values = dict(h.starts[0].values if h.effect.posture else h.starts[len(h.starts) // 2].values)
+        if h.amount.unit == "N m" and torque:  # a share of the torques that go round: moments are not known beforehand
+            values[h.amount.name] = 0.25 * float(np.median(torque))
+        found |= {f"effect.{h.effect.id}.{k}": v for k, v in values.items() if not isinstance(v, str)}
     return found
 
 
