@@ -22,6 +22,7 @@ from cablecomp import __version__
 from cablecomp.errors import CablecompError, ConfigError, DeviceError, InputError, InternalError, printable
 
 COMMANDS: Final = {
+    "guide": "guide.show_guide",
     "demo": "demo.demo",
     "example": "example.copy_example",
     "run": "run.run",

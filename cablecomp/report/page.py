@@ -110,7 +110,7 @@ def page(title: str, lead: str, sections: Iterable[Section]) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{_CSS}</style><script>{get_plotlyjs()}</script></head>"
+        f"<style>{CSS}</style><script>{get_plotlyjs()}</script></head>"
         f'<body><header><h1>{escape(title)}</h1><p class="lead">{escape(lead)}</p><nav>{links}</nav></header>'
         f"<main>{body}</main>"
         # figures are drawn while the page is still being laid out: let each take its final width
@@ -141,7 +141,7 @@ def _superscript(exponent: int) -> str:
     return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-_CSS = f"""
+CSS = f"""
 :root {{ color-scheme: light; }}
 * {{ box-sizing: border-box; }}
 body {{ margin: 0; background: #f4f6f9; color: {style.INK}; font: 15px/1.55 {style.FONT}; }}
