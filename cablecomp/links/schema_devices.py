@@ -6,13 +6,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from cablecomp.links.cansimple_firmware import FIRMWARES, Datum, FirmwareName
 from cablecomp.links.records import CHANNELS
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1)]
 Value = Finite | str
-OdriveData = Literal["encoder", "iq", "torques", "temperature", "bus"]
 
 
 class Frozen(BaseModel):
@@ -54,19 +54,21 @@ class CanSimpleDevice(Frozen):
 
     protocol: Literal["cansimple"]
     id: Name
-    firmware: Literal["0.5", "0.6"] = "0.6"
-    cyclic: tuple[OdriveData, ...] = ("encoder",)
-    polled: tuple[OdriveData, ...] = ()
+    firmware: FirmwareName = "0.6"
+    cyclic: tuple[Datum, ...] = ("encoder",)
+    polled: tuple[Datum, ...] = ()
     torque_constant_Nm_per_A: Positive | None = None
     velocity_limit_turns_s: Positive | None = None
     current_limit_A: Positive | None = None
 
     @model_validator(mode="after")
     def _known_to_firmware(self) -> Self:
-        if self.firmware == "0.5" and {"torques", "temperature"} & {*self.cyclic, *self.polled}:
-            raise ValueError(
-                "firmware 0.5 has no `torques` and no `temperature`; `encoder`, `iq`, `bus` are accepted"
-            )
+        known = FIRMWARES[self.firmware].data
+        for datum in (*self.cyclic, *self.polled):
+            if datum not in known:
+                raise ValueError(
+                    f"firmware {self.firmware} has no `{datum}`; {', '.join(known)} are accepted"
+                )
         if (self.velocity_limit_turns_s is None) != (self.current_limit_A is None):
             raise ValueError(
                 "`velocity_limit_turns_s` and `current_limit_A` go together: both or none are accepted"

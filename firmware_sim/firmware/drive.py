@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from firmware_sim.errors import SimError
 from firmware_sim.firmware.records import FAULTS, DriveFlag, DriveState, Mode, Request, Setpoint
+from firmware_sim.firmware.shaping import InputMode, Shaper
 from firmware_sim.plantlike import Readings
 
 # What a request does in each state; a pair that is missing is refused and leaves everything as it is.
@@ -95,6 +96,7 @@ class Drive:
         self.mode = self.config.mode
         self.flags = DriveFlag.STARTED_AFRESH
         self.setpoint = Setpoint()
+        self.shaper = Shaper()
         self.homed = self.config.index_position_rad is None
         self.refused = 0
         self._raw_zero: float | None = 0.0 if self.homed else None
@@ -146,10 +148,15 @@ class Drive:
         """A message that is not a target but shows that the host lives."""
         self._last_command_s = now_s
 
-    def set_mode(self, mode: Mode) -> None:
-        """Change the control mode; targets start from where the motor is."""
+    def set_mode(self, mode: Mode, inputs: InputMode = InputMode.PASSTHROUGH) -> None:
+        """Change the control mode and how inputs are taken; targets start from where the motor is."""
         self.mode = mode
+        self.shaper.mode = inputs
         self._hold()
+
+    def refuse_mode(self) -> None:
+        """A mode was asked for that this drive does not have: it lets go, aloud."""
+        self._fault(DriveFlag.BAD_MODE)
 
     def set_limits(self, velocity_rad_s: float | None = None, torque_Nm: float | None = None) -> None:
         """Narrow the limits; none can exceed what the drive was built for."""
@@ -272,6 +279,7 @@ class Drive:
     def _hold(self) -> None:
         self._integral_Nm = 0.0
         self.setpoint = Setpoint(position_rad=self.position_rad)
+        self.shaper.hold(self.position_rad)
 
     def _fault(self, flag: DriveFlag) -> None:
         self.flags |= flag
@@ -302,7 +310,7 @@ class Drive:
             self._fault(found)
 
     def _law(self, dt_s: float) -> float:
-        c, s = self.config, self.setpoint
+        c, s = self.config, self.shaper.step(self.setpoint, dt_s)
         position = min(max(s.position_rad, c.position_min_rad), c.position_max_rad)
         if self.mode is Mode.TORQUE:
             return s.torque_Nm

@@ -130,6 +130,10 @@ class MitWire:
         """The drive's own id."""
         return (self.drive_id,)
 
+    def broadcasts(self) -> Iterable[int]:
+        """None."""
+        return ()
+
     def hear(self, frame: Frame, drive: Drive, now_s: float) -> Heard:
         """A special frame asks the state table, any other is a command; both are answered by the drive's
         state."""

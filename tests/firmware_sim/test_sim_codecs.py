@@ -154,7 +154,9 @@ def test_odrive_identifiers_and_payloads_of_the_documentation() -> None:
 def test_odrive_answers() -> None:
     wire, drive = OdriveWire(1), drive_at(position=2 * math.pi, velocity=-math.pi)
     heartbeat = wire.answer(Answer.ASKED, Frame(0x21, remote=True), drive)
-    assert heartbeat == Frame(0x21, bytes.fromhex("0000000001000000"))  # no error, idle, success
+    assert heartbeat == Frame(
+        0x21, bytes.fromhex("0000000001000100")
+    )  # no error, idle, success, no trajectory
     encoder = wire.answer(Answer.ASKED, Frame(0x29, remote=True), drive)
     assert encoder == Frame(0x29, bytes.fromhex("0000803F000000BF"))  # 1 rev, -0.5 rev/s
     drive.request(Request.STOP, 0.0)
@@ -215,7 +217,7 @@ def test_shipped_tables_read_the_same_bytes_as_the_manuals() -> None:
     told = odrive.decode_message(0x2C, bytes.fromhex("B6F39D3FF40106FF"))
     assert told == {"Input_Pos": pytest.approx(1.234), "Vel_FF": 0.5, "Torque_FF": -0.25}
     assert (
-        odrive.decode_message(0x21, bytes.fromhex("0000000208030000"))["Axis_State"] == "closed_loop_control"
+        odrive.decode_message(0x21, bytes.fromhex("0000000208030000"))["Axis_State"] == "CLOSED_LOOP_CONTROL"
     )
     joint = cantools.database.load_file(LINKS / "cablecomp_joint.dbc")
     told = joint.decode_message(0x680, bytes.fromhex("40420F00B03CFF07"))
