@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,10 +12,14 @@ import numpy as np
 import polars as pl
 
 from cablecomp.errors import InputError
+from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source import Piece, Truncated, ahead, chunks
 from cablecomp.recording.table import FloatArray
 
 _HEAD_LIMIT: Final = 1 << 20
+_BREAK: Final = b"\n"
+_LINE_LIMIT: Final = 1 << 20
+_MOST_COLUMNS: Final = 4096
 _SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 
@@ -33,18 +38,36 @@ class Head:
 
 @dataclass(frozen=True)
 class Rows:
-    """Parsed rows, one array per column of the file; row k is line `first_line + k`; NaN where empty."""
+    """Parsed rows, one array per column; row k is line `first_line + k`; NaN where empty."""
 
     first_line: int
-    arrays: list[FloatArray]
+    arrays: Mapping[str, FloatArray]
     fraction: float
     text: bytes
-    separator: str
+    head: Head
     ends_with_break: bool = True
+    left_out: int = 0
 
-    def cell(self, row: int, column: int) -> str:
+    def cell(self, row: int, column: str) -> str:
         """Return the text of a cell, for messages."""
-        return self.text.split(b"\n")[row].decode("utf-8", "replace").split(self.separator)[column].strip()
+        cells = self.text.split(b"\n")[row].decode("utf-8", "replace").split(self.head.separator)
+        return cells[self.head.columns.index(column)].strip()
+
+
+def open_csv(path: Path, gzipped: bool) -> RawTable:
+    """Open CSV text (comma, semicolon, tab; plain or gzip); InputError if it has no header of names."""
+    head = read_head(path, gzipped)
+    twice = next((n for n, count in Counter(head.columns).items() if count > 1), None)
+    if twice is not None:
+        raise InputError(f"{path}: line {head.header_line}: column {twice!r} occurs twice; keep one of them")
+
+    def read(names: Sequence[str]) -> Iterator[Rows]:
+        return read_rows(path, gzipped, head)
+
+    odd = gzipped and path.suffix != ".gz"
+    notes = (f"is gzip although it is named {path.suffix or path.name}; read unpacked",) if odd else ()
+    where = f"line {head.header_line}: "
+    return RawTable(head.columns, read, "line", where, head.comments, notes=notes)
 
 
 def read_head(path: Path, gzipped: bool) -> Head:
@@ -64,6 +87,10 @@ def read_head(path: Path, gzipped: bool) -> Head:
     if head is None:
         raise InputError(
             f"{path}: has no header line; expected column names such as time_s,motor_position_rad"
+        )
+    if len(head.columns) > _MOST_COLUMNS:
+        raise InputError(
+            f"{path}: line {head.header_line}: has {len(head.columns)} columns; {_MOST_COLUMNS} are accepted"
         )
     if _is_number(head.columns[0]):
         raise InputError(
@@ -87,9 +114,12 @@ def read_rows(path: Path, gzipped: bool, head: Head) -> Iterator[Rows]:
                 drop = min(skip, len(data))
                 data, skip = data[drop:], skip - drop
             body, tail = _whole_lines(tail + data)
+            if len(tail) > _LINE_LIMIT:
+                found = "over a million empty lines" if tail.isspace() else "over a million characters"
+                raise InputError(f"{path}: line {line + body.count(_BREAK)}: {found}; that is no recording")
             if body:
                 rows = parser.parse(body, line, fraction)
-                line += len(rows.arrays[0])
+                line += len(rows.arrays[head.columns[0]])
                 yield rows
     except Truncated as error:
         raise InputError(f"{path}: line {line}: {error}; copy or record the file anew") from None
@@ -113,7 +143,8 @@ class _Parser:
         if self.head.decimal_comma:
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)
-        return Rows(line, arrays, fraction, text, self.head.separator, not last)
+        named = dict(zip(self.head.columns, arrays, strict=True))
+        return Rows(line, named, fraction, text, self.head, not last)
 
     def _fast(self, text: bytes) -> list[FloatArray] | None:
         """Return the columns (NaN where a cell is empty), or None if any row may be ragged or hold text.
@@ -179,7 +210,8 @@ def _parse_head(text: bytes) -> Head | None:
             comments.append(line[1:].strip())
             continue
         separator = max(_SEPARATORS, key=line.count)
-        columns = tuple(name.strip().strip('"').strip() for name in line.split(separator))
+        names = (name.strip().strip('"').strip() for name in line.split(separator))
+        columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
         first = lines[number].decode("utf-8", "replace") if number < len(lines) else ""
         comma = separator != "," and "," in first
         return Head(columns, tuple(comments), separator, comma, number, number + 1, size + shift)
