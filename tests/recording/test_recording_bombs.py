@@ -47,7 +47,9 @@ def npz() -> bytes:
     """Two arrays of 60 million zeros."""
     out = io.BytesIO()
     head = io.BytesIO()
-    np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (60_000_000,)})
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": "<f8", "fortran_order": False, "shape": (60_000_000,)}
+    )
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name in ("time_s", "other_x"):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -94,7 +96,11 @@ CASES: dict[str, tuple[Callable[[], bytes], str, str]] = {
     "gzip of line breaks": (lambda: gzipped(b"\n" * MB, 400), "stream", "over a million empty lines"),
     "npz, streamed": (npz, "stream", "60000000 rows"),
     "MCAP that states a large chunk": (lambda: mcap(3 << 30, b"zstd", b"x"), "stream", "a chunk states"),
-    "MCAP whose zstd gives more than stated": (lambda: mcap(100, b"zstd", zstd()), "stream", "not of the size"),
+    "MCAP whose zstd gives more than stated": (
+        lambda: mcap(100, b"zstd", zstd()),
+        "stream",
+        "not of the size",
+    ),
     "MCAP whose lz4 gives more than stated": (lambda: mcap(100, b"lz4", lz4()), "stream", "not of the size"),
     "MATLAB": (mat, "stream", "more than 134,217,728 numbers"),
 }
