@@ -27,6 +27,8 @@ COMMANDS: Final = {
     "example": "example.copy_example",
     "run": "run.run",
     "replay": "replay.replay",
+    "inspect": "inspect.inspect_recording",
+    "convert": "convert.convert_recording",
     "init": "init.init",
     "info": "info.info",
     "design": "design.design",

@@ -9,11 +9,11 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.shared import Config, announce_compilation, console, read_joint, share_bar
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import Diagnosis, diagnose, report_json, write_diagnosis
 from cablecomp.effects import load_effects
 from cablecomp.recording.atomic import atomic_directory
-from cablecomp.recording.reader import read_all
 from cablecomp.report.diagnosis_build import diagnosis_report
 
 
@@ -27,12 +27,17 @@ def diagnose_recordings(
     effects: Annotated[
         list[Path] | None, typer.Option(help="Python file that registers an effect of your own")
     ] = None,
+    words: MapOption = None,
+    link: LinkOption = None,
+    dbc: DbcOption = None,
+    which: JointOption = None,
 ) -> None:
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
     for path in effects or ():
         load_effects(path)
     joint = read_joint(config)
-    data = {str(path): read_all(path).columns for path in recordings}
+    reading = sources(words, link, dbc, which, joint)
+    data = {str(path): reading.read(path).columns for path in recordings}
     announce_compilation()
     with share_bar() as told:
         found = diagnose(joint, data, told, seed)

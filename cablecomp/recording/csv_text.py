@@ -62,7 +62,7 @@ def open_csv(path: Path, gzipped: bool) -> RawTable:
         raise InputError(f"{path}: line {head.header_line}: column {twice!r} occurs twice; keep one of them")
 
     def read(names: Sequence[str]) -> Iterator[Rows]:
-        return read_rows(path, gzipped, head)
+        return read_rows(path, gzipped, head, names)
 
     odd = gzipped and path.suffix != ".gz"
     notes = (f"is gzip although it is named {path.suffix or path.name}; read unpacked",) if odd else ()
@@ -100,9 +100,12 @@ def read_head(path: Path, gzipped: bool) -> Head:
     return head
 
 
-def read_rows(path: Path, gzipped: bool, head: Head) -> Iterator[Rows]:
-    """Stream the rows below the head; InputError with the line for ragged rows, text, and files cut short."""
-    parser = _Parser(path, head)
+def read_rows(path: Path, gzipped: bool, head: Head, names: Sequence[str]) -> Iterator[Rows]:
+    """Stream these columns of the rows below the head; what stands in the others does not matter.
+
+    InputError with the line for ragged rows, text, and files cut short.
+    """
+    parser = _Parser(path, head, tuple(dict.fromkeys(names)))
     skip, line, tail, fraction = head.size, head.first_line, b"", 0.0
     carriage = b""
     try:
@@ -119,7 +122,7 @@ def read_rows(path: Path, gzipped: bool, head: Head) -> Iterator[Rows]:
                 raise InputError(f"{path}: line {line + body.count(_BREAK)}: {found}; that is no recording")
             if body:
                 rows = parser.parse(body, line, fraction)
-                line += len(rows.arrays[head.columns[0]])
+                line += len(next(iter(rows.arrays.values())))
                 yield rows
     except Truncated as error:
         raise InputError(f"{path}: line {line}: {error}; copy or record the file anew") from None
@@ -137,13 +140,14 @@ def _pieces(path: Path, gzipped: bool) -> Iterator[Piece]:
 class _Parser:
     path: Path
     head: Head
+    names: tuple[str, ...]
 
     def parse(self, text: bytes, line: int, fraction: float, last: bool = False) -> Rows:
         text = text.replace(b'"', b"") if b'"' in text else text
         if self.head.decimal_comma:
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)
-        named = dict(zip(self.head.columns, arrays, strict=True))
+        named = dict(zip(self.names, arrays, strict=True))
         return Rows(line, named, fraction, text, self.head, not last)
 
     def _fast(self, text: bytes) -> list[FloatArray] | None:
@@ -152,24 +156,25 @@ class _Parser:
         The parser refuses rows with too many cells and fills up short ones: with the right total of
         separators and no refusal, no row is short either.
         """
-        names = [f"c{i}" for i in range(len(self.head.columns))]
+        places = {name: f"c{i}" for i, name in enumerate(self.head.columns)}
+        kinds = {place: pl.Float64 if name in self.names else pl.String for name, place in places.items()}
         rows = text.count(b"\n") + (not text.endswith(b"\n"))
-        if text.count(self.head.separator.encode()) != rows * (len(names) - 1):
+        if text.count(self.head.separator.encode()) != rows * (len(places) - 1):
             return None
         try:
             frame = pl.read_csv(
-                text, has_header=False, schema=dict.fromkeys(names, pl.Float64), separator=self.head.separator
+                text, has_header=False, schema=kinds, separator=self.head.separator, quote_char=None
             )
         except pl.exceptions.PolarsError:
             return None
         if frame.height != rows:
             return None
-        return [frame[name].to_numpy() for name in names]
+        return [frame[places[name]].to_numpy() for name in self.names]
 
     def _slow(self, text: bytes, line: int, last: bool) -> list[FloatArray]:
         """Parse row by row: allows empty cells, and names the line and column of what is wrong."""
         lines = text.decode("utf-8", "replace").removesuffix("\n").split("\n")
-        out = np.empty((len(lines), len(self.head.columns)))
+        out = np.empty((len(lines), len(self.names)))
         for k, row in enumerate(lines):
             cut = last and k == len(lines) - 1
             out[k] = self._row(row, line + k, cut)
@@ -187,7 +192,8 @@ class _Parser:
                 f"{ending or '; mend or remove that line'}"
             )
         values = []
-        for name, cell in zip(self.head.columns, cells, strict=True):
+        for name in self.names:
+            cell = cells[self.head.columns.index(name)]
             value = _number(cell)
             if value is None:
                 raise InputError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import weakref
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -32,12 +32,11 @@ class TableLog:
         self,
         path: Path | str,
         columns: Sequence[str],
-        comments: Iterable[str] = (),
         rows_per_write: int = 1000,
         header: Sequence[str] | None = None,
     ) -> None:
         self.path = Path(path)
-        writer = _opened(self.path, columns if header is None else header, comments)
+        writer = _opened(self.path, columns if header is None else header)
         self._store = _Store(writer, tuple(columns), rows_per_write)
         self._finish = weakref.finalize(self, self._store.finish)  # also runs at the interpreter's exit
 
@@ -74,23 +73,22 @@ class Recorder(TableLog):
     """Appends samples to a canonical CSV recording.
 
     A row must be finite in all channels but `temperature_degC` and `other_*`: the recorder writes what it is
-    given (NaN as an empty cell), and reading refuses empty cells elsewhere.
+    given (NaN too), and reading refuses NaN elsewhere.
     """
 
     def __init__(
         self,
         path: Path | str,
         channels: Sequence[str],
-        comments: Iterable[str] = (),
         rows_per_write: int = 1000,
     ) -> None:
         self.channels = tuple(channels)
-        super().__init__(path, channels, comments, rows_per_write, check_canonical(channels))
+        super().__init__(path, channels, rows_per_write, check_canonical(channels))
 
 
-def _opened(path: Path, header: Sequence[str], comments: Iterable[str]) -> CsvWriter:
+def _opened(path: Path, header: Sequence[str]) -> CsvWriter:
     try:
-        writer = CsvWriter(path, tuple(header), tuple(comments))
+        writer = CsvWriter(path, tuple(header))
         writer.flush()
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None

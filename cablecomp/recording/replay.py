@@ -237,7 +237,7 @@ class PredictionCsv:
         self._write = write
 
     def take(self, replayed: Replayed) -> None:
-        """Write one block; what is unknown stays empty."""
+        """Write one block; what is unknown is NaN."""
         times, residual = replayed.block.columns["time_s"], replayed.residual_rad
         unknown = np.full(len(times), np.nan)
         known = replayed.predicted | {

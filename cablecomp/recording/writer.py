@@ -18,21 +18,21 @@ from cablecomp.recording.table import FloatArray
 
 
 class CsvWriter:
-    """Streams columns to a CSV file (gzip if the name ends in .gz); NaN is written as an empty cell.
+    """Streams columns to a CSV file (gzip if the name ends in .gz).
 
-    Every finite number is written with as few digits as identify it: reading gives back the same bits.
+    Every finite number is written with as few digits as identify it: reading gives back the same bits. The first
+    line holds the names, what is absent is NaN: pandas and polars read it as it is, each column as numbers.
     """
 
-    def __init__(self, path: Path, names: Sequence[str], comments: Iterable[str] = ()) -> None:
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
         self._names = tuple(names)
         self._file = _open(path)
-        head = [f"# {line}" for text in comments for line in text.splitlines()]
-        self._file.write(("\n".join([*head, ",".join(self._names)]) + "\n").encode())
+        self._file.write((",".join(self._names) + "\n").encode())
 
     def write(self, columns: Mapping[str, FloatArray]) -> None:
         """Append rows; every column named at the start must be there, all of one length."""
         frame = pl.DataFrame({name: columns[name] for name in self._names})
-        frame.fill_nan(None).write_csv(self._file, include_header=False)
+        frame.write_csv(self._file, include_header=False)
 
     def flush(self) -> None:
         """Hand everything to the operating system: it outlives a crash of this process."""
@@ -68,12 +68,10 @@ def check_canonical(names: Iterable[str]) -> tuple[str, ...]:
     return order(names)
 
 
-def write_canonical(
-    path: Path | str, columns: Mapping[str, FloatArray], comments: Iterable[str] = ()
-) -> None:
+def write_canonical(path: Path | str, columns: Mapping[str, FloatArray]) -> None:
     """Write a recording whole (gzip if the name ends in .gz); the file appears only when it is complete.
 
-    `columns` maps canonical names to float64 arrays of one length; `comments` become `#` lines at the head.
+    `columns` maps canonical names to float64 arrays of one length.
     """
     path = Path(path)
     names = check_canonical(columns)
@@ -82,7 +80,7 @@ def write_canonical(
         raise InternalError(f"columns of {path.name} differ in length")
     with atomic_file(path) as temporary:
         packed = temporary.with_name(f"{temporary.name}.gz") if path.suffix == ".gz" else temporary
-        with CsvWriter(packed, names, comments) as writer:
+        with CsvWriter(packed, names) as writer:
             writer.write(ready)
         if packed != temporary:
             packed.rename(temporary)

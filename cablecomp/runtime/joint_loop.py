@@ -251,8 +251,7 @@ class JointLoop:
         controlled: bool,
     ) -> None:
         if self.log is None:
-            comments = (f"cablecomp run, joint {self.setup.name}, configuration joint.toml",)
-            self.log = JointLog(folder, sample, self.readings.others, comments)
+            self.log = JointLog(folder, sample, self.readings.others)
         sent, state, wanted = self._sent, self.degraded, self._last_reference
         self.log.append(
             sample,

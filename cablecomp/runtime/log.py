@@ -45,9 +45,7 @@ class JointLog:
     the same configuration gives the same predictions, bit for bit.
     """
 
-    def __init__(
-        self, folder: Path, first: Sample, others: Sequence[str], comments: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, folder: Path, first: Sample, others: Sequence[str]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
         self._joint = first.joint_position_rad == first.joint_position_rad
@@ -58,7 +56,7 @@ class JointLog:
         channels += ["joint_torque_Nm"] if self._torque else []
         channels += ["motor_torque_Nm"] if self._motor else []
         channels += ["temperature_degC", *others]
-        self._recorder = Recorder(folder / "recording.csv", channels, comments)
+        self._recorder = Recorder(folder / "recording.csv", channels)
         self._prediction = TableLog(folder / "prediction.csv", PREDICTION)
         self._cycle = TableLog(folder / "cycles.csv", CYCLE)
 

@@ -191,9 +191,8 @@ class LiveWatch:
         columns = self._ring.columns()
         path = self._folder / f"mismatch-{len(self.kept) + 1}.csv"
         measured = {k: columns[k] for k in self._channels if np.isfinite(columns[k]).any()}
-        comments = (f"kept by cablecomp run --live: {_words(alarm)}",)
         self._folder.mkdir(parents=True, exist_ok=True)
-        write_canonical(path, measured, comments)
+        write_canonical(path, measured)
         located, words = self._located(columns)
         note = {
             "schema": 1,
