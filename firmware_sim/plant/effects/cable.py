@@ -23,9 +23,9 @@ NONLINEAR_CABLE = EffectKind(
 
 
 def _strand(build: Build, p: Mapping[str, float]) -> None:
-    for c in build.cables:
-        c["play_compliance"] = p["fraction"] * c["free_m"] / c["EA"]
-        c["play_yield"] = p["yield_N"]
+    build.cables["plays"] = 1
+    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["radius"][:, 0] = p["yield_N"]
 
 
 STRAND_FRICTION = EffectKind(
