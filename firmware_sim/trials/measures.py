@@ -55,16 +55,16 @@ def loop_width(deflection: Floats, load: Floats) -> float:
 def plain_measures(course: Course, joint_rad: Floats, ratio: float) -> PlainDrive:
     """Measure the plain drive's answer to a course, noise-free."""
     deflection = joint_rad - ratio * course.motor_rad
-    load, dt = course.load_Nm, course.time_s[1] - course.time_s[0]
+    load, time = course.load_Nm, course.time_s
     slope = float(np.polyfit(load, deflection, 1)[0]) if np.ptp(load) > 0 else 0.0
-    speed = np.gradient(joint_rad, dt)
+    speed = np.gradient(joint_rad, time)
     return PlainDrive(
         loop_width(deflection, load),
         max(slope, 1e-9),
         float(np.ptp(deflection)),
         _rms(load - load.mean()),
         _rms(speed),
-        _rms(np.gradient(speed, dt)),
+        _rms(np.gradient(speed, time)),
         _rms(course.other - course.other.mean()),
     )
 

@@ -36,14 +36,22 @@ def run_course(scene: Scene, effects: Sequence[EffectSpec] = (), resolution: Res
         temperature_degC=c.temperature_degC,
         other_1=c.other,
         resolution=resolution,
+        history=c.history,
     )
 
 
-def give_size(scene: Scene, identifier: str, shape: Shape, wanted: float, plain: PlantRun) -> Sized | None:
+def give_size(
+    scene: Scene,
+    identifier: str,
+    shape: Shape,
+    wanted: float,
+    plain: PlantRun,
+    within: tuple[float, float] = (SMALLEST, LARGEST),
+) -> Sized | None:
     """Find the effect whose contribution is `wanted` of the loop, or as near as it gets within its limits.
 
     `plain` is the plain drive's run. False position in logarithms, at most a few simulations.
-    None if nothing between the smallest and the largest size that counts was found.
+    None if nothing whose size lies `within` the smallest and the largest that count was found.
     """
     low: tuple[float, float] | None = None
     high: tuple[float, float] | None = None
@@ -74,7 +82,8 @@ def give_size(scene: Scene, identifier: str, shape: Shape, wanted: float, plain:
         if size < wanted and x >= 0.999 * ceiling:
             break
         x = min(_next(low, high, wanted), ceiling)
-    fit = [sized for _, sized in sorted(found, key=lambda pair: pair[0]) if SMALLEST <= sized.size <= LARGEST]
+    nearest_first = [sized for _, sized in sorted(found, key=lambda pair: pair[0])]
+    fit = [sized for sized in nearest_first if within[0] <= sized.size <= within[1]]
     return fit[0] if fit else None
 
 

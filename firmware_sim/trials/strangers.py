@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from firmware_sim.trials.suspects import ANY, TURNING, Scene, Shape, Suspect, _angle, _sign
+from firmware_sim.trials.suspects import ANY, TURNING, Scene, Shape, Suspect, angle, sign
 
 
 def _ageing(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -18,7 +18,7 @@ def _ageing(rng: np.random.Generator, scene: Scene) -> Shape:
 
 def _warm_friction(rng: np.random.Generator, scene: Scene) -> Shape:
     reach = max(float(np.max(np.abs(scene.course.temperature_degC - 20.0))), 1e-3)
-    return Shape({"reference_degC": 20.0}, {"coefficient_per_K": _sign(rng) / reach}, 1.0, 0.8)
+    return Shape({"reference_degC": 20.0}, {"coefficient_per_K": sign(rng) / reach}, 1.0, 0.8)
 
 
 def _seal(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -54,7 +54,7 @@ def _bottoming(rng: np.random.Generator, scene: Scene) -> Shape:
 def _joint_ripple(rng: np.random.Generator, scene: Scene) -> Shape:
     order = float(rng.integers(4, 11))
     return Shape(
-        {"order": order, "phase_rad": _angle(rng)}, {"amplitude_rad": 1.0}, 1.5 * scene.plain.loop_rad, 0.1
+        {"order": order, "phase_rad": angle(rng)}, {"amplitude_rad": 1.0}, 1.5 * scene.plain.loop_rad, 0.1
     )
 
 
@@ -62,13 +62,13 @@ def _motor_ripple(rng: np.random.Generator, scene: Scene) -> Shape:
     order = float(rng.integers(5, 12))
     ratio = scene.joint.true.ratio
     first = 1.5 * scene.plain.loop_rad / ratio
-    return Shape({"order": order, "phase_rad": _angle(rng)}, {"amplitude_rad": 1.0}, first, 0.1)
+    return Shape({"order": order, "phase_rad": angle(rng)}, {"amplitude_rad": 1.0}, first, 0.1)
 
 
 def _bent_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
     load = scene.joint.load_Nm
     first = 2.0 * scene.plain.loop_rad / scene.plain.compliance / load**2
-    return Shape({}, {"coefficient_per_Nm": _sign(rng)}, first, 0.4 / load)
+    return Shape({}, {"coefficient_per_Nm": sign(rng)}, first, 0.4 / load)
 
 
 def _lazy_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -80,7 +80,7 @@ def _lazy_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
 def _drifting_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
     swing = max(float(np.std(scene.course.temperature_degC)), 1e-3)
     first = scene.plain.loop_rad / scene.plain.compliance / swing
-    return Shape({"reference_degC": 20.0}, {"coefficient_Nm_per_K": _sign(rng)}, first, 100.0 * first)
+    return Shape({"reference_degC": 20.0}, {"coefficient_Nm_per_K": sign(rng)}, first, 100.0 * first)
 
 
 STRANGERS = (
