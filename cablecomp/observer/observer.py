@@ -55,7 +55,7 @@ class Observer:
         self._row = np.zeros(st.IN_OTHER + len(self.channels))
         self._out = np.zeros(st.OUT_WIDTH)
         self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
-        self._ratio = _rigid_ratio(config)
+        self._ratio = config.drive.ratio
         self._breaking = config.drive.stage[-1].breaking_force_N
         self._last_time = -math.inf
         self._source = config.observer.load
@@ -343,7 +343,3 @@ def _need(columns: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.f
     if name not in columns:
         raise InputError(f"channel `{name}` is missing; the recording has {', '.join(sorted(columns))}")
     return columns[name]
-
-
-def _rigid_ratio(config: JointConfig) -> float:
-    return float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))

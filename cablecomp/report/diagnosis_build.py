@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -51,7 +50,7 @@ def diagnosis_view(diagnosis: Diagnosis, augmented_toml: str = "") -> DiagnosisV
 def _recordings(diagnosis: Diagnosis) -> Iterator[RecordingView]:
     setting = diagnosis.setting
     found, measured = setting.covariates, setting.problem.measured
-    ratio = math.prod(s.input_radius_m / s.output_radius_m for s in setting.problem.config.drive.stage)
+    ratio = setting.problem.config.drive.ratio
     rigid = ratio * found.values["motor_angle"]
     kept = setting.layout.heldout | setting.layout.training
     bounds = np.append(found.starts, found.samples)

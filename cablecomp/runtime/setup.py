@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cablecomp.config import JointConfig
 from cablecomp.control.command import Reference
-from cablecomp.control.compensator import Compensator, Gains, ratio_of
+from cablecomp.control.compensator import Compensator, Gains
 from cablecomp.control.degrade import DegradeTimes
 from cablecomp.control.gate import GateLimits
 from cablecomp.control.options import CompensatorOptions, ControlConfig, ControlMode
@@ -109,7 +109,7 @@ def joint_setup(
     sensor = config.observer.load == "joint_torque"
     health = Health(
         control.health,
-        ratio_of(config),
+        config.drive.ratio,
         times.fresh_s,
         period,
         needs_torque=sensor,
