@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.shared import console
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, Sources, rigid_ratio, sources
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, Sources, sources
 from cablecomp.config import load_joint
 from cablecomp.errors import InputError
 from cablecomp.recording.channels import CANONICAL
@@ -53,7 +53,7 @@ def inspect_recording(
     saved = find_mapping(recording)
     if known is None and saved is not None:
         known = load_mapping(saved)
-    ratio = None if config is None else rigid_ratio(load_joint(config))
+    ratio = None if config is None else load_joint(config).drive.ratio
     found = suggest(raw.columns, ratio)
     mapping = as_mapping(found) if known is None else joined_maps(as_mapping(found), known)
     seen, notes, why = _looked_at(recording, mapping, reading)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from cablecomp.cli.shared import console
@@ -84,9 +83,4 @@ def sources(
     mapping: ColumnMap | None = None
     for part in [*map(load_mapping, files), *([mapping_from(inline)] if inline else [])]:
         mapping = part if mapping is None else joined_maps(mapping, part)
-    return Sources(mapping, "auto" in (words or ()), decode, None if config is None else rigid_ratio(config))
-
-
-def rigid_ratio(config: JointConfig) -> float:
-    """Joint angle per motor angle of the rigid drive, product of r/R."""
-    return float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))
+    return Sources(mapping, "auto" in (words or ()), decode, None if config is None else config.drive.ratio)
