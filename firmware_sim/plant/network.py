@@ -37,10 +37,13 @@ from firmware_sim.plant.shafts import (
 
 
 def winding_out_of(c: Any, q: float) -> float:
-    """Arc on the output drum, m: R w + s (R q + e (sin(n q + φ) − sin φ) + g q²/2)."""
+    """Arc on the output drum, m: R w + s (R q + e (sin(n q + φ) − sin φ) + g q²/2), the last of
+    the angle beyond a flange's foot where there is one."""
     turned = c.runout_order * q + c.runout_phase
     wound = c.R * q + c.runout_m * (math.sin(turned) - math.sin(c.runout_phase))
-    wound += 0.5 * c.climb_m_per_rad * q * q
+    if c.climb_m_per_rad != 0.0:
+        beyond = max(q - c.climb_from, 0.0) if c.climb_beyond == 1.0 else q
+        wound += 0.5 * c.climb_m_per_rad * beyond * beyond
     arc: float = c.R * c.wrap_out + c.sign * wound
     return arc
 
@@ -62,7 +65,8 @@ def place_cable(c: Any, q_out: float, q_in: float) -> None:
     c.A = winding_out(c, q_out)
     c.Y = c.A + c.free_m + c.guide_arc_m - c.ext + winding_in(c, q_in)
     swing = c.runout_order * c.runout_m * math.cos(c.runout_order * q_out + c.runout_phase)
-    c.lead_out = c.sign * (c.R + swing + c.climb_m_per_rad * q_out)
+    beyond = max(q_out - c.climb_from, 0.0) if c.climb_beyond == 1.0 else q_out
+    c.lead_out = c.sign * (c.R + swing + c.climb_m_per_rad * beyond)
     c.lead_in = -c.sign * (c.r + c.in_runout_m * math.cos(q_in + c.in_runout_phase))
 
 

@@ -33,7 +33,9 @@ CABLE = np.dtype(
         ("runout_order", "f8"),  # periods per turn
         ("in_runout_m", "f8"),
         ("in_runout_phase", "f8"),
-        ("climb_m_per_rad", "f8"),  # growth of the output radius with angle
+        ("climb_m_per_rad", "f8"),  # growth of the output radius with angle,
+        ("climb_beyond", "i8"),  # 1: beyond `climb_from` alone
+        ("climb_from", "f8"),  # rad
         # cable
         ("EA", "f8"),
         ("EA_whole", "f8"),  # before any wire broke

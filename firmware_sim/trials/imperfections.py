@@ -50,6 +50,10 @@ class Imperfections:
     def __getitem__(self, name: str) -> dict[str, Any]:
         return self.drawn[name]
 
+    def having(self, name: str, numbers: dict[str, Any]) -> Imperfections:
+        """These and another one."""
+        return Imperfections({**self.drawn, name: numbers})
+
     def truth(self) -> dict[str, Any]:
         """As the truth states them."""
         return {k: {**v, "acts_as": list(ACTS_AS.get(k, ()))} for k, v in self.drawn.items()}

@@ -69,14 +69,15 @@ def plain_measures(course: Course, joint_rad: Floats, ratio: float) -> PlainDriv
     )
 
 
-def apparent_angle(run: PlantRun, compliance: float) -> Floats:
+def apparent_angle(run: PlantRun, compliance: float, motor_torque: bool = False) -> Floats:
     """The joint angle as the channels tell it, rad: what a sensor of motor angle or torque gets wrong counts
-    by what it makes of the joint angle (ratio, mean compliance)."""
-    return np.asarray(
+    by what it makes of the joint angle (ratio, mean compliance), that of the motor torque where asked for."""
+    angle = (
         run.joint_position_rad
         - run.ratio * (run.motor_position_rad - run.motor_true_rad)
         - compliance * run.joint_torque_Nm
     )
+    return np.asarray(angle + compliance / run.ratio * run.motor_torque_Nm if motor_torque else angle)
 
 
 def contribution(with_effect: Floats, without: Floats) -> float:

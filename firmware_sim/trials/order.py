@@ -14,7 +14,7 @@ from firmware_sim.plant import PlantError
 from firmware_sim.trials.forms_cable import CABLE
 from firmware_sim.trials.forms_friction import FRICTION
 from firmware_sim.trials.forms_joint import JOINT
-from firmware_sim.trials.strangers import STRANGERS
+from firmware_sim.trials.strangers import NEAR_AND_FAR
 from firmware_sim.trials.suspects import CATALOGUE, Suspect
 
 KINDS = ("single", "pair", "none", "stranger")
@@ -62,7 +62,7 @@ def order(wanted: Wanted, number: int) -> Order:
     if kind == "none":
         return Order(number, kind, ())
     if kind == "stranger":
-        return Order(number, kind, (_in_turn(wanted.seed, place, STRANGERS, 3),))
+        return Order(number, kind, (_in_turn(wanted.seed, place, NEAR_AND_FAR, 3),))
     if kind == "single":
         effect = _in_turn(wanted.seed, place, CATALOGUE, 4)
         return Order(number, kind, (form_of(wanted, effect, place),))

@@ -47,6 +47,7 @@ def give_size(
     wanted: float,
     plain: PlantRun,
     within: tuple[float, float] = (SMALLEST, LARGEST),
+    motor_torque: bool = False,
 ) -> Sized | None:
     """Find the effect whose contribution is `wanted` of the loop, or as near as it gets within its limits.
 
@@ -57,15 +58,15 @@ def give_size(
     high: tuple[float, float] | None = None
     found: list[tuple[float, Sized]] = []
     without = (
-        apparent_angle(plain, scene.plain.compliance)
+        apparent_angle(plain, scene.plain.compliance, motor_torque)
         if shape.absent
-        else _angle(scene, identifier, shape, 0.0)
+        else _angle(scene, identifier, shape, 0.0, motor_torque)
     )
     if without is None:
         return None
     x, ceiling = min(shape.first * wanted, shape.largest), shape.largest
     for _ in range(_TRIES):
-        angle = _angle(scene, identifier, shape, x)
+        angle = _angle(scene, identifier, shape, x, motor_torque)
         if angle is None:  # more than the joint can carry
             ceiling = x
             x = 0.5 * x if low is None else math.sqrt(low[0] * x)
@@ -87,10 +88,10 @@ def give_size(
     return fit[0] if fit else None
 
 
-def _angle(scene: Scene, identifier: str, shape: Shape, x: float) -> Floats | None:
+def _angle(scene: Scene, identifier: str, shape: Shape, x: float, motor_torque: bool) -> Floats | None:
     try:
         run = run_course(scene, (EffectSpec(identifier, shape.parameters(x)),))
-        return apparent_angle(run, scene.plain.compliance)
+        return apparent_angle(run, scene.plain.compliance, motor_torque)
     except PlantError:
         return None
 

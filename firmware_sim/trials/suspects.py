@@ -50,7 +50,7 @@ class Shape:
 class Suspect:
     """An effect that may be concealed: in which courses, whether it needs a temperature that moves, a load
     that changes its sign, a neighbour, a closed circuit (where an open one hangs on a weight, which holds
-    the tension whatever the cable does); `shape` draws everything but its size."""
+    the tension whatever the cable does), a motor torque that is recorded; `shape` draws everything but its size."""
 
     id: str
     courses: tuple[str, ...]
@@ -59,6 +59,7 @@ class Suspect:
     neighbour: bool = False
     two_sided: bool = False
     closed: bool = False
+    motor_torque: bool = False
 
 
 def angle(rng: np.random.Generator) -> float:

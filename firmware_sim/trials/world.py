@@ -90,6 +90,8 @@ def draw_world(wanted: Wanted, number: int) -> World:
 
 def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | None:
     how = draw_imperfections(rng, wanted.imperfections, asked.kind)
+    if any(s.motor_torque for s in asked.suspects):
+        how = how.having("motor_torque", {"noise_of_range": log_uniform(rng, 0.002, 0.01)})
     as_stated = asked.kind == "none" and wanted.imperfections == "none" and rng.uniform() < 0.3
     joint = draw_joint(rng, as_stated, closed=any(s.closed for s in asked.suspects))
     courses = _courses(rng, asked.suspects, joint, how)
@@ -188,7 +190,7 @@ def _sized(
     plain: PlantRun,
 ) -> Sized | None:
     shape = suspect.shape(rng, replace(scene, course=scene.course.seen))
-    return give_size(scene, suspect.id, shape, size, plain, within)
+    return give_size(scene, suspect.id, shape, size, plain, within, suspect.motor_torque)
 
 
 def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: set[str]) -> Suspect:
