@@ -49,9 +49,17 @@ def public_joint(world: World) -> str:
             key = f"{name}_resolution_{unit}"
             sensors[key] = float(f"{sensors[key] * coarser(world.how, name):.3e}")
     own: tuple[str, ...] = ()
+    case = world.order.case
+    conditions = {case.condition: world.other} if case is not None else {}
     if "sessions" in world.how and world.how["sessions"]["declared"]:
         own = ("joint_position_offset_rad", "joint_torque_offset_Nm", "pretension_N")
-    return joint_toml(joint.with_sensors(sensors), joint.nominal, tolerance=joint.tolerance, session_own=own)
+    return joint_toml(
+        joint.with_sensors(sensors),
+        joint.nominal,
+        tolerance=joint.tolerance,
+        session_own=own,
+        conditions=conditions,
+    )
 
 
 def full_truth(world: World, wanted: Wanted) -> dict[str, Any]:
@@ -66,7 +74,9 @@ def full_truth(world: World, wanted: Wanted) -> dict[str, Any]:
         "circuit": joint.true.circuit,
         "loop_rad": world.plain.loop_rad,
         "noise_floor_rad": world.floor_rad,
-        "effects": [_effect(h) for h in world.hidden],
+        "effects": [_effect(h, world.other) for h in world.hidden if not _is_dependence(world, h)],
+        "case": "" if world.order.case is None else world.order.case.name,
+        "depends_on": _dependences(world),
         "imperfections": world.how.truth(),
         "recordings": [_recording(world, k) for k in range(len(world.legs))],
         "true": dict(joint.stage.__dict__),
@@ -93,17 +103,40 @@ def _recording(world: World, k: int) -> dict[str, Any]:
     }
 
 
-def _effect(hidden: Hidden) -> dict[str, Any]:
+def _is_dependence(world: World, hidden: Hidden) -> bool:
+    """Whether what is concealed is no effect of its own, but a parameter of the drive that follows a condition."""
+    kind = EFFECTS.get(hidden.sized.spec.id)
+    return world.order.case is not None and kind is not None and not kind.listed
+
+
+def _dependences(world: World) -> list[dict[str, Any]]:
+    """What depends on what; `size` in shares of the loop where it was sized so."""
+    case = world.order.case
+    if case is None:
+        return []
+    sizes = {h.sized.spec.id: h.sized.size for h in world.hidden}
+    followed = {"routing_friction.mu_angle": "routing_friction:bending", "pretension_N": "neighbour_tightens"}
+    return [
+        {
+            "parameter": parameter,
+            "on": on,
+            "size": None if on == "session" else sizes.get(followed[parameter]),
+        }
+        for parameter, on in case.depends
+    ]
+
+
+def _effect(hidden: Hidden, other: str) -> dict[str, Any]:
     spec = hidden.sized.spec
     kind = EFFECTS.get(spec.id) or FORMS[spec.id]
     return {
         "effect": kind.effect,
-        "form": "catalogue" if kind.listed else kind.form or "stranger",
+        "form": "catalogue" if kind.listed or kind.form == "bending" else kind.form or "stranger",
         "role": hidden.role,
         "listed": kind.listed,
         "size": hidden.sized.size,
         "parameters": observer_parameters(spec),
-        "covariates": [c.replace("other:1", "other:neighbour") for c in kind.covariates],
+        "covariates": [c.replace("other:1", other.replace("other_", "other:")) for c in kind.covariates],
         "nearest": [kind.effect] if kind.listed else list(kind.nearest),
     }
 

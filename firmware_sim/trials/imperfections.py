@@ -87,6 +87,11 @@ def draw_imperfections(rng: np.random.Generator, amount: str, kind: str) -> Impe
     return Imperfections(found)
 
 
+def drawn_numbers(rng: np.random.Generator, name: str) -> dict[str, Any]:
+    """Numbers of one imperfection, drawn anew."""
+    return _NUMBERS[name](rng)
+
+
 def _history(rng: np.random.Generator) -> dict[str, Any]:
     return {
         "lasts_s": float(rng.uniform(6.0, 20.0)),

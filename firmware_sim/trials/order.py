@@ -16,8 +16,9 @@ from firmware_sim.trials.forms_friction import FRICTION
 from firmware_sim.trials.forms_joint import JOINT
 from firmware_sim.trials.strangers import NEAR_AND_FAR
 from firmware_sim.trials.suspects import CATALOGUE, Suspect
+from firmware_sim.trials.tabletop import Case, case_in_turn
 
-KINDS = ("single", "pair", "none", "stranger")
+KINDS = ("single", "pair", "none", "stranger", "sessions")
 LAWS = ("catalogue", "other", "mixed")
 IMPERFECTIONS = ("none", "some", "all")
 OTHER_FORMS = (*FRICTION, *CABLE, *JOINT)
@@ -48,17 +49,20 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Order:
-    """What one trial is to hold; `suspects` in no order of size."""
+    """What one trial is to hold; `suspects` in no order of size, `case` of one of several sessions."""
 
     number: int
     kind: str
     suspects: tuple[Suspect, ...]
+    case: Case | None = None
 
 
 def order(wanted: Wanted, number: int) -> Order:
     """What trial `number` (from 0) is to hold: kinds in turn as they were given, and each kind's effects in turn."""
     place, within = divmod(number, len(wanted.kinds))
     kind = wanted.kinds[within]
+    if kind == "sessions":
+        return Order(number, kind, (), case_in_turn(wanted.seed, place))
     if kind == "none":
         return Order(number, kind, ())
     if kind == "stranger":

@@ -12,7 +12,7 @@ from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantError, Plan
 from firmware_sim.plant.records import Floats
 from firmware_sim.trials.courses import KINDS, RATES_HZ, Course, draw_course
 from firmware_sim.trials.history import uneven, with_history
-from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, settled
+from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
 from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
 from firmware_sim.trials.measures import PlainDrive
 from firmware_sim.trials.order import OTHER_FORMS, Order, Wanted, order
@@ -20,6 +20,7 @@ from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
 from firmware_sim.trials.spoil import Recorded, record
 from firmware_sim.trials.suspects import CATALOGUE, Scene, Suspect
+from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
 from firmware_sim.trials.trial import PAUSE_S, is_slack, plain_scene, usable
 
 SAMPLES = (10_000, 12_000)
@@ -90,11 +91,17 @@ def draw_world(wanted: Wanted, number: int) -> World:
 
 def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | None:
     how = draw_imperfections(rng, wanted.imperfections, asked.kind)
+    if asked.case is not None:
+        how = how.having("sessions", sessions_of(rng, asked.case, drawn_numbers(rng, "sessions")))
     if any(s.motor_torque for s in asked.suspects):
         how = how.having("motor_torque", {"noise_of_range": log_uniform(rng, 0.002, 0.01)})
     as_stated = asked.kind == "none" and wanted.imperfections == "none" and rng.uniform() < 0.3
     joint = draw_joint(rng, as_stated, closed=any(s.closed for s in asked.suspects))
-    courses = _courses(rng, asked.suspects, joint, how)
+    if asked.case is not None:
+        courses, sessions = table_courses(rng, joint, how)
+    else:
+        courses = _courses(rng, asked.suspects, joint, how)
+        sessions = tuple(range(len(courses))) if "sessions" in how else (0,) * len(courses)
     scene, plain_run = plain_scene(joint, courses[0])
     joint = joint.with_sensors(draw_sensors(rng, joint, scene.plain))
     floor = noise_floor_rad(joint, scene.plain)
@@ -113,7 +120,9 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
         joint = _off(joint, how, scene.plain)
     needed = any(s.neighbour for s in asked.suspects)
     other = NEIGHBOUR if needed or rng.uniform() < 0.6 else ""
-    legs = _legs(rng, joint, scene.plain, hidden, courses, how, other)
+    if asked.case is not None:
+        other = f"other_{asked.case.condition}"
+    legs = _legs(rng, joint, scene.plain, hidden, courses, sessions, how, other)
     return None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other)
 
 
@@ -155,6 +164,12 @@ def _conceal(
     plain: PlantRun,
 ) -> tuple[Hidden, ...] | None:
     found = []
+    if asked.case is not None:
+        given = shape_of(rng, replace(scene, course=scene.course.seen), asked.case)
+        if given is None:
+            return ()
+        sized = give_size(scene, *given, log_uniform(rng, 0.1, LARGEST), plain)
+        return None if sized is None else (Hidden(sized, "main"),)
     for suspect, size in zip(asked.suspects, _sizes(rng, asked.kind), strict=False):
         sized = _sized(rng, suspect, size, (SMALLEST, LARGEST), scene, plain)
         if sized is None:
@@ -221,7 +236,8 @@ def _off(joint: DrawnJoint, how: Imperfections, plain: PlainDrive) -> DrawnJoint
     key = numbers["beyond_tolerance"]
     true = joint.true.stages[0].__dict__[key]
     values[key] = true * math.exp(numbers["sigmas"] * joint.tolerance[key])
-    return replace(joint, nominal=replace(joint.nominal, stages=(StageConfig(**values),)))
+    stated = {name: float(f"{value:.4e}") for name, value in values.items()}
+    return replace(joint, nominal=replace(joint.nominal, stages=(StageConfig(**stated),)))
 
 
 def _legs(
@@ -230,18 +246,19 @@ def _legs(
     plain: PlainDrive,
     hidden: Sequence[Hidden],
     courses: Sequence[Course],
+    sessions: Sequence[int],
     how: Imperfections,
     other: str,
 ) -> tuple[Leg, ...] | None:
     found = []
     zeros, drive = {"joint_position": joint.offset_rad}, joint.true
-    for k, course in enumerate(courses):
+    for course, k in zip(courses, sessions, strict=True):
         if "sessions" in how:
             zeros, drive = session(joint, how, k)
         leg = _leg(rng, replace(joint, true=drive), plain, hidden, course, how, other, zeros)
         if leg is None:
             return None
-        found.append(replace(leg, session=k if "sessions" in how else 0))
+        found.append(replace(leg, session=k))
     return tuple(found)
 
 

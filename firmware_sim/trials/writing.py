@@ -55,9 +55,10 @@ def joint_toml(
     tolerance: Mapping[str, float] | None = None,
     offset_rad: float | None = None,
     session_own: Sequence[str] = (),
+    conditions: Mapping[str, str] | None = None,
 ) -> str:
-    """A joint's configuration file: drive as given, the joint's sensors and limits, effects if any, and what may
-    differ from session to session where that is known."""
+    """A joint's configuration file: drive as given, the joint's sensors and limits, effects if any, what may
+    differ from session to session where that is known, and which channels tell how the drive stood."""
     sensors = dict(joint.sensors)
     if offset_rad is not None:
         sensors["joint_position_offset_rad"] = offset_rad
@@ -79,6 +80,8 @@ def joint_toml(
     lines += _table("[limits]", limits)
     if session_own:
         lines += _table("[session]", {"own": list(session_own)})
+    if conditions:
+        lines += _table("[condition]", conditions)
     for effect in effects:
         lines += _table("[[effect]]", {"id": effect.id, **observer_parameters(effect)})
     return "\n".join(lines) + "\n"

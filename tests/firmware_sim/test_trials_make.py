@@ -16,6 +16,7 @@ from firmware_sim.plant import FORMS, PlantError
 from firmware_sim.trials.make import main, make
 from firmware_sim.trials.order import KINDS, OTHER_FORMS, Wanted, order
 from firmware_sim.trials.suspects import CATALOGUE
+from firmware_sim.trials.tabletop import CASES
 
 PRIVATE = {"routing_friction:bending"}  # depends on a condition: for trials of several sessions
 
@@ -110,6 +111,32 @@ def _lagged(how: dict[str, Any], truth: dict[str, Any]) -> float:
     """What lag leaves between joint encoder and joint, RMS, about."""
     shares = [how[n]["size_of_floor"] for n in ("late", "low_pass") if how[n]["channel"] == "joint_position"]
     return float(np.sqrt(np.sum(np.square(shares)))) * truth["noise_floor_rad"] if shares else 0.0
+
+
+def test_sessions_stand_apart_and_what_depends_on_what_is_in_the_truth(tmp_path: Path) -> None:
+    make(Wanted(4, ("sessions",), "catalogue", "none"), len(CASES), tmp_path)
+    seen = set()
+    for folder in sorted(tmp_path.iterdir()):
+        truth, angles = _truth(folder)
+        case = next(c for c in CASES if c.name == truth["case"])
+        seen.add(case.name)
+        assert {(d["parameter"], d["on"]) for d in truth["depends_on"]} == set(case.depends)
+        channel = f"other_{case.condition}"
+        assert f'{case.condition} = "{channel}"' in (folder / "joint.toml").read_text()
+        tight = {entry["session"]: entry["pretension_N"] for entry in truth["recordings"]}
+        assert len(tight) == 2
+        apart = abs(np.log(tight["1"] / tight["2"]))
+        assert (apart > 0.14) == (("pretension_N", "session") in case.depends)
+        stands = [np.mean(_read(folder / entry["file"])[channel]) for entry in truth["recordings"]]
+        assert max(stands) - min(stands) > 0.3
+        assert all(e["effect"] == "routing_friction" for e in truth["effects"])
+        if any(on == case.condition for _, on in case.depends):
+            # what depends on the stand adds more where it stands further
+            loops = [
+                np.ptp(angles[f"joint_rad_{k}"] - angles[f"plain_rad_{k}"]) for k in range(1, len(stands) + 1)
+            ]
+            assert loops[int(np.argmax(stands))] > loops[int(np.argmin(stands))]
+    assert seen == {c.name for c in CASES}
 
 
 def test_what_cannot_be_made_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
