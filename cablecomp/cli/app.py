@@ -132,7 +132,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"cablecomp: {printable(text)}", file=sys.stderr)
+    with suppress(OSError):  # whoever was to read it may be gone
+        print(f"cablecomp: {printable(text)}", file=sys.stderr)
     return code
 
 

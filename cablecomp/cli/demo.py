@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from pathlib import Path
 from typing import Annotated
@@ -51,7 +50,6 @@ def compare_controllers(
 ) -> None:
     """Run motor-side control, linear stiffness and observer side by side on simulated joints; show and write it."""
     with LiveView(console) as view:
-        signal.signal(signal.SIGINT, lambda number, frame: view.press())
         found = compare(
             joint,
             bus,

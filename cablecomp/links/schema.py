@@ -71,6 +71,8 @@ class MotorEnd(Frozen):
     pulley.
 
     `q_in = sign * q_drive / gear_ratio - position_offset_rad`, `torque = sign * gear_ratio * torque_drive`.
+    `command_timeout_s`: after how long without commands the drive stops by itself, as it is set in the drive
+    (0 = it does not; absent = not known).
     """
 
     device: Name
@@ -82,6 +84,7 @@ class MotorEnd(Frozen):
     mode: ModeName = "position"
     stiffness_Nm_per_rad: NonNegative = 0.0
     damping_Nms_per_rad: NonNegative = 0.0
+    command_timeout_s: NonNegative | None = None
 
 
 class SensorEnd(Frozen):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
+from cablecomp.durable import write_durably
 from cablecomp.effects import extend
 from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError
@@ -158,10 +159,8 @@ class Observer:
         self._last_time = unpack(data, self.config, self.model.I, *self._parts())
 
     def save(self, path: Path) -> None:
-        """Write the snapshot to a file, atomically: a power cut leaves the old file or the new one."""
-        spare = path.with_name(path.name + ".part")
-        spare.write_bytes(self.snapshot())
-        spare.replace(path)
+        """Write the snapshot to a file: a power cut leaves the old file or the new one; raises OSError."""
+        write_durably(path, self.snapshot())
 
     def load(self, path: Path) -> None:
         """Restore from a file written by `save`."""
