@@ -9,7 +9,7 @@ from typing import Literal
 from firmware_sim.errors import SimError
 from firmware_sim.joint import Asked, HeardFrame, SimulatedJoint
 from firmware_sim.ports.base import Port
-from firmware_sim.wire.frame import Frame
+from firmware_sim.wire.frame import LAST_BYTE, Frame
 from firmware_sim.wire.tables import SYNC_ID
 
 Stepping = Literal["command", "sync"]
@@ -44,6 +44,12 @@ class Bench:
                 route.setdefault(identifier, []).append(joint)
         self._route = {identifier: tuple(heard_by) for identifier, heard_by in route.items()}
 
+    def _listeners(self, frame: Frame) -> tuple[SimulatedJoint, ...]:
+        found = self._route.get(frame.key)
+        if found is None and frame.extended:
+            found = self._route.get(LAST_BYTE | frame.identifier & 0xFF)
+        return found or ()
+
     def _hear(self, joint: SimulatedJoint, frame: Frame) -> HeardFrame:
         heard = joint.hear(frame)
         if heard.moved:
@@ -59,7 +65,7 @@ class Bench:
         """Follow the caller's time: hear what arrived, answer it, advance every joint to `now_s`."""
         out: list[Frame] = []
         for frame in self.port.poll(now_s):
-            for joint in self._route.get(frame.key, ()):
+            for joint in self._listeners(frame):
                 out += joint.render(self._hear(joint, frame).asked)
         for joint in self.joints:
             out += joint.advance_to(now_s)
@@ -73,7 +79,7 @@ class Bench:
             if frame.identifier == SYNC_ID and self.stepping == "sync":
                 self._step(self.joints, {})
                 continue
-            for joint in self._route.get(frame.key, ()):
+            for joint in self._listeners(frame):
                 heard = self._hear(joint, frame)
                 if heard.steps and self.stepping == "command":
                     self._step((joint,), {joint.number: heard.asked})

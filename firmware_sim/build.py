@@ -14,12 +14,15 @@ from firmware_sim.joint import SimulatedJoint, Timing
 from firmware_sim.plantlike import PlantLike
 from firmware_sim.ports.base import Port
 from firmware_sim.wire.base import DriveWire
+from firmware_sim.wire.cubemars import CubeMarsWire
+from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.dbc import DbcWire, load_map
-from firmware_sim.wire.mit import MitWire
+from firmware_sim.wire.mit import MitWire, model_of
 from firmware_sim.wire.odrive import FirmwareName, OdriveRates, OdriveWire
+from firmware_sim.wire.robstride import RobStrideWire
 from firmware_sim.wire.tables import MOST_JOINTS
 
-PROTOCOLS = ("mit", "odrive", "dbc")
+PROTOCOLS = ("mit", "cubemars", "robstride", "odrive", "dbc")
 MakePlant = Callable[[int], PlantLike]
 
 
@@ -50,7 +53,12 @@ class BenchConfig:
 def make_wire(config: BenchConfig, number: int) -> DriveWire:
     """The drive wire of joint `number`."""
     if config.protocol == "mit":
-        return MitWire(number, config.model, config.reply_id)
+        damiao = model_of(config.model).maker == "damiao"
+        return (DamiaoWire if damiao else MitWire)(number, config.model, config.reply_id)
+    if config.protocol == "cubemars":
+        return CubeMarsWire(number, config.model)
+    if config.protocol == "robstride":
+        return RobStrideWire(number, config.model)
     if config.protocol == "odrive":
         return OdriveWire(number, config.rates, config.torque_constant, config.firmware)
     mapped = None if config.map_path is None else load_map(config.map_path)
@@ -58,8 +66,14 @@ def make_wire(config: BenchConfig, number: int) -> DriveWire:
 
 
 def _drive_of(config: BenchConfig) -> DriveConfig:
-    """The drive as its protocol knows it: an ODrive starts in position control and has no impedance mode."""
-    return replace(config.drive, mode=Mode.POSITION) if config.protocol == "odrive" else config.drive
+    """The drive as its protocol knows it: an ODrive starts in position control and has no impedance mode; MIT
+    drives but Damiao's and RobStride's report no error when the host falls silent."""
+    if config.protocol == "odrive":
+        return replace(config.drive, mode=Mode.POSITION)
+    silent = config.protocol == "cubemars" or (
+        config.protocol == "mit" and model_of(config.model).maker in ("cubemars", "katz")
+    )
+    return replace(config.drive, timeout_faults=False) if silent else config.drive
 
 
 def make_bench(config: BenchConfig, make_plant: MakePlant, port: Port, faults: Sequence[Fault] = ()) -> Bench:

@@ -1,10 +1,15 @@
-"""What did not run is said at the end of every run: how many tests, and what they miss."""
+"""What did not run is said at the end of every run: how many tests, and what they miss. Property tests hold
+laws, not times: on a loaded machine an example may take long."""
 
 from __future__ import annotations
 
 from collections import Counter
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 BENCHMARKS = "Skipping benchmark"  # asked for by pyproject.toml, no lack
 

@@ -13,12 +13,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from cablecomp.links.schema_devices import (
-    CanSimpleDevice,
-    DbcDevice,
     Device,
     Finite,
     Frozen,
-    MitDevice,
     Name,
     Positive,
 )
@@ -158,7 +155,7 @@ class LinkConfig(Frozen):
         """The same slcan or serial link on another terminal, such as a simulated adapter's."""
         return self.redirect("serial" if isinstance(self.bus, SerialBus) else "slcan", path)
 
-    def device_of(self, end: MotorEnd | SensorEnd) -> MitDevice | CanSimpleDevice | DbcDevice:
+    def device_of(self, end: MotorEnd | SensorEnd) -> Device:
         """The device that an end names."""
         return next(d for d in self.device if d.id == end.device)
 

@@ -32,7 +32,8 @@ class DriveWire(Protocol):
     frames."""
 
     def identifiers(self) -> Iterable[int]:
-        """Identifiers of the frames that are meant for this drive, 29-bit ones marked `EXTENDED`."""
+        """Identifiers of the frames that are meant for this drive, 29-bit ones marked `EXTENDED`, or
+        `LAST_BYTE | n` for all that end in n."""
         ...
 
     def broadcasts(self) -> Iterable[int]:

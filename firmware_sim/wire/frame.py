@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 EXTENDED = 0x8000_0000
 """Marks a 29-bit identifier where identifiers of both lengths stand side by side."""
+LAST_BYTE = 0x1_0000_0000
+"""`LAST_BYTE | n`: every 29-bit identifier that ends in the byte n."""
 
 
 class Frame(NamedTuple):

@@ -50,7 +50,7 @@ def test_every_frame_told_is_one_of_odrives_table(firmware: Any) -> None:
     assert heard["Axis1_Get_Bus_Voltage_Current"]["Bus_Voltage"] == 24.0
 
 
-async def reached(condition: Callable[[], bool], seconds: float = 5.0) -> None:
+async def reached(condition: Callable[[], bool], seconds: float = 30.0) -> None:
     end = asyncio.get_running_loop().time() + seconds
     while not condition():
         assert asyncio.get_running_loop().time() < end, "not reached"

@@ -24,6 +24,7 @@ from firmware_sim.firmware import (
 )
 from firmware_sim.plantlike import Readings
 from firmware_sim.wire.base import Answer
+from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.mit import MODELS, MitWire, decode_command, encode_command
 from firmware_sim.wire.odrive import OdriveWire
@@ -99,7 +100,7 @@ def test_mit_reply_bytes() -> None:
 
 
 def test_damiao_reply_carries_the_state_in_the_upper_four_bits() -> None:
-    wire, drive = MitWire(3, "DM-J4310-2EC", reply_id=0x13), drive_at()
+    wire, drive = DamiaoWire(3, "DM-J4310-2EC", reply_id=0x13), drive_at()
     frame = wire.answer(Answer.STATE, Frame(3), drive)
     assert frame is not None
     assert (frame.identifier, frame.data[0]) == (0x13, 0x03)
@@ -116,7 +117,10 @@ def test_damiao_reply_carries_the_state_in_the_upper_four_bits() -> None:
 def test_mit_special_frames(last: int, state: DriveState) -> None:
     wire, drive = MitWire(1), drive_at(position=0.5)
     heard = wire.hear(Frame(1, b"\xff" * 7 + bytes((last,))), drive, 0.0)
-    assert heard.answers
+    # TMotorCANControl, `zero`: "shut off communication with the motor for about a second"
+    assert bool(heard.answers) == (last != 0xFE)
+    assert bool(wire.hear(Frame(1, bytes(8)), drive, 0.9).answers) == (last != 0xFE)
+    assert wire.hear(Frame(1, bytes(8)), drive, 1.1).answers
     assert not heard.steps
     assert drive.state is state
     assert drive.position_rad == (0.0 if last == 0xFE else 0.5)
