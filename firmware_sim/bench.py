@@ -7,9 +7,9 @@ from types import TracebackType
 from typing import Literal
 
 from firmware_sim.errors import SimError
-from firmware_sim.joint import Asked, SimulatedJoint
+from firmware_sim.joint import Asked, HeardFrame, SimulatedJoint
 from firmware_sim.ports.base import Port
-from firmware_sim.wire.frame import Frame
+from firmware_sim.wire.frame import LAST_BYTE, Frame
 from firmware_sim.wire.tables import SYNC_ID
 
 Stepping = Literal["command", "sync"]
@@ -30,14 +30,31 @@ class Bench:
         self.joints = tuple(joints)
         self.stepping = stepping
         self.steps = 0
-        self._route: dict[int, SimulatedJoint] = {}
+        self._route: dict[int, tuple[SimulatedJoint, ...]] = {}
+        self._connect()
+        for identifier, heard_by in self._route.items():
+            if len(heard_by) > 1 and any(identifier not in j.wire.broadcasts() for j in heard_by):
+                names = " and ".join(str(j.number) for j in heard_by)
+                raise SimError(f"joints {names} share 0x{identifier & 0x1FFF_FFFF:X}")
+
+    def _connect(self) -> None:
+        route: dict[int, list[SimulatedJoint]] = {}
         for joint in self.joints:
-            for identifier in joint.wire.identifiers():
-                if identifier in self._route:
-                    raise SimError(
-                        f"joints {joint.number} and {self._route[identifier].number} share 0x{identifier:X}"
-                    )
-                self._route[identifier] = joint
+            for identifier in {*joint.wire.identifiers(), *joint.wire.broadcasts()}:
+                route.setdefault(identifier, []).append(joint)
+        self._route = {identifier: tuple(heard_by) for identifier, heard_by in route.items()}
+
+    def _listeners(self, frame: Frame) -> tuple[SimulatedJoint, ...]:
+        found = self._route.get(frame.key)
+        if found is None and frame.extended:
+            found = self._route.get(LAST_BYTE | frame.identifier & 0xFF)
+        return found or ()
+
+    def _hear(self, joint: SimulatedJoint, frame: Frame) -> HeardFrame:
+        heard = joint.hear(frame)
+        if heard.moved:
+            self._connect()
+        return heard
 
     @property
     def time_s(self) -> float:
@@ -48,9 +65,8 @@ class Bench:
         """Follow the caller's time: hear what arrived, answer it, advance every joint to `now_s`."""
         out: list[Frame] = []
         for frame in self.port.poll(now_s):
-            joint = self._route.get(frame.identifier)
-            if joint is not None:
-                out += joint.render(joint.hear(frame).asked)
+            for joint in self._listeners(frame):
+                out += joint.render(self._hear(joint, frame).asked)
         for joint in self.joints:
             out += joint.advance_to(now_s)
         if out:
@@ -63,14 +79,12 @@ class Bench:
             if frame.identifier == SYNC_ID and self.stepping == "sync":
                 self._step(self.joints, {})
                 continue
-            joint = self._route.get(frame.identifier)
-            if joint is None:
-                continue
-            heard = joint.hear(frame)
-            if heard.steps and self.stepping == "command":
-                self._step((joint,), {joint.number: heard.asked})
-            else:
-                self.port.send(joint.render(heard.asked), self.time_s)
+            for joint in self._listeners(frame):
+                heard = self._hear(joint, frame)
+                if heard.steps and self.stepping == "command":
+                    self._step((joint,), {joint.number: heard.asked})
+                else:
+                    self.port.send(joint.render(heard.asked), self.time_s)
         return self.steps - before
 
     def _step(self, joints: Sequence[SimulatedJoint], asked: dict[int, list[Asked]]) -> None:

@@ -9,17 +9,20 @@ from pathlib import Path
 from firmware_sim.bench import Bench, Stepping
 from firmware_sim.errors import SimError
 from firmware_sim.faults import DeviceFault, Fault, FaultyPort, LineFault, WireFault
-from firmware_sim.firmware import DriveConfig, SensorNodeConfig
+from firmware_sim.firmware import DriveConfig, Mode, SensorNodeConfig
 from firmware_sim.joint import SimulatedJoint, Timing
 from firmware_sim.plantlike import PlantLike
 from firmware_sim.ports.base import Port
 from firmware_sim.wire.base import DriveWire
+from firmware_sim.wire.cubemars import CubeMarsWire
+from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.dbc import DbcWire, load_map
-from firmware_sim.wire.mit import MitWire
-from firmware_sim.wire.odrive import OdriveRates, OdriveWire
+from firmware_sim.wire.mit import MitWire, model_of
+from firmware_sim.wire.odrive import FirmwareName, OdriveRates, OdriveWire
+from firmware_sim.wire.robstride import RobStrideWire
 from firmware_sim.wire.tables import MOST_JOINTS
 
-PROTOCOLS = ("mit", "odrive", "dbc")
+PROTOCOLS = ("mit", "cubemars", "robstride", "odrive", "dbc")
 MakePlant = Callable[[int], PlantLike]
 
 
@@ -33,6 +36,7 @@ class BenchConfig:
     reply_id: int = 0
     map_path: Path | None = None
     rates: OdriveRates = field(default_factory=OdriveRates)
+    firmware: FirmwareName = "0.6"
     torque_constant: float = 0.1
     drive: DriveConfig = field(default_factory=DriveConfig)
     sensor: SensorNodeConfig = field(default_factory=SensorNodeConfig)
@@ -49,11 +53,27 @@ class BenchConfig:
 def make_wire(config: BenchConfig, number: int) -> DriveWire:
     """The drive wire of joint `number`."""
     if config.protocol == "mit":
-        return MitWire(number, config.model, config.reply_id)
+        damiao = model_of(config.model).maker == "damiao"
+        return (DamiaoWire if damiao else MitWire)(number, config.model, config.reply_id)
+    if config.protocol == "cubemars":
+        return CubeMarsWire(number, config.model)
+    if config.protocol == "robstride":
+        return RobStrideWire(number, config.model)
     if config.protocol == "odrive":
-        return OdriveWire(number, config.rates, config.torque_constant)
+        return OdriveWire(number, config.rates, config.torque_constant, config.firmware)
     mapped = None if config.map_path is None else load_map(config.map_path)
     return DbcWire(number, mapped, config.sensor.status_every)
+
+
+def _drive_of(config: BenchConfig) -> DriveConfig:
+    """The drive as its protocol knows it: an ODrive starts in position control and has no impedance mode; MIT
+    drives but Damiao's and RobStride's report no error when the host falls silent."""
+    if config.protocol == "odrive":
+        return replace(config.drive, mode=Mode.POSITION)
+    silent = config.protocol == "cubemars" or (
+        config.protocol == "mit" and model_of(config.model).maker in ("cubemars", "katz")
+    )
+    return replace(config.drive, timeout_faults=False) if silent else config.drive
 
 
 def make_bench(config: BenchConfig, make_plant: MakePlant, port: Port, faults: Sequence[Fault] = ()) -> Bench:
@@ -65,7 +85,7 @@ def make_bench(config: BenchConfig, make_plant: MakePlant, port: Port, faults: S
             make_plant(number),
             make_wire(config, number),
             number,
-            config.drive,
+            _drive_of(config),
             replace(config.sensor, status_phase=number - 1),
             config.timing,
             device,

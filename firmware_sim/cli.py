@@ -50,6 +50,7 @@ def make_parser() -> argparse.ArgumentParser:
     p.add_argument("--protocol", choices=PROTOCOLS, default="mit")
     p.add_argument("--model", default="AK80-9", help=f"mit: {', '.join(MODELS)}")
     p.add_argument("--reply-id", type=lambda t: int(t, 0), default=0, help="mit: identifier of the replies")
+    p.add_argument("--firmware", choices=("0.5", "0.6"), default="0.6", help="odrive: its firmware")
     p.add_argument("--map", type=Path, help="dbc: map of a maker's messages (firmware_sim/wire/dbc.py)")
     p.add_argument("--joints", type=int, default=1, help="number of joints, numbered from 1")
     pace = p.add_mutually_exclusive_group()
@@ -92,6 +93,7 @@ def bench_config(options: argparse.Namespace) -> BenchConfig:
         model=options.model,
         reply_id=options.reply_id,
         map_path=options.map,
+        firmware=options.firmware,
         drive=drive,
         sensor=SensorNodeConfig(status_every=options.status_every),
         timing=replace(Timing(), step_s=1.0 / options.drive_rate, steps_per_sample=round(ratio)),

@@ -48,6 +48,7 @@ class HeardFrame(NamedTuple):
 
     asked: list[Asked]
     steps: bool
+    moved: bool = False
 
 
 class SimulatedJoint:
@@ -85,7 +86,7 @@ class SimulatedJoint:
         if Node.DRIVE in self._silent():
             return HeardFrame([], False)
         heard = self.wire.hear(frame, self.drive, self.time_s)
-        return HeardFrame([Asked(answer, frame) for answer in heard.answers], heard.steps)
+        return HeardFrame([Asked(answer, frame) for answer in heard.answers], heard.steps, heard.moved)
 
     def render(self, asked: Iterable[Asked]) -> list[Frame]:
         """Frames that answer, from the drive's present report."""

@@ -22,10 +22,13 @@ from cablecomp import __version__
 from cablecomp.errors import CablecompError, ConfigError, DeviceError, InputError, InternalError, printable
 
 COMMANDS: Final = {
+    "guide": "guide.show_guide",
     "demo": "demo.demo",
     "example": "example.copy_example",
     "run": "run.run",
     "replay": "replay.replay",
+    "inspect": "inspect.inspect_recording",
+    "convert": "convert.convert_recording",
     "init": "init.init",
     "info": "info.info",
     "design": "design.design",
@@ -129,7 +132,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"cablecomp: {printable(text)}", file=sys.stderr)
+    with suppress(OSError):  # whoever was to read it may be gone
+        print(f"cablecomp: {printable(text)}", file=sys.stderr)
     return code
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from pathlib import Path
 from typing import Annotated
@@ -19,7 +18,7 @@ from cablecomp.examples import example
 from cablecomp.identification.calibrate import calibrate
 from cablecomp.links.load import load_link
 from cablecomp.links.schema import LinkConfig
-from cablecomp.report.compare_page import HEAD, summary_rows, write_comparison
+from cablecomp.report.compare_page import HEADERS, summary_rows, write_comparison
 from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.view import LiveView
@@ -51,7 +50,6 @@ def compare_controllers(
 ) -> None:
     """Run motor-side control, linear stiffness and observer side by side on simulated joints; show and write it."""
     with LiveView(console) as view:
-        signal.signal(signal.SIGINT, lambda number, frame: view.press())
         found = compare(
             joint,
             bus,
@@ -76,7 +74,7 @@ def _calibrated(config: JointConfig, columns: Columns) -> Calibrated:
 
 def _summary(found: Comparison) -> None:
     table = Table(title="Joint-side error under unseen motions with load changes")
-    for name in HEAD:
+    for name in HEADERS:
         table.add_column(name, justify="left" if name == "controller" else "right")
     for row in summary_rows(found):
         table.add_row(*row)

@@ -10,13 +10,13 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import Config, announce_compilation, console, read_joint, share_bar
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
 from cablecomp.effects import load_effects
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.folder import find_recordings
-from cablecomp.recording.reader import read_all
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 
@@ -50,12 +50,17 @@ def diagnose_recordings(
     as_json: Annotated[
         bool, typer.Option("--json", help="print diagnosis.json in place of the summary")
     ] = False,
+    words: MapOption = None,
+    link: LinkOption = None,
+    dbc: DbcOption = None,
+    which: JointOption = None,
 ) -> None:
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
     for path in effects or ():
         load_effects(path)
     joint = read_joint(config)
-    data = {str(path): read_all(path).columns for path in find_recordings(recordings)}
+    reading = sources(words, link, dbc, which, joint)
+    data = {str(path): reading.read(path).columns for path in find_recordings(recordings)}
     if not as_json:
         announce_compilation()
     with share_bar() as told:

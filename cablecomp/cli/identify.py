@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import Config, console, read_joint
-from cablecomp.recording.reader import read_all
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.report.info import bench_table
 from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
 
@@ -23,10 +23,14 @@ def identify(
     narrow: Annotated[
         bool, typer.Option("--narrow", help="tensions of nearly tangent pulleys (App. C)")
     ] = False,
+    words: MapOption = None,
+    link: LinkOption = None,
+    dbc: DbcOption = None,
+    which: JointOption = None,
 ) -> None:
     """True and acting coefficient of friction from a bench recording, the thesis's way."""
     joint = read_joint(config)
-    bench = bench_recording(read_all(recording).columns, joint)
+    bench = bench_recording(sources(words, link, dbc, which, joint).read(recording).columns, joint)
     console.print(
         bench_table(
             evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)

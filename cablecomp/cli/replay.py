@@ -9,15 +9,17 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.shared import Config, announce_compilation, console, read_joint
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config import in_session, session_of
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
-from cablecomp.recording.reader import open_recording
 from cablecomp.report.replay_page import write_replay
 
 
 def replay(
-    recording: Annotated[Path, typer.Argument(help="recording (CSV, gzip CSV, Parquet, MCAP)")],
+    recording: Annotated[
+        Path, typer.Argument(help="recording (CSV, Parquet, npz, mat, MCAP, ROS bag, CAN log)")
+    ],
     config: Config,
     out: Annotated[Path, typer.Option(help="folder for prediction.csv, replay.json, report.html")] = Path(
         "replay"
@@ -29,9 +31,14 @@ def replay(
         str | None,
         typer.Option(help="whose own values hold; the [[session]] that names the recording if absent"),
     ] = None,
+    words: MapOption = None,
+    link: LinkOption = None,
+    dbc: DbcOption = None,
+    which: JointOption = None,
 ) -> None:
     """Stream a recording through the observer that the controller runs; compare with what was measured."""
-    joint, source = read_joint(config), open_recording(recording)
+    joint = read_joint(config)
+    source = sources(words, link, dbc, which, joint).open(recording)
     found = session_of(joint, recording, session)
     joint = in_session(joint, found)
     announce_compilation()

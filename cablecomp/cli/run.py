@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import signal
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -11,11 +11,12 @@ from rich.table import Table
 
 from cablecomp.cli.live import LiveRun
 from cablecomp.cli.shared import DEMO_LINK, Config, Control, console, control_of, read_joint
+from cablecomp.config import JointConfig
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlMode
 from cablecomp.control.protocol import load_protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
-from cablecomp.errors import InputError
+from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.load import load_link
 from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.results import RunReport
@@ -23,6 +24,7 @@ from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched, same_joint
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
+from cablecomp.runtime.ways_out import WaysOut
 
 
 def run(
@@ -60,6 +62,13 @@ def run(
     live: Annotated[
         bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
     ] = False,
+    without_drive_timeout: Annotated[
+        bool,
+        typer.Option(
+            "--without-drive-timeout",
+            help="run though a drive would stay enabled if this process were killed",
+        ),
+    ] = False,
 ) -> None:
     """Control a joint over a link, real or simulated; ends with a timing report and a recording that
     `replay` accepts.
@@ -89,28 +98,44 @@ def run(
         span = 30.0 if duration is None else max(duration, 30.0)
         asked = force_protocol(joint, seed, span) if force else reaching_protocol(joint, seed, span)
     wish = SimulationWish(bus, wanted, 1, not nominal, seed, tuple(fault or ()))
-    simulation = _simulation(config, wish) if sim else None
-    if simulation is not None and asked.mode == "force":
-        simulation.set_wall(1, 0.0)
-    options = RunOptions(duration, fast, out, bounds, resume=resume)
-    try:
-        with LiveView(console) as view:
-            signal.signal(signal.SIGINT, lambda number, frame: view.press())
-            beside = LiveRun(joint, bus.rate_Hz, out, view.watch, stepped=fast) if live else None
-            watch = view.watch if beside is None else beside.watch
-            report = run_joint(joint, bus, wanted, asked, options, simulation, watch)
-    finally:
-        if simulation is not None:
-            simulation.close()
+    options = RunOptions(
+        duration, fast, out, bounds, resume=resume, without_drive_timeout=without_drive_timeout
+    )
+    with WaysOut() as ways_out:
+        simulation = _simulation(config, wish) if sim else None
+        beside: LiveRun | None = None
+        try:
+            if simulation is not None and asked.mode == "force":
+                simulation.set_wall(1, 0.0)
+            with LiveView(console) as view:
+                beside = LiveRun(joint, bus.rate_Hz, out, view.watch, stepped=fast) if live else None
+                watch = view.watch if beside is None else beside.watch
+                report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
+        finally:
+            if simulation is not None:
+                simulation.close()
+        _finish(report, joint, config, beside)
+
+
+def _finish(report: RunReport, joint: JointConfig, config: Path, beside: LiveRun | None) -> None:
+    """Leave the page, say what came of it; a terminal that is gone by now changes nothing."""
     if beside is not None:
         report = beside.finish(report)
-    _show(report)
-    for path in () if beside is None else beside.kept:
-        console.print(
-            f"mismatch: see {path.with_suffix('.json')}; cablecomp diagnose {path} --config {config}"
-        )
-    page = write_run_page(report, joint_text(joint))
-    console.print(f"report: {page}")
+    failures = list(report.failures)
+    try:
+        page = f"report: {write_run_page(report, joint_text(joint))}"
+    except OSError as error:
+        page = "no report.html was written"
+        failures.append(f"{report.folder}/report.html: cannot be written ({error.strerror}); free some space")
+    with suppress(OSError):
+        _show(report)
+        for path in () if beside is None else beside.kept:
+            console.print(
+                f"mismatch: see {path.with_suffix('.json')}; cablecomp diagnose {path} --config {config}"
+            )
+        console.print(page)
+    if failures:
+        raise DeviceError("; ".join(failures))
     if not report.ended_well:
         raise typer.Exit(3)
 

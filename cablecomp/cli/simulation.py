@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from cablecomp.config import read_toml
 from cablecomp.control.options import MotorModel
 from cablecomp.errors import DeviceError, InputError
-from cablecomp.links.schema import LinkConfig, SerialBus
-from cablecomp.links.schema_devices import CanSimpleDevice, MitDevice
+from cablecomp.links.device_mit import reply_receiver
+from cablecomp.links.schema import LinkConfig, MotorEnd, SerialBus
+from cablecomp.links.schema_devices import CanSimpleDevice, CubeMarsDevice, Device, MitDevice, RobStrideDevice
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from firmware_sim.build import BenchConfig
 from firmware_sim.errors import SimError
@@ -83,13 +85,19 @@ def _bench(wish: SimulationWish, torque: float, *, one_sided: bool) -> BenchConf
             fault_damping_Nms_per_rad=motor.damping_Nms_per_rad,
             brake_Nm_per_rad=motor.stiffness_Nm_per_rad,
         )
+    return replace(_bench_of(device, ends.motor), joints=wish.joints, drive=drive)
+
+
+def _bench_of(device: Device, end: MotorEnd) -> BenchConfig:
+    """The simulated drive that speaks what a device of the link speaks."""
     if isinstance(device, MitDevice):
-        reply = 0 if ends.motor.reply_id is None else ends.motor.reply_id
-        return BenchConfig(
-            protocol="mit", joints=wish.joints, model=device.model or "AK80-9", reply_id=reply, drive=drive
-        )
-    protocol = "odrive" if isinstance(device, CanSimpleDevice) else "dbc"
-    return BenchConfig(protocol=protocol, joints=wish.joints, drive=drive)
+        reply = reply_receiver(device, end, lambda data, now_s: 0).identifier
+        return BenchConfig(protocol="mit", model=device.model or "AK80-9", reply_id=reply)
+    if isinstance(device, CubeMarsDevice | RobStrideDevice):
+        return BenchConfig(protocol=device.protocol, model=device.model or "AK80-9")
+    if isinstance(device, CanSimpleDevice):
+        return BenchConfig(protocol="odrive", firmware=device.firmware)
+    return BenchConfig(protocol="dbc")
 
 
 def _bus(link: LinkConfig) -> str:

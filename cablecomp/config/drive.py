@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -32,6 +33,11 @@ class Stage(Frozen):
         None, description="where the cable breaks; above it a sample is refused"
     )
 
+    @property
+    def ratio(self) -> float:
+        """Output angle over input angle, r/R."""
+        return self.input_radius_m / self.output_radius_m
+
 
 class Drive(Frozen):
     """The cable drive, input side first.
@@ -44,3 +50,8 @@ class Drive(Frozen):
     circuit: Literal["open", "closed"] = Field(description="one cable, or two that pull against each other")
     arrangement: Literal["parallel", "series"] = Field("series", description="of several stages")
     stage: Annotated[tuple[Stage, ...], listed(16)] = Field(min_length=1)
+
+    @property
+    def ratio(self) -> float:
+        """Joint angle over motor angle of the rigid drive: product of r/R over the stages (thesis, 6-2)."""
+        return math.prod(stage.ratio for stage in self.stage)

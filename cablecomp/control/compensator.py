@@ -8,7 +8,7 @@ deflection(wanted load)) / N`.
 
 from __future__ import annotations
 
-from math import isfinite, prod, tanh
+from math import isfinite, tanh
 from typing import NamedTuple, Protocol
 
 from cablecomp.config import JointConfig
@@ -61,11 +61,6 @@ def given_gains(options: CompensatorOptions) -> Gains | None:
     return None if any(value is None for value in found) else Gains(*found)
 
 
-def ratio_of(config: JointConfig) -> float:
-    """Joint angle per motor angle of the rigid drive: N = product of r/R over the stages."""
-    return prod(s.input_radius_m / s.output_radius_m for s in config.drive.stage)
-
-
 def preload_of(config: JointConfig) -> float:
     """Torque (Nm, at the input pulley) by which an open circuit's pretension pulls at the motor: r T0, for the
     external moment is counted from the pretensioned state; 0 in a closed circuit, whose cables balance.
@@ -98,7 +93,7 @@ class Compensator:
         self.options = options
         self.gains = gains_of(options, gains)
         self.observer = observer
-        self.ratio = ratio_of(config)
+        self.ratio = config.drive.ratio
         self.preload_Nm = preload_of(config)
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from math import inf
 from typing import NamedTuple
 
 from cablecomp.control.command import Feed
-from cablecomp.errors import InputError
 
 
 class Phase(IntEnum):
@@ -45,20 +43,6 @@ class DegradeState(NamedTuple):
 
 
 NORMAL = DegradeState()
-
-
-def checked_times(times: DegradeTimes) -> DegradeTimes:
-    """The times as they are; raises InputError unless 0 < fresh <= hold < fade <= stop, and the others above
-    0."""
-    t = times
-    if not (0.0 < t.fresh_s <= t.hold_s < t.fade_s <= t.stop_s < inf):
-        raise InputError(
-            f"times: fresh {t.fresh_s} s, hold {t.hold_s} s, fade {t.fade_s} s, stop {t.stop_s} s; "
-            "0 < fresh <= hold < fade <= stop is accepted"
-        )
-    if not (t.recover_s > 0.0 and t.motor_stop_s >= t.fresh_s):
-        raise InputError("times: recover_s must be above 0, motor_stop_s not below fresh_s")
-    return times
 
 
 def degrade(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi, prod, sqrt
+from math import pi, sqrt
 
 from cablecomp.config import JointConfig
 from cablecomp.control.gate import GateLimits
@@ -24,7 +24,7 @@ def control_for(config: JointConfig) -> ControlConfig:
 
     Good for simulation and for a first look at a design; for hardware, state the real values.
     """
-    ratio = prod(s.input_radius_m / s.output_radius_m for s in config.drive.stage)
+    ratio = config.drive.ratio
     stiffness = stiffness_range(config, samples=80)
     inertia = stiffness.zero_Nm_per_rad / (2.0 * pi * _LINK_HZ) ** 2
     rotor = 2.0 * inertia * ratio**2

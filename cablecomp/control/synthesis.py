@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
-from cablecomp.control.compensator import Gains, ratio_of
+from cablecomp.control.compensator import Gains
 from cablecomp.control.margins import Loop, grid_for, highest_gain, holds, margin_of, modulus_for
 from cablecomp.control.options import ControlConfig
 from cablecomp.control.plant_model import (
@@ -47,7 +47,7 @@ class DesignWork:
     ) -> None:
         self.wanted = wanted
         self.motor = wanted.motor
-        self.ratio = ratio_of(config)
+        self.ratio = config.drive.ratio
         self.period = period_s
         self.slope_Hz = wanted.compensator.velocity_filter_Hz
         self.range = stiffness.spread(5)

@@ -1,8 +1,9 @@
 """ODrive's CANSimple: identifier `node << 5 | command`, little-endian payloads, turns and turns/s at the
-ODrive's encoder.
+ODrive's encoder. What the two firmwares share; what differs lies in `cansimple_firmware`.
 
-Sources: ODrive documentation, "CAN Protocol" (message table; 1 << 5 | 0x0C = 0x2C) for firmware 0.5.x and
-0.6.x, and the message tables (DBC) that ODrive publishes for both. Where the two differ, both are named here.
+Sources: ODrive documentation, "CAN Protocol" (message table; 1 << 5 | 0x0C = 0x2C), and the message tables (DBC)
+that ODrive publishes for firmware 0.5.6 and 0.6.10: a message of one float has eight bytes there, four of them
+zero, and whoever reads by the table refuses a shorter one.
 """
 
 from __future__ import annotations
@@ -18,27 +19,25 @@ from cablecomp.links.records import (
     CLIP_TORQUE,
     CLIP_VELOCITY,
     REMOTE,
-    DriveState,
     Frame,
 )
 
 FLOAT_TOP: Final = 3.4028234663852886e38
-_F: Final = Struct("<f")
+_F: Final = Struct("<f4x")
 _FF: Final = Struct("<ff")
 _FHH: Final = Struct("<fhh")
 _II: Final = Struct("<II")
-_I: Final = Struct("<I")
+_I: Final = Struct("<I4x")
+_COUNT: Final = Struct("<i4x")
 _HEARTBEAT: Final = Struct("<IB3s")
+_SDO: Final = Struct("<BHB4s")
 
 
 class Cmd(IntEnum):
-    """Command numbers (lower five bits of the identifier)."""
+    """Command numbers (lower five bits of the identifier) that mean the same to both firmwares."""
 
-    GET_VERSION = 0x00
     HEARTBEAT = 0x01
     ESTOP = 0x02
-    GET_ERROR = 0x03
-    SET_AXIS_NODE_ID = 0x06
     SET_AXIS_STATE = 0x07
     GET_ENCODER_ESTIMATES = 0x09
     SET_CONTROLLER_MODE = 0x0B
@@ -46,22 +45,31 @@ class Cmd(IntEnum):
     SET_INPUT_VEL = 0x0D
     SET_INPUT_TORQUE = 0x0E
     SET_LIMITS = 0x0F
-    SET_TRAJ_VEL_LIMIT = 0x11
-    SET_TRAJ_ACCEL_LIMITS = 0x12
-    SET_TRAJ_INERTIA = 0x13
     GET_IQ = 0x14
-    GET_TEMPERATURE = 0x15
     REBOOT = 0x16
     GET_BUS_VOLTAGE_CURRENT = 0x17
     CLEAR_ERRORS = 0x18
+
+
+class Cmd05(IntEnum):
+    """Command numbers of firmware 0.5 alone."""
+
+    SET_LINEAR_COUNT = 0x19
+
+
+class Cmd06(IntEnum):
+    """Command numbers of firmware 0.6 that 0.5 does not have, or uses for something else."""
+
+    RX_SDO = 0x04
+    TX_SDO = 0x05
+    GET_TEMPERATURE = 0x15
     SET_ABSOLUTE_POSITION = 0x19
-    SET_POS_GAIN = 0x1A
-    SET_VEL_GAINS = 0x1B
     GET_TORQUES = 0x1C
+    GET_POWERS = 0x1D
 
 
 class AxisState(IntEnum):
-    """States of an axis; FULL_CALIBRATION to HOMING are busy ones."""
+    """States of an axis; those but UNDEFINED, IDLE and CLOSED_LOOP are busy ones."""
 
     UNDEFINED = 0
     IDLE = 1
@@ -74,6 +82,9 @@ class AxisState(IntEnum):
     LOCKIN_SPIN = 9
     ENCODER_DIR_FIND = 10
     HOMING = 11
+    HALL_POLARITY_CALIBRATION = 12
+    HALL_PHASE_CALIBRATION = 13
+    ANTICOGGING_CALIBRATION = 14
 
 
 class ControlMode(IntEnum):
@@ -121,17 +132,13 @@ def identifier(node: int, command: int) -> int:
     return node << 5 | command
 
 
-def request(node: int, command: Cmd) -> Frame:
+def request(node: int, command: int) -> Frame:
     """Remote frame that asks an axis to answer with that command's payload."""
     return Frame(identifier(node, command) | REMOTE, b"")
 
 
 def parse_heartbeat(data: bytes) -> Heartbeat:
-    """Heartbeat: error u32, state u8, three more bytes; raises InputError unless 8 bytes.
-
-    Firmware 0.5: bytes 5…7 are motor, encoder, controller flags, trajectory done; 0.6: procedure result,
-    trajectory done.
-    """
+    """Heartbeat: error u32, state u8, three more bytes; raises InputError unless 8 bytes."""
     if len(data) != 8:
         raise InputError(f"ODrive heartbeat: {len(data)} bytes; 8 are accepted")
     return Heartbeat(*_HEARTBEAT.unpack(data))
@@ -143,18 +150,6 @@ def parse_pair(data: bytes) -> Pair:
     if len(data) != 8:
         raise InputError(f"ODrive payload: {len(data)} bytes; 8 are accepted")
     return Pair(*_FF.unpack(data))
-
-
-def drive_state(heartbeat: Heartbeat) -> DriveState:
-    """Canonical state: any error is FAULT, idle is DISABLED, closed loop is ENABLED, other sequences are
-    CALIBRATING."""
-    if heartbeat.error:
-        return DriveState.FAULT
-    if heartbeat.axis_state == AxisState.CLOSED_LOOP:
-        return DriveState.ENABLED
-    if heartbeat.axis_state == AxisState.IDLE:
-        return DriveState.DISABLED
-    return DriveState.UNKNOWN if heartbeat.axis_state == AxisState.UNDEFINED else DriveState.CALIBRATING
 
 
 def set_axis_state(node: int, state: AxisState) -> Frame:
@@ -181,21 +176,20 @@ def estop(node: int) -> Frame:
     return Frame(identifier(node, Cmd.ESTOP), b"")
 
 
-def clear_errors(node: int) -> Frame:
-    """Clear errors: firmware 0.6 reads one byte (identify = 0), 0.5 ignores it."""
-    return Frame(identifier(node, Cmd.CLEAR_ERRORS), b"\x00")
-
-
-def reboot(node: int) -> Frame:
-    """Restart the ODrive: firmware 0.6 reads one byte (0 = reboot), 0.5 ignores it."""
-    return Frame(identifier(node, Cmd.REBOOT), b"\x00")
-
-
 def set_absolute_position(node: int, position_turns: float) -> Frame:
-    """Make the present position read `position_turns` (firmware 0.6; 0.5 calls it Set Linear Count and takes
-    counts)."""
+    """Make the present position read `position_turns` (firmware 0.6)."""
     _finite("Set_Absolute_Position", position_turns)
-    return Frame(identifier(node, Cmd.SET_ABSOLUTE_POSITION), _F.pack(position_turns))
+    return Frame(identifier(node, Cmd06.SET_ABSOLUTE_POSITION), _F.pack(position_turns))
+
+
+def set_linear_count(node: int, count: int) -> Frame:
+    """Make the present position read `count` encoder counts (firmware 0.5)."""
+    return Frame(identifier(node, Cmd05.SET_LINEAR_COUNT), _COUNT.pack(count))
+
+
+def read_endpoint(node: int, endpoint: int) -> Frame:
+    """Ask for a parameter by its endpoint number (firmware 0.6), which TxSdo answers."""
+    return Frame(identifier(node, Cmd06.RX_SDO), _SDO.pack(0, endpoint, 0, bytes(4)))
 
 
 def set_input_pos(
@@ -207,7 +201,9 @@ def set_input_pos(
     position, c0 = _real(position_turns, CLIP_POSITION)
     velocity, c1 = _thousandths(velocity_ff_turns_s, CLIP_VELOCITY)
     torque, c2 = _thousandths(torque_ff_Nm, CLIP_TORQUE)
-    return Encoded(Frame(identifier(node, 0x0C), _FHH.pack(position, velocity, torque)), c0 | c1 | c2)
+    return Encoded(
+        Frame(identifier(node, Cmd.SET_INPUT_POS), _FHH.pack(position, velocity, torque)), c0 | c1 | c2
+    )
 
 
 def set_input_vel(node: int, velocity_turns_s: float, torque_ff_Nm: float) -> Encoded:
@@ -215,14 +211,14 @@ def set_input_vel(node: int, velocity_turns_s: float, torque_ff_Nm: float) -> En
     _finite("Set_Input_Vel", velocity_turns_s, torque_ff_Nm)
     velocity, c0 = _real(velocity_turns_s, CLIP_VELOCITY)
     torque, c1 = _real(torque_ff_Nm, CLIP_TORQUE)
-    return Encoded(Frame(identifier(node, 0x0D), _FF.pack(velocity, torque)), c0 | c1)
+    return Encoded(Frame(identifier(node, Cmd.SET_INPUT_VEL), _FF.pack(velocity, torque)), c0 | c1)
 
 
 def set_input_torque(node: int, torque_Nm: float) -> Encoded:
-    """Torque target (four bytes); raises InputError on NaN or infinity."""
+    """Torque target; raises InputError on NaN or infinity."""
     _finite("Set_Input_Torque", torque_Nm)
     torque, clipped = _real(torque_Nm, CLIP_TORQUE)
-    return Encoded(Frame(identifier(node, 0x0E), _F.pack(torque)), clipped)
+    return Encoded(Frame(identifier(node, Cmd.SET_INPUT_TORQUE), _F.pack(torque)), clipped)
 
 
 def _finite(message: str, *values: float) -> None:

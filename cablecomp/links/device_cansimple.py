@@ -8,25 +8,20 @@ from typing import Final
 from cablecomp.errors import InputError
 from cablecomp.links import cansimple
 from cablecomp.links.cansimple import AxisState, Cmd, ControlMode
+from cablecomp.links.cansimple_firmware import FIRMWARES, Datum, error_of, error_words, state_of
 from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
 from cablecomp.links.readings import JointReadings, MessageStats
 from cablecomp.links.records import Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd
-from cablecomp.links.schema_devices import CanSimpleDevice, OdriveData
+from cablecomp.links.schema_devices import CanSimpleDevice
 from cablecomp.links.units import Linear
 from cablecomp.signals import Wire
 
 _TURN: Final = 2.0 * pi
-_COMMANDS: Final[dict[OdriveData, Cmd]] = {
-    "encoder": Cmd.GET_ENCODER_ESTIMATES,
-    "iq": Cmd.GET_IQ,
-    "torques": Cmd.GET_TORQUES,
-    "temperature": Cmd.GET_TEMPERATURE,
-    "bus": Cmd.GET_BUS_VOLTAGE_CURRENT,
-}
-_EXTRAS: Final[dict[OdriveData, str]] = {
-    "temperature": "other_motor_temperature_degC",
-    "bus": "other_bus_voltage_V",
+_EXTRAS: Final[dict[Datum, tuple[str, ...]]] = {
+    "temperature": ("other_motor_temperature_degC",),
+    "bus": ("other_bus_voltage_V",),
+    "powers": ("other_electrical_power_W", "other_mechanical_power_W"),
 }
 _MODES: Final = {
     Mode.TORQUE: ControlMode.TORQUE,
@@ -37,7 +32,7 @@ _MODES: Final = {
 
 def extra_channels(device: CanSimpleDevice) -> tuple[str, ...]:
     """Channels beside the common ones that the messages named by the device bring."""
-    return tuple(_EXTRAS[d] for d in _EXTRAS if d in (*device.cyclic, *device.polled))
+    return tuple(c for d in _EXTRAS if d in (*device.cyclic, *device.polled) for c in _EXTRAS[d])
 
 
 def claims(end: MotorEnd) -> tuple[Claim, ...]:
@@ -57,8 +52,8 @@ class CanSimpleDrive:
         cansimple.identifier(end.node, 0)
         self._device = device
         self._readings = readings
-        self._polled = tuple(cansimple.request(end.node, _COMMANDS[d]) for d in device.polled)
-        self._state = AxisState.UNDEFINED
+        self._firmware = FIRMWARES[device.firmware]
+        self._polled = tuple(cansimple.request(end.node, self._firmware.data[d]) for d in device.polled)
         self._set_mode(Mode(end.mode))
         gear = Gear(end)
         turns = Linear(_TURN)
@@ -86,19 +81,20 @@ class CanSimpleDrive:
         of_iq: list[tuple[int, str, Linear]] = [(1, "motor_current_A", self._current)]
         if constant is not None and "torques" not in wanted:
             of_iq.append((1, "motor_torque_Nm", chain(Linear(constant), self._torque)))
-        maps: dict[OdriveData, list[tuple[int, str, Linear]]] = {
+        maps: dict[Datum, list[tuple[int, str, Linear]]] = {
             "encoder": [
                 (0, "motor_position_rad", self._position),
                 (1, "motor_velocity_rad_s", self._velocity),
             ],
             "iq": of_iq,
             "torques": [(1, "motor_torque_Nm", self._torque)],
-            "temperature": [(1, _EXTRAS["temperature"], Linear(1.0))],
-            "bus": [(0, _EXTRAS["bus"], Linear(1.0))],
+            "temperature": [(1, _EXTRAS["temperature"][0], Linear(1.0))],
+            "bus": [(0, _EXTRAS["bus"][0], Linear(1.0))],
+            "powers": [(k, channel, Linear(1.0)) for k, channel in enumerate(_EXTRAS["powers"])],
         }
         out = [Receiver(cansimple.identifier(self._node, Cmd.HEARTBEAT), self._heartbeat())]
         for name in sorted(wanted):
-            identifier = cansimple.identifier(self._node, _COMMANDS[name])
+            identifier = cansimple.identifier(self._node, self._firmware.data[name])
             out.append(Receiver(identifier, self._pair(name, maps[name])))
         return tuple(out)
 
@@ -108,22 +104,22 @@ class CanSimpleDrive:
         return stats
 
     def _heartbeat(self) -> Take:
-        stats, readings = self._stats("heartbeat"), self._readings
+        stats, readings, firmware = self._stats("heartbeat"), self._readings, self._firmware
 
         def take(data: bytes, now_s: float) -> int:
             if len(data) != 8:
                 stats.invalid += 1
                 return 0
             heartbeat = cansimple.parse_heartbeat(data)
-            readings.state = cansimple.drive_state(heartbeat)
-            readings.error = heartbeat.error
+            readings.state = state_of(firmware, heartbeat)
+            readings.error = error_of(firmware, heartbeat)
             stats.received += 1
             stats.last_s = now_s
             return 0
 
         return take
 
-    def _pair(self, name: OdriveData, channels: list[tuple[int, str, Linear]]) -> Take:
+    def _pair(self, name: Datum, channels: list[tuple[int, str, Linear]]) -> Take:
         stats, readings = self._stats(name), self._readings
         places = [(which, readings.index(channel), *line) for which, channel, line in channels]
         values, arrived, updates = readings.values, readings.arrived_s, readings.updates
@@ -185,11 +181,11 @@ class CanSimpleDrive:
         return None
 
     def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
-        """See `Drive.request`; enabling sets mode and limits first; zero needs firmware 0.6; what is sent by
-        itself need not be asked for."""
+        """See `Drive.request`; enabling sets mode and limits first; what is sent by itself need not be asked
+        for."""
         if mode is not None:
             self._set_mode(mode)
-        node, device = self._node, self._device
+        node, device, firmware = self._node, self._device, self._firmware
         if request == Request.ENABLE:
             frames = [cansimple.set_controller_mode(node, _MODES[self._mode])]
             if device.velocity_limit_turns_s is not None and device.current_limit_A is not None:
@@ -206,41 +202,13 @@ class CanSimpleDrive:
         if request == Request.CALIBRATE:
             return (cansimple.set_axis_state(node, AxisState.FULL_CALIBRATION),)
         if request == Request.CLEAR_FAULTS:
-            return (cansimple.clear_errors(node),)
+            return (Frame(cansimple.identifier(node, Cmd.CLEAR_ERRORS), firmware.clear),)
         if request == Request.RESET:
-            return (cansimple.reboot(node),)
-        if device.firmware == "0.6":
+            return (Frame(cansimple.identifier(node, Cmd.REBOOT), firmware.reboot),)
+        if firmware.name == "0.6":
             return (cansimple.set_absolute_position(node, 0.0),)
-        return ()
+        return (cansimple.set_linear_count(node, 0),)
 
     def error_text(self, error: int) -> str:
         """See `Drive.error_text`."""
-        names = [name for bit, name in _ERRORS.items() if error & bit]
-        return ", ".join(names) if names else (f"axis error 0x{error:X}" if error else "")
-
-
-_ERRORS: Final = {
-    0x01: "initializing",
-    0x02: "system level",
-    0x04: "timing error",
-    0x08: "missing estimate",
-    0x10: "bad config",
-    0x20: "drv fault",
-    0x40: "missing input",
-    0x100: "dc bus over voltage",
-    0x200: "dc bus under voltage",
-    0x400: "dc bus over current",
-    0x800: "dc bus over regen current",
-    0x1000: "current limit violation",
-    0x2000: "motor over temperature",
-    0x4000: "inverter over temperature",
-    0x8000: "velocity limit violation",
-    0x10000: "position limit violation",
-    0x1000000: "watchdog timer expired",
-    0x2000000: "estop requested",
-    0x4000000: "spinout detected",
-    0x8000000: "brake resistor disarmed",
-    0x10000000: "thermistor disconnected",
-    0x40000000: "calibration error",
-}
-"""Axis error bits of firmware 0.6 (ODrive's own message table)."""
+        return error_words(self._firmware, error)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 from cablecomp.errors import InputError
 from cablecomp.links import mit
+from cablecomp.links.damiao_registers import REGISTERS
 from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
 from cablecomp.links.mit import MitRange, reply_counts, saturation
 from cablecomp.links.mit_profiles import Family, error_text, profile, status_of
@@ -27,8 +30,8 @@ MOTOR_TEMPERATURE = "other_motor_temperature_degC"
 
 
 def extra_channels(device: MitDevice) -> tuple[str, ...]:
-    """Channels beside the common ones: the motor's temperature, where the reply has eight bytes."""
-    return (MOTOR_TEMPERATURE,) if _reply_length(device) == 8 else ()
+    """Channels beside the common ones: the motor's temperature, where the reply has it."""
+    return (MOTOR_TEMPERATURE,) if _reply_length(device) > 6 else ()
 
 
 def _reply_length(device: MitDevice) -> int:
@@ -44,15 +47,16 @@ def family_of(device: MitDevice) -> Family:
     if device.family is not None:
         return device.family
     if device.model is None:
-        raise InputError(f"device `{device.id}`: no family; cubemars, damiao or katz are accepted")
+        raise InputError(f"device `{device.id}`: no family; {', '.join(get_args(Family))} are accepted")
     return profile(device.model).family
 
 
 def reply_receiver(device: MitDevice, end: MotorEnd, take: Take) -> Receiver:
     """Who takes a drive's replies. Identifier, unless the link gives one: CubeMars the drive number, Damiao
-    drive number + 0x10 (the maker's advice for the master's identifier), Katz 0."""
+    drive number + 0x10 (the maker's advice for the master's identifier), RobStride 0xFD (its host number as
+    delivered), Katz 0."""
     family = family_of(device)
-    default = {"cubemars": end.node, "damiao": end.node + 0x10, "katz": 0}[family]
+    default = {"cubemars": end.node, "damiao": end.node + 0x10, "katz": 0, "robstride": 0xFD}[family]
     mask = 0x0F if family == "damiao" else 0xFF
     return Receiver(end.reply_id if end.reply_id is not None else default, take, mask, end.node & mask)
 
@@ -64,24 +68,22 @@ def claims(device: MitDevice, end: MotorEnd) -> tuple[Claim, ...]:
             f"device `{device.id}`: node {end.node}; 0 to 2047 are accepted (11-bit identifiers)"
         )
     reply = reply_receiver(device, end, lambda data, now_s: 0)
-    return (
+    found = (
         Claim(end.node, "MIT commands"),
         Claim(reply.identifier, "MIT replies", reply.mask, reply.number),
     )
-
-
-def is_register_reply(data: bytes) -> bool:
-    """Whether a Damiao drive answers a register request of somebody's, on the identifier of its states:
-    number, 0, 0x33 (read), 0x55 (write) or 0xAA (save), … Read as a state it would be a disabled drive at the
-    very end of its range."""
-    return data[0] < 0x10 and data[1] == 0 and data[2] in (0x33, 0x55, 0xAA)
+    if family_of(device) != "damiao":
+        return found
+    own = ((0x100, "position"), (0x200, "velocity")) if device.native else ()
+    modes = (Claim(base + end.node, f"Damiao {name} commands") for base, name in own)
+    return (*found, *modes, Claim(REGISTERS, "Damiao registers", group="damiao"))
 
 
 class MitDrive:
     """Encodes commands and decodes replies of one drive.
 
-    CubeMars and Katz do not say whether the motor mode is on: the state is then what was asked for last, once
-    a reply has come.
+    CubeMars, RobStride and Katz do not say whether the motor mode is on: the state is then what was asked for
+    last, once a reply has come.
     """
 
     def __init__(self, device: MitDevice, end: MotorEnd, readings: JointReadings) -> None:
@@ -98,11 +100,16 @@ class MitDrive:
         self._readings = readings
         self._stats = MessageStats(f"{readings.name}: {device.id} reply")
         readings.messages.append(self._stats)
-        self._temperature = readings.index(MOTOR_TEMPERATURE) if self._length == 8 else -1
+        self._temperature = readings.index(MOTOR_TEMPERATURE) if self._length > 6 else -1
         self._asked = DriveState.UNKNOWN
         self._mode = Mode(end.mode)
         self._share = 1.0
         self._prepare(Gear(end), end)
+        if self._mode in (Mode.POSITION, Mode.IMPEDANCE) and self._kp <= 0 and not device.native:
+            raise InputError(
+                f"joint `{readings.name}`: motor.stiffness_Nm_per_rad is 0; a MIT drive in mode "
+                f"`{self._mode}` needs a positive one"
+            )
 
     def _prepare(self, gear: Gear, end: MotorEnd) -> None:
         p, v, t, _, _ = self._scale
@@ -117,11 +124,6 @@ class MitDrive:
         self._to_velocity, self._to_torque, self._to_gain = gear.velocity(), gear.torque(), gear.gain()
         self._kp = end.stiffness_Nm_per_rad * self._to_gain
         self._kd = end.damping_Nms_per_rad * self._to_gain
-        if self._mode in (Mode.POSITION, Mode.IMPEDANCE) and self._kp <= 0:
-            raise InputError(
-                f"joint `{self._readings.name}`: motor.stiffness_Nm_per_rad is 0; a MIT drive in mode "
-                f"`{self._mode}` needs a positive one"
-            )
 
     def receivers(self) -> tuple[Receiver, ...]:
         """See `Drive.receivers`."""
@@ -130,19 +132,16 @@ class MitDrive:
     def take(self, data: bytes, now_s: float) -> int:
         """Take one reply."""
         stats, readings = self._stats, self._readings
-        if len(data) != self._length or (self._family == "damiao" and is_register_reply(data)):
+        if len(data) != self._length:
             stats.invalid += 1
             return 0
-        word = int.from_bytes(data, "big")
-        byte_7 = None
+        if self._family == "robstride" and not any(data[3:]):
+            return self._take_faults(data, now_s)
+        word = int.from_bytes(data, "big") >> 8 * (self._length - 6)
         values, arrived, updates = readings.values, readings.arrived_s, readings.updates
-        if self._length == 8:
-            byte_7 = word & 0xFF
-            byte_6 = word >> 8 & 0xFF
-            word >>= 16
-            # Damiao: byte 6 MOSFETs, byte 7 motor; CubeMars: byte 6 motor (int8), byte 7 error
+        if self._length > 6:
             place = self._temperature
-            values[place] = float(byte_7 if self._family == "damiao" else byte_6 - 256 * (byte_6 >> 7))
+            values[place] = self._degrees(data)
             arrived[place] = now_s
             updates[place] += 1
         n_p, n_v, n_t = reply_counts(word)
@@ -153,14 +152,34 @@ class MitDrive:
             arrived[place] = now_s
             updates[place] += 1
         readings.saturated = saturation(n_p, n_v, n_t)
-        _, state, error = status_of(self._family, word >> 40, byte_7)
+        _, state, error = status_of(self._family, data[0], data[7] if self._length == 8 else None)
         readings.state = self._asked if state is DriveState.UNKNOWN else state
         readings.error = error
         readings.replies += 1
         readings.unanswered = 0
         stats.received += 1
         stats.last_s = now_s
-        return 4 if self._length == 8 else 3
+        return 4 if self._length > 6 else 3
+
+    def _degrees(self, data: bytes) -> float:
+        """Temperature: Damiao byte 7 (byte 6 is the MOSFETs'), RobStride tenths in bytes 6 and 7, CubeMars an
+        int8 in byte 6."""
+        if self._family == "damiao":
+            return float(data[7])
+        if self._family == "robstride" and self._length == 8:
+            return 0.1 * (data[6] << 8 | data[7])
+        return float(data[6] - 256 * (data[6] >> 7))
+
+    def _take_faults(self, data: bytes, now_s: float) -> int:
+        """A RobStride drive's faults, in a frame of their own: bits in bytes 1 and 2, zeros after them."""
+        faults = data[1] | data[2] << 8
+        readings, stats = self._readings, self._stats
+        if faults:
+            readings.state = DriveState.FAULT
+        readings.error = faults
+        stats.received += 1
+        stats.last_s = now_s
+        return 0
 
     def command(self, command: MotorCommand) -> Outgoing:
         """See `Drive.command`."""
@@ -215,7 +234,8 @@ class MitDrive:
             return (Frame(self._node, mit.ZERO),)
         if request == Request.CLEAR_FAULTS:
             self._asked = DriveState.DISABLED
-            return (Frame(self._node, mit.CLEAR if self._family == "damiao" else mit.EXIT),)
+            has_one = self._family in ("damiao", "robstride")
+            return (Frame(self._node, mit.CLEAR if has_one else mit.EXIT),)
         return ()
 
     def error_text(self, error: int) -> str:

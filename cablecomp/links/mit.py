@@ -99,19 +99,15 @@ def value_of(n: int, low: float, high: float, top: int) -> float:
     return low + n * ((high - low) / top)
 
 
-def pack_command(
+def clipping(
     scale: MitRange,
     position_rad: float,
     velocity_rad_s: float,
     kp_Nm_per_rad: float,
     kd_Nms_per_rad: float,
     torque_Nm: float,
-) -> Packed:
-    """Bytes of one command; raises InputError on NaN or infinity, saturates beyond the range and says so in
-    `clipped`.
-
-    Bits from the top: position 16, velocity 12, kp 12, kd 12, torque 12 (CubeMars manual p. 49).
-    """
+) -> int:
+    """CLIP_* bits of what lies beyond the range; raises InputError on NaN or infinity."""
     if not isfinite(position_rad + velocity_rad_s + kp_Nm_per_rad + kd_Nms_per_rad + torque_Nm):
         raise InputError(
             f"MIT command: position {position_rad}, velocity {velocity_rad_s}, kp {kp_Nm_per_rad}, "
@@ -129,6 +125,24 @@ def pack_command(
         clipped |= CLIP_STIFFNESS
     if not 0.0 <= kd_Nms_per_rad <= kd:
         clipped |= CLIP_DAMPING
+    return clipped
+
+
+def pack_command(
+    scale: MitRange,
+    position_rad: float,
+    velocity_rad_s: float,
+    kp_Nm_per_rad: float,
+    kd_Nms_per_rad: float,
+    torque_Nm: float,
+) -> Packed:
+    """Bytes of one command; raises InputError on NaN or infinity, saturates beyond the range and says so in
+    `clipped`.
+
+    Bits from the top: position 16, velocity 12, kp 12, kd 12, torque 12 (CubeMars manual p. 49).
+    """
+    clipped = clipping(scale, position_rad, velocity_rad_s, kp_Nm_per_rad, kd_Nms_per_rad, torque_Nm)
+    p, v, t, kp, kd = scale
     word = (
         count(position_rad, -p, p, P_TOP) << 48
         | count(velocity_rad_s, -v, v, V_TOP) << 36

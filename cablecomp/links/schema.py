@@ -13,12 +13,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from cablecomp.links.schema_devices import (
-    CanSimpleDevice,
-    DbcDevice,
     Device,
     Finite,
     Frozen,
-    MitDevice,
     Name,
     Positive,
 )
@@ -71,6 +68,8 @@ class MotorEnd(Frozen):
     pulley.
 
     `q_in = sign * q_drive / gear_ratio - position_offset_rad`, `torque = sign * gear_ratio * torque_drive`.
+    `command_timeout_s`: after how long without commands the drive stops by itself, as it is set in the drive
+    (0 = it does not; absent = not known).
     """
 
     device: Name
@@ -82,6 +81,7 @@ class MotorEnd(Frozen):
     mode: ModeName = "position"
     stiffness_Nm_per_rad: NonNegative = 0.0
     damping_Nms_per_rad: NonNegative = 0.0
+    command_timeout_s: NonNegative | None = None
 
 
 class SensorEnd(Frozen):
@@ -155,7 +155,7 @@ class LinkConfig(Frozen):
         """The same slcan or serial link on another terminal, such as a simulated adapter's."""
         return self.redirect("serial" if isinstance(self.bus, SerialBus) else "slcan", path)
 
-    def device_of(self, end: MotorEnd | SensorEnd) -> MitDevice | CanSimpleDevice | DbcDevice:
+    def device_of(self, end: MotorEnd | SensorEnd) -> Device:
         """The device that an end names."""
         return next(d for d in self.device if d.id == end.device)
 

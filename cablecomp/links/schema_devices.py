@@ -6,13 +6,14 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from cablecomp.links.cansimple_firmware import FIRMWARES, Datum, FirmwareName
+from cablecomp.links.mit_profiles import Family
 from cablecomp.links.records import CHANNELS
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1)]
 Value = Finite | str
-OdriveData = Literal["encoder", "iq", "torques", "temperature", "bus"]
 
 
 class Frozen(BaseModel):
@@ -32,20 +33,53 @@ class MitScale(Frozen):
 
 
 class MitDevice(Frozen):
-    """A drive that speaks the MIT frame: a `model` of the table, or `range` and `family` of another one."""
+    """A drive that speaks the MIT frame: a `model` of the table, or `range` and `family` of another one.
+
+    `native` (Damiao): positions and velocities go to the drive's own loops, on identifiers 0x100 and 0x200
+    above its number, with `velocity_limit_rad_s` at the drive's shaft.
+    """
 
     protocol: Literal["mit"]
     id: Name
     model: str | None = None
     range: MitScale | None = None
-    family: Literal["cubemars", "damiao", "katz"] | None = None
-    reply_length: Literal[6, 8] | None = None
+    family: Family | None = None
+    reply_length: Literal[6, 7, 8] | None = None
+    native: bool = False
+    velocity_limit_rad_s: Positive | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if self.model is None and (self.range is None or self.family is None):
             raise ValueError("`model`, or `range` and `family` are accepted")
+        if self.native and self.velocity_limit_rad_s is None:
+            raise ValueError("`native` needs `velocity_limit_rad_s`")
         return self
+
+
+class CubeMarsDevice(Frozen):
+    """A CubeMars AK drive on extended identifiers: `control` "servo", or "force" (V3 boards).
+
+    `electrical_turns`: pole pairs times reduction; `torque_constant_Nm_per_A` at the output shaft; both are
+    known of some models.
+    """
+
+    protocol: Literal["cubemars"]
+    id: Name
+    control: Literal["servo", "force"]
+    model: str | None = None
+    range: MitScale | None = None
+    electrical_turns: Annotated[int, Field(gt=0)] | None = None
+    torque_constant_Nm_per_A: Positive | None = None
+
+
+class RobStrideDevice(Frozen):
+    """A RobStride drive in its own protocol; `host`: the number that this side goes by."""
+
+    protocol: Literal["robstride"]
+    id: Name
+    model: Name
+    host: Annotated[int, Field(ge=0, le=0xFF)] = 0xFD
 
 
 class CanSimpleDevice(Frozen):
@@ -54,19 +88,21 @@ class CanSimpleDevice(Frozen):
 
     protocol: Literal["cansimple"]
     id: Name
-    firmware: Literal["0.5", "0.6"] = "0.6"
-    cyclic: tuple[OdriveData, ...] = ("encoder",)
-    polled: tuple[OdriveData, ...] = ()
+    firmware: FirmwareName = "0.6"
+    cyclic: tuple[Datum, ...] = ("encoder",)
+    polled: tuple[Datum, ...] = ()
     torque_constant_Nm_per_A: Positive | None = None
     velocity_limit_turns_s: Positive | None = None
     current_limit_A: Positive | None = None
 
     @model_validator(mode="after")
     def _known_to_firmware(self) -> Self:
-        if self.firmware == "0.5" and {"torques", "temperature"} & {*self.cyclic, *self.polled}:
-            raise ValueError(
-                "firmware 0.5 has no `torques` and no `temperature`; `encoder`, `iq`, `bus` are accepted"
-            )
+        known = FIRMWARES[self.firmware].data
+        for datum in (*self.cyclic, *self.polled):
+            if datum not in known:
+                raise ValueError(
+                    f"firmware {self.firmware} has no `{datum}`; {', '.join(known)} are accepted"
+                )
         if (self.velocity_limit_turns_s is None) != (self.current_limit_A is None):
             raise ValueError(
                 "`velocity_limit_turns_s` and `current_limit_A` go together: both or none are accepted"
@@ -169,4 +205,7 @@ class DbcDevice(Frozen):
     ] = Field(default_factory=dict)
 
 
-Device = Annotated[MitDevice | CanSimpleDevice | DbcDevice, Field(discriminator="protocol")]
+Device = Annotated[
+    MitDevice | CubeMarsDevice | RobStrideDevice | CanSimpleDevice | DbcDevice,
+    Field(discriminator="protocol"),
+]

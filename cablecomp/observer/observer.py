@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
+from cablecomp.durable import write_durably
 from cablecomp.effects import extend
 from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError
@@ -55,7 +56,7 @@ class Observer:
         self._row = np.zeros(st.IN_OTHER + len(self.channels))
         self._out = np.zeros(st.OUT_WIDTH)
         self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
-        self._ratio = _rigid_ratio(config)
+        self._ratio = config.drive.ratio
         self._breaking = config.drive.stage[-1].breaking_force_N
         self._last_time = -math.inf
         self._source = config.observer.load
@@ -158,10 +159,8 @@ class Observer:
         self._last_time = unpack(data, self.config, self.model.I, *self._parts())
 
     def save(self, path: Path) -> None:
-        """Write the snapshot to a file, atomically: a power cut leaves the old file or the new one."""
-        spare = path.with_name(path.name + ".part")
-        spare.write_bytes(self.snapshot())
-        spare.replace(path)
+        """Write the snapshot to a file: a power cut leaves the old file or the new one; raises OSError."""
+        write_durably(path, self.snapshot())
 
     def load(self, path: Path) -> None:
         """Restore from a file written by `save`."""
@@ -343,7 +342,3 @@ def _need(columns: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.f
     if name not in columns:
         raise InputError(f"channel `{name}` is missing; the recording has {', '.join(sorted(columns))}")
     return columns[name]
-
-
-def _rigid_ratio(config: JointConfig) -> float:
-    return float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))

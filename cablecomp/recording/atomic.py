@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from cablecomp.durable import replace_durably
 from cablecomp.errors import InputError
 
 
@@ -42,7 +43,7 @@ def atomic_file(path: Path | str) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.partial-{os.getpid()}")
     try:
         yield temporary
-        os.replace(temporary, path)
+        replace_durably(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
@@ -64,14 +65,14 @@ def _sibling(out: Path) -> Path:
 
 def _move_into(source: Path, target: Path) -> None:
     if not target.exists():
-        source.rename(target)
+        replace_durably(source, target)
         return
     for item in sorted(source.iterdir()):
         place = target / item.name
         if item.is_dir() and place.is_dir():
             _move_into(item, place)
         else:
-            os.replace(item, place)
+            replace_durably(item, place)
     source.rmdir()
 
 

@@ -66,6 +66,8 @@ def order(names: Iterable[str]) -> tuple[str, ...]:
 def parse_column(column: str) -> Column:
     """Say what a column's name means; InputError (without the file's name) if it means nothing."""
     name = column.strip()
+    if name.startswith("(column "):
+        raise InputError(f"{name.strip('()')} has no name; give it one, such as other_x")
     if is_other(name):
         if not _OTHER_NAME.fullmatch(name):
             raise InputError(
@@ -85,9 +87,7 @@ def parse_column(column: str) -> Column:
 def parse_header(columns: Iterable[str]) -> tuple[Column, ...]:
     """Say what each column means; InputError if one means nothing or two mean the same channel."""
     parsed: dict[str, Column] = {}
-    for position, text in enumerate(columns, start=1):
-        if not text.strip():
-            raise InputError(f"column {position} has no name; give it one, such as other_{position}")
+    for text in columns:
         column = parse_column(text)
         earlier = parsed.get(column.name)
         if earlier is not None:

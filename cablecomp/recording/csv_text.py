@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,10 +12,14 @@ import numpy as np
 import polars as pl
 
 from cablecomp.errors import InputError
+from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source import Piece, Truncated, ahead, chunks
 from cablecomp.recording.table import FloatArray
 
 _HEAD_LIMIT: Final = 1 << 20
+_BREAK: Final = b"\n"
+_LINE_LIMIT: Final = 1 << 20
+_MOST_COLUMNS: Final = 4096
 _SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 
@@ -33,18 +38,36 @@ class Head:
 
 @dataclass(frozen=True)
 class Rows:
-    """Parsed rows, one array per column of the file; row k is line `first_line + k`; NaN where empty."""
+    """Parsed rows, one array per column; row k is line `first_line + k`; NaN where empty."""
 
     first_line: int
-    arrays: list[FloatArray]
+    arrays: Mapping[str, FloatArray]
     fraction: float
     text: bytes
-    separator: str
+    head: Head
     ends_with_break: bool = True
+    left_out: int = 0
 
-    def cell(self, row: int, column: int) -> str:
+    def cell(self, row: int, column: str) -> str:
         """Return the text of a cell, for messages."""
-        return self.text.split(b"\n")[row].decode("utf-8", "replace").split(self.separator)[column].strip()
+        cells = self.text.split(b"\n")[row].decode("utf-8", "replace").split(self.head.separator)
+        return cells[self.head.columns.index(column)].strip()
+
+
+def open_csv(path: Path, gzipped: bool) -> RawTable:
+    """Open CSV text (comma, semicolon, tab; plain or gzip); InputError if it has no header of names."""
+    head = read_head(path, gzipped)
+    twice = next((n for n, count in Counter(head.columns).items() if count > 1), None)
+    if twice is not None:
+        raise InputError(f"{path}: line {head.header_line}: column {twice!r} occurs twice; keep one of them")
+
+    def read(names: Sequence[str]) -> Iterator[Rows]:
+        return read_rows(path, gzipped, head, names)
+
+    odd = gzipped and path.suffix != ".gz"
+    notes = (f"is gzip although it is named {path.suffix or path.name}; read unpacked",) if odd else ()
+    where = f"line {head.header_line}: "
+    return RawTable(head.columns, read, "line", where, head.comments, notes=notes)
 
 
 def read_head(path: Path, gzipped: bool) -> Head:
@@ -65,6 +88,10 @@ def read_head(path: Path, gzipped: bool) -> Head:
         raise InputError(
             f"{path}: has no header line; expected column names such as time_s,motor_position_rad"
         )
+    if len(head.columns) > _MOST_COLUMNS:
+        raise InputError(
+            f"{path}: line {head.header_line}: has {len(head.columns)} columns; {_MOST_COLUMNS} are accepted"
+        )
     if _is_number(head.columns[0]):
         raise InputError(
             f"{path}: line {head.header_line}: holds numbers where the column names are expected; "
@@ -73,9 +100,12 @@ def read_head(path: Path, gzipped: bool) -> Head:
     return head
 
 
-def read_rows(path: Path, gzipped: bool, head: Head) -> Iterator[Rows]:
-    """Stream the rows below the head; InputError with the line for ragged rows, text, and files cut short."""
-    parser = _Parser(path, head)
+def read_rows(path: Path, gzipped: bool, head: Head, names: Sequence[str]) -> Iterator[Rows]:
+    """Stream these columns of the rows below the head; what stands in the others does not matter.
+
+    InputError with the line for ragged rows, text, and files cut short.
+    """
+    parser = _Parser(path, head, tuple(dict.fromkeys(names)))
     skip, line, tail, fraction = head.size, head.first_line, b"", 0.0
     carriage = b""
     try:
@@ -87,9 +117,12 @@ def read_rows(path: Path, gzipped: bool, head: Head) -> Iterator[Rows]:
                 drop = min(skip, len(data))
                 data, skip = data[drop:], skip - drop
             body, tail = _whole_lines(tail + data)
+            if len(tail) > _LINE_LIMIT:
+                found = "over a million empty lines" if tail.isspace() else "over a million characters"
+                raise InputError(f"{path}: line {line + body.count(_BREAK)}: {found}; that is no recording")
             if body:
                 rows = parser.parse(body, line, fraction)
-                line += len(rows.arrays[0])
+                line += len(next(iter(rows.arrays.values())))
                 yield rows
     except Truncated as error:
         raise InputError(f"{path}: line {line}: {error}; copy or record the file anew") from None
@@ -107,13 +140,15 @@ def _pieces(path: Path, gzipped: bool) -> Iterator[Piece]:
 class _Parser:
     path: Path
     head: Head
+    names: tuple[str, ...]
 
     def parse(self, text: bytes, line: int, fraction: float, last: bool = False) -> Rows:
         text = text.replace(b'"', b"") if b'"' in text else text
         if self.head.decimal_comma:
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)
-        return Rows(line, arrays, fraction, text, self.head.separator, not last)
+        named = dict(zip(self.names, arrays, strict=True))
+        return Rows(line, named, fraction, text, self.head, not last)
 
     def _fast(self, text: bytes) -> list[FloatArray] | None:
         """Return the columns (NaN where a cell is empty), or None if any row may be ragged or hold text.
@@ -121,24 +156,25 @@ class _Parser:
         The parser refuses rows with too many cells and fills up short ones: with the right total of
         separators and no refusal, no row is short either.
         """
-        names = [f"c{i}" for i in range(len(self.head.columns))]
+        places = {name: f"c{i}" for i, name in enumerate(self.head.columns)}
+        kinds = {place: pl.Float64 if name in self.names else pl.String for name, place in places.items()}
         rows = text.count(b"\n") + (not text.endswith(b"\n"))
-        if text.count(self.head.separator.encode()) != rows * (len(names) - 1):
+        if text.count(self.head.separator.encode()) != rows * (len(places) - 1):
             return None
         try:
             frame = pl.read_csv(
-                text, has_header=False, schema=dict.fromkeys(names, pl.Float64), separator=self.head.separator
+                text, has_header=False, schema=kinds, separator=self.head.separator, quote_char=None
             )
         except pl.exceptions.PolarsError:
             return None
         if frame.height != rows:
             return None
-        return [frame[name].to_numpy() for name in names]
+        return [frame[places[name]].to_numpy() for name in self.names]
 
     def _slow(self, text: bytes, line: int, last: bool) -> list[FloatArray]:
         """Parse row by row: allows empty cells, and names the line and column of what is wrong."""
         lines = text.decode("utf-8", "replace").removesuffix("\n").split("\n")
-        out = np.empty((len(lines), len(self.head.columns)))
+        out = np.empty((len(lines), len(self.names)))
         for k, row in enumerate(lines):
             cut = last and k == len(lines) - 1
             out[k] = self._row(row, line + k, cut)
@@ -156,7 +192,8 @@ class _Parser:
                 f"{ending or '; mend or remove that line'}"
             )
         values = []
-        for name, cell in zip(self.head.columns, cells, strict=True):
+        for name in self.names:
+            cell = cells[self.head.columns.index(name)]
             value = _number(cell)
             if value is None:
                 raise InputError(
@@ -179,7 +216,8 @@ def _parse_head(text: bytes) -> Head | None:
             comments.append(line[1:].strip())
             continue
         separator = max(_SEPARATORS, key=line.count)
-        columns = tuple(name.strip().strip('"').strip() for name in line.split(separator))
+        names = (name.strip().strip('"').strip() for name in line.split(separator))
+        columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
         first = lines[number].decode("utf-8", "replace") if number < len(lines) else ""
         comma = separator != "," and "," in first
         return Head(columns, tuple(comments), separator, comma, number, number + 1, size + shift)

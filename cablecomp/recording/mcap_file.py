@@ -1,57 +1,237 @@
-"""MCAP with JSON messages, as Foxglove and PlotJuggler read and write it (optional package `mcap`).
+"""MCAP (optional package `mcap`): messages in JSON, protobuf and ROS 2's CDR, every checksum checked.
 
-A row is all the messages of one log time. A field is a channel if its name is one (`joint_torque_mNm`); a
-message with the single field `value` or `data` is the channel that its topic's last part names.
-Source: https://mcap.dev/spec
+Source: https://mcap.dev/spec. Chunks are unpacked by streaming, never beyond the size that they state.
 """
 
 from __future__ import annotations
 
-import importlib
+import heapq
 import json
-import math
-from collections.abc import Iterable, Iterator
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final, NamedTuple
 
 import numpy as np
 
 from cablecomp.errors import InputError
-from cablecomp.recording.channels import parse_column
-from cablecomp.recording.foreign import BinaryRows, RowStream
+from cablecomp.recording.array_file import first_line
+from cablecomp.recording.message_decoders import Decode, decoder_for
+from cablecomp.recording.messages import Message, MessageLog, numbers, stamp_of
+from cablecomp.recording.packages import package
 from cablecomp.recording.table import Block
 
 TOPIC: Final = "/joint"
-_ROWS: Final = 1 << 14
+MAGIC: Final = b"\x89MCAP0\r\n"
+_MOST_CHUNK: Final = 1 << 26
+_MOST_WAITING: Final = 1 << 20
+_DATA_END, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x0F, 0x02, 0x03, 0x04, 0x05, 0x06
 
 
-def open_mcap(path: Path) -> tuple[tuple[str, ...], RowStream]:
-    """Return column names and a stream of rows; InputError if damaged or no JSON topic holds a channel.
+class _Record(NamedTuple):
+    code: int
+    data: bytes
+    at: int
 
-    Fields that are no channels are left out. Without a time channel, log time since the first message is it.
-    """
-    names, seen, clock = _discover(path)
-    if not names:
+
+class _Stretch(NamedTuple):
+    """Messages that lie together: a chunk, or one message outside of any; in file order."""
+
+    first_ns: int
+    at: int
+
+
+def open_mcap(path: Path) -> MessageLog:
+    """Open MCAP: one pass checks lengths and checksums and finds the channels; InputError if damaged or cut."""
+    package("mcap.records", path, "mcap", "MCAP")
+    contents = _Contents(path)
+    stretches = contents.survey()
+
+    def read(topics: frozenset[str] | None) -> Iterator[tuple[Message, float]]:
+        total = max(path.stat().st_size, 1)
+        with path.open("rb") as file:
+            for at, channel, logged, data in contents.in_order(file, stretches, topics):
+                topic, decode = contents.channels[channel]
+                content = _decoded(path, topic, decode, data)
+                yield Message(topic, logged, stamp_of(content), numbers(content)), min(at / total, 1.0)
+
+    return MessageLog("mcap", read, dict(contents.skipped))
+
+
+class _Contents:
+    """What an MCAP file holds, as far as one pass over it tells."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.channels: dict[int, tuple[str, Decode]] = {}
+        self.skipped: dict[str, str] = {}
+        self._schemas: dict[int, Any] = {}
+        self._seen: dict[int, bytes] = {}
+        self._records = package("mcap.records", path, "mcap", "MCAP")
+        self._stream = package("mcap.data_stream", path, "mcap", "MCAP").ReadDataStream
+
+    def survey(self) -> list[_Stretch]:
+        """Check the whole file; returns its stretches by the time of their first message."""
+        found: list[_Stretch] = []
+        with self.path.open("rb") as file:
+            for record in self._outer(file):
+                try:
+                    found += self._noted(record)
+                except (KeyError, ValueError, EOFError, self._error()) as error:
+                    raise self._damaged(first_line(error)) from None
+        return sorted(found)
+
+    def in_order(
+        self, file: IO[bytes], stretches: list[_Stretch], topics: frozenset[str] | None
+    ) -> Iterator[tuple[int, int, int, bytes]]:
+        """Stream (place, channel, log time, data) in the order of log time; stretches that overlap are merged."""
+        wanted = {c for c, (topic, _) in self.channels.items() if topics is None or topic in topics}
+        waiting: list[tuple[int, int, int, int, bytes]] = []
+        for k, stretch in enumerate(stretches):
+            order = 0
+            for logged, channel, data in self._messages(self._again(file, stretch.at)):
+                if channel in wanted:
+                    heapq.heappush(waiting, (logged, k, order, channel, data))
+                    order += 1
+            if len(waiting) > _MOST_WAITING:
+                raise InputError(f"{self.path}: messages are too far out of order; sort it with `mcap` first")
+            until = stretches[k + 1].first_ns if k + 1 < len(stretches) else None
+            while waiting and (until is None or waiting[0][0] < until):
+                logged, _, _, channel, data = heapq.heappop(waiting)
+                yield stretch.at, channel, logged, data
+
+    def _noted(self, record: _Record) -> Iterator[_Stretch]:
+        """Take in schemas and channels; the stretch of a record that holds messages, if it is one."""
+        if record.code == _SCHEMA:
+            schema = self._records.Schema.read(self._stream(BytesIO(record.data)))
+            self._schemas[schema.id] = schema
+        elif record.code == _CHANNEL:
+            self._channel(self._records.Channel.read(self._stream(BytesIO(record.data))))
+        elif record.code in (_CHUNK, _MESSAGE):
+            inside = list(self._inner(record)) if record.code == _CHUNK else [record]
+            for inner in inside:
+                if inner.code in (_SCHEMA, _CHANNEL):
+                    yield from self._noted(inner)
+            times = [logged for inner in inside for logged, _, _ in self._message(inner)]
+            if times:
+                yield _Stretch(min(times), record.at)
+
+    def _channel(self, channel: Any) -> None:
+        if channel.id in self.channels:
+            return
+        schema = self._schemas.get(channel.schema_id)
+        decode = decoder_for(channel.message_encoding, schema, self.path)
+        if isinstance(decode, str):
+            self.skipped[channel.topic] = decode
+        else:
+            self.channels[channel.id] = (channel.topic, decode)
+
+    def _messages(self, record: _Record) -> Iterator[tuple[int, int, bytes]]:
+        """(log time, channel, data) of the messages in a chunk, or of a message outside of any."""
+        for inner in self._inner(record) if record.code == _CHUNK else (record,):
+            yield from self._message(inner)
+
+    def _message(self, record: _Record) -> Iterator[tuple[int, int, bytes]]:
+        if record.code != _MESSAGE:
+            return
+        if len(record.data) < 22:
+            raise self._damaged("a message is too short")
+        channel = int.from_bytes(record.data[:2], "little")
+        yield int.from_bytes(record.data[6:14], "little"), channel, record.data[22:]
+
+    def _inner(self, record: _Record) -> Iterator[_Record]:
+        """The records in a chunk, unpacked and its checksum checked."""
+        chunk = self._records.Chunk.read(self._stream(BytesIO(record.data)))
+        if chunk.uncompressed_size > _MOST_CHUNK:
+            raise self._damaged(
+                f"a chunk states {chunk.uncompressed_size:,} bytes; {_MOST_CHUNK:,} are accepted"
+            )
+        data = _unpacked(chunk.compression, chunk.data, chunk.uncompressed_size, self.path)
+        if len(data) != chunk.uncompressed_size:
+            raise self._damaged("a chunk is not of the size that it states")
+        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+            raise self._damaged("a chunk's checksum is wrong")
+        at = 0
+        while at < len(data):
+            size = int.from_bytes(data[at + 1 : at + 9], "little")
+            if at + 9 + size > len(data):
+                raise self._damaged("a record goes beyond its chunk")
+            yield _Record(data[at], data[at + 9 : at + 9 + size], record.at)
+            at += 9 + size
+
+    def _outer(self, file: IO[bytes]) -> Iterator[_Record]:
+        """The records of the data section, with its checksum and the end of the file checked."""
+        crc, at = zlib.crc32(file.read(len(MAGIC))), len(MAGIC)
+        while True:
+            head = file.read(9)
+            if len(head) < 9:
+                raise self._cut()
+            size = int.from_bytes(head[1:], "little")
+            data = file.read(min(size, 2 * _MOST_CHUNK + 1))
+            if len(data) < size:
+                raise (
+                    self._cut()
+                    if len(data) < 2 * _MOST_CHUNK
+                    else self._damaged(f"a record of {size:,} bytes")
+                )
+            if head[0] == _DATA_END:
+                stated = int.from_bytes(data[:4], "little")
+                if stated and stated != crc:
+                    raise self._damaged("the checksum of its data is wrong")
+                break
+            crc = zlib.crc32(data, zlib.crc32(head, crc))
+            yield _Record(head[0], data, at)
+            at += 9 + size
+        self._end(file)
+
+    def _end(self, file: IO[bytes]) -> None:
+        file.seek(-len(MAGIC), 2)
+        if file.read() != MAGIC:
+            raise self._cut()
+
+    def _again(self, file: IO[bytes], at: int) -> _Record:
+        file.seek(at)
+        head = file.read(9)
+        return _Record(head[0], file.read(int.from_bytes(head[1:], "little")), at)
+
+    def _error(self) -> type[Exception]:
+        kind: type[Exception] = package("mcap.exceptions", self.path, "mcap", "MCAP").McapError
+        return kind
+
+    def _damaged(self, why: str) -> InputError:
+        return InputError(f"{self.path}: damaged MCAP ({why}); run `mcap recover` on it")
+
+    def _cut(self) -> InputError:
+        return InputError(f"{self.path}: MCAP without its end, it was cut short; run `mcap recover` on it")
+
+
+def _unpacked(kind: str, data: bytes, size: int, path: Path) -> bytes:
+    """Unpack at most `size` + 1 bytes, whatever the data would give."""
+    try:
+        if kind == "zstd":
+            zstandard = package("zstandard", path, "mcap", "MCAP with zstd")
+            with zstandard.ZstdDecompressor().stream_reader(BytesIO(data)) as reader:
+                return bytes(reader.read(size + 1))
+        if kind == "lz4":
+            frame = package("lz4.frame", path, "mcap", "MCAP with lz4")
+            return bytes(frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
+    except InputError:
+        raise
+    except Exception as error:  # each package has errors of its own
+        raise InputError(f"{path}: damaged MCAP ({first_line(error)}); run `mcap recover` on it") from None
+    if kind:
+        raise InputError(f"{path}: MCAP packed by {kind!r}; zstd, lz4 and none are accepted")
+    return data
+
+
+def _decoded(path: Path, topic: str, decode: Callable[[bytes], Any], data: bytes) -> Any:
+    try:
+        return decode(data)
+    except Exception as error:  # whatever a decoder makes of damaged bytes
         raise InputError(
-            f"{path}: no JSON message holds a known channel; expected fields such as motor_position_rad; "
-            f"found {', '.join(sorted(seen)) or 'no JSON topic'}"
-        )
-    columns = names if clock is not None else ("time_s", *names)
-
-    def rows() -> Iterator[BinaryRows]:
-        first_line, held = 1, []
-        start: int | None = None
-        for log_time, fields, fraction in _merged(path):
-            start = log_time if start is None else start
-            fields.setdefault("time_s", (log_time - start) * 1e-9)
-            held.append([fields.get(name, math.nan) for name in columns])
-            if len(held) == _ROWS:
-                yield _rows(first_line, held, fraction)
-                first_line, held = first_line + len(held), []
-        if held:
-            yield _rows(first_line, held, 1.0)
-
-    return columns, rows
+            f"{path}: topic {topic} holds a message that cannot be decoded ({first_line(error)}); record it anew"
+        ) from None
 
 
 def write_mcap(path: Path, blocks: Iterable[Block]) -> None:
@@ -59,9 +239,9 @@ def write_mcap(path: Path, blocks: Iterable[Block]) -> None:
 
     Log time is `time_s` in whole nanoseconds, counted from the first row where that is negative.
     """
-    writer_module = _package("mcap.writer", path)
+    writer_module = package("mcap.writer", path, "mcap", "MCAP")
     with path.open("wb") as stream:
-        writer = writer_module.Writer(stream)
+        writer = writer_module.Writer(stream, enable_data_crcs=True)
         writer.start(profile="", library="cablecomp")
         channel: int | None = None
         shift = 0.0
@@ -73,7 +253,7 @@ def write_mcap(path: Path, blocks: Iterable[Block]) -> None:
             for row in zip(*(block.columns[name].tolist() for name in names), strict=True):
                 values = dict(zip(names, row, strict=True))
                 stamp = round((values["time_s"] - shift) * 1e9)
-                data = json.dumps({n: None if math.isnan(v) else v for n, v in values.items()}).encode()
+                data = json.dumps({n: None if np.isnan(v) else v for n, v in values.items()}).encode()
                 writer.add_message(channel_id=channel, log_time=stamp, publish_time=stamp, data=data)
         writer.finish()
 
@@ -84,105 +264,3 @@ def _register(writer: Any, names: tuple[str, ...]) -> int:
     schema_id = writer.register_schema(name="cablecomp.Joint", encoding="jsonschema", data=schema)
     channel: int = writer.register_channel(topic=TOPIC, message_encoding="json", schema_id=schema_id)
     return channel
-
-
-def _rows(first_line: int, held: list[list[float]], fraction: float) -> BinaryRows:
-    return BinaryRows(first_line, list(np.ascontiguousarray(np.array(held, dtype=np.float64).T)), fraction)
-
-
-def _discover(path: Path) -> tuple[tuple[str, ...], set[str], str | None]:
-    """Return the channels, everything seen, and the time channel, from each topic's first message."""
-    names: dict[str, None] = {}
-    seen: set[str] = set()
-    topics: set[str] = set()
-    waiting: set[str] | None = None
-    for channel, message, known in _messages(path):
-        waiting = set(known) if waiting is None else waiting
-        if channel.topic not in topics:
-            topics.add(channel.topic)
-            fields = _fields(channel.topic, message, path)
-            seen |= {f"{channel.topic}.{name}" for name in fields}
-            names |= dict.fromkeys(name for name in fields if _is_channel(name))
-        if topics >= waiting:
-            break
-    clock = next((name for name in names if parse_column(name).name == "time_s"), None)
-    return tuple(names), seen, clock
-
-
-def _merged(path: Path) -> Iterator[tuple[int, dict[str, float], float]]:
-    current: int | None = None
-    fields: dict[str, float] = {}
-    span: tuple[int, int] | None = None
-    for channel, message, _ in _messages(path):
-        if span is None:
-            span = _span(path)
-        if current is not None and message.log_time != current:
-            yield current, fields, _share(current, span)
-            fields = {}
-        current = message.log_time
-        fields |= _fields(channel.topic, message, path)
-    if current is not None:
-        yield current, fields, 1.0
-
-
-def _messages(path: Path) -> Iterator[tuple[Any, Any, list[str]]]:
-    """Stream (channel, message, all JSON topics) in the order of log time."""
-    reader_module, errors = _package("mcap.reader", path), _package("mcap.exceptions", path)
-    try:
-        with path.open("rb") as stream:
-            reader = reader_module.make_reader(stream)
-            summary = reader.get_summary()
-            if summary is None:
-                raise InputError(
-                    f"{path}: MCAP without its index, it was cut short; run `mcap recover` on it"
-                )
-            topics = [c.topic for c in summary.channels.values() if c.message_encoding == "json"]
-            if topics:
-                for _, channel, message in reader.iter_messages(topics=topics):
-                    yield channel, message, topics
-    except (errors.McapError, OSError, EOFError, ValueError) as error:
-        raise InputError(f"{path}: damaged or cut MCAP ({error}); run `mcap recover` on it") from None
-
-
-def _span(path: Path) -> tuple[int, int]:
-    with path.open("rb") as stream:
-        statistics = _package("mcap.reader", path).make_reader(stream).get_summary().statistics
-    return (statistics.message_start_time, statistics.message_end_time) if statistics else (0, 0)
-
-
-def _share(now: int, span: tuple[int, int]) -> float:
-    return (now - span[0]) / (span[1] - span[0]) if span[1] > span[0] else 1.0
-
-
-def _fields(topic: str, message: Any, path: Path) -> dict[str, float]:
-    try:
-        content = json.loads(message.data)
-    except ValueError:
-        raise InputError(f"{path}: topic {topic} holds a message that is not JSON; export it anew") from None
-    if not isinstance(content, dict):
-        return {}
-    fields = {
-        name: math.nan if value is None else float(value)
-        for name, value in content.items()
-        if value is None or (isinstance(value, int | float) and not isinstance(value, bool))
-    }
-    if len(fields) == 1 and next(iter(fields)) in ("value", "data"):
-        return {topic.rsplit("/", 1)[-1]: next(iter(fields.values()))}
-    return fields
-
-
-def _is_channel(name: str) -> bool:
-    try:
-        parse_column(name)
-    except InputError:
-        return False
-    return True
-
-
-def _package(name: str, path: Path) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise InputError(
-            f"{path}: MCAP needs the package mcap; install it with `pip install cablecomp[mcap]`"
-        ) from None

@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
-from cablecomp.errors import InputError
-from cablecomp.recording import csv_text, foreign, mcap_file
-from cablecomp.recording.channels import Column, may_be_empty, parse_header
-from cablecomp.recording.source import identify
+from cablecomp.errors import ConfigError, InputError
+from cablecomp.recording.can_log import DecodeFrame
+from cablecomp.recording.channels import Column, may_be_empty, order, parse_header
+from cablecomp.recording.join import JoinRule, join
+from cablecomp.recording.mapping import ColumnMap, columns_by, find_mapping, load_mapping, meaning
+from cablecomp.recording.raw import RawRows, RawTable
+from cablecomp.recording.source_file import Messages, open_file
 from cablecomp.recording.table import Block, FloatArray, Remark, Table
 
 _GAP_FACTOR: Final = 10.0
-
-
-class RawRows(Protocol):
-    """Rows as a reader gives them: arrays in the order of the file's columns, NaN where a cell is empty."""
-
-    @property
-    def first_line(self) -> int: ...
-    @property
-    def arrays(self) -> list[FloatArray]: ...
-    @property
-    def fraction(self) -> float: ...
-    @property
-    def ends_with_break(self) -> bool: ...
-    def cell(self, row: int, column: int) -> str:
-        """Return the text of a cell, for messages."""
+_MOST_VALUES: Final = 200_000_000
 
 
 @dataclass(frozen=True)
@@ -38,7 +27,8 @@ class Recording:
     """A recording that has been opened: its head is known, its rows are streamed by `blocks`.
 
     `channels` are canonical names in the order of the file, `columns` say how each was named and is
-    converted, `comments` are the `#` lines at the head, `line_word` is what messages count ("line", "row").
+    converted, `comments` are the `#` lines at the head, `line_word` is what messages count ("line", "row"),
+    `notes` say what was assumed on opening.
     """
 
     path: Path
@@ -47,6 +37,7 @@ class Recording:
     kind: str
     line_word: str
     raw: Callable[[], Iterator[RawRows]]
+    notes: tuple[str, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -72,41 +63,105 @@ class Recording:
         return _regrouped((checked.block(piece) for piece in _some(self.raw(), self.path)), rows)
 
 
-def open_recording(path: Path | str) -> Recording:
+def open_recording(
+    path: Path | str, mapping: ColumnMap | None = None, decode: Callable[[], DecodeFrame] | None = None
+) -> Recording:
     """Open a recording by what the file holds; InputError in one line if it cannot be read.
 
-    Accepted: CSV (comma, semicolon, tab; plain or gzip), Parquet, MCAP with JSON messages, NumPy .npz.
+    Accepted: CSV (comma, semicolon, tab; plain or gzip), Parquet, NumPy .npz, MATLAB .mat, MCAP and ROS bags,
+    CAN logs (with `decode`). `mapping` says what foreign columns mean; without one, that saved beside the file
+    is taken, where the file's own names are not all channels.
     """
     path = Path(path)
-    kind, gzipped = identify(path)
-    if kind == "text":
-        head = csv_text.read_head(path, gzipped)
-        names, comments, word = head.columns, head.comments, "line"
-
-        def raw() -> Iterator[RawRows]:
-            return csv_text.read_rows(path, gzipped, head)
-
-    else:
-        opener = {"parquet": foreign.open_parquet, "npz": foreign.open_npz, "mcap": mcap_file.open_mcap}[kind]
-        names, raw = opener(path)
-        comments, word = (), "row"
-    try:
-        columns = parse_header(names)
-    except InputError as error:
-        where = f"line {head.header_line}: " if kind == "text" else ""
-        raise InputError(f"{path}: {where}{error}") from None
-    recording = Recording(path, columns, comments, kind, word, raw)
+    kind, source = open_file(path, decode)
+    saved = find_mapping(path) if mapping is None else None
+    notes = list(source.notes if isinstance(source, RawTable) else source.log.notes)
+    if saved is not None and not _speaks_for_itself(source):
+        mapping = load_mapping(saved)
+        notes.append(f"columns taken as {saved} says")
+    table, columns, more = (
+        _joined_rows(path, source, mapping)
+        if isinstance(source, Messages)
+        else (source, _columns(path, source, mapping), ())
+    )
+    used = tuple(column.column for column in columns)
+    recording = Recording(
+        path, columns, table.comments, kind, table.line_word, lambda: table.read(used), (*notes, *more)
+    )
     recording.require(["time_s"], "as the clock of every recording (time_s, time_ms, time_us, ...)")
     return recording
 
 
-def read_all(path: Path | str) -> Table:
-    """Read a whole recording into memory; errors as `open_recording` and `Recording.blocks`."""
-    recording = open_recording(path)
-    blocks = list(recording.blocks())
+def read_all(
+    path: Path | str, mapping: ColumnMap | None = None, decode: Callable[[], DecodeFrame] | None = None
+) -> Table:
+    """Read a whole recording into memory; errors as `open_recording` and `Recording.blocks`.
+
+    InputError as well for one of over 200 million values.
+    """
+    recording = open_recording(path, mapping, decode)
+    blocks, values = [], 0
+    for block in recording.blocks():
+        values += block.rows * len(block.columns)
+        if values > _MOST_VALUES:
+            raise InputError(
+                f"{path}: holds over {_MOST_VALUES:,} values; cut it with `cablecomp convert` first"
+            )
+        blocks.append(block)
     columns = {name: np.concatenate([block.columns[name] for block in blocks]) for name in recording.channels}
     remarks = tuple(remark for block in blocks for remark in block.remarks)
-    return Table(recording.path, blocks[0].first_line, columns, remarks)
+    return Table(recording.path, blocks[0].first_line, columns, remarks, recording.notes)
+
+
+def _speaks_for_itself(source: RawTable | Messages) -> bool:
+    """Whether a file's own names are channels: then no mapping found by chance is put over them."""
+    if isinstance(source, Messages):
+        return "motor_position_rad" in {c.name for c in source.own_columns().values()}
+    return all(meaning(name) is not None for name in source.names)
+
+
+def _columns(path: Path, table: RawTable, mapping: ColumnMap | None) -> tuple[Column, ...]:
+    try:
+        if mapping is not None:
+            return columns_by(mapping, table.names, table.units)
+        return parse_header(table.names)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {line}" for line in error.lines) from None
+    except InputError as error:
+        raise InputError(f"{path}: {table.where}{error}; `cablecomp inspect` suggests a mapping") from None
+
+
+def _joined_rows(
+    path: Path, source: Messages, mapping: ColumnMap | None
+) -> tuple[RawTable, tuple[Column, ...], tuple[str, ...]]:
+    """Rows from messages, what their columns mean, and the rule by which they were joined."""
+    own = source.own_columns()
+    by_channel = {column.name: column for column in own.values()}
+    if mapping is not None:
+        try:
+            by_channel |= {c.name: c for c in columns_by(mapping, tuple(source.fields), {})}
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {line}" for line in error.lines) from None
+    if not set(by_channel) - {"time_s"}:
+        shown = ", ".join(list(source.fields)[:12])
+        raise InputError(
+            f"{path}: no message holds a known channel such as motor_position_rad; found {shown}; "
+            "`cablecomp inspect` suggests a mapping"
+        )
+    ordered = sorted(by_channel.values(), key=lambda column: column.name != "motor_position_rad")
+    wanted = {c.column: source.fields[c.column] for c in ordered}
+    needed = [c.column for c in by_channel.values() if not may_be_empty(c.name)]
+    rule = JoinRule() if mapping is None else mapping.rule
+    motor = by_channel.get("motor_position_rad")
+    if rule.leader is None and motor is not None:
+        rule = replace(rule, leader=source.fields[motor.column][0])
+    joined = join(source.log, source.topics, wanted, needed, rule)
+    columns = [by_channel[name] for name in order(by_channel)]
+    if "time_s" not in by_channel:
+        columns.insert(0, Column("time_s", "time_s", 1.0, 0.0))
+    ages = [name for name in joined.names if name.startswith("other_age_") and name not in by_channel]
+    columns += [Column(name, name, 1.0, 0.0) for name in ages]
+    return RawTable(joined.names, lambda names: joined.read()), tuple(columns), joined.notes
 
 
 class _Checks:
@@ -119,16 +174,18 @@ class _Checks:
 
     def block(self, raw: RawRows) -> Block:
         columns, remarks = {}, []
-        for index, column in enumerate(self._recording.columns):
-            values = _converted(raw.arrays[index], column)
-            remarks += self._finite(values, raw, index, column)
+        for column in self._recording.columns:
+            values = _converted(raw.arrays[column.column], column)
+            remarks += self._finite(values, raw, column)
             columns[column.name] = values
         remarks += self._time(columns["time_s"], raw.first_line)
+        if raw.left_out:
+            remarks.append(Remark("stale", raw.first_line, raw.left_out))
         if not raw.ends_with_break:
             remarks.append(Remark("end", raw.first_line + len(columns["time_s"]) - 1, 1))
         return Block(raw.first_line, columns, raw.fraction, tuple(remarks))
 
-    def _finite(self, values: FloatArray, raw: RawRows, index: int, column: Column) -> list[Remark]:
+    def _finite(self, values: FloatArray, raw: RawRows, column: Column) -> list[Remark]:
         if np.isfinite(values).all():
             return []
         bad = ~np.isfinite(values)
@@ -141,7 +198,7 @@ class _Checks:
         if not bad.any():
             return []
         row = int(np.argmax(bad))
-        cell = raw.cell(row, index)
+        cell = raw.cell(row, column.column)
         found = f"holds {cell!r}" if cell else "is empty"
         raise InputError(
             f"{self._where(raw.first_line + row)}: column {column.column!r} {found}; a finite number is "
@@ -190,7 +247,7 @@ def _converted(values: FloatArray, column: Column) -> FloatArray:
 def _some(pieces: Iterator[RawRows], path: Path) -> Iterator[RawRows]:
     found = False
     for piece in pieces:
-        if len(piece.arrays[0]):
+        if len(next(iter(piece.arrays.values()))):
             found = True
             yield piece
     if not found:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import weakref
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -22,22 +22,23 @@ class TableLog:
     """Appends rows of floats to a CSV file.
 
     `append` copies one row into a buffer, without waiting for the disk; each full buffer (`rows_per_write`,
-    1 s at 1 kHz by default) is formatted and flushed to the operating system by another thread. `close`
-    writes the rest; it also happens at the end of a `with` block, on an unhandled exception and at the
-    interpreter's exit. If the process is killed, the file holds every full buffer. `header` is the order of
-    the columns in the file, if another than that of the rows. DeviceError if the file cannot be opened.
+    1 s at 1 kHz by default), and what has come until `flush`, is formatted and handed to the operating
+    system by another thread. `close` writes the rest; it also happens at the end of a `with` block, on an
+    unhandled exception and at the interpreter's exit. If the process is killed, the file holds what was
+    handed over. A disk that fills ends the file with its last whole rows; `failure` says so. `header` is
+    the order of the columns in the file, if another than that of the rows. DeviceError if the file cannot
+    be opened.
     """
 
     def __init__(
         self,
         path: Path | str,
         columns: Sequence[str],
-        comments: Iterable[str] = (),
         rows_per_write: int = 1000,
         header: Sequence[str] | None = None,
     ) -> None:
         self.path = Path(path)
-        writer = _opened(self.path, columns if header is None else header, comments)
+        writer = _opened(self.path, columns if header is None else header)
         self._store = _Store(writer, tuple(columns), rows_per_write)
         self._finish = weakref.finalize(self, self._store.finish)  # also runs at the interpreter's exit
 
@@ -57,9 +58,16 @@ class TableLog:
     def close(self) -> None:
         """Write the rest and finish the file; DeviceError if the disk refused. May be called again."""
         self._finish()
+        if self.failure:
+            raise DeviceError(self.failure)
+
+    @property
+    def failure(self) -> str:
+        """Why the file takes no more, in one line ("" = it does)."""
         failure = self._store.failure
-        if failure is not None:
-            raise DeviceError(f"{self.path}: is incomplete ({failure.strerror}); free some space")
+        if failure is None:
+            return ""
+        return f"{self.path}: is incomplete ({failure.strerror}); free some space"
 
     def __enter__(self) -> Self:
         return self
@@ -74,27 +82,24 @@ class Recorder(TableLog):
     """Appends samples to a canonical CSV recording.
 
     A row must be finite in all channels but `temperature_degC` and `other_*`: the recorder writes what it is
-    given (NaN as an empty cell), and reading refuses empty cells elsewhere.
+    given (NaN too), and reading refuses NaN elsewhere.
     """
 
     def __init__(
         self,
         path: Path | str,
         channels: Sequence[str],
-        comments: Iterable[str] = (),
         rows_per_write: int = 1000,
     ) -> None:
         self.channels = tuple(channels)
-        super().__init__(path, channels, comments, rows_per_write, check_canonical(channels))
+        super().__init__(path, channels, rows_per_write, check_canonical(channels))
 
 
-def _opened(path: Path, header: Sequence[str], comments: Iterable[str]) -> CsvWriter:
+def _opened(path: Path, header: Sequence[str]) -> CsvWriter:
     try:
-        writer = CsvWriter(path, tuple(header), tuple(comments))
-        writer.flush()
+        return CsvWriter(path, tuple(header))
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
-    return writer
 
 
 class _Store:
@@ -133,11 +138,14 @@ class _Store:
     def _drain(self) -> None:
         while (block := self._queue.get()) is not None:
             self._guarded(partial(self._write, block))
-        self._guarded(self._writer.close)
+        self._guarded(self._writer.sync)
+        try:
+            self._writer.close()
+        except OSError as error:
+            self.failure = self.failure or error
 
     def _write(self, block: FloatArray) -> None:
         self._writer.write({name: block[:, k] for k, name in enumerate(self._columns)})
-        self._writer.flush()
 
     def _guarded(self, action: Callable[[], None]) -> None:
         try:

@@ -155,7 +155,7 @@ class _Run:
             samples_per_s=self.samples / max(elapsed_s, 1e-9),
             observer_samples_per_s=self.samples / max(self._busy, 1e-9),
             gaps=tuple({"line": gap.line, "gap_s": gap.size} for gap in self._log.gaps),
-            notes=self._log.notes(),
+            notes=(*self._recording.notes, *self._log.notes()),
             assumptions=assumptions(self._config, channels),
             snapshots=in_order([*self._snapshots.values(), self._snapshot(END)]),
         )
@@ -237,7 +237,7 @@ class PredictionCsv:
         self._write = write
 
     def take(self, replayed: Replayed) -> None:
-        """Write one block; what is unknown stays empty."""
+        """Write one block; what is unknown is NaN."""
         times, residual = replayed.block.columns["time_s"], replayed.residual_rad
         unknown = np.full(len(times), np.nan)
         known = replayed.predicted | {

@@ -10,30 +10,35 @@ from pathlib import Path
 from typing import BinaryIO, Final, Literal, NamedTuple
 
 from cablecomp.errors import InputError
+from cablecomp.recording.can_log import can_kind
 
-Kind = Literal["text", "parquet", "mcap", "npz"]
+Kind = Literal["text", "parquet", "mcap", "npz", "mat", "bag", "blf", "asc", "candump", "trc", "mf4"]
 
 CHUNK: Final = 1 << 22
 _SNIFF: Final = 8192
 _GZIP: Final = b"\x1f\x8b"
-_READABLE: Final[dict[bytes, Kind]] = {b"PAR1": "parquet", b"\x89MCAP0\r\n": "mcap", b"PK\x03\x04": "npz"}
+_READABLE: Final[dict[bytes, Kind]] = {
+    b"PAR1": "parquet",
+    b"\x89MCAP0\r\n": "mcap",
+    b"PK\x03\x04": "npz",
+    b"MATLAB 5": "mat",
+    b"#ROSBAG": "bag",
+    b"SQLite format 3": "bag",
+}
 _FOREIGN: Final[dict[bytes, str]] = {
     b"BZh": "bzip2-compressed",
     b"\xfd7zXZ\x00": "xz-compressed",
     b"\x28\xb5\x2f\xfd": "zstd-compressed",
     b"7z\xbc\xaf": "a 7-zip archive",
-    b"\x89HDF": "HDF5 (or MATLAB 7.3)",
-    b"MATLAB 5": "a MATLAB file",
+    b"\x89HDF": "HDF5 (or MATLAB 7.3: save it with -v7)",
     b"ARROW1": "an Arrow file",
     b"%PDF": "a PDF",
     b"\x89PNG": "a PNG image",
-    b"SQLite format 3": "an SQLite database (ROS 2 bag?)",
-    b"#ROSBAG": "a ROS 1 bag",
     b"\xff\xfe": "UTF-16 text",
     b"\xfe\xff": "UTF-16 text",
     b"\xd0\xcf\x11\xe0": "an old Excel file",
 }
-_ACCEPTED: Final = "accepted are CSV text (plain or gzip), Parquet, MCAP and .npz"
+_ACCEPTED: Final = "accepted are CSV text (plain or gzip), Parquet, .npz, .mat, MCAP, ROS bags, CAN logs (BLF, ASC, candump, TRC, MF4)"
 
 
 class Truncated(Exception):
@@ -56,6 +61,8 @@ class Piece(NamedTuple):
 
 def identify(path: Path) -> Opened:
     """Look at a file's first bytes; InputError if it is missing, empty or nothing that can be read."""
+    if (path / "metadata.yaml").is_file():
+        return Opened("bag", False)
     try:
         with path.open("rb") as file:
             head = file.read(_SNIFF)
@@ -134,6 +141,9 @@ def _kind(path: Path, head: bytes, wrapper: str) -> Kind:
     for magic, name in _FOREIGN.items():
         if head.startswith(magic):
             raise InputError(f"{path}: is {wrapper}{name}; {_ACCEPTED}: convert it first")
+    log = can_kind(head)
+    if log is not None:
+        return log
     if b"\0" in head:
         ending = f" although it is named {path.suffix}" if path.suffix else ""
         raise InputError(f"{path}: is {wrapper}binary data of an unknown kind{ending}; {_ACCEPTED}")

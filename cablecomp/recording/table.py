@@ -19,10 +19,11 @@ class Remark:
 
     `kind`: "gap" = the time step into this line is far longer than usual (`size` = step in s); "repeat" =
     `size` rows have the time stamp of the row before them; "empty" = `size` cells of an optional channel are
-    empty; "end" = the file does not end with a line break. `line` is the first line concerned.
+    empty; "stale" = `size` rows were left out because another topic had no fresh value; "end" = the file does
+    not end with a line break. `line` is the first line concerned.
     """
 
-    kind: Literal["gap", "repeat", "empty", "end"]
+    kind: Literal["gap", "repeat", "empty", "stale", "end"]
     line: int
     size: float
     channel: str = "time_s"
@@ -60,6 +61,7 @@ class Table:
     first_line: int
     columns: dict[str, FloatArray]
     remarks: tuple[Remark, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -118,6 +120,8 @@ class RemarkLog:
                 yield f"{count} row(s) repeat the time stamp of the row before, {where}"
             elif remark.kind == "empty":
                 yield f"{remark.channel} is empty in {count} row(s), {where}; left empty"
+            elif remark.kind == "stale":
+                yield f"{count} row(s) left out for want of a fresh value from another topic, {where}"
             else:
                 yield (
                     f"{self._word} {remark.line} does not end with a line break; "

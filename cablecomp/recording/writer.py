@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gzip
+import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from io import BytesIO, FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import IO, cast
 
 import numpy as np
 import polars as pl
@@ -18,25 +20,44 @@ from cablecomp.recording.table import FloatArray
 
 
 class CsvWriter:
-    """Streams columns to a CSV file (gzip if the name ends in .gz); NaN is written as an empty cell.
+    """Streams columns to a CSV file (gzip if the name ends in .gz).
 
-    Every finite number is written with as few digits as identify it: reading gives back the same bits.
+    Every finite number is written with as few digits as identify it: reading gives back the same bits. The first
+    line holds the names, what is absent is NaN: pandas and polars read it as it is, each column as numbers.
+    Rows that the disk does not take whole are taken back: OSError, and the file ends with the rows before.
     """
 
-    def __init__(self, path: Path, names: Sequence[str], comments: Iterable[str] = ()) -> None:
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
         self._names = tuple(names)
         self._file = _open(path)
-        head = [f"# {line}" for text in comments for line in text.splitlines()]
-        self._file.write(("\n".join([*head, ",".join(self._names)]) + "\n").encode())
+        self._put((",".join(self._names) + "\n").encode())
 
     def write(self, columns: Mapping[str, FloatArray]) -> None:
         """Append rows; every column named at the start must be there, all of one length."""
         frame = pl.DataFrame({name: columns[name] for name in self._names})
-        frame.fill_nan(None).write_csv(self._file, include_header=False)
+        rows = BytesIO()
+        frame.write_csv(rows, include_header=False)
+        self._put(rows.getvalue())
 
-    def flush(self) -> None:
-        """Hand everything to the operating system: it outlives a crash of this process."""
+    def _put(self, data: bytes) -> None:
+        """All of it at once, to the operating system: it outlives a crash of this process."""
+        if isinstance(self._file, gzip.GzipFile):
+            self._file.write(data)
+            return
+        left, end = memoryview(data), self._file.tell()
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            with suppress(OSError):
+                self._file.truncate(end)
+                self._file.seek(end)
+            raise
+
+    def sync(self) -> None:
+        """Wait until all of it is on the disk."""
         self._file.flush()
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """Finish the file; may be called again."""
@@ -51,10 +72,10 @@ class CsvWriter:
         self.close()
 
 
-def _open(path: Path) -> IO[bytes]:
+def _open(path: Path) -> gzip.GzipFile | FileIO:
     if path.suffix == ".gz":
-        return cast(IO[bytes], gzip.GzipFile(path, "wb", compresslevel=4, mtime=0))
-    return path.open("wb")
+        return gzip.GzipFile(path, "wb", compresslevel=4, mtime=0)
+    return path.open("wb", buffering=0)
 
 
 def check_canonical(names: Iterable[str]) -> tuple[str, ...]:
@@ -68,12 +89,10 @@ def check_canonical(names: Iterable[str]) -> tuple[str, ...]:
     return order(names)
 
 
-def write_canonical(
-    path: Path | str, columns: Mapping[str, FloatArray], comments: Iterable[str] = ()
-) -> None:
+def write_canonical(path: Path | str, columns: Mapping[str, FloatArray]) -> None:
     """Write a recording whole (gzip if the name ends in .gz); the file appears only when it is complete.
 
-    `columns` maps canonical names to float64 arrays of one length; `comments` become `#` lines at the head.
+    `columns` maps canonical names to float64 arrays of one length.
     """
     path = Path(path)
     names = check_canonical(columns)
@@ -82,7 +101,7 @@ def write_canonical(
         raise InternalError(f"columns of {path.name} differ in length")
     with atomic_file(path) as temporary:
         packed = temporary.with_name(f"{temporary.name}.gz") if path.suffix == ".gz" else temporary
-        with CsvWriter(packed, names, comments) as writer:
+        with CsvWriter(packed, names) as writer:
             writer.write(ready)
         if packed != temporary:
             packed.rename(temporary)

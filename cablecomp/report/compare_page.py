@@ -54,11 +54,11 @@ def _cells(found: Comparison, name: str, report: RunReport) -> tuple[str, str]:
     return f"{1e3 * joint.true_position_rad:.4f}", f"{found.factor(name, report):.1f}×"
 
 
-HEAD = ("controller", "RMS error / mrad", "over ours", "with joint feedback / mrad", "over ours")
+HEADERS = ("controller", "RMS error / mrad", "over ours", "with joint feedback / mrad", "over ours")
 
 
 def _sections(found: Comparison, out: Path, config_text: str) -> Iterator[Section]:
-    yield Section("Result", page.facts(_facts(found)) + page.table(HEAD, summary_rows(found)))
+    yield Section("Result", page.facts(_facts(found)) + page.table(HEADERS, summary_rows(found)))
     data = {name: load_run(out / "open-loop" / name, 5000) for name in NAMES}
     yield Section(
         "Joint-side error, motor-side sensing only",

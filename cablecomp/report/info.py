@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import math
 from typing import Final
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -56,16 +55,6 @@ def bench_table(result: BenchResult) -> RenderableType:
     parts += [Text(line) for line in lines]
     parts += [Text(f"note: {note}", style="yellow") for note in result.notes]
     return Group(*parts)
-
-
-def as_text(content: RenderableType, width: int = 110) -> str:
-    """Return what a console of `width` columns would show, without colour."""
-    console = Console(
-        file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False, emoji=False
-    )
-    with console.capture() as captured:
-        console.print(content)
-    return captured.get()
 
 
 def _joint_table(sheet: DesignSheet) -> Table:

@@ -138,7 +138,7 @@ def page(title: str, lead: str, sections: Iterable[Section]) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{_CSS}</style>{_library(body)}</head>"
+        f"<style>{CSS}</style>{_library(body)}</head>"
         f'<body><header><h1>{escape(title)}</h1><p class="lead">{escape(lead)}</p><nav>{links}</nav></header>'
         f"<main>{body}</main><script>{_DRAW}</script></body></html>\n"
     )
@@ -228,7 +228,7 @@ _DRAW: Final = """
 })();
 """.replace("CONFIG", _CONFIG).replace("TEMPLATE", json.dumps(style.template().to_plotly_json()))
 
-_CSS = f"""
+CSS = f"""
 :root {{ color-scheme: light; }}
 * {{ box-sizing: border-box; }}
 body {{ margin: 0; background: #f4f6f9; color: {style.INK}; font: 15px/1.55 {style.FONT}; }}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from plotly.subplots import make_subplots
 
+from cablecomp.durable import write_durably
 from cablecomp.report import page, style
 from cablecomp.report.page import Fact, Section
 from cablecomp.report.run_data import Floats, RunData, load_run
@@ -23,7 +24,7 @@ def write_run_page(report: RunReport, config_text: str) -> Path:
     """Write the page beside the run's files and return its path."""
     assert report.folder is not None
     path = report.folder / "report.html"
-    path.write_text(run_page(report, config_text), encoding="utf-8")
+    write_durably(path, run_page(report, config_text).encode())
     return path
 
 

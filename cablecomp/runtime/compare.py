@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
-from cablecomp.control.compensator import ratio_of
 from cablecomp.control.options import CompensatorOptions, ControlConfig, FeedForward
 from cablecomp.control.protocol import Protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
@@ -117,7 +116,7 @@ def compare(
     columns = read_all(options.out / "calibration" / "recording.csv").columns
     say("fitting the cable's parameters to that recording")
     calibrated = calibrate(config, columns)
-    linear = best_line(columns, ratio_of(config))
+    linear = best_line(columns, config.drive.ratio)
     protocol = reaching_protocol(config, 100 + options.seed, options.duration_s)
     say(f"side by side: {', '.join(NAMES)}; {protocol.duration_s:.0f} s of unseen motions")
     open_loop = base.side_by_side("open-loop", calibrated.config, linear, protocol, 0.0)

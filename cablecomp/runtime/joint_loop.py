@@ -16,7 +16,9 @@ from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gat
 from cablecomp.errors import InputError
 from cablecomp.links.link import Link
 from cablecomp.links.records import CHANNELS, NOT_TAKEN, DriveState, Mode, MotorCommand
+from cablecomp.runtime.folder import SNAPSHOT
 from cablecomp.runtime.health import Checked, Health, health_names
+from cablecomp.runtime.keeper import Keeper
 from cablecomp.runtime.log import EventLog, JointLog
 from cablecomp.runtime.taking_up import TakingUp
 from cablecomp.runtime.tally import JointTally, View
@@ -58,6 +60,7 @@ class JointLoop:
         self.step_s = nan
         self.tally = JointTally()
         self.log: JointLog | None = None
+        self._keeper: Keeper | None = None
         self.checked: Checked | None = None
         self._link = link
         self._folder = folder
@@ -133,15 +136,36 @@ class JointLoop:
         if self.checked is not None and self.checked.ready and not self._refused:
             self._finish(self._observe(now_s, None), None)
 
-    def close(self) -> None:
-        """Keep the observer's state, finish the logs."""
-        save = getattr(self.setup.compensator.observer, "save", None)
-        try:
-            if save is not None and self._folder is not None and self.log is not None:
-                save(self._folder / "observer.snapshot")
-        finally:
-            if self.log is not None:
-                self.log.close()
+    def keep(self) -> None:
+        """In idle time: hand what has been recorded and the observer's state to those who write it."""
+        if self._keeper is None or self.log is None or not self._keeper.due:
+            return
+        self.log.flush()
+        self._keep(self._keeper)
+
+    @property
+    def failure(self) -> str:
+        """Why something of this joint is not on disk ("" = it is)."""
+        if self.log is None:
+            return ""
+        return self.log.failure or ("" if self._keeper is None else self._keeper.failure)
+
+    def close(self) -> list[str]:
+        """Keep the observer's state, finish the logs; returns why something of it is incomplete."""
+        found: list[str] = []
+        if self._keeper is not None:
+            self._keep(self._keeper)
+            self._keeper.close()
+            found += [self._keeper.failure] if self._keeper.failure else []
+            self._keeper = None
+        if self.log is not None:
+            found += self.log.close()
+        return found
+
+    def _keep(self, keeper: Keeper) -> None:
+        snapshot = getattr(self.setup.compensator.observer, "snapshot", None)
+        if snapshot is not None and self.log is not None:
+            keeper.offer(snapshot())
 
     # ---- inside ----------------------------------------------------------------------------------
 
@@ -251,8 +275,8 @@ class JointLoop:
         controlled: bool,
     ) -> None:
         if self.log is None:
-            comments = (f"cablecomp run, joint {self.setup.name}, configuration joint.toml",)
-            self.log = JointLog(folder, sample, self.readings.others, comments)
+            self.log = JointLog(folder, sample, self.readings.others)
+            self._keeper = Keeper(folder / SNAPSHOT)
         sent, state, wanted = self._sent, self.degraded, self._last_reference
         self.log.append(
             sample,

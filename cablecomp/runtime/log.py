@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from io import FileIO
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Final
 
 from cablecomp.errors import DeviceError
 from cablecomp.recording.recorder import Recorder, TableLog
@@ -45,9 +46,7 @@ class JointLog:
     the same configuration gives the same predictions, bit for bit.
     """
 
-    def __init__(
-        self, folder: Path, first: Sample, others: Sequence[str], comments: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, folder: Path, first: Sample, others: Sequence[str]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
         self._joint = first.joint_position_rad == first.joint_position_rad
@@ -58,7 +57,7 @@ class JointLog:
         channels += ["joint_torque_Nm"] if self._torque else []
         channels += ["motor_torque_Nm"] if self._motor else []
         channels += ["temperature_degC", *others]
-        self._recorder = Recorder(folder / "recording.csv", channels, comments)
+        self._recorder = Recorder(folder / "recording.csv", channels)
         self._prediction = TableLog(folder / "prediction.csv", PREDICTION)
         self._cycle = TableLog(folder / "cycles.csv", CYCLE)
 
@@ -104,28 +103,38 @@ class JointLog:
         )
         self._cycle.append(cycle)
 
-    def close(self) -> None:
-        """Finish all files; every one of them is tried, the first failure is raised afterwards."""
-        failure: DeviceError | None = None
+    def flush(self) -> None:
+        """Hand over what has been appended so far, without waiting for the disk."""
+        for log in (self._recorder, self._prediction, self._cycle):
+            log.flush()
+
+    @property
+    def failure(self) -> str:
+        """Why one of the files takes no more ("" = all do)."""
+        return self._recorder.failure or self._prediction.failure or self._cycle.failure
+
+    def close(self) -> list[str]:
+        """Finish all files, every one of them; returns why some are incomplete."""
+        found: list[str] = []
         for log in (self._recorder, self._prediction, self._cycle):
             try:
                 log.close()
             except DeviceError as error:
-                failure = error if failure is None else failure
-        if failure is not None:
-            raise failure
+                found.append(str(error))
+        return found
 
 
 class EventLog:
-    """What happened, one JSON line each, at once on disk (`path` None = nowhere; made with the first event); the
-    last ones are kept for the live view.
+    """What happened, one JSON line each, at once with the operating system (`path` None = nowhere; made with
+    the first event); the last ones are kept for the live view. `failure` says why no more are written.
     """
 
     def __init__(self, path: Path | None, keep: int = 200) -> None:
         self.last: list[tuple[float, str, str]] = []
         self._keep = keep
+        self.failure = ""
         self._path = path
-        self._file: TextIO | None = None
+        self._file: FileIO | None = None
 
     def add(self, time_s: float, joint: str, what: str) -> None:
         """Note an event of a joint ("" = of the run)."""
@@ -134,9 +143,13 @@ class EventLog:
             del self.last[0]
         if self._file is None and self._path is not None:
             self._file = _opened(self._path)
-        if self._file is not None and not self._file.closed:
-            self._file.write(json.dumps({"time_s": round(time_s, 6), "joint": joint, "what": what}) + "\n")
-            self._file.flush()
+        if self._file is None or self._file.closed or self.failure:
+            return
+        line = json.dumps({"time_s": round(time_s, 6), "joint": joint, "what": what}) + "\n"
+        try:
+            self._file.write(line.encode())
+        except OSError as error:
+            self.failure = f"{self._path}: is incomplete ({error.strerror}); free some space"
 
     def close(self) -> None:
         """Finish the file; may be called again."""
@@ -144,8 +157,8 @@ class EventLog:
             self._file.close()
 
 
-def _opened(path: Path) -> TextIO:
+def _opened(path: Path) -> FileIO:
     try:
-        return path.open("w", encoding="utf-8")
+        return path.open("wb", buffering=0)
     except OSError as error:
         raise DeviceError(f"{path}: cannot be written ({error.strerror}); choose another place") from None

@@ -24,7 +24,6 @@ from cablecomp.runtime.priority import QUIET, Granted, Policy, armed
 from cablecomp.runtime.timing import TimingReport
 
 TIME_IS_OVER = "time is over"
-ASKED_BY_USER = "asked by the user"
 COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
 LOOK_EVERY = 128  # ticks between two looks at the link's counters
 DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
@@ -64,8 +63,8 @@ AfterTick = Callable[[Tick, Stage], None]
 
 class Loop:
     """Runs joints on a link. `run` returns when the time is over or something asked for a stop; the stop
-    command is sent in every case, an unexpected exception included, and all logs are closed. `prepare` is
-    called once the link is open: nothing is written before.
+    command is sent in every case, an unexpected exception included, and all logs are closed; `failures` says
+    what of them is incomplete. `prepare` is called once the link is open: nothing is written before.
     """
 
     def __init__(
@@ -84,6 +83,7 @@ class Loop:
         self.period_s = period_s
         self.stage = Stage.LISTENING
         self.stop_reason = ""
+        self.failures: list[str] = []
         self.times = CycleTimes()
         self.minutes = Minutes()
         self.events = EventLog(None if folder is None else folder / "events.jsonl")
@@ -184,6 +184,8 @@ class Loop:
             self._account(tick, begin, polled, perf_counter())
             if self._after is not None:
                 self._after(tick, self.stage)
+            for joint in self.joints:
+                joint.keep()
             if done:
                 return
 
@@ -274,7 +276,9 @@ class Loop:
         for joint in self.joints:
             if joint.stop_reason:
                 return f"{joint.setup.name}: {joint.stop_reason}{self._flood()}"
-        return ""
+            if joint.failure:
+                return joint.failure
+        return self.events.failure
 
     def _flood(self) -> str:
         """What is behind data that come too late: frames that nobody waits for, more than can be read."""
@@ -342,7 +346,12 @@ class Loop:
                 all_of_them.callback(self.link.close)
                 all_of_them.callback(self.events.close)
                 for joint in self.joints:
-                    all_of_them.callback(joint.close)
+                    all_of_them.callback(self._close_joint, joint)
+            if self.events.failure:
+                self.failures.append(self.events.failure)
+
+    def _close_joint(self, joint: JointLoop) -> None:
+        self.failures += joint.close()
 
 
 def _folder_of(folder: Path, setup: JointSetup, count: int) -> Path:

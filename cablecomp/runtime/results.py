@@ -10,8 +10,9 @@ from typing import Any
 
 from cablecomp.control.compensator import Gains
 from cablecomp.runtime.joint_loop import JointLoop
-from cablecomp.runtime.loop import ASKED_BY_USER, TIME_IS_OVER
+from cablecomp.runtime.loop import TIME_IS_OVER
 from cablecomp.runtime.timing import TimingReport
+from cablecomp.runtime.ways_out import ASKED_BY_USER
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class JointResult:
 
 @dataclass(frozen=True)
 class RunReport:
-    """What `run_joints` gives back; `folder` holds the files."""
+    """What `run_joints` gives back; `folder` holds the files, `failures` says which of them are incomplete."""
 
     joints: tuple[JointResult, ...]
     timing: TimingReport
@@ -44,11 +45,13 @@ class RunReport:
     events: tuple[tuple[float, str, str], ...]
     gains: Gains
     folder: Path | None
+    failures: tuple[str, ...] = ()
 
     @property
     def ended_well(self) -> bool:
-        """Whether the run lasted as long as was asked, or was ended by the user."""
-        return self.stop_reason in (TIME_IS_OVER, ASKED_BY_USER)
+        """Whether the run lasted as long as was asked, or was ended by the user, and all of it is recorded."""
+        asked = self.stop_reason == TIME_IS_OVER or self.stop_reason.startswith(ASKED_BY_USER)
+        return asked and not self.failures
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, for `run.json`."""
@@ -56,6 +59,7 @@ class RunReport:
         return {
             "schema": 1,
             "stop_reason": self.stop_reason,
+            "failures": list(self.failures),
             "gains": self.gains._asdict(),
             "joints": joints,
             "timing": self.timing.as_dict(),

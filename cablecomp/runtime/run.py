@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cablecomp.config import JointConfig
@@ -13,24 +14,34 @@ from cablecomp.control.compensator import given_gains
 from cablecomp.control.design import design_loop
 from cablecomp.control.options import ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol
+from cablecomp.durable import write_durably
 from cablecomp.errors import InputError
 from cablecomp.links.link import BusLink, Link
 from cablecomp.links.records import Mode
 from cablecomp.links.schema import LinkConfig
 from cablecomp.runtime.clock import Clock, MonotonicClock, SteppedClock, Tick
+from cablecomp.runtime.folder import SNAPSHOT, START, RunFolder
 from cablecomp.runtime.joint_loop import JointSetup
 from cablecomp.runtime.loop import Loop, LoopOptions, Stage
 from cablecomp.runtime.priority import QUIET, Policy
 from cablecomp.runtime.results import RunReport, TruthTally, result_of
-from cablecomp.runtime.setup import Contestant, joint_setup, references_of, resumed_at_s
+from cablecomp.runtime.setup import (
+    Contestant,
+    check_drive_timeouts,
+    joint_setup,
+    references_of,
+    resumed_at_s,
+)
 from cablecomp.runtime.simulated import Simulation
+from cablecomp.runtime.ways_out import WaysOut
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """How a run is done. `duration_s` None = the protocol's; `stepped`: simulated time, as fast as it
     goes; `out`: folder for recording, predictions, cycles, events, snapshot and `run.json` (None =
-    nothing is written); `resume`: a snapshot to go on from, in its time and history.
+    nothing is written); `resume`: a snapshot to go on from, in its time and history;
+    `without_drive_timeout`: run though a drive would stay enabled if this process were killed.
     """
 
     duration_s: float | None = None
@@ -39,6 +50,7 @@ class RunOptions:
     bounds: bool = False
     policy: Policy | None = None
     resume: Path | None = None
+    without_drive_timeout: bool = False
 
 
 Watch = Callable[[Loop, Tick], None]
@@ -53,6 +65,7 @@ def run_joint(
     options: RunOptions,
     simulation: Simulation | None = None,
     watch: Watch | None = None,
+    ways_out: WaysOut | None = None,
 ) -> RunReport:
     """Run one joint, the link's first; see `run_joints`."""
     name = link.joint[0].name
@@ -64,6 +77,7 @@ def run_joint(
         options,
         simulation,
         watch,
+        ways_out,
     )
 
 
@@ -75,16 +89,20 @@ def run_joints(
     options: RunOptions,
     simulation: Simulation | None = None,
     watch: Watch | None = None,
+    ways_out: WaysOut | None = None,
 ) -> RunReport:
     """Run joints side by side on one link under one protocol; returns how they did, leaves the files in
     `options.out`.
 
     On hardware the protocol's load is what the surroundings do; on a simulation it is applied there. In
-    force mode the load is the reference. Raises InputError for what does not fit together, DeviceError
-    if the other side does not answer.
+    force mode the load is the reference. Signals that ask to end stop the joints first (`ways_out`: entered
+    already by the caller). Raises InputError for what does not fit together, DeviceError if the other side
+    does not answer.
     """
     if options.stepped and simulation is None:
         raise InputError("stepped time needs a simulated joint; leave out --fast, or add --sim")
+    if simulation is None and not options.without_drive_timeout:
+        check_drive_timeouts(link, [c.place for c in contestants])
     for c in contestants:
         protocol.check_within(c.config.limits, protocol.name)
     if simulation is not None and simulation.terminal is not None:
@@ -116,23 +134,37 @@ def run_joints(
         if watch is not None:
             watch(loop, tick)
 
-    def prepare() -> None:
-        if options.out is not None:
-            _prepare(options.out, setups, options.resume)
+    with ExitStack() as last:
 
-    loop = Loop(bus, setups, clock, period, timing, options.out, after, prepare)
-    report = loop.run()
-    found = RunReport(
-        tuple(result_of(joint, truths) for joint in loop.joints),
-        report,
-        loop.stop_reason,
-        tuple(loop.events.last),
-        gains,
-        options.out,
-    )
-    if options.out is not None:
-        (options.out / "run.json").write_text(json.dumps(found.as_dict(), indent=1) + "\n", encoding="utf-8")
-    return found
+        def prepare() -> None:
+            if options.out is not None:
+                last.callback(_prepare(options.out, setups, options.resume).close)
+
+        ways = last.enter_context(WaysOut()) if ways_out is None else ways_out
+        loop = Loop(bus, setups, clock, period, timing, options.out, after, prepare)
+        last.enter_context(ways.asking(loop.ask_to_stop))
+        report = loop.run()
+        found = RunReport(
+            tuple(result_of(joint, truths) for joint in loop.joints),
+            report,
+            loop.stop_reason,
+            tuple(loop.events.last),
+            gains,
+            options.out,
+            tuple(loop.failures),
+        )
+        return found if options.out is None else _reported(found, options.out)
+
+
+def _reported(report: RunReport, out: Path) -> RunReport:
+    """Write `run.json`; what cannot be written is said, and loses nothing of what is there."""
+    path = out / "run.json"
+    try:
+        write_durably(path, (json.dumps(report.as_dict(), indent=1) + "\n").encode())
+    except OSError as error:
+        failure = f"{path}: cannot be written ({error.strerror}); free some space"
+        return replace(report, failures=(*report.failures, failure))
+    return report
 
 
 def _drive_mode(link: LinkConfig, place: int) -> Mode:
@@ -170,13 +202,15 @@ def _simulate(
         truths.add(joint.setup.name, truth.joint_position_rad - wanted.joint_position_rad, torque)
 
 
-def _prepare(out: Path, setups: Sequence[JointSetup], resume: Path | None) -> None:
-    for setup in setups:
-        folder = out if len(setups) == 1 else out / setup.name
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from None
-        if resume is not None:  # kept: replayed from there, the recording gives the same predictions
-            (folder / "start.snapshot").write_bytes(resume.read_bytes())
+def _prepare(out: Path, setups: Sequence[JointSetup], resume: Path | None) -> RunFolder:
+    try:
+        start = None if resume is None else resume.read_bytes()
+    except OSError as error:
+        raise InputError(f"{resume}: cannot be read ({error.strerror}); give a snapshot file") from None
+    opened = RunFolder(out, [setup.name for setup in setups])
+    for setup, folder in zip(setups, opened.folders, strict=True):
+        if start is not None:  # kept: replayed from there, the recording gives the same predictions
+            write_durably(folder / START, start)
+            write_durably(folder / SNAPSHOT, start)
         write_joint(folder / "joint.toml", setup.config, ("the configuration that this run used",))
+    return opened

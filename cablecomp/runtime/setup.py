@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cablecomp.config import JointConfig
 from cablecomp.control.command import Reference
-from cablecomp.control.compensator import Compensator, Gains, ratio_of
+from cablecomp.control.compensator import Compensator, Gains
 from cablecomp.control.degrade import DegradeTimes
 from cablecomp.control.gate import GateLimits
 from cablecomp.control.options import CompensatorOptions, ControlConfig, ControlMode
@@ -72,6 +72,27 @@ def same_joint(link: LinkConfig, names: Sequence[str]) -> LinkConfig:
     return link.model_copy(update={"joint": tuple(copy(k, name) for k, name in enumerate(names))})
 
 
+def check_drive_timeouts(link: LinkConfig, places: Sequence[int]) -> None:
+    """Raise InputError unless every drive is stated to stop by itself when commands stay out."""
+    for place in places:
+        motor = link.joint[place].motor if 0 <= place < len(link.joint) else None
+        if motor is None:
+            continue
+        timeout, where = motor.command_timeout_s, f"link `{link.name}`, joint `{link.joint[place].name}`"
+        if not timeout:
+            said = "is not stated" if timeout is None else "is off"
+            raise InputError(
+                f"{where}: the drive's command timeout {said}, so that it would stay enabled if this process "
+                "were killed; set one in the drive and state it as motor.command_timeout_s, or give "
+                "--without-drive-timeout"
+            )
+        if timeout < 3.0 / link.rate_Hz:
+            raise InputError(
+                f"{where}: motor.command_timeout_s is {timeout:g} s, less than three periods of "
+                f"{1.0 / link.rate_Hz:g} s; give the drive a longer one"
+            )
+
+
 def times_of(link: LinkConfig, period_s: float) -> DegradeTimes:
     """The link's timeouts as times of the descent; two periods and a half count as fresh."""
     t = link.timeouts
@@ -109,7 +130,7 @@ def joint_setup(
     sensor = config.observer.load == "joint_torque"
     health = Health(
         control.health,
-        ratio_of(config),
+        config.drive.ratio,
         times.fresh_s,
         period,
         needs_torque=sensor,

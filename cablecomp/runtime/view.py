@@ -5,6 +5,7 @@ by a thread of its own.
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from types import TracebackType
 
 from rich.console import Console, Group, RenderableType
@@ -16,7 +17,7 @@ from cablecomp.control.degrade import Phase
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.health import health_names
 from cablecomp.runtime.joint_loop import JointLoop
-from cablecomp.runtime.loop import ASKED_BY_USER, Loop
+from cablecomp.runtime.loop import Loop
 from cablecomp.runtime.tally import View
 
 _COLOURS = {
@@ -29,14 +30,13 @@ _COLOURS = {
 
 
 class LiveView:
-    """Shows a loop while it runs; `watch` is handed to the run, `press` ends it safely at the next tick."""
+    """Shows a loop while it runs; `watch` is handed to the run. A terminal that is gone is drawn on no more."""
 
     def __init__(self, console: Console, *, shown: bool = True, per_second: float = 8.0) -> None:
         self._console = console
         self._shown = shown and console.is_terminal
         self._period_s = 1.0 / per_second
         self._loop: Loop | None = None
-        self._pressed = False
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
         self.title = ""
@@ -44,12 +44,6 @@ class LiveView:
     def watch(self, loop: Loop, tick: Tick) -> None:
         """Called once a tick; costs next to nothing."""
         self._loop = loop
-        if self._pressed:
-            loop.ask_to_stop(ASKED_BY_USER)
-
-    def press(self) -> None:
-        """Ask the run to stop."""
-        self._pressed = True
 
     def say(self, line: str) -> None:
         """Print a line above the view."""
@@ -70,7 +64,7 @@ class LiveView:
             self._thread.join(timeout=2.0)
 
     def _draw(self) -> None:
-        with Live(console=self._console, auto_refresh=False, transient=True) as live:
+        with suppress(OSError), Live(console=self._console, auto_refresh=False, transient=True) as live:
             while not self._over.wait(self._period_s):
                 loop = self._loop
                 if loop is not None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
+from math import comb, hypot, sqrt
 from typing import Final
 
 import numpy as np
 from scipy.optimize import brentq
 
 from cablecomp.errors import InputError
-from cablecomp.signal.smoothing import FloatArray, group_means, local_fit
+from cablecomp.signal.smoothing import FloatArray, group_means
 
 _FEWEST: Final = 32
 _ORDERS: Final = (2, 3, 4, 5, 6)
@@ -47,6 +47,14 @@ class InputNoise:
 
     sigma: float
     sensitivity: FloatArray | float
+
+
+def reading_sigma(white: float | None, resolution: float | None) -> float:
+    """1-sigma of a reading: white noise, and d/sqrt(12) of a grid of step d that the signal crosses (None = 0).
+
+    Source: B. Widrow, I. Kollár, Quantization Noise (2008), chapter 4: uniform error of a quantiser.
+    """
+    return hypot(white or 0.0, (resolution or 0.0) / sqrt(12.0))
 
 
 def grid_step(values: FloatArray) -> float:
@@ -103,9 +111,7 @@ def channel_noise(time_s: FloatArray, values: FloatArray, resolution: float | No
     scatter = float(np.std(power[inside]) / np.sqrt(inside.sum()))
     spread = max(2.0 * white**2, step**2 / 12.0)
     doubt = scatter / spread if spread > 0.0 else float("inf")
-    return ChannelNoise(
-        float(np.hypot(white, step / np.sqrt(12.0))), white, step, doubt, resting, coloured, len(values)
-    )
+    return ChannelNoise(reading_sigma(white, step), white, step, doubt, resting, coloured, len(values))
 
 
 def residual_floor(joint_sigma: float, inputs: Sequence[InputNoise], samples: int) -> FloatArray:
@@ -119,30 +125,6 @@ def residual_floor(joint_sigma: float, inputs: Sequence[InputNoise], samples: in
     for entry in inputs:
         square = square + np.square(entry.sensitivity) * entry.sigma**2
     return np.asarray(np.sqrt(square), dtype=np.float64)
-
-
-def local_sensitivity(
-    time_s: FloatArray, prediction: FloatArray, driver: FloatArray, half_width_s: float
-) -> FloatArray:
-    """Return the local slope d(prediction)/d(driver) out of a prediction's own run, in prediction unit per
-    driver unit.
-
-    Slope of the two smoothed rates against each other over the window; where the driver rests, the last
-    slope seen is carried on. For one driver at a time: take the share of other inputs off the prediction
-    first.
-    """
-    rate = local_fit(time_s, driver, half_width_s).slope
-    answer = local_fit(time_s, prediction, half_width_s).slope
-    width = max(1, int(2.0 * half_width_s / max(np.median(np.diff(time_s)), 1e-12)))
-    window = np.ones(min(width, len(rate)))
-    cross = np.convolve(rate * answer, window, mode="same")
-    square = np.convolve(rate * rate, window, mode="same")
-    moving = square > 1e-4 * np.mean(square)
-    if not np.any(moving):
-        return np.zeros(len(rate))
-    last = np.maximum.accumulate(np.where(moving, np.arange(len(rate)), -1))
-    last = np.where(last < 0, int(np.argmax(moving)), last)
-    return np.asarray((cross / np.where(moving, square, 1.0))[last], dtype=np.float64)
 
 
 def _differences(time_s: FloatArray, values: FloatArray, order: int) -> FloatArray:

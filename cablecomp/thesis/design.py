@@ -20,7 +20,6 @@ from cablecomp.thesis.closed_forms.stage import (
     is_series,
     settled_pretensions_N,
     stage_ratios,
-    total_ratio,
 )
 from cablecomp.thesis.design_types import DesignSheet, Pretension, StageSheet, WrapUse
 
@@ -47,7 +46,7 @@ def design_sheet(config: JointConfig, load_max_Nm: float | None = None) -> Desig
         circuit=drive.circuit,
         arrangement=drive.arrangement if len(drive.stage) > 1 else "single",
         load_max_Nm=load,
-        ratio=total_ratio(drive),
+        ratio=drive.ratio,
         equivalent=None if is_series(drive) else last,
         mu_eff=last.mu_eff,
         GF=last.GF,

@@ -14,7 +14,7 @@ from cablecomp.trials.reference import Yardstick
 from cablecomp.trials.sealed import TrueEffect, Truth
 
 EVENT_SLACK_S = 1.0  # how far beside an interval an event may lie and still count as inside
-SEEN = 1.5  # mean square over the noise floor from which unknown physics can be seen at all
+VISIBLE = 1.5  # mean square over the noise floor from which unknown physics can be seen at all
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Row:
     @property
     def visible(self) -> bool:
         """Whether the recalibrated drive leaves clearly more than noise."""
-        return self.baseline_rad**2 > SEEN * self.floor_rad**2
+        return self.baseline_rad**2 > VISIBLE * self.floor_rad**2
 
     @property
     def outcome(self) -> str:

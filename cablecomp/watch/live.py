@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from math import hypot, sqrt
+from math import sqrt
 from pathlib import Path
 from typing import Final
 
@@ -22,7 +22,7 @@ from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.recording.writer import write_canonical
-from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.noise import channel_noise, reading_sigma
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.signals import Estimate, Sample
 from cablecomp.watch.ring import Ring, locate_in_ring
@@ -191,9 +191,8 @@ class LiveWatch:
         columns = self._ring.columns()
         path = self._folder / f"mismatch-{len(self.kept) + 1}.csv"
         measured = {k: columns[k] for k in self._channels if np.isfinite(columns[k]).any()}
-        comments = (f"kept by cablecomp run --live: {_words(alarm)}",)
         self._folder.mkdir(parents=True, exist_ok=True)
-        write_canonical(path, measured, comments)
+        write_canonical(path, measured)
         located, words = self._located(columns)
         note = {
             "schema": 1,
@@ -227,8 +226,7 @@ class LiveWatch:
 
 def _stated_floor(config: JointConfig) -> float:
     sensors = config.sensors
-    resolution = sensors.joint_position_resolution_rad or 0.0
-    return max(hypot(sensors.joint_position_noise_rad or 0.0, resolution / sqrt(12.0)), 1e-12)
+    return max(reading_sigma(sensors.joint_position_noise_rad, sensors.joint_position_resolution_rad), 1e-12)
 
 
 def _words(alarm: Alarm) -> str:

@@ -13,6 +13,7 @@ from firmware_sim.firmware.records import (
     Status,
 )
 from firmware_sim.firmware.sensor_node import SensorNode, SensorNodeConfig
+from firmware_sim.firmware.shaping import InputMode, Shaper, ShapingConfig
 
 __all__ = [
     "Drive",
@@ -20,6 +21,7 @@ __all__ = [
     "DriveFlag",
     "DriveReport",
     "DriveState",
+    "InputMode",
     "Mode",
     "Request",
     "Sample",
@@ -27,5 +29,7 @@ __all__ = [
     "SensorNode",
     "SensorNodeConfig",
     "Setpoint",
+    "Shaper",
+    "ShapingConfig",
     "Status",
 ]

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from firmware_sim.errors import SimError
 from firmware_sim.firmware.records import FAULTS, DriveFlag, DriveState, Mode, Request, Setpoint
+from firmware_sim.firmware.shaping import InputMode, Shaper
 from firmware_sim.plantlike import Readings
 
 # What a request does in each state; a pair that is missing is refused and leaves everything as it is.
@@ -33,10 +34,10 @@ class DriveConfig:
     """Parameters of the drive; angles and torques at the input pulley.
 
     `index_position_rad` is where the index of an incremental encoder lies (one a turn); None = absolute
-    encoder, at home
-    from the start. `calibrate_on_enable`: asked to enable before the index was found, the drive searches it
-    first, then
-    enables. `fault_damping_Nms_per_rad` brakes the motor in a fault (shorted windings); 0 lets it coast.
+    encoder, at home from the start. `timeout_faults`: a drive that hears nothing for `command_timeout_s` ends
+    in a fault; False = it makes no torque until it hears again, as MIT firmware does. `calibrate_on_enable`:
+    asked to enable before the index was found, the drive searches it first, then enables.
+    `fault_damping_Nms_per_rad` brakes the motor in a fault (shorted windings); 0 lets it coast.
     `brake_Nm_per_rad` > 0: a holding brake of that stiffness, closed while the drive is neither enabled nor
     calibrating (damped by the same), as one-sided loads need it.
     """
@@ -46,6 +47,7 @@ class DriveConfig:
     position_min_rad: float = -math.inf
     position_max_rad: float = math.inf
     command_timeout_s: float = 0.1
+    timeout_faults: bool = True
     temperature_limit_degC: float = 90.0
     index_position_rad: float | None = None
     search_velocity_rad_s: float = 1.0
@@ -95,6 +97,7 @@ class Drive:
         self.mode = self.config.mode
         self.flags = DriveFlag.STARTED_AFRESH
         self.setpoint = Setpoint()
+        self.shaper = Shaper()
         self.homed = self.config.index_position_rad is None
         self.refused = 0
         self._raw_zero: float | None = 0.0 if self.homed else None
@@ -108,6 +111,7 @@ class Drive:
         self._search_turn = 0
         self._enable_when_homed = False
         self._torque_command = 0.0
+        self._unheard = False
         self._readings: Readings | None = None
 
     # ---- what the host may ask -------------------------------------------------------------------
@@ -146,10 +150,15 @@ class Drive:
         """A message that is not a target but shows that the host lives."""
         self._last_command_s = now_s
 
-    def set_mode(self, mode: Mode) -> None:
-        """Change the control mode; targets start from where the motor is."""
+    def set_mode(self, mode: Mode, inputs: InputMode = InputMode.PASSTHROUGH) -> None:
+        """Change the control mode and how inputs are taken; targets start from where the motor is."""
         self.mode = mode
+        self.shaper.mode = inputs
         self._hold()
+
+    def refuse_mode(self) -> None:
+        """A mode was asked for that this drive does not have: it lets go, aloud."""
+        self._fault(DriveFlag.BAD_MODE)
 
     def set_limits(self, velocity_rad_s: float | None = None, torque_Nm: float | None = None) -> None:
         """Narrow the limits; none can exceed what the drive was built for."""
@@ -190,7 +199,7 @@ class Drive:
         if self.state is DriveState.CALIBRATING:
             wanted = self._search(now_s)
         elif self.state is DriveState.ENABLED:
-            wanted = self._law(dt_s)
+            wanted = 0.0 if self._unheard else self._law(dt_s)
         else:
             wanted = self._brake()
         if self.state in (DriveState.CALIBRATING, DriveState.ENABLED):
@@ -272,6 +281,7 @@ class Drive:
     def _hold(self) -> None:
         self._integral_Nm = 0.0
         self.setpoint = Setpoint(position_rad=self.position_rad)
+        self.shaper.hold(self.position_rad)
 
     def _fault(self, flag: DriveFlag) -> None:
         self.flags |= flag
@@ -294,15 +304,17 @@ class Drive:
         if readings.temperature_degC > c.temperature_limit_degC:
             found |= DriveFlag.OVER_TEMPERATURE
         waited = now_s - self._last_command_s
-        if self.state is DriveState.ENABLED and 0.0 < c.command_timeout_s < waited:
-            found |= DriveFlag.COMMAND_TIMEOUT
+        self._unheard = self.state is DriveState.ENABLED and 0.0 < c.command_timeout_s < waited
+        if self._unheard:
+            self.flags |= DriveFlag.COMMAND_TIMEOUT
+            found |= DriveFlag.COMMAND_TIMEOUT if c.timeout_faults else DriveFlag(0)
         if self.homed and not c.position_min_rad - 0.05 <= self.position_rad <= c.position_max_rad + 0.05:
             found |= DriveFlag.POSITION_LIMIT
         if found & FAULTS:
             self._fault(found)
 
     def _law(self, dt_s: float) -> float:
-        c, s = self.config, self.setpoint
+        c, s = self.config, self.shaper.step(self.setpoint, dt_s)
         position = min(max(s.position_rad, c.position_min_rad), c.position_max_rad)
         if self.mode is Mode.TORQUE:
             return s.torque_Nm

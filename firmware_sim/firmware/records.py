@@ -50,6 +50,7 @@ class DriveFlag(IntFlag):
     BAD_FRAME = 1 << 8
     STARTED_AFRESH = 1 << 9
     NOT_CALIBRATED = 1 << 10
+    BAD_MODE = 1 << 11
 
 
 FAULTS = (
@@ -60,6 +61,7 @@ FAULTS = (
     | DriveFlag.INDEX_NOT_FOUND
     | DriveFlag.OVER_TEMPERATURE
     | DriveFlag.EMERGENCY_STOP
+    | DriveFlag.BAD_MODE
 )
 
 

@@ -4,7 +4,7 @@ sensors, effects."""
 from firmware_sim.plant.bench import PlantRun, simulate
 from firmware_sim.plant.config import EffectSpec, PlantConfig, StageConfig
 from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings, PlantTruth, noiseless
-from firmware_sim.plant.effects import EFFECTS, LISTED, UNLISTED, EffectKind
+from firmware_sim.plant.effects import EFFECTS, FORMS, LISTED, UNLISTED, EffectKind
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.mesh import COARSE, FINE, NORMAL, Resolution
 from firmware_sim.plant.sensors import SensorSpec, measure
@@ -13,6 +13,7 @@ __all__ = [
     "COARSE",
     "EFFECTS",
     "FINE",
+    "FORMS",
     "LISTED",
     "NORMAL",
     "UNLISTED",

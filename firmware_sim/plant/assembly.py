@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,10 +11,23 @@ import numpy as np
 
 from firmware_sim.plant.config import EffectSpec, PlantConfig, StageConfig
 from firmware_sim.plant.errors import PlantError
-from firmware_sim.plant.mesh import Resolution, element_lengths, fine_spacing
+from firmware_sim.plant.mesh import Guides, Resolution, element_lengths, fine_spacing
 from firmware_sim.plant.network import winding_in_of, winding_out_of
 from firmware_sim.plant.readout import READOUT
-from firmware_sim.plant.records import CABLE, COUPLING, SHAFT, SURROUND, Drive, allocate_nodes, make_drive
+from firmware_sim.plant.records import (
+    CABLE,
+    COUPLING,
+    GROOVE_POINTS,
+    PLAY,
+    PLAYS,
+    SHAFT,
+    SURROUND,
+    TENSILE_POINTS,
+    Drive,
+    Floats,
+    allocate_nodes,
+    make_drive,
+)
 
 SLACK_RATIO = 1e-6
 MIN_PRESLIDING_RAD = 1e-7
@@ -22,12 +35,23 @@ MIN_PRESLIDING_RAD = 1e-7
 
 @dataclass(frozen=True)
 class Tail:
-    """A further inertia behind the output pulley, through a spring, a damper and a clearance."""
+    """A further inertia behind the output pulley, through a spring, a damper and a clearance.
+
+    A chain of them carries encoder and load at its end; a `branch` hangs on the pulley beside them.
+    """
 
     inertia_kgm2: float
     stiffness_Nm_per_rad: float
     damping_Nms_per_rad: float = 0.0
     gap_rad: float = 0.0
+    branch: bool = False
+
+
+Schedule = Callable[[Floats], None]
+"""Fills columns of the inputs, one row per sample, from others: what acts over time, whatever the joint does."""
+
+Reading = Callable[[Floats, Floats], None]
+"""Changes columns of the outputs by inputs and outputs, one row per sample: what happens between joint and file."""
 
 
 @dataclass
@@ -36,6 +60,8 @@ class Build:
 
     `cables` (output stage first, h before l), `shafts` (motor first), `surround` and `readout` are
     structured arrays; `output` is the index of the output pulley; what `tails` lists comes behind it.
+    `schedules` run before a recording is played; of the readings those behind the pulley (`mounts`) come first, then
+    `encoders`, then `stamps`. A plant that runs live has none of these.
     """
 
     config: PlantConfig
@@ -44,12 +70,25 @@ class Build:
     shafts: Any
     surround: Any
     readout: Any
+    plays: Any
+    grooves: Floats
+    tensile: Floats
     output: int
     dynamic: bool
     tails: list[Tail] = field(default_factory=list)
     extra_compliance: float = 0.0
     gap_rad: float = 0.0
     clock_delay_s: float = 0.0
+    schedules: list[Schedule] = field(default_factory=list)
+    mounts: list[Reading] = field(default_factory=list)
+    encoders: list[Reading] = field(default_factory=list)
+    stamps: list[Reading] = field(default_factory=list)
+
+    @property
+    def bench_only(self) -> bool:
+        """Whether something was asked for that only a recording played on the bench can show."""
+        beside = any(tail.branch for tail in self.tails)
+        return beside or bool(self.schedules or self.mounts or self.encoders or self.stamps)
 
 
 @dataclass(frozen=True)
@@ -106,11 +145,13 @@ def start_build(config: PlantConfig, dynamic: bool) -> Build:
     stages = settled_stages(config)
     plan, count = _shaft_plan(config)
     cables = np.zeros(len(plan), dtype=CABLE)
-    for record, (index, side, shaft_in, shaft_out) in zip(cables, plan, strict=True):
+    plays = np.zeros((len(plan), PLAYS), dtype=PLAY)
+    for k, (record, (index, side, shaft_in, shaft_out)) in enumerate(zip(cables, plan, strict=True)):
         stage = stages[index]
         # EA_N is stiffness per length of cable in place, as a bench measures it; T = EA (l/l0 − 1) counts
         # from the unstressed length, on which the same cable shows EA_N − T0.
         values = {
+            "index": k,
             "shaft_out": shaft_out,
             "shaft_in": shaft_in,
             "side": side,
@@ -121,14 +162,20 @@ def start_build(config: PlantConfig, dynamic: bool) -> Build:
             "wrap_in": stage.wrap_input_rad,
             "free_m": stage.free_length_m,
             "EA": stage.EA_N - stage.pretension_N,
+            "EA_whole": stage.EA_N - stage.pretension_N,
             "T0": stage.pretension_N,
+            "runout_order": 1.0,
+            "guide_count": 1,
+            "guide_first": 0.5,
+            "drag_exponent": 1.0,
+            "drag_speed": 1.0,
             "mu_out": stage.mu_output,
             "mu_in": stage.mu_input,
             "mu_scale": 1.0,
+            "guide_scale": 1.0,
             "slack_ratio": SLACK_RATIO,
-            "play_zero": stage.pretension_N,
-            "play": stage.pretension_N,
         }
+        plays[k]["zero"] = plays[k]["value"] = stage.pretension_N
         for key, value in values.items():
             record[key] = value
     shafts = np.zeros(count, dtype=SHAFT)
@@ -143,7 +190,10 @@ def start_build(config: PlantConfig, dynamic: bool) -> Build:
     surround["slip_time_s"] = surround["break_time_s"] = math.inf
     readout = np.zeros(1, dtype=READOUT)
     readout["mount_time_s"] = readout["mount_yield_Nm"] = 1.0
-    return Build(config, stages, cables, shafts, surround, readout, count - 1, dynamic)
+    grooves, tensile = np.ones((2 * len(plan), GROOVE_POINTS)), np.zeros((2, TENSILE_POINTS))
+    return Build(
+        config, stages, cables, shafts, surround, readout, plays, grooves, tensile, count - 1, dynamic
+    )
 
 
 def stage_of(build: Build, cable: int) -> StageConfig:
@@ -173,12 +223,12 @@ def assemble_joint(build: Build, motor_rad: float, travel_rad: float, resolution
         c["force_tol"] = 1e-9 * c["T0"] + 4.0 * c["EA"] * rounding
         first += count
     nodes.old[:] = nodes.y
-    build.surround["EA_whole"] = build.cables["EA"][0]
-    load_shaft = len(build.shafts) - 1
+    load_shaft = build.output + sum(not tail.branch for tail in build.tails)
     build.surround["load_shaft"], build.surround["output_shaft"] = load_shaft, build.output
     couplings = np.zeros(len(build.tails), dtype=COUPLING)
     for k, tail in enumerate(build.tails):
-        couplings[k]["a"], couplings[k]["b"] = build.output + k, build.output + k + 1
+        couplings[k]["a"] = build.output if tail.branch else build.output + k
+        couplings[k]["b"] = build.output + k + 1
         couplings[k]["stiffness"], couplings[k]["damping"] = (
             tail.stiffness_Nm_per_rad,
             tail.damping_Nms_per_rad,
@@ -186,12 +236,22 @@ def assemble_joint(build: Build, motor_rad: float, travel_rad: float, resolution
         couplings[k]["gap"] = tail.gap_rad
         # the same loss as the damper gives at a depth of 1e-4 rad
         couplings[k]["flank_loss"] = tail.damping_Nms_per_rad / (tail.stiffness_Nm_per_rad * 1e-4)
-    drive = make_drive(build.cables, build.shafts, couplings, build.surround, nodes)
+    drive = make_drive(
+        build.cables,
+        build.shafts,
+        couplings,
+        build.surround,
+        nodes,
+        build.plays,
+        build.grooves,
+        build.tensile,
+    )
     spacing = min(min(fine_spacing(s, resolution)) for s in build.stages)
     return Joint(drive, build.readout, build.output, load_shaft, spacing, build.clock_delay_s)
 
 
 def _add_tails(build: Build) -> None:
+    build.tails.sort(key=lambda tail: tail.branch)
     extra = np.zeros(len(build.tails), dtype=SHAFT)
     extra["presliding"] = MIN_PRESLIDING_RAD
     extra["wall_at"] = math.inf
@@ -215,8 +275,9 @@ def _set_positions(build: Build, motor_rad: float) -> None:
             angle -= c["sign"] * error / c["R"]
         q[outside] = angle
     q[build.output :] = q[build.output]
-    for key in ("q_1", "q_2", "bristle"):
+    for key in ("q_1", "q_2"):
         build.shafts[key] = q
+    build.shafts["bristle"] = np.where(build.shafts["friction_kind"] == 0, q, 0.0)
 
 
 class _Fields:
@@ -242,8 +303,10 @@ def _mesh_cable(build: Build, k: int, travel_rad: float, resolution: Resolution)
     c["A"] = on_out
     travel_m = 1.05 * travel_rad * stage.input_radius_m * _speed(build, stage) + 0.02 * stage.output_radius_m
     arcs = (on_out, stage.free_length_m + float(c["guide_arc_m"]), on_in)
-    guide_mu = float(c["guide_mu_per_m"] * c["guide_arc_m"])
-    return element_lengths(stage, arcs, travel_m, resolution, guide_mu)
+    guides = Guides(
+        int(c["guide_count"]), float(c["guide_first"]), float(c["guide_mu_per_m"] * c["guide_arc_m"])
+    )
+    return element_lengths(stage, arcs, travel_m, resolution, guides)
 
 
 def _speed(build: Build, stage: StageConfig) -> float:

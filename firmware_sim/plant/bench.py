@@ -11,29 +11,41 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from firmware_sim.plant.assembly import Joint, assemble_joint, joint_effects, start_build
+from firmware_sim.plant.columns import (
+    JOINT_NM,
+    JOINT_TORQUE,
+    MOTOR_ANGLE,
+    MOTOR_NM,
+    MOTOR_TORQUE,
+    MOTOR_TRUE,
+    N_INPUTS,
+    N_OUTPUTS,
+    OTHER,
+    PATH,
+    PULLEY,
+    Q_IN,
+    Q_OUT,
+    T_H,
+    T_H_IN,
+    T_L,
+    T_L_IN,
+    TEMPERATURE,
+    TIME,
+    UNSEEN_TORQUE,
+    V_IN,
+    V_OUT,
+)
 from firmware_sim.plant.config import EffectSpec, PlantConfig
 from firmware_sim.plant.effects import apply_effects
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.jit import njit
 from firmware_sim.plant.mesh import NORMAL, Resolution
-from firmware_sim.plant.network import (
-    JOINT_TORQUE,
-    MOTOR_ANGLE,
-    MOTOR_TORQUE,
-    N_INPUTS,
-    OTHER,
-    TEMPERATURE,
-    TIME,
-)
 from firmware_sim.plant.readout import read_out
 from firmware_sim.plant.records import Drive, Floats
 from firmware_sim.plant.stepping import advance
 
 RAMP_STEP_S = 1e4  # so slow that neither inertia nor viscosity acts
 ROOM_TEMPERATURE_DEGC = 20.0
-
-(Q_OUT, Q_IN, V_OUT, V_IN, T_H, T_L, T_H_IN, T_L_IN, JOINT_NM, MOTOR_NM, PULLEY, MOTOR_TRUE, PATH) = range(13)
-N_OUTPUTS = 13
 
 
 @dataclass(frozen=True)
@@ -89,22 +101,28 @@ def simulate(
     temperature_degC: ArrayLike | None = None,
     other_1: ArrayLike | None = None,
     resolution: Resolution = NORMAL,
+    history: int = 0,
 ) -> PlantRun:
     """Play a bench recording: given motor angle and external moment, solve joint angle, tensions and motor
     torque.
 
     The cable starts at uniform pretension at the first motor angle; the first moment is then applied
-    slowly. Arrays hold one value per sample (s, rad, N·m, °C, any unit). Raises PlantError on unequal
+    slowly. Arrays hold one value per sample (s, rad, N·m, °C, any unit). The first `history` samples are played, but
+    belong to no recording: they are left out of the run, whose first sample comes after. Raises PlantError on unequal
     lengths, values that are not finite, time that does not increase, a wrap run out, or a step without
     solution.
     """
     inputs = _inputs(time_s, motor_position_rad, joint_torque_Nm, temperature_degC, other_1)
+    if not 0 <= history < len(inputs) - 1:
+        raise PlantError(f"history is {history}; 0 to {len(inputs) - 2}, so that two samples are left")
     build = start_build(config, dynamic=False)
+    build.surround["start_s"] = inputs[history, TIME]
     apply_effects(build, joint_effects(config, effects))
+    for fill in build.schedules:
+        fill(inputs)
     motor = inputs[:, MOTOR_ANGLE]
     travel = float(np.max(np.abs(motor - motor[0])))
     joint = assemble_joint(build, float(motor[0]), travel, resolution)
-    joint.drive.surround["start_s"] = inputs[0, TIME]
     joint.drive.shafts["prescribed"][0] = 1
     load_slowly(joint.drive, inputs[0], resolution.ramp_steps)
     _start_moving(joint, inputs)
@@ -122,7 +140,9 @@ def simulate(
     if joint.clock_delay_s != 0.0:
         late = inputs[:, TIME] - joint.clock_delay_s
         outputs[:, Q_OUT] = np.interp(late, inputs[:, TIME], outputs[:, Q_OUT])
-    return _collect(inputs, outputs, joint, config)
+    for read in (*build.mounts, *build.encoders, *build.stamps):
+        read(inputs, outputs)
+    return _collect(inputs[history:], outputs[history:], joint, config)
 
 
 def _inputs(time: ArrayLike, motor: ArrayLike, load: ArrayLike, warm: Any, other: Any) -> Floats:
@@ -160,7 +180,7 @@ def load_slowly(drive: Drive, target: Floats, steps: int) -> None:
     values."""
     weight = drive.shafts["gravity_Nm"].copy()
     before = target.copy()
-    before[[MOTOR_TORQUE, JOINT_TORQUE, OTHER]] = 0.0
+    before[[MOTOR_TORQUE, JOINT_TORQUE, OTHER, UNSEEN_TORQUE]] = 0.0
     whole = target.copy()
     for k in range(1, steps + 1):
         share = k / steps
@@ -253,7 +273,7 @@ def observe(drive: Drive, readout: Any, output: int, u: Floats, h: float, row: F
     path = s.load_Nm + passed
     sensed = u[JOINT_TORQUE] if m.prescribed == 1 else passed
     motor = -m.cable_Nm if m.prescribed == 1 else m.external_Nm
-    end = drive.shafts[len(drive.shafts) - 1]
+    end = drive.shafts[drive.surround[0].load_shaft]
     read_out(readout, h, end.q, m.q, path, sensed, motor, u[TEMPERATURE], u[OTHER])
     row[Q_OUT], row[Q_IN], row[JOINT_NM], row[MOTOR_NM] = (
         readout.joint_rad,

@@ -11,35 +11,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from firmware_sim.plant.assembly import Build, Joint, Tail, assemble_joint, joint_effects, start_build
-from firmware_sim.plant.bench import JOINT_NM as ROW_JOINT_NM
-from firmware_sim.plant.bench import MOTOR_NM as ROW_MOTOR_NM
-from firmware_sim.plant.bench import (
+from firmware_sim.plant.bench import ROOM_TEMPERATURE_DEGC, load_slowly, observe, rest, wrap_exhausted
+from firmware_sim.plant.columns import (
+    JOINT_NM,
+    JOINT_TORQUE,
+    MOTOR_ANGLE,
+    MOTOR_NM,
+    MOTOR_TORQUE,
+    N_INPUTS,
     N_OUTPUTS,
-    ROOM_TEMPERATURE_DEGC,
-    load_slowly,
-    observe,
-    rest,
-    wrap_exhausted,
+    OTHER,
+    PATH,
+    PULLEY,
+    Q_IN,
+    Q_OUT,
+    T_H,
+    T_L,
+    TEMPERATURE,
+    TIME,
 )
-from firmware_sim.plant.bench import PATH as ROW_PATH
-from firmware_sim.plant.bench import PULLEY as ROW_PULLEY
-from firmware_sim.plant.bench import Q_IN as ROW_Q_IN
-from firmware_sim.plant.bench import Q_OUT as ROW_Q_OUT
-from firmware_sim.plant.bench import T_H as ROW_T_H
-from firmware_sim.plant.bench import T_L as ROW_T_L
 from firmware_sim.plant.config import EffectSpec, PlantConfig
 from firmware_sim.plant.effects import apply_effects
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.mesh import NORMAL, Resolution
-from firmware_sim.plant.network import (
-    JOINT_TORQUE,
-    MOTOR_ANGLE,
-    MOTOR_TORQUE,
-    N_INPUTS,
-    OTHER,
-    TEMPERATURE,
-    TIME,
-)
 from firmware_sim.plant.sensors import SensorSpec
 from firmware_sim.plant.stepping import advance
 
@@ -162,6 +156,9 @@ class Plant:
         self._rng = np.random.default_rng(seed)
         build = start_build(config, dynamic=True)
         apply_effects(build, joint_effects(config, effects))
+        if build.bench_only:
+            names = ", ".join(e.id for e in joint_effects(config, effects))
+            raise PlantError(f"one of {names} can be played on the bench only, not on a plant that runs live")
         if build.clock_delay_s < 0:
             raise PlantError(
                 "clock_skew: a running plant cannot stamp the joint early; delay_s >= 0 is accepted"
@@ -205,7 +202,7 @@ class Plant:
         load_slowly(self._joint.drive, self._input, self._resolution.ramp_steps)
         self._torque = -float(shafts["cable_Nm"][0])
         shafts["prescribed"][0] = 0
-        shafts["bristle"] = shafts["q"]
+        shafts["bristle"] = np.where(shafts["friction_kind"] == 0, shafts["q"], 0.0)
         rest(self._joint.drive)
         self._input[MOTOR_TORQUE] = self._torque
 
@@ -269,12 +266,10 @@ class Plant:
     def _read(self, dt_s: float, temperature: float) -> PlantReadings:
         s, row, shafts = self.sensors, self._row, self._joint.drive.shafts
         noise = self._rng.standard_normal(5)
-        joint = self._delayed(float(row[ROW_Q_OUT]))
+        joint = self._delayed(float(row[Q_OUT]))
         angles = np.array(
             [
-                _counted(
-                    row[ROW_Q_IN] + s.motor_position_noise_rad * noise[0], s.motor_position_resolution_rad
-                ),
+                _counted(row[Q_IN] + s.motor_position_noise_rad * noise[0], s.motor_position_resolution_rad),
                 _counted(
                     joint + s.joint_position_offset_rad + s.joint_position_noise_rad * noise[1],
                     s.joint_position_resolution_rad,
@@ -285,8 +280,8 @@ class Plant:
             share = -math.expm1(-2 * math.pi * s.velocity_bandwidth_Hz * dt_s)
             self._velocity += share * ((angles - self._last) / dt_s - self._velocity)
         self._last = angles
-        torque = s.joint_torque_gain * row[ROW_JOINT_NM] + s.joint_torque_offset_Nm
-        motor = row[ROW_MOTOR_NM] + s.motor_torque_noise_Nm * noise[3]
+        torque = s.joint_torque_gain * row[JOINT_NM] + s.joint_torque_offset_Nm
+        motor = row[MOTOR_NM] + s.motor_torque_noise_Nm * noise[3]
         motor = _counted(motor, s.motor_torque_resolution_Nm)
         return PlantReadings(
             time_s=self.time_s,
@@ -305,13 +300,13 @@ class Plant:
                 motor_velocity_rad_s=float(shafts["v"][0]),
                 joint_position_rad=float(shafts["q"][self._joint.load_shaft]),
                 joint_velocity_rad_s=float(shafts["v"][self._joint.load_shaft]),
-                pulley_position_rad=float(row[ROW_PULLEY]),
-                joint_torque_Nm=float(row[ROW_JOINT_NM]),
-                load_path_Nm=float(row[ROW_PATH]),
+                pulley_position_rad=float(row[PULLEY]),
+                joint_torque_Nm=float(row[JOINT_NM]),
+                load_path_Nm=float(row[PATH]),
                 motor_torque_Nm=self._torque,
                 contact_torque_Nm=float(shafts["contact_Nm"][self._joint.load_shaft]),
-                tension_h_N=max(float(row[ROW_T_H]), 0.0),
-                tension_l_N=max(float(row[ROW_T_L]), 0.0),
+                tension_h_N=max(float(row[T_H]), 0.0),
+                tension_l_N=max(float(row[T_L]), 0.0),
             ),
         )
 

@@ -1,8 +1,8 @@
 """The plant's numba decorator.
 
-Machine code is kept on disk in a folder named after a digest of all of the plant's sources: numba by itself
-watches only the file that a function stands in, and would go on using code compiled from an older version
-of its callees.
+Machine code is kept on disk in a folder named after a digest of all of the plant's sources but those of effects
+and their forms, which never are compiled: numba by itself watches only the file that a function stands in, and would
+go on using code compiled from an older version of its callees.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def _digest() -> str:
     crc = 0
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted(Path(__file__).parent.glob("*.py")):
         crc = zlib.crc32(path.read_bytes(), zlib.crc32(path.name.encode(), crc))
     return f"{crc:08x}"
 

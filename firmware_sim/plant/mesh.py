@@ -40,13 +40,33 @@ NORMAL = Resolution()
 FINE = Resolution(friction_step=0.007, spacings_per_step=0.5, max_nodes=20000)
 
 
-def fine_spacing(stage: StageConfig, resolution: Resolution, with_guide: bool = False) -> tuple[float, float]:
+@dataclass(frozen=True)
+class Guides:
+    """Guides along a free span: how many, the share of the free length before the first (equal shares of the rest
+    follow each), and mu Θ of all together."""
+
+    count: int = 1
+    first: float = 0.5
+    friction_angle: float = 0.0
+
+    @property
+    def least_span(self) -> float:
+        """The shortest span between two bodies, as a share of the free length."""
+        return min(self.first, (1.0 - self.first) / self.count)
+
+    def starts(self, free_m: float, arc_m: float) -> list[float]:
+        """Where they begin, m from the output drum."""
+        pitch = (arc_m + (1.0 - self.first) * free_m) / self.count
+        return [self.first * free_m + k * pitch for k in range(self.count)]
+
+
+def fine_spacing(stage: StageConfig, resolution: Resolution, least_span: float = 1.0) -> tuple[float, float]:
     """Spacing wanted near the output and near the input drum, m.
 
     A share of the friction length R/mu, from 0.01 to 0.2 rad of contact, never more than what lets one point
     touch two bodies.
     """
-    apart = 0.9 * stage.free_length_m * (0.5 if with_guide else 1.0)
+    apart = 0.9 * stage.free_length_m * least_span
 
     def spacing(radius: float, mu: float) -> float:
         return min(max(resolution.friction_step / mu, 0.01), 0.2) * radius
@@ -72,7 +92,7 @@ def element_lengths(
     arcs: tuple[float, float, float],
     travel_m: float,
     resolution: Resolution,
-    guide_mu: float = 0.0,
+    guides: Guides = Guides(),
 ) -> Floats:
     """Stretched element lengths from termination to termination.
 
@@ -82,15 +102,20 @@ def element_lengths(
     """
     on_out, span, on_in = arcs
     guide = span - stage.free_length_m
-    fine_out, fine_in = fine_spacing(stage, resolution, guide > 0)
+    fine_out, fine_in = fine_spacing(stage, resolution, guides.least_span if guide > 0 else 1.0)
     total = on_out + span + on_in
     edges = [(-math.inf, on_out + travel_m, fine_out), (total - on_in - travel_m, math.inf, fine_in)]
     if guide > 0:
-        middle = on_out + 0.5 * stage.free_length_m
+        arc = guide / guides.count
         spacing = guide_spacing(
-            guide, guide_mu, min(fine_out, fine_in), stage.free_length_m, resolution.friction_step
+            arc,
+            guides.friction_angle / guides.count,
+            min(fine_out, fine_in),
+            stage.free_length_m,
+            resolution.friction_step,
         )
-        edges.append((middle - travel_m, middle + guide + travel_m, spacing))
+        for start in guides.starts(stage.free_length_m, guide):
+            edges.append((on_out + start - travel_m, on_out + start + arc + travel_m, spacing))
 
     def wanted(p: float) -> float:
         return min(fine + resolution.growth * max(low - p, p - high, 0.0) for low, high, fine in edges)

@@ -15,6 +15,7 @@ FREE, OUT, IN, GUIDE = 0, 1, 2, 3  # where a node lies: span, output drum, input
 # One cable from its termination on the output drum (path coordinate 0) to that on the input drum.
 CABLE = np.dtype(
     [
+        ("index", "i8"),  # among the cables
         ("first", "i8"),  # index of the first node
         ("count", "i8"),  # number of nodes
         ("shaft_out", "i8"),
@@ -29,31 +30,50 @@ CABLE = np.dtype(
         ("free_m", "f8"),
         ("runout_m", "f8"),  # eccentricity of the output pulley
         ("runout_phase", "f8"),
+        ("runout_order", "f8"),  # periods per turn
         ("in_runout_m", "f8"),
         ("in_runout_phase", "f8"),
-        ("climb_m_per_rad", "f8"),  # growth of the output radius with angle
+        ("climb_m_per_rad", "f8"),  # growth of the output radius with angle,
+        ("climb_beyond", "i8"),  # 1: beyond `climb_from` alone
+        ("climb_from", "f8"),  # rad
         # cable
         ("EA", "f8"),
+        ("EA_whole", "f8"),  # before any wire broke
         ("T0", "f8"),
         ("stiffening", "f8"),
+        ("tabled", "i8"),  # 1: tension by `Drive.tensile`
         ("slack_ratio", "f8"),  # stiffness of a slack element over EA (regularisation)
         # friction
         ("mu_out", "f8"),
         ("mu_in", "f8"),
         ("guide_mu_per_m", "f8"),
-        ("guide_arc_m", "f8"),
+        ("guide_arc_m", "f8"),  # of all guides
+        ("guide_count", "i8"),
+        (
+            "guide_first",
+            "f8",
+        ),  # share of the free length before the first guide; the rest is shared out evenly
         ("viscous_out", "f8"),  # N s/m per metre of arc
         ("viscous_in", "f8"),
+        ("viscous_guide", "f8"),
+        ("drag_exponent", "f8"),  # viscous force grows with this power of the slip speed,
+        ("drag_speed", "f8"),  # m/s, and is the linear one at this speed
+        ("strengthening", "f8"),  # Coulomb force grows by this times arsinh of slip speed over `drag_speed`
         ("pressure_exponent", "f8"),
+        ("pressure_kind", "i8"),  # which law of contact pressure
+        ("pressure_floor", "f8"),
         ("groove_amplitude", "f8"),
         ("groove_phase", "f8"),
-        ("mu_scale", "f8"),  # time-varying factor on every coefficient
+        ("grooved", "i8"),  # 1: factors by place on either drum in `Drive.grooves`
+        ("grain", "f8"),  # how much more of that is felt sliding towards the input than the other way
+        ("mu_scale", "f8"),  # time-varying factor on every coefficient,
+        ("guide_scale", "f8"),  # and on those of guides
         # length budget
-        ("play_compliance", "f8"),  # m/N
-        ("play_yield", "f8"),  # N
-        ("play", "f8"),  # N, state
-        ("play_zero", "f8"),  # N, reference
+        ("plays", "i8"),  # slots of `Drive.plays` in use
         ("released_m", "f8"),  # length let go into the free span
+        ("overload_N", "f8"),  # tension above which the clamp creeps,
+        ("overload_rate", "f8"),  # m/(N s)
+        ("crept_m", "f8"),  # state
         ("end_shift_m", "f8"),  # displacement of the output termination towards the span
         ("eigenstrain", "f8"),  # thermal strain and creep
         ("force_tol", "f8"),  # N, below which forces count as equal (rounding of positions)
@@ -92,6 +112,11 @@ SHAFT = np.dtype(
         ("inertia", "f8"),
         ("viscous", "f8"),
         ("coulomb_Nm", "f8"),
+        ("friction_kind", "i8"),  # 0: spring that yields, 1: Dahl, 2: LuGre
+        ("coulomb_skew", "f8"),  # more friction turning forward than backward, over their mean
+        ("stribeck_gain", "f8"),  # static over sliding friction, less one
+        ("stribeck_speed", "f8"),  # rad/s
+        ("bristle_damping", "f8"),  # N·m·s/rad
         ("load_coefficient", "f8"),  # friction torque per N·m of radial cable load R (T_h + T_l)
         ("presliding", "f8"),  # rad
         ("bristle", "f8"),  # rad, anchor of the presliding spring
@@ -99,6 +124,11 @@ SHAFT = np.dtype(
         ("bearing_limit", "f8"),
         ("gravity_Nm", "f8"),
         ("gravity_phase", "f8"),
+        ("gravity_second", "f8"),  # second harmonic over the first
+        ("gravity_second_phase", "f8"),
+        ("tilt", "f8"),  # rad, turn of the weight's direction at present
+        ("inertia_swing", "f8"),  # J (1 + swing cos(q − phase))
+        ("inertia_phase", "f8"),
         ("spring_Nm", "f8"),  # saturation torque of a parallel spring
         ("spring_rate", "f8"),  # N·m/rad
         ("wall_stiffness", "f8"),
@@ -142,7 +172,6 @@ SURROUND = np.dtype(
         ("slip_behind_wrap", "f8"),
         ("break_fraction", "f8"),
         ("break_time_s", "f8"),
-        ("EA_whole", "f8"),
         ("crosstalk", "f8"),
         ("ageing_gain", "f8"),
         ("ageing_count", "f8"),
@@ -155,6 +184,23 @@ SURROUND = np.dtype(
         ("is_open", "i8"),
     ]
 )
+
+
+# A stretch of a cable's free span that follows the tension through a play: (compliance · (play − zero)).
+PLAY = np.dtype(
+    [
+        ("compliance", "f8"),  # m/N
+        ("radius", "f8"),  # N
+        ("share", "f8"),  # of the tension, adds to the radius
+        ("time_s", "f8"),  # how long it takes to yield
+        ("value", "f8"),  # N, state
+        ("zero", "f8"),  # N
+    ]
+)
+PLAYS = 6  # slots per cable
+
+GROOVE_LOW, GROOVE_STEP, GROOVE_POINTS = -60.0, 0.05, 2401  # rad of joint or motor angle
+TENSILE_LOW, TENSILE_STEP, TENSILE_POINTS = -2.0, 0.02, 601  # strain over that of the pretension
 
 
 class Nodes(NamedTuple):
@@ -171,6 +217,7 @@ class Nodes(NamedTuple):
     beta: Floats  # per change of path length,
     gamma: Floats  # per change of arc on the output drum
     upper: Floats  # elimination work space
+    burr: Floats  # share by which the grip differs with the direction of sliding
     mode: Codes  # -1, +1: slides that way; 0: sticks
     where: Codes  # FREE, OUT, IN, GUIDE
     saved_mode: Codes
@@ -184,6 +231,10 @@ class Drive(NamedTuple):
     couplings: Any
     surround: Any
     nodes: Nodes
+    plays: Any  # (cables, PLAYS)
+    grooves: Floats  # (2 cables, GROOVE_POINTS): factor of mu on the output drum, then on the input drum
+    tensile: Floats  # (2, TENSILE_POINTS): T/T0 and its slope over strain · EA/T0
+    saved_plays: Any
     saved_cables: Any
     saved_shafts: Any
     saved_couplings: Any
@@ -194,13 +245,22 @@ class Drive(NamedTuple):
 
 def allocate_nodes(total: int) -> Nodes:
     """Zeroed arrays for `total` nodes."""
-    f = [np.zeros(total) for _ in range(11)]
+    f = [np.zeros(total) for _ in range(12)]
     c = [np.zeros(total, dtype=np.int8) for _ in range(3)]
-    return Nodes(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], c[0], c[1], c[2])
+    return Nodes(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], c[0], c[1], c[2])
 
 
-def make_drive(cables: Any, shafts: Any, couplings: Any, surround: Any, nodes: Nodes) -> Drive:
-    """Bind records and nodes, with room to step back to the start of a step."""
+def make_drive(
+    cables: Any,
+    shafts: Any,
+    couplings: Any,
+    surround: Any,
+    nodes: Nodes,
+    plays: Any,
+    grooves: Floats,
+    tensile: Floats,
+) -> Drive:
+    """Bind records, tables and nodes, with room to step back to the start of a step."""
     n = len(shafts)
     return Drive(
         cables,
@@ -208,6 +268,10 @@ def make_drive(cables: Any, shafts: Any, couplings: Any, surround: Any, nodes: N
         couplings,
         surround,
         nodes,
+        plays,
+        grooves,
+        tensile,
+        plays.copy(),
         cables.copy(),
         shafts.copy(),
         couplings.copy(),

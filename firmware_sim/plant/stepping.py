@@ -14,21 +14,20 @@ from firmware_sim.plant.cable import (
     lumped_slope,
     move_nodes,
     refresh_tension,
+    settle_cable,
     solve_cable,
     update_modes,
 )
+from firmware_sim.plant.columns import MOTOR_ANGLE, PRETENSION_H
 from firmware_sim.plant.jit import njit
 from firmware_sim.plant.network import (
-    MOTOR_ANGLE,
-    TEMPERATURE,
-    TIME,
     apply_surroundings,
     assemble,
     place_cable,
     pretension_factor,
     solve_small,
 )
-from firmware_sim.plant.records import Drive, Floats
+from firmware_sim.plant.records import Drive, Floats, Nodes
 from firmware_sim.plant.shafts import bdf, settle_bearing, update_bearing
 
 MAX_ITERATIONS = 400
@@ -54,7 +53,7 @@ def begin_step(drive: Drive, u: Floats, h: float) -> None:
         c.A_old, c.Y_old = c.A, c.Y
         place_cable(c, drive.shafts[c.shaft_out].q, drive.shafts[c.shaft_in].q)
         carry_along(c, nodes, c.Y - c.Y_old, c.A - c.A_old)
-        guess_tension(c, nodes)
+        guess_tension(c, nodes, drive.tensile)
 
 
 @njit
@@ -85,21 +84,30 @@ def all_finite(g: Floats, n: int) -> bool:
 
 @njit
 def advance_cable(
-    c: Any, drive: Drive, step_out: float, step_in: float, share: float, rush: bool
+    c: Any,
+    shafts: Any,
+    nodes: Nodes,
+    plays: Any,
+    tensile: Floats,
+    step_out: float,
+    step_in: float,
+    share: float,
+    rush: bool,
+    h: float,
 ) -> tuple[float, int]:
     """Move one cable with its shafts; returns the change of its end forces over T0 and of its modes."""
-    excess = lumped_extension(c, c.T_out) - c.ext
-    slope = lumped_slope(c, c.T_out)
+    excess = lumped_extension(c, plays, c.T_out, h) - c.ext
+    slope = lumped_slope(c, plays, c.T_out, h)
     turn = c.lead_out * step_out + c.lead_in * step_in
     dT = share * c.dT_out + c.dT_out_dY * (turn - share * excess) + c.dT_out_dA * c.lead_out * step_out
     dT /= 1.0 + c.dT_out_dY * slope
     c.ext += share * excess + slope * dT
     A, Y, T_out, T_in = c.A, c.Y, c.T_out, c.T_in
-    place_cable(c, drive.shafts[c.shaft_out].q, drive.shafts[c.shaft_in].q)
-    move_nodes(c, drive.nodes, c.Y - Y, c.A - A, share)
-    refresh_tension(c, drive.nodes)
-    c.T_out, c.T_in = drive.nodes.tension[c.i_out], drive.nodes.tension[c.i_in - 1]
-    changed = update_modes(c, drive.nodes, c.force_tol, rush)
+    place_cable(c, shafts[c.shaft_out].q, shafts[c.shaft_in].q)
+    move_nodes(c, nodes, c.Y - Y, c.A - A, share)
+    refresh_tension(c, nodes, tensile)
+    c.T_out, c.T_in = nodes.tension[c.i_out], nodes.tension[c.i_in - 1]
+    changed = update_modes(c, nodes, c.force_tol, rush)
     return max(abs(c.T_out - T_out), abs(c.T_in - T_in)) / (c.T0 * share), changed
 
 
@@ -120,8 +128,8 @@ def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
         p.iterations += 1
         for k in range(len(drive.cables)):
             if iteration < CONTACT_ITERATIONS:
-                find_contacts(drive.cables[k], drive.nodes, h)
-            solve_cable(drive.cables[k], drive.nodes)
+                find_contacts(drive.cables[k], drive.nodes, drive.grooves, h)
+            solve_cable(drive.cables[k], drive.nodes, h)
         assemble(drive, h, b0, b1, b2, factor)
         for k in range(n):
             if drive.shafts[k].prescribed == 1:
@@ -137,7 +145,18 @@ def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
             changed += update_bearing(drive.shafts[k])
         for k in range(len(drive.cables)):
             c = drive.cables[k]
-            change, modes = advance_cable(c, drive, g[c.shaft_out], g[c.shaft_in], share, rush)
+            change, modes = advance_cable(
+                c,
+                drive.shafts,
+                drive.nodes,
+                drive.plays,
+                drive.tensile,
+                g[c.shaft_out],
+                g[c.shaft_in],
+                share,
+                rush,
+                h,
+            )
             moved = max(moved, change)
             changed += modes
         if not (moved < 1e12 and all_finite(g, n)):
@@ -155,13 +174,12 @@ def finish_step(drive: Drive, u: Floats, h: float) -> None:
     """Commit what depends on the step's end: rates, bearing anchors, cable plays, count of load reversals."""
     p = drive.surround[0]
     b0, b1, b2 = bdf(h, p.h_prev)
-    factor = pretension_factor(p, u[TIME], u[TEMPERATURE])
+    factor = pretension_factor(p, u) + u[PRETENSION_H]
     assemble(drive, h, b0, b1, b2, factor)
     for k in range(len(drive.shafts)):
         settle_bearing(drive.shafts[k])
     for k in range(len(drive.cables)):
-        c = drive.cables[k]
-        c.play = min(max(c.play, c.T_out - c.play_yield), c.T_out + c.play_yield)
+        settle_cable(drive.cables[k], drive.plays, h)
     load = drive.shafts[p.load_shaft].external_Nm
     swing = 0.05 * drive.cables[0].T0 * drive.cables[0].R
     if (load - p.load_turn) * p.load_direction > 0.0:
@@ -178,6 +196,7 @@ def save_state(drive: Drive, nodes_y: Floats) -> None:
     """Keep the state for a second try."""
     nodes_y[:] = drive.nodes.y
     drive.nodes.saved_mode[:] = drive.nodes.mode
+    drive.saved_plays[:] = drive.plays
     drive.saved_cables[:] = drive.cables
     drive.saved_shafts[:] = drive.shafts
     drive.saved_couplings[:] = drive.couplings
@@ -190,13 +209,14 @@ def restore_state(drive: Drive, nodes_y: Floats) -> None:
     iterations, failures = drive.surround[0].iterations, drive.surround[0].failures
     drive.nodes.y[:] = nodes_y
     drive.nodes.mode[:] = drive.nodes.saved_mode
+    drive.plays[:] = drive.saved_plays
     drive.cables[:] = drive.saved_cables
     drive.shafts[:] = drive.saved_shafts
     drive.couplings[:] = drive.saved_couplings
     drive.surround[:] = drive.saved_surround
     drive.surround[0].iterations, drive.surround[0].failures = iterations, failures
     for k in range(len(drive.cables)):
-        refresh_tension(drive.cables[k], drive.nodes)
+        refresh_tension(drive.cables[k], drive.nodes, drive.tensile)
 
 
 @njit

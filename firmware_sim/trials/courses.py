@@ -18,7 +18,8 @@ HANDOVER_S = 0.03  # a contact's load builds up within this time at the least
 class Course:
     """What is done to a joint in one recording; SI units, one value per sample.
 
-    `temperature_degC` and `other` (the load of a neighbouring joint, N·m) go along with it.
+    `temperature_degC` and `other` (the load of a neighbouring joint, N·m) go along with it. The first `history`
+    samples happen before the recording begins.
     """
 
     kind: str
@@ -27,6 +28,30 @@ class Course:
     load_Nm: Floats
     temperature_degC: Floats
     other: Floats
+    history: int = 0
+
+    @property
+    def seen(self) -> Course:
+        """The course without its history."""
+        if self.history == 0:
+            return self
+        return self.at(self.time_s[self.history :])
+
+    def at(self, time_s: Floats, history: int = 0) -> Course:
+        """The same course at other instants; the first `history` of them count as history."""
+
+        def taken(values: Floats) -> Floats:
+            return np.asarray(np.interp(time_s, self.time_s, values))
+
+        return Course(
+            self.kind,
+            time_s,
+            taken(self.motor_rad),
+            taken(self.load_Nm),
+            taken(self.temperature_degC),
+            taken(self.other),
+            history,
+        )
 
     def later(self, start_s: float) -> Course:
         """The same course with its clock set on by `start_s`."""
@@ -43,15 +68,23 @@ class Range:
     one_sided: bool = False
 
 
-def draw_course(rng: np.random.Generator, kind: str, within: Range, warm: bool = False) -> Course:
-    """Draw a course of 40–60 s: `bench` (ramps and holds, input locked), `moving` (sweeps of both pulleys
-    under changing load) or `reaching` (least-jerk moves, load steps on contact).
+def draw_course(
+    rng: np.random.Generator,
+    kind: str,
+    within: Range,
+    warm: bool = False,
+    rate_Hz: float | None = None,
+    lasts_s: float | None = None,
+) -> Course:
+    """Draw a course, of 40–60 s if nothing else is said: `bench` (ramps and holds, input locked), `moving` (sweeps of
+    both pulleys under changing load) or `reaching` (least-jerk moves, load steps on contact).
 
     With `warm` the temperature swings by 6–12 K, else it drifts by about one; `within.one_sided` keeps the
     load from changing its sign.
     """
-    rate = float(rng.choice(RATES_HZ))
-    time = np.arange(round(float(rng.uniform(40.0, 60.0)) * rate)) / rate
+    rate = float(rng.choice(RATES_HZ)) if rate_Hz is None else rate_Hz
+    lasts = float(rng.uniform(40.0, 60.0)) if lasts_s is None else lasts_s
+    time = np.arange(round(lasts * rate)) / rate
     makers = {"bench": _bench, "moving": _moving, "reaching": _reaching}
     joint, load = makers[kind](rng, time)
     if within.one_sided:
@@ -105,11 +138,11 @@ def _bench(rng: np.random.Generator, time: Floats) -> tuple[Floats, Floats]:
 
 
 def _moving(rng: np.random.Generator, time: Floats) -> tuple[Floats, Floats]:
-    """Sweeps whose speed and reach change, with rests; load by slow sines, ramps and holds."""
+    """Sweeps whose speed and reach change, with rests; load by slow sines, or by ramps and holds."""
     fast, slow = float(rng.uniform(0.25, 0.45)), float(rng.uniform(0.07, 0.14))
     pace = np.where((time // float(rng.uniform(6.0, 10.0))) % 2 == 0, fast, slow)
     for _ in range(int(rng.integers(1, 4))):
-        start = float(rng.uniform(3.0, time[-1] - 5.0))
+        start = float(rng.uniform(3.0, max(time[-1] - 5.0, 3.1)))
         pace = np.where((time > start) & (time < start + rng.uniform(1.0, 3.0)), 0.0, pace)
     phase = 2.0 * math.pi * _smooth(np.cumsum(pace) * (time[1] - time[0]), time, 0.2)
     wobble = 1.0 - float(rng.uniform(0.0, 0.4)) * np.sin(0.37 * phase) ** 2

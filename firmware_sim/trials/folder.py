@@ -9,101 +9,146 @@ from typing import Any
 
 import numpy as np
 
-from firmware_sim.plant import EFFECTS, FINE, EffectSpec
-from firmware_sim.plant.records import Floats
-from firmware_sim.trials.sizes import Sized, run_course
-from firmware_sim.trials.suspects import Scene
-from firmware_sim.trials.trial import Trial
-from firmware_sim.trials.writing import (
-    JOINT_FILE,
-    joint_toml,
-    observer_parameters,
-    recording_name,
-    truth_of,
-    write_recording,
-)
+from firmware_sim.plant import EFFECTS, FORMS
+from firmware_sim.trials.order import Wanted
+from firmware_sim.trials.spoil import UNITS, coarser
+from firmware_sim.trials.world import Hidden, World
+from firmware_sim.trials.writing import JOINT_FILE, joint_toml, observer_parameters, write_recording
 
 RECORDINGS, TRUTH_FILE, ANGLES_FILE = "recordings", "truth.json", "truth.npz"
-_KINDS = {"parameters": "none", "nothing": "none", "unknown": "stranger"}
 
 
-def write_trial(folder: Path, trial: Trial, seed: int) -> None:
+def write_world(folder: Path, world: World, wanted: Wanted) -> None:
     """Write recordings, configuration and truth; the folder appears whole or not at all."""
     spare = folder.with_name(folder.name + ".part")
     shutil.rmtree(spare, ignore_errors=True)
-    (spare / RECORDINGS).mkdir(parents=True)
-    for k, channels in enumerate(trial.recordings):
-        write_recording(spare / RECORDINGS / recording_name(k), channels)
-    text = joint_toml(trial.joint, trial.joint.nominal, tolerance=trial.joint.tolerance)
-    (spare / JOINT_FILE).write_text(text, encoding="utf-8")
-    truth = json.dumps(full_truth(trial, seed), indent=1) + "\n"
+    for k, leg in enumerate(world.legs):
+        path = spare / recording_file(world, k)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_recording(path, leg.recorded.channels)
+    (spare / JOINT_FILE).write_text(public_joint(world), encoding="utf-8")
+    truth = json.dumps(full_truth(world, wanted), indent=1) + "\n"
     (spare / TRUTH_FILE).write_text(truth, encoding="utf-8")
-    np.savez_compressed(spare / ANGLES_FILE, **true_angles(trial))
+    np.savez_compressed(spare / ANGLES_FILE, **true_angles(world))
     spare.rename(folder)
 
 
-def full_truth(trial: Trial, seed: int) -> dict[str, Any]:
-    """Everything that is true of a trial, as plain data."""
-    old = truth_of(trial)
-    keep = (
-        "trial",
-        "circuit",
-        "excitation",
-        "loop_rad",
-        "noise_floor_rad",
-        "true",
-        "nominal",
-        "tolerance",
-        "sensors",
-        "offset_rad",
-        "load_Nm",
-        "travel_rad",
-        "neighbour",
+def recording_file(world: World, k: int) -> str:
+    """Where recording k stands in the folder: one folder a session, where there are several."""
+    name = f"recording-{k + 1}.csv.gz"
+    if len({leg.session for leg in world.legs}) == 1:
+        return f"{RECORDINGS}/{name}"
+    return f"{RECORDINGS}/session-{world.legs[k].session + 1}/{name}"
+
+
+def public_joint(world: World) -> str:
+    """The configuration as the joint's user has it."""
+    joint, sensors = world.joint, dict(world.joint.sensors)
+    if "quantisation" in world.how and world.how["quantisation"]["stated"]:
+        for name, unit in UNITS.items():
+            key = f"{name}_resolution_{unit}"
+            sensors[key] = float(f"{sensors[key] * coarser(world.how, name):.3e}")
+    own: tuple[str, ...] = ()
+    case = world.order.case
+    conditions = {case.condition: world.other} if case is not None else {}
+    if "sessions" in world.how and world.how["sessions"]["declared"]:
+        own = ("joint_position_offset_rad", "joint_torque_offset_Nm", "pretension_N")
+    return joint_toml(
+        joint.with_sensors(sensors),
+        joint.nominal,
+        tolerance=joint.tolerance,
+        session_own=own,
+        conditions=conditions,
     )
+
+
+def full_truth(world: World, wanted: Wanted) -> dict[str, Any]:
+    """Everything that is true of a trial, as plain data."""
+    joint = world.joint
     return {
         "schema": 1,
-        "seed": seed,
-        "kind": _KINDS.get(old["kind"], old["kind"]),
-        **{k: old[k] for k in keep},
-        "effects": [_effect(e) for e in trial.effects],
-        "imperfections": {},
-        "recordings": [
-            {"file": f"{RECORDINGS}/{recording_name(k)}", "session": "1", "samples": len(c.time_s)}
-            for k, c in enumerate(trial.courses)
-        ],
+        "seed": wanted.seed,
+        "trial": world.order.number,
+        "kind": world.order.kind,
+        "laws": wanted.laws,
+        "circuit": joint.true.circuit,
+        "loop_rad": world.plain.loop_rad,
+        "noise_floor_rad": world.floor_rad,
+        "effects": [_effect(h, world.other) for h in world.hidden if not _is_dependence(world, h)],
+        "case": "" if world.order.case is None else world.order.case.name,
+        "depends_on": _dependences(world),
+        "imperfections": world.how.truth(),
+        "recordings": [_recording(world, k) for k in range(len(world.legs))],
+        "true": dict(joint.stage.__dict__),
+        "nominal": dict(joint.nominal.stages[0].__dict__),
+        "tolerance": dict(joint.tolerance),
+        "sensors": dict(joint.sensors),
+        "load_Nm": joint.load_Nm,
+        "travel_rad": joint.travel_rad,
+        "other": world.other,
+        "plain": dict(world.plain.__dict__),
     }
 
 
-def _effect(effect: Sized) -> dict[str, Any]:
-    kind = EFFECTS[effect.spec.id]
+def _recording(world: World, k: int) -> dict[str, Any]:
+    leg = world.legs[k]
     return {
-        "effect": effect.spec.id,
-        "form": "catalogue" if kind.listed else "stranger",
-        "listed": kind.listed,
-        "size": effect.size,
-        "parameters": observer_parameters(effect.spec),
-        "covariates": [c.replace("other:1", "other:neighbour") for c in kind.covariates],
-        "nearest": [effect.spec.id] if kind.listed else [],
+        "file": recording_file(world, k),
+        "session": str(leg.session + 1),
+        "course": leg.course.kind,
+        "rows": len(leg.recorded.rows),
+        "history_s": float(leg.course.seen.time_s[0] - leg.course.time_s[0]),
+        "zeros": dict(leg.zeros),
+        "pretension_N": leg.drive.stages[0].pretension_N,
     }
 
 
-def true_angles(trial: Trial) -> dict[str, Any]:
-    """Joint angle of the true drive, of the drive without any effect, and (of several) without each; rad.
+def _is_dependence(world: World, hidden: Hidden) -> bool:
+    """Whether what is concealed is no effect of its own, but a parameter of the drive that follows a condition."""
+    kind = EFFECTS.get(hidden.sized.spec.id)
+    return world.order.case is not None and kind is not None and not kind.listed
 
-    `joint_rad_k`, `plain_rad_k`, `without_<effect>_rad_k` on the samples `time_s_k` of recording k = 1, 2, …
-    """
-    specs = [e.spec for e in trial.effects]
-    found: dict[str, Floats] = {}
-    for k, course in enumerate(trial.courses, start=1):
-        scene = Scene(trial.joint, course, trial.plain)
 
-        def angle(effects: list[EffectSpec], scene: Scene = scene) -> Floats:
-            return run_course(scene, effects, FINE).joint_position_rad
+def _dependences(world: World) -> list[dict[str, Any]]:
+    """What depends on what; `size` in shares of the loop where it was sized so."""
+    case = world.order.case
+    if case is None:
+        return []
+    sizes = {h.sized.spec.id: h.sized.size for h in world.hidden}
+    followed = {"routing_friction.mu_angle": "routing_friction:bending", "pretension_N": "neighbour_tightens"}
+    return [
+        {
+            "parameter": parameter,
+            "on": on,
+            "size": None if on == "session" else sizes.get(followed[parameter]),
+        }
+        for parameter, on in case.depends
+    ]
 
-        found[f"time_s_{k}"] = course.time_s
-        found[f"joint_rad_{k}"] = angle(specs)
-        found[f"plain_rad_{k}"] = angle([])
-        if len(specs) > 1:
-            for spec in specs:
-                found[f"without_{spec.id}_rad_{k}"] = angle([s for s in specs if s is not spec])
+
+def _effect(hidden: Hidden, other: str) -> dict[str, Any]:
+    spec = hidden.sized.spec
+    kind = EFFECTS.get(spec.id) or FORMS[spec.id]
+    return {
+        "effect": kind.effect,
+        "form": "catalogue" if kind.listed or kind.form == "bending" else kind.form or "stranger",
+        "role": hidden.role,
+        "listed": kind.listed,
+        "size": hidden.sized.size,
+        "parameters": observer_parameters(spec),
+        "covariates": [c.replace("other:1", other.replace("other_", "other:")) for c in kind.covariates],
+        "nearest": [kind.effect] if kind.listed else list(kind.nearest),
+    }
+
+
+def true_angles(world: World) -> dict[str, Any]:
+    """Noise-free joint angles on the rows of recording k = 1, 2, …, rad, as an encoder without a zero of its own
+    shows them: `joint_rad_k` of the drive as it is, `plain_rad_k` without any effect, and of several
+    `without_<id>_rad_k` without each."""
+    found: dict[str, Any] = {}
+    for k, leg in enumerate(world.legs, start=1):
+        found[f"time_s_{k}"] = leg.recorded.channels["time_s"]
+        found[f"joint_rad_{k}"], found[f"plain_rad_{k}"] = leg.true_rad, leg.plain_rad
+        for name, angle in leg.without.items():
+            found[f"without_{name.replace(':', '.')}_rad_{k}"] = angle
     return found

@@ -1,6 +1,6 @@
 """`python -m firmware_sim.trials.make`: trials with their truth beside them, one folder each, to learn on.
 
-`--seed S --count N [--laws L] [--imperfections I] [--kinds K,…] --out DIR
+`--seed S --count N [--laws catalogue|other|mixed] [--imperfections none|some|all] [--kinds K,…] --out DIR
 [--first F] [--workers W]`. Folder DIR/00000 holds `recordings/…csv.gz`, `joint.toml`, `truth.json` and `truth.npz`.
 A trial depends on the seed, its number and what was asked for, not on how many are made.
 """
@@ -15,15 +15,15 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from firmware_sim.plant import PlantError
-from firmware_sim.trials.folder import write_trial
-from firmware_sim.trials.order import IMPERFECTIONS, KINDS, LAWS, Wanted, order
-from firmware_sim.trials.trial import draw_trial
+from firmware_sim.trials.folder import write_world
+from firmware_sim.trials.order import IMPERFECTIONS, KINDS, LAWS, Wanted
+from firmware_sim.trials.world import draw_world
 from firmware_sim.trials.writing import folder_name
 
 
 def make_one(wanted: Wanted, number: int, out: str) -> int:
     """Draw one trial and write its folder; returns its number."""
-    write_trial(Path(out) / folder_name(number), draw_trial(wanted.seed, order(wanted, number)), wanted.seed)
+    write_world(Path(out) / folder_name(number), draw_world(wanted, number), wanted)
     return number
 
 
@@ -59,8 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--count", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--laws", choices=LAWS, default="catalogue")
-    parser.add_argument("--imperfections", choices=IMPERFECTIONS, default="none")
+    parser.add_argument("--laws", choices=LAWS, default="mixed")
+    parser.add_argument("--imperfections", choices=IMPERFECTIONS, default="some")
     parser.add_argument("--kinds", default="single,pair,none,stranger", help=f"of {', '.join(KINDS)}")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)

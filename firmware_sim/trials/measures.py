@@ -55,28 +55,29 @@ def loop_width(deflection: Floats, load: Floats) -> float:
 def plain_measures(course: Course, joint_rad: Floats, ratio: float) -> PlainDrive:
     """Measure the plain drive's answer to a course, noise-free."""
     deflection = joint_rad - ratio * course.motor_rad
-    load, dt = course.load_Nm, course.time_s[1] - course.time_s[0]
+    load, time = course.load_Nm, course.time_s
     slope = float(np.polyfit(load, deflection, 1)[0]) if np.ptp(load) > 0 else 0.0
-    speed = np.gradient(joint_rad, dt)
+    speed = np.gradient(joint_rad, time)
     return PlainDrive(
         loop_width(deflection, load),
         max(slope, 1e-9),
         float(np.ptp(deflection)),
         _rms(load - load.mean()),
         _rms(speed),
-        _rms(np.gradient(speed, dt)),
+        _rms(np.gradient(speed, time)),
         _rms(course.other - course.other.mean()),
     )
 
 
-def apparent_angle(run: PlantRun, compliance: float) -> Floats:
+def apparent_angle(run: PlantRun, compliance: float, motor_torque: bool = False) -> Floats:
     """The joint angle as the channels tell it, rad: what a sensor of motor angle or torque gets wrong counts
-    by what it makes of the joint angle (ratio, mean compliance)."""
-    return np.asarray(
+    by what it makes of the joint angle (ratio, mean compliance), that of the motor torque where asked for."""
+    angle = (
         run.joint_position_rad
         - run.ratio * (run.motor_position_rad - run.motor_true_rad)
         - compliance * run.joint_torque_Nm
     )
+    return np.asarray(angle + compliance / run.ratio * run.motor_torque_Nm if motor_torque else angle)
 
 
 def contribution(with_effect: Floats, without: Floats) -> float:

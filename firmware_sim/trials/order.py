@@ -1,16 +1,28 @@
-"""What each of a series of trials is to hold: kinds in turn, effects in turn, drawn from the seed."""
+"""What each of a series of trials is to hold: kinds, effects and forms in turn, in orders drawn from the seed.
+
+A trial's order depends on the seed and its number alone, not on how many trials are made.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware_sim.plant import PlantError
-from firmware_sim.trials.plan import Assignment, assignment
+import numpy as np
 
-KINDS = ("single", "pair", "none", "stranger")
-LAWS = ("catalogue",)
-IMPERFECTIONS = ("none",)
-_PLANNED = {"single": "single", "pair": "pair", "none": "parameters", "stranger": "unknown"}
+from firmware_sim.plant import PlantError
+from firmware_sim.trials.forms_cable import CABLE
+from firmware_sim.trials.forms_friction import FRICTION
+from firmware_sim.trials.forms_joint import JOINT
+from firmware_sim.trials.strangers import NEAR_AND_FAR
+from firmware_sim.trials.suspects import CATALOGUE, Suspect
+from firmware_sim.trials.tabletop import Case, case_in_turn
+
+KINDS = ("single", "pair", "none", "stranger", "sessions")
+LAWS = ("catalogue", "other", "mixed")
+IMPERFECTIONS = ("none", "some", "all")
+OTHER_FORMS = (*FRICTION, *CABLE, *JOINT)
+"""What can be concealed of laws that the catalogue does not hold."""
 
 
 @dataclass(frozen=True)
@@ -23,13 +35,64 @@ class Wanted:
     imperfections: str
 
     def __post_init__(self) -> None:
-        for kind in self.kinds:
-            if kind not in KINDS:
-                raise PlantError(f"kind is {kind!r}; {', '.join(KINDS)} are accepted")
+        for what, given, known in (
+            ("kind", self.kinds, KINDS),
+            ("laws", (self.laws,), LAWS),
+            ("imperfections", (self.imperfections,), IMPERFECTIONS),
+        ):
+            for name in given:
+                if name not in known:
+                    raise PlantError(f"{what} is {name!r}; {', '.join(known)} are accepted")
+        if self.seed < 0 or not self.kinds:
+            raise PlantError(f"seed is {self.seed}; a seed of 0 or more and at least one kind are accepted")
 
 
-def order(wanted: Wanted, number: int) -> Assignment:
-    """What trial `number` is to hold: kinds in turn, each kind's effects in an order drawn from the seed."""
-    turn, within = divmod(number, len(wanted.kinds))
-    planned = assignment(wanted.seed, turn, _PLANNED[wanted.kinds[within]])
-    return Assignment(number, planned.kind, planned.effects, planned.case)
+@dataclass(frozen=True)
+class Order:
+    """What one trial is to hold; `suspects` in no order of size, `case` of one of several sessions."""
+
+    number: int
+    kind: str
+    suspects: tuple[Suspect, ...]
+    case: Case | None = None
+
+
+def order(wanted: Wanted, number: int) -> Order:
+    """What trial `number` (from 0) is to hold: kinds in turn as they were given, and each kind's effects in turn."""
+    place, within = divmod(number, len(wanted.kinds))
+    kind = wanted.kinds[within]
+    if kind == "sessions":
+        return Order(number, kind, (), case_in_turn(wanted.seed, place))
+    if kind == "none":
+        return Order(number, kind, ())
+    if kind == "stranger":
+        return Order(number, kind, (_in_turn(wanted.seed, place, NEAR_AND_FAR, 3),))
+    if kind == "single":
+        effect = _in_turn(wanted.seed, place, CATALOGUE, 4)
+        return Order(number, kind, (form_of(wanted, effect, place),))
+    return Order(number, kind, _pair(wanted, place))
+
+
+def form_of(wanted: Wanted, effect: Suspect, place: int) -> Suspect:
+    """The law by which an effect goes the `place`-th time: the catalogue's, or one of its other forms in turn."""
+    rng = np.random.default_rng([wanted.seed, 5, place])
+    if wanted.laws == "catalogue" or (wanted.laws == "mixed" and rng.uniform() < 0.5):
+        return effect
+    forms = [s for s in OTHER_FORMS if s.id.partition(":")[0] == effect.id]
+    return forms[int(rng.integers(len(forms)))]
+
+
+def _in_turn(seed: int, place: int, pool: Sequence[Suspect], stream: int) -> Suspect:
+    """Every one once in each round, in a new order each round."""
+    turn, within = divmod(place, len(pool))
+    return pool[int(np.random.default_rng([seed, stream, turn]).permutation(len(pool))[within])]
+
+
+def _pair(wanted: Wanted, place: int) -> tuple[Suspect, ...]:
+    """Two different effects that one course can show."""
+    rng = np.random.default_rng([wanted.seed, 2, place])
+    while True:
+        first, second = (CATALOGUE[int(k)] for k in rng.choice(len(CATALOGUE), 2, replace=False))
+        pair = (form_of(wanted, first, 2 * place), form_of(wanted, second, 2 * place + 1))
+        if set(pair[0].courses) & set(pair[1].courses):
+            return pair

@@ -36,28 +36,37 @@ def run_course(scene: Scene, effects: Sequence[EffectSpec] = (), resolution: Res
         temperature_degC=c.temperature_degC,
         other_1=c.other,
         resolution=resolution,
+        history=c.history,
     )
 
 
-def give_size(scene: Scene, identifier: str, shape: Shape, wanted: float, plain: PlantRun) -> Sized | None:
+def give_size(
+    scene: Scene,
+    identifier: str,
+    shape: Shape,
+    wanted: float,
+    plain: PlantRun,
+    within: tuple[float, float] = (SMALLEST, LARGEST),
+    motor_torque: bool = False,
+) -> Sized | None:
     """Find the effect whose contribution is `wanted` of the loop, or as near as it gets within its limits.
 
     `plain` is the plain drive's run. False position in logarithms, at most a few simulations.
-    None if nothing between the smallest and the largest size that counts was found.
+    None if nothing whose size lies `within` the smallest and the largest that count was found.
     """
     low: tuple[float, float] | None = None
     high: tuple[float, float] | None = None
     found: list[tuple[float, Sized]] = []
     without = (
-        apparent_angle(plain, scene.plain.compliance)
+        apparent_angle(plain, scene.plain.compliance, motor_torque)
         if shape.absent
-        else _angle(scene, identifier, shape, 0.0)
+        else _angle(scene, identifier, shape, 0.0, motor_torque)
     )
     if without is None:
         return None
     x, ceiling = min(shape.first * wanted, shape.largest), shape.largest
     for _ in range(_TRIES):
-        angle = _angle(scene, identifier, shape, x)
+        angle = _angle(scene, identifier, shape, x, motor_torque)
         if angle is None:  # more than the joint can carry
             ceiling = x
             x = 0.5 * x if low is None else math.sqrt(low[0] * x)
@@ -74,14 +83,15 @@ def give_size(scene: Scene, identifier: str, shape: Shape, wanted: float, plain:
         if size < wanted and x >= 0.999 * ceiling:
             break
         x = min(_next(low, high, wanted), ceiling)
-    fit = [sized for _, sized in sorted(found, key=lambda pair: pair[0]) if SMALLEST <= sized.size <= LARGEST]
+    nearest_first = [sized for _, sized in sorted(found, key=lambda pair: pair[0])]
+    fit = [sized for sized in nearest_first if within[0] <= sized.size <= within[1]]
     return fit[0] if fit else None
 
 
-def _angle(scene: Scene, identifier: str, shape: Shape, x: float) -> Floats | None:
+def _angle(scene: Scene, identifier: str, shape: Shape, x: float, motor_torque: bool) -> Floats | None:
     try:
         run = run_course(scene, (EffectSpec(identifier, shape.parameters(x)),))
-        return apparent_angle(run, scene.plain.compliance)
+        return apparent_angle(run, scene.plain.compliance, motor_torque)
     except PlantError:
         return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,10 +28,10 @@ class Scene:
 
 @dataclass(frozen=True)
 class Shape:
-    """An effect of known shape and open size: parameters = `fixed` and `scaled` times x.
+    """An effect of known shape and open size: parameters = `fixed` and `base` plus `scaled` times x.
 
-    `first` is a guess of x for a contribution of one loop width, `largest` what x may become. `without`
-    holds the values of the scaled parameters with which the effect counts as absent (0 where not given).
+    `first` is a guess of x for a contribution of one loop width, `largest` what x may become. Where its part of the
+    joint stays when x is 0 (a guide without friction is cable yet), `absent` is false.
     """
 
     fixed: Mapping[str, float]
@@ -39,17 +39,18 @@ class Shape:
     first: float
     largest: float
     absent: bool = True
+    base: Mapping[str, float] = field(default_factory=dict)
 
     def parameters(self, x: float) -> dict[str, float]:
         """All parameters at size x."""
-        return {**self.fixed, **{name: unit * x for name, unit in self.scaled.items()}}
+        return {**self.fixed, **{k: self.base.get(k, 0.0) + unit * x for k, unit in self.scaled.items()}}
 
 
 @dataclass(frozen=True)
 class Suspect:
     """An effect that may be concealed: in which courses, whether it needs a temperature that moves, a load
     that changes its sign, a neighbour, a closed circuit (where an open one hangs on a weight, which holds
-    the tension whatever the cable does); `shape` draws everything but its size."""
+    the tension whatever the cable does), a motor torque that is recorded; `shape` draws everything but its size."""
 
     id: str
     courses: tuple[str, ...]
@@ -58,17 +59,18 @@ class Suspect:
     neighbour: bool = False
     two_sided: bool = False
     closed: bool = False
+    motor_torque: bool = False
 
 
-def _angle(rng: np.random.Generator) -> float:
+def angle(rng: np.random.Generator) -> float:
     return float(rng.uniform(-math.pi, math.pi))
 
 
-def _sign(rng: np.random.Generator, minus: float = 0.5) -> float:
+def sign(rng: np.random.Generator, minus: float = 0.5) -> float:
     return -1.0 if rng.uniform() < minus else 1.0
 
 
-def _instant(rng: np.random.Generator, scene: Scene) -> float:
+def instant(rng: np.random.Generator, scene: Scene) -> float:
     time = scene.course.time_s
     return float(round(time[0] + rng.uniform(0.25, 0.75) * (time[-1] - time[0]), 2))
 
@@ -93,7 +95,7 @@ def _thermal(rng: np.random.Generator, scene: Scene) -> Shape:
     warm = scene.course.temperature_degC
     reference = 20.0 + float(rng.uniform(-1.0, 1.0))
     reach = max(float(np.max(np.abs(warm - reference))), 1e-3)
-    unit = _sign(rng) / reach
+    unit = sign(rng) / reach
     return Shape({"reference_degC": reference}, {"coefficient_per_K": unit}, 0.1, 0.35)
 
 
@@ -121,8 +123,8 @@ def _backlash(rng: np.random.Generator, scene: Scene) -> Shape:
 
 
 def _nonlinear(rng: np.random.Generator, scene: Scene) -> Shape:
-    sign = _sign(rng, 0.2)
-    return Shape({}, {"stiffening": sign}, 0.5, 0.85 if sign > 0 else 0.45)
+    way = sign(rng, 0.2)
+    return Shape({}, {"stiffening": way}, 0.5, 0.85 if way > 0 else 0.45)
 
 
 def _strand(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -132,23 +134,23 @@ def _strand(rng: np.random.Generator, scene: Scene) -> Shape:
 
 
 def _pressure(rng: np.random.Generator, scene: Scene) -> Shape:
-    sign = _sign(rng, 0.2)
-    return Shape({}, {"exponent": sign}, 2.0, 0.75 if sign > 0 else 0.35)
+    way = sign(rng, 0.2)
+    return Shape({}, {"exponent": way}, 2.0, 0.75 if way > 0 else 0.35)
 
 
 def _position(rng: np.random.Generator, scene: Scene) -> Shape:
-    return Shape({"phase_rad": _angle(rng)}, {"amplitude": 1.0}, 1.5, 0.9)
+    return Shape({"phase_rad": angle(rng)}, {"amplitude": 1.0}, 1.5, 0.9)
 
 
 def _runout(rng: np.random.Generator, scene: Scene) -> Shape:
     radius = scene.joint.stage.output_radius_m
     first = 2.0 * scene.plain.loop_rad * radius
-    return Shape({"phase_rad": _angle(rng)}, {"eccentricity_m": 1.0}, first, 0.1 * radius)
+    return Shape({"phase_rad": angle(rng)}, {"eccentricity_m": 1.0}, first, 0.1 * radius)
 
 
 def _clock(rng: np.random.Generator, scene: Scene) -> Shape:
     first = scene.plain.loop_rad / max(scene.plain.speed_rms, 1e-9)
-    return Shape({}, {"delay_s": _sign(rng, 0.3)}, first, 0.045)
+    return Shape({}, {"delay_s": sign(rng, 0.3)}, first, 0.045)
 
 
 def _inertia(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -160,7 +162,7 @@ def _inertia(rng: np.random.Generator, scene: Scene) -> Shape:
 def _gravity(rng: np.random.Generator, scene: Scene) -> Shape:
     p = scene.plain
     return Shape(
-        {"phase_rad": _angle(rng)},
+        {"phase_rad": angle(rng)},
         {"moment_Nm": 1.0},
         2.0 * p.loop_rad / p.compliance,
         0.6 * scene.joint.load_Nm,
@@ -174,7 +176,7 @@ def _clamp(rng: np.random.Generator, scene: Scene) -> Shape:
     # a quarter of the pretension at the most may go
     whole = stage.free_length_m + stage.output_radius_m / stage.mu_output
     return Shape(
-        {"time_s": _instant(rng, scene)},
+        {"time_s": instant(rng, scene)},
         {"slip_m": 1.0},
         first,
         0.25 * stage.pretension_N / stage.EA_N * whole * shafts,
@@ -182,13 +184,13 @@ def _clamp(rng: np.random.Generator, scene: Scene) -> Shape:
 
 
 def _break(rng: np.random.Generator, scene: Scene) -> Shape:
-    return Shape({"time_s": _instant(rng, scene)}, {"fraction": 1.0}, 0.5, 0.7)
+    return Shape({"time_s": instant(rng, scene)}, {"fraction": 1.0}, 0.5, 0.7)
 
 
 def _crosstalk(rng: np.random.Generator, scene: Scene) -> Shape:
     p = scene.plain
     first = p.loop_rad / p.compliance / max(p.other_rms, 1e-9)
-    return Shape({}, {"load_coefficient": _sign(rng)}, first, 0.5)
+    return Shape({}, {"load_coefficient": sign(rng)}, first, 0.5)
 
 
 CATALOGUE = (

@@ -119,7 +119,7 @@ def plain_scene(joint: DrawnJoint, course: Course) -> tuple[Scene, PlantRun]:
     """The scene of a course with the measures of its plain drive, and the plain drive's run."""
     unmeasured = PlainDrive(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     run = run_course(Scene(joint, course, unmeasured))
-    return Scene(joint, course, plain_measures(course, run.joint_position_rad, joint.true.ratio)), run
+    return Scene(joint, course, plain_measures(course.seen, run.joint_position_rad, joint.true.ratio)), run
 
 
 def _size_all(
@@ -157,14 +157,15 @@ def _record(
     recordings = []
     for course in courses:
         run = run_course(Scene(joint, course, plain), [e.spec for e in effects], FINE)
-        if _slack(run, joint):
+        if is_slack(run, joint):
             return None
         recordings.append(read_sensors(rng, run, joint, course, neighbour))
     floor = noise_floor_rad(joint, plain)
     return Trial(wanted, joint, effects, plain, courses, tuple(recordings), floor, neighbour, partner)
 
 
-def _slack(run: PlantRun, joint: DrawnJoint) -> bool:
+def is_slack(run: PlantRun, joint: DrawnJoint) -> bool:
+    """Whether a cable came so near to going slack that the trial would be about that."""
     least = float(run.tension_h_N.min())
     if joint.true.circuit == "closed":
         least = min(least, float(run.tension_l_N.min()))

@@ -54,8 +54,11 @@ def joint_toml(
     effects: Sequence[EffectSpec] = (),
     tolerance: Mapping[str, float] | None = None,
     offset_rad: float | None = None,
+    session_own: Sequence[str] = (),
+    conditions: Mapping[str, str] | None = None,
 ) -> str:
-    """A joint's configuration file: drive as given, the joint's sensors and limits, effects if any."""
+    """A joint's configuration file: drive as given, the joint's sensors and limits, effects if any, what may
+    differ from session to session where that is known, and which channels tell how the drive stood."""
     sensors = dict(joint.sensors)
     if offset_rad is not None:
         sensors["joint_position_offset_rad"] = offset_rad
@@ -75,6 +78,10 @@ def joint_toml(
         lines += _table("[tolerance]", tolerance)
     lines += _table("[sensors]", sensors)
     lines += _table("[limits]", limits)
+    if session_own:
+        lines += _table("[session]", {"own": list(session_own)})
+    if conditions:
+        lines += _table("[condition]", conditions)
     for effect in effects:
         lines += _table("[[effect]]", {"id": effect.id, **observer_parameters(effect)})
     return "\n".join(lines) + "\n"
@@ -152,4 +159,4 @@ def _table(head: str, values: Mapping[str, Any]) -> list[str]:
 
 
 def _value(value: Any) -> str:
-    return json.dumps(value) if isinstance(value, str) else repr(float(value))
+    return json.dumps(value) if isinstance(value, (str, list)) else repr(float(value))

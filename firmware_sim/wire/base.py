@@ -19,11 +19,12 @@ class Answer(Enum):
 
 
 class Heard(NamedTuple):
-    """What came of a frame: the answers that it asks for, and whether it is a command that steps stepped
-    time."""
+    """What came of a frame: the answers that it asks for, whether it is a command that steps stepped time, and
+    whether the drive listens to other identifiers from now on."""
 
     answers: tuple[Answer, ...] = ()
     steps: bool = False
+    moved: bool = False
 
 
 class DriveWire(Protocol):
@@ -31,7 +32,12 @@ class DriveWire(Protocol):
     frames."""
 
     def identifiers(self) -> Iterable[int]:
-        """Identifiers of the frames that are meant for this drive."""
+        """Identifiers of the frames that are meant for this drive, 29-bit ones marked `EXTENDED`, or
+        `LAST_BYTE | n` for all that end in n."""
+        ...
+
+    def broadcasts(self) -> Iterable[int]:
+        """Identifiers of the frames that are meant for every drive of this protocol."""
         ...
 
     def hear(self, frame: Frame, drive: Drive, now_s: float) -> Heard:

@@ -36,7 +36,7 @@ from firmware_sim.errors import SimError
 from firmware_sim.firmware import Drive, DriveFlag, DriveReport, Mode, Request, Setpoint
 from firmware_sim.wire.base import Answer, Heard
 from firmware_sim.wire.dbc_text import render
-from firmware_sim.wire.frame import Frame
+from firmware_sim.wire.frame import EXTENDED, Frame
 from firmware_sim.wire.packed import PackedMessage
 from firmware_sim.wire.tables import joint_table
 
@@ -184,7 +184,11 @@ class DbcWire:
     def identifiers(self) -> Iterable[int]:
         """The messages that the host sends."""
         heard = (self.command,) if self.control is None else (self.command, self.control)
-        return tuple(spoken.packed.identifier for spoken in heard)
+        return tuple(s.packed.identifier | (EXTENDED if s.packed.extended else 0) for s in heard)
+
+    def broadcasts(self) -> Iterable[int]:
+        """None."""
+        return ()
 
     def hear(self, frame: Frame, drive: Drive, now_s: float) -> Heard:
         """Targets are answered by the state, controls by the status and the state."""

@@ -5,6 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+EXTENDED = 0x8000_0000
+"""Marks a 29-bit identifier where identifiers of both lengths stand side by side."""
+LAST_BYTE = 0x1_0000_0000
+"""`LAST_BYTE | n`: every 29-bit identifier that ends in the byte n."""
+
 
 class Frame(NamedTuple):
     """A CAN frame or a serial record: identifier, 0 to 8 bytes, and whether it asks (remote) instead of
@@ -14,6 +19,11 @@ class Frame(NamedTuple):
     data: bytes = b""
     remote: bool = False
     extended: bool = False
+
+    @property
+    def key(self) -> int:
+        """Identifier, marked where it has 29 bits."""
+        return self.identifier | EXTENDED if self.extended else self.identifier
 
 
 def to_raw(value: float, scale: float, bits: int) -> int:

@@ -1,10 +1,13 @@
 """ODrive CANSimple, device side: identifier = node << 5 | command, little-endian, angles in turns.
 
-Heartbeat (0x01), encoder estimates (0x09), Iq (0x14), temperature (0x15), bus voltage and current (0x17)
-and torques
-(0x1C) go out by themselves at the rates of the configuration; each of them, and version (0x00) and error
-(0x03), also
-answers a remote request. Source: ODrive documentation, "CAN Protocol", and its message table (firmware 0.6).
+Two firmwares, which share most messages but not all: 0.5 (ODrive v3.x, both axes nodes of their own) and 0.6
+(Pro, S1, Micro). What differs lies in `Firmware`: error bits, the heartbeat's last three bytes, what 0x03 to
+0x06, 0x0A, 0x15, 0x19, 0x1C and 0x1D mean, and which messages feed the watchdog. Every cyclic message also
+answers a remote request, or an empty frame in its place.
+
+Sources: ODrive's message tables (`odrive-cansimple.dbc`) of 0.5.6 and 0.6.10; ODrive's documentation, "CAN
+Protocol" of both; 0.5's published firmware (`can_simple.cpp`); ODrive's own CAN examples for addressing and
+parameter access.
 """
 
 from __future__ import annotations
@@ -13,59 +16,74 @@ import math
 import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 from firmware_sim.errors import SimError
-from firmware_sim.firmware import Drive, DriveFlag, DriveReport, DriveState, Mode, Request, Setpoint
+from firmware_sim.firmware import (
+    Drive,
+    DriveFlag,
+    DriveReport,
+    DriveState,
+    InputMode,
+    Mode,
+    Request,
+    Setpoint,
+)
 from firmware_sim.wire.base import Answer, Heard
 from firmware_sim.wire.frame import Frame
+from firmware_sim.wire.odrive_endpoints import serve
+from firmware_sim.wire.odrive_errors import V05, V06, Codes
 
 TURN = 2.0 * math.pi
 IDLE, INDEX_SEARCH, CLOSED_LOOP = 1, 6, 8
 CALIBRATIONS = (3, 4, 6, 7)
 MODES = {1: Mode.TORQUE, 2: Mode.VELOCITY, 3: Mode.POSITION}
-PASSTHROUGH = 1
 SUCCESS, BUSY, DISARMED, INVALID_STATE, NOT_CALIBRATED = 0, 1, 3, 13, 14
-ERRORS = (
-    (DriveFlag.STARTED_AFRESH, 0),
-    (DriveFlag.MOTOR_ENCODER, 0x8),
-    (DriveFlag.OVER_TEMPERATURE, 0x2000),
-    (DriveFlag.OVER_VELOCITY, 0x8000),
-    (DriveFlag.POSITION_LIMIT, 0x1_0000),
-    (DriveFlag.COMMAND_TIMEOUT, 0x100_0000),
-    (DriveFlag.EMERGENCY_STOP, 0x200_0000),
-    (DriveFlag.INDEX_NOT_FOUND, 0x4000_0000),
-)
+BROADCAST = 0x3F
+ADDRESS, REBOOT, CLEAR = 0x06, 0x16, 0x18
+COUNTS_PER_TURN = 8192
+BUS_V = 24.0
+
+FirmwareName = Literal["0.5", "0.6"]
 
 
 @dataclass(frozen=True)
 class OdriveRates:
-    """Cyclic messages: every how many samples each goes out; 0 = only when asked."""
+    """Cyclic messages: every how many samples each goes out; 0 = only when asked. `temperature`, `torques` and
+    `powers` are there in firmware 0.6 only."""
 
     heartbeat: int = 100
     encoder: int = 1
-    iq: int = 0
+    error: int = 100
+    iq: int = 10
     temperature: int = 100
-    bus: int = 0
+    bus: int = 100
     torques: int = 1
-
-
-def error_bits(report: DriveReport) -> int:
-    """Active errors in ODrive's bits."""
-    if report.state is not DriveState.FAULT:
-        return 0
-    return sum(bit for flag, bit in ERRORS if report.flags & flag)
+    powers: int = 0
 
 
 class OdriveWire:
-    """A drive that speaks CANSimple; `node` 0…62, `torque_constant` in Nm/A turns current limits into
-    torque limits."""
+    """A drive that speaks CANSimple; `node` 0…62, or 63 for one that was given no address yet;
+    `torque_constant` in Nm/A turns current limits into torque limits."""
 
-    def __init__(self, node: int, rates: OdriveRates | None = None, torque_constant: float = 0.1) -> None:
-        if not 0 <= node <= 0x3E:
-            raise SimError(f"odrive: node {node}; 0 to 62 is accepted")
-        self.node = node
+    def __init__(
+        self,
+        node: int,
+        rates: OdriveRates | None = None,
+        torque_constant: float = 0.1,
+        firmware: FirmwareName = "0.6",
+        serial: int | None = None,
+    ) -> None:
+        if not 0 <= node <= BROADCAST:
+            raise SimError(f"odrive: node {node}; 0 to 63 is accepted")
+        self.node = self._saved_node = node
+        self.serial = 0x3000_0000_0000 + node if serial is None else serial
         self.rates = OdriveRates() if rates is None else rates
         self.torque_constant = torque_constant
+        self.codes: Codes = {"0.5": V05, "0.6": V06}[firmware]
+        self._old = firmware == "0.5"
+        self._hear = HEAR_05 if self._old else HEAR_06
+        self._tell = TELL_05 if self._old else TELL_06
         self._disarm_reason = 0
         self._result = SUCCESS
         self.reset()
@@ -75,34 +93,54 @@ class OdriveWire:
         self._samples = 0
         self._told: tuple[int, int] | None = None
         self._result = SUCCESS
+        self.node = self._saved_node
 
     def identifiers(self) -> Iterable[int]:
         """Every command of the node."""
         return (self.node << 5 | command for command in range(32))
 
+    def broadcasts(self) -> Iterable[int]:
+        """Addressing, reboot and identification of all nodes (firmware 0.6)."""
+        return () if self._old else (BROADCAST << 5 | c for c in (ADDRESS, REBOOT, CLEAR))
+
     # ---- from the host ---------------------------------------------------------------------------
 
     def hear(self, frame: Frame, drive: Drive, now_s: float) -> Heard:
-        """Apply one frame; a remote request is answered, a frame too short for its command is counted as
-        bad."""
+        """Apply one frame; a request is answered, a frame too short for its command is counted as bad."""
         command = frame.identifier & 0x1F
-        if frame.remote:
-            return Heard((Answer.ASKED,)) if command in TELL else Heard()
-        action = HEAR.get(command)
-        if action is None or len(frame.data) < action[0]:
-            if command not in TELL:
+        fed = command in self.codes.feeding or self._old
+        if fed and not (frame.remote and not self._old):
+            drive.feed_watchdog(now_s)
+        asks = frame.remote or not frame.data
+        if asks and command in self._tell:
+            return Heard((Answer.ASKED,))
+        action = self._hear.get(command)
+        if frame.remote or action is None or len(frame.data) < action[0]:
+            if command not in self._tell:
                 drive.flags |= DriveFlag.BAD_FRAME
             return Heard()
-        action[1](self, frame.data, drive, now_s)
-        drive.feed_watchdog(now_s)
-        if command == 0x07:
-            return Heard((Answer.STATUS,))
-        return Heard(steps=command in (0x0C, 0x0D, 0x0E))
+        before = self.node
+        answers = action[1](self, frame.data, drive, now_s)
+        return Heard(answers or (), command in (0x0C, 0x0D, 0x0E), self.node != before)
 
     def _stop(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.request(Request.STOP, now_s)
 
-    def _axis_state(self, data: bytes, drive: Drive, now_s: float) -> None:
+    def _sdo(self, data: bytes, drive: Drive, now_s: float) -> tuple[Answer, ...]:
+        self._sdo_answer = serve(data, drive)
+        return () if self._sdo_answer is None else (Answer.ASKED,)
+
+    def _address(self, data: bytes, drive: Drive, now_s: float) -> None:
+        wanted, serial = data[0], int.from_bytes(data[1:7], "little")
+        if serial == self.serial:
+            self.node = wanted & 0x3F
+        elif wanted == self.node:
+            self.node = BROADCAST  # another drive is given this number: make room
+
+    def _node_id(self, data: bytes, drive: Drive, now_s: float) -> None:
+        self.node = self._saved_node = struct.unpack_from("<I", data)[0] & 0x3F
+
+    def _axis_state(self, data: bytes, drive: Drive, now_s: float) -> tuple[Answer, ...]:
         (wanted,) = struct.unpack_from("<I", data)
         if wanted == IDLE:
             accepted = drive.request(Request.DISABLE, now_s)
@@ -115,13 +153,15 @@ class OdriveWire:
         self._result = SUCCESS if accepted else INVALID_STATE
         if drive.flags & DriveFlag.NOT_CALIBRATED:
             self._result = NOT_CALIBRATED
+        return (Answer.STATUS,)
 
-    def _controller_mode(self, data: bytes, drive: Drive, now_s: float) -> None:
-        control, shaping = struct.unpack_from("<II", data)
-        if control not in MODES or shaping != PASSTHROUGH:
-            drive.flags |= DriveFlag.BAD_FRAME  # the simulated drive has no ramps and no filters
-            return
-        drive.set_mode(MODES[control])
+    def _controller_mode(self, data: bytes, drive: Drive, now_s: float) -> tuple[Answer, ...]:
+        control, inputs = struct.unpack_from("<II", data)
+        if control not in MODES or inputs not in InputMode.__members__.values():
+            drive.refuse_mode()
+            return (Answer.STATUS,)
+        drive.set_mode(MODES[control], InputMode(inputs))
+        return ()
 
     def _input_pos(self, data: bytes, drive: Drive, now_s: float) -> None:
         position, velocity, torque = struct.unpack_from("<fhh", data)
@@ -129,17 +169,33 @@ class OdriveWire:
 
     def _input_vel(self, data: bytes, drive: Drive, now_s: float) -> None:
         velocity, torque = struct.unpack_from("<ff", data)
-        drive.command(Setpoint(drive.setpoint.position_rad, velocity * TURN, torque), now_s)
+        drive.command(drive.setpoint._replace(velocity_rad_s=velocity * TURN, torque_Nm=torque), now_s)
 
     def _input_torque(self, data: bytes, drive: Drive, now_s: float) -> None:
         (torque,) = struct.unpack_from("<f", data)
-        drive.command(Setpoint(drive.setpoint.position_rad, 0.0, torque), now_s)
+        drive.command(drive.setpoint._replace(torque_Nm=torque), now_s)
 
     def _limits(self, data: bytes, drive: Drive, now_s: float) -> None:
         velocity, current = struct.unpack_from("<ff", data)
         drive.set_limits(velocity * TURN, current * self.torque_constant)
 
+    def _trajectory_velocity(self, data: bytes, drive: Drive, now_s: float) -> None:
+        drive.shaper.config.trajectory_velocity_rad_s = struct.unpack_from("<f", data)[0] * TURN
+
+    def _trajectory_acceleration(self, data: bytes, drive: Drive, now_s: float) -> None:
+        up, down = struct.unpack_from("<ff", data)
+        drive.shaper.config.trajectory_acceleration_rad_s2 = up * TURN
+        drive.shaper.config.trajectory_deceleration_rad_s2 = down * TURN
+
+    def _inertia(self, data: bytes, drive: Drive, now_s: float) -> None:
+        drive.shaper.config.inertia_Nms2_per_rad = struct.unpack_from("<f", data)[0] / TURN
+
     def _reboot(self, data: bytes, drive: Drive, now_s: float) -> None:
+        action = data[0] if data else 0
+        if action == 1:
+            self._saved_node = self.node
+        elif action == 2:
+            self._saved_node = BROADCAST
         drive.request(Request.RESET, now_s)
         self.reset()
 
@@ -149,6 +205,9 @@ class OdriveWire:
 
     def _absolute(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.set_position(struct.unpack_from("<f", data)[0] * TURN)
+
+    def _linear_count(self, data: bytes, drive: Drive, now_s: float) -> None:
+        drive.set_position(struct.unpack_from("<i", data)[0] * TURN / COUNTS_PER_TURN)
 
     def _pos_gain(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.set_gains(position=struct.unpack_from("<f", data)[0])
@@ -162,67 +221,99 @@ class OdriveWire:
     def answer(self, answer: Answer, frame: Frame, drive: Drive) -> Frame | None:
         """The message asked for; a change of state is answered by a heartbeat."""
         command = 0x01 if answer is Answer.STATUS else frame.identifier & 0x1F
-        return self._message(command, drive.report())
+        if command == 0x04 and not self._old:
+            return None if self._sdo_answer is None else Frame(self.node << 5 | 0x05, self._sdo_answer)
+        return self._message(command, drive)
+
+    _sdo_answer: bytes | None = None
 
     def cyclic(self, drive: Drive, now_s: float) -> list[Frame]:
         """Messages that are due at this sample; the heartbeat also at once when state or errors change."""
         report = drive.report()
-        state = (report.state, error_bits(report))
+        state = (report.state, self.codes.axis(report))
         count, rates = self._samples, self.rates
         self._samples += 1
         due = []
         if state != self._told or (rates.heartbeat and count % rates.heartbeat == 0):
             self._told = state
             due.append(0x01)
-        for command, every in (
-            (0x09, rates.encoder),
-            (0x14, rates.iq),
-            (0x15, rates.temperature),
-            (0x17, rates.bus),
-            (0x1C, rates.torques),
-        ):
-            if every and count % every == 0:
-                due.append(command)
-        return [self._message(command, report) for command in due]
+        periods = [(0x09, rates.encoder), (0x03, rates.error), (0x14, rates.iq), (0x17, rates.bus)]
+        if not self._old:
+            periods += [(0x15, rates.temperature), (0x1C, rates.torques), (0x1D, rates.powers)]
+        due += [command for command, every in periods if every and count % every == 0]
+        return [self._message(command, drive) for command in due]
 
-    def _message(self, command: int, report: DriveReport) -> Frame:
-        return Frame(self.node << 5 | command, TELL[command](self, report))
+    def _message(self, command: int, drive: Drive) -> Frame:
+        return Frame(self.node << 5 | command, self._tell[command](self, drive, drive.report()))
 
-    def _tell_version(self, report: DriveReport) -> bytes:
+    def _tell_version(self, drive: Drive, report: DriveReport) -> bytes:
         return bytes((2, 4, 4, 58, 0, 6, 10, 0))
 
-    def _tell_heartbeat(self, report: DriveReport) -> bytes:
+    def _axis(self, report: DriveReport) -> tuple[int, int]:
         state = {DriveState.ENABLED: CLOSED_LOOP, DriveState.CALIBRATING: INDEX_SEARCH}.get(
             report.state, IDLE
         )
-        errors = error_bits(report)
+        errors = self.codes.axis(report)
         if errors:
             self._disarm_reason = errors
+        return errors, state
+
+    def _tell_heartbeat(self, drive: Drive, report: DriveReport) -> bytes:
+        errors, state = self._axis(report)
         result = DISARMED if errors else BUSY if state == INDEX_SEARCH else self._result
-        return struct.pack("<IBBBB", errors, state, result, 0, 0)
+        return struct.pack("<IBBBB", errors, state, result, drive.shaper.trajectory_done, 0)
 
-    def _tell_error(self, report: DriveReport) -> bytes:
-        return struct.pack("<II", error_bits(report), self._disarm_reason)
+    def _tell_heartbeat_05(self, drive: Drive, report: DriveReport) -> bytes:
+        errors, state = self._axis(report)
+        c = self.codes
+        controller = (c.controller(report) != 0) | drive.shaper.trajectory_done << 7
+        return struct.pack("<IBBBB", errors, state, c.motor(report) != 0, c.encoder(report) != 0, controller)
 
-    def _tell_encoder(self, report: DriveReport) -> bytes:
+    def _tell_error(self, drive: Drive, report: DriveReport) -> bytes:
+        return struct.pack("<II", self.codes.axis(report), self._disarm_reason)
+
+    def _tell_motor_error(self, drive: Drive, report: DriveReport) -> bytes:
+        return struct.pack("<Q", self.codes.motor(report))
+
+    def _tell_encoder_error(self, drive: Drive, report: DriveReport) -> bytes:
+        return struct.pack("<II", self.codes.encoder(report), 0)
+
+    def _tell_controller_error(self, drive: Drive, report: DriveReport) -> bytes:
+        return struct.pack("<II", self.codes.controller(report), 0)
+
+    def _tell_nothing(self, drive: Drive, report: DriveReport) -> bytes:
+        return bytes(8)  # sensorless estimator and its errors: there is none here
+
+    def _tell_address(self, drive: Drive, report: DriveReport) -> bytes:
+        return bytes((self.node,)) + self.serial.to_bytes(6, "little") + b"\x00"
+
+    def _tell_encoder(self, drive: Drive, report: DriveReport) -> bytes:
         return struct.pack("<ff", report.position_rad / TURN, report.velocity_rad_s / TURN)
 
-    def _tell_iq(self, report: DriveReport) -> bytes:
+    def _tell_count(self, drive: Drive, report: DriveReport) -> bytes:
+        count = round(report.position_rad / TURN * COUNTS_PER_TURN)
+        return struct.pack("<ii", count, count % COUNTS_PER_TURN)
+
+    def _tell_iq(self, drive: Drive, report: DriveReport) -> bytes:
         return struct.pack("<ff", report.torque_command_Nm / self.torque_constant, report.current_A)
 
-    def _tell_temperature(self, report: DriveReport) -> bytes:
+    def _tell_temperature(self, drive: Drive, report: DriveReport) -> bytes:
         return struct.pack("<ff", report.temperature_degC, report.temperature_degC)
 
-    def _tell_bus(self, report: DriveReport) -> bytes:
-        power = report.torque_Nm * report.velocity_rad_s
-        return struct.pack("<ff", 24.0, power / 24.0)
+    def _tell_bus(self, drive: Drive, report: DriveReport) -> bytes:
+        return struct.pack("<ff", BUS_V, report.torque_Nm * report.velocity_rad_s / BUS_V)
 
-    def _tell_torques(self, report: DriveReport) -> bytes:
+    def _tell_torques(self, drive: Drive, report: DriveReport) -> bytes:
         return struct.pack("<ff", report.torque_command_Nm, report.torque_Nm)
 
+    def _tell_powers(self, drive: Drive, report: DriveReport) -> bytes:
+        power = report.torque_Nm * report.velocity_rad_s
+        return struct.pack("<ff", power, power)  # the simulated motor loses nothing
 
-Hear = Callable[[OdriveWire, bytes, Drive, float], None]
-HEAR: dict[int, tuple[int, Hear]] = {
+
+Hear = Callable[[OdriveWire, bytes, Drive, float], tuple[Answer, ...] | None]
+Tell = Callable[[OdriveWire, Drive, DriveReport], bytes]
+_HEAR: dict[int, tuple[int, Hear]] = {
     0x02: (0, OdriveWire._stop),
     0x07: (4, OdriveWire._axis_state),
     0x0B: (8, OdriveWire._controller_mode),
@@ -230,19 +321,43 @@ HEAR: dict[int, tuple[int, Hear]] = {
     0x0D: (8, OdriveWire._input_vel),
     0x0E: (4, OdriveWire._input_torque),
     0x0F: (8, OdriveWire._limits),
+    0x11: (4, OdriveWire._trajectory_velocity),
+    0x12: (8, OdriveWire._trajectory_acceleration),
+    0x13: (4, OdriveWire._inertia),
     0x16: (0, OdriveWire._reboot),
     0x18: (0, OdriveWire._clear),
-    0x19: (4, OdriveWire._absolute),
     0x1A: (4, OdriveWire._pos_gain),
     0x1B: (8, OdriveWire._vel_gains),
 }
-TELL: dict[int, Callable[[OdriveWire, DriveReport], bytes]] = {
+HEAR_05 = {**_HEAR, 0x06: (4, OdriveWire._node_id), 0x19: (4, OdriveWire._linear_count)}
+HEAR_06: dict[int, tuple[int, Hear]] = {
+    **_HEAR,
+    0x04: (4, OdriveWire._sdo),
+    0x06: (7, OdriveWire._address),
+    0x19: (4, OdriveWire._absolute),
+}
+_TELL: dict[int, Tell] = {
+    0x09: OdriveWire._tell_encoder,
+    0x14: OdriveWire._tell_iq,
+    0x17: OdriveWire._tell_bus,
+}
+TELL_05: dict[int, Tell] = {
+    **_TELL,
+    0x01: OdriveWire._tell_heartbeat_05,
+    0x03: OdriveWire._tell_motor_error,
+    0x04: OdriveWire._tell_encoder_error,
+    0x05: OdriveWire._tell_nothing,
+    0x0A: OdriveWire._tell_count,
+    0x15: OdriveWire._tell_nothing,
+    0x1D: OdriveWire._tell_controller_error,
+}
+TELL_06: dict[int, Tell] = {
+    **_TELL,
     0x00: OdriveWire._tell_version,
     0x01: OdriveWire._tell_heartbeat,
     0x03: OdriveWire._tell_error,
-    0x09: OdriveWire._tell_encoder,
-    0x14: OdriveWire._tell_iq,
+    0x06: OdriveWire._tell_address,
     0x15: OdriveWire._tell_temperature,
-    0x17: OdriveWire._tell_bus,
     0x1C: OdriveWire._tell_torques,
+    0x1D: OdriveWire._tell_powers,
 }

@@ -46,7 +46,7 @@ SENSOR_FLAGS = (
 DRIVE_FLAGS = (
     "bit 0 command timeout, 1 over torque, 2 over velocity, 3 position limit, 4 motor encoder, "
     "5 index not found, 6 over temperature, 7 emergency stop, 8 bad frame, "
-    "9 started afresh, 10 not calibrated"
+    "9 started afresh, 10 not calibrated, 11 asked for a mode that it does not have"
 )
 
 

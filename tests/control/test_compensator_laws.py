@@ -12,7 +12,7 @@ import pytest
 
 from cablecomp.config import load_joint
 from cablecomp.control.command import FULL, Feed, Reference
-from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains, preload_of, ratio_of
+from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains, preload_of
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
 from cablecomp.control.shaping import Ahead, Bump, Slope
 from cablecomp.errors import InputError
@@ -20,7 +20,7 @@ from cablecomp.observer import Observer
 from cablecomp.signals import NAN, Estimate, Sample
 
 JOINT = load_joint(Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml")
-N = ratio_of(JOINT)
+N = JOINT.drive.ratio
 T = 1e-3
 K = 200.0
 GAINS = Gains(20.0, 0.0, 20.0, 0.0, 0.0, 5.0, 0.0)

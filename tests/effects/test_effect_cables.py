@@ -259,7 +259,8 @@ def test_a_stiffening_cable_against_quadrature(b: float) -> None:
         stretch += stage.output_radius_m * wrap_stretch(strain, tau, stage.mu_output)
         stretch += stage.input_radius_m * wrap_stretch(strain, tau, stage.mu_input)
         expected = stretch * stage.pretension_N / stage.EA_N / stage.output_radius_m
-        # the joint turns back by some 1e-2 rad, and with it the wraps: exact for M < 0 (sheet, section 2)
+        # the joint turns back by some 1e-2 rad, and with it the wraps: exact for M < 0, where
+        # no tensioned cable winds on or off (thesis, 3-30)
         assert found[k] == pytest.approx(expected, rel=1e-9)
 
 

@@ -1,4 +1,4 @@
-"""The README's worked example, run exactly as it stands there."""
+"""The guide's worked example, run exactly as it stands there."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 
 EXAMPLE = Path(__file__).with_name("user_effect_example.py")
-README = Path(__file__).parents[2] / "README.md"
-SECTION = "Adding an effect of your own"
+GUIDE = Path(__file__).parents[2] / "cablecomp/guide/effects.md"
 
 
 @pytest.fixture(autouse=True)
@@ -25,10 +24,8 @@ def _nothing_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_registered", {})
 
 
-def test_the_readme_shows_this_very_file() -> None:
-    text = README.read_text(encoding="utf-8")
-    assert SECTION in text
-    block = re.search(r"```python\n(.*?)```", text[text.index(SECTION) :], re.S)
+def test_the_guide_shows_this_very_file() -> None:
+    block = re.search(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.S)
     assert block is not None
     code = EXAMPLE.read_text(encoding="utf-8").split('"""\n', 1)[1].strip()
     assert block.group(1).strip().endswith(code)

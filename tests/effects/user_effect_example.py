@@ -1,4 +1,4 @@
-"""A seal that drags on the output shaft: the file `seal_drag.py` of the README, word for word."""
+"""A seal that drags on the output shaft: the file `seal_drag.py` of the guide, word for word."""
 
 from cablecomp.effects import Change, Effect, Parameter, register, term
 from cablecomp.mechanics.layout import X_DT, X_FIRST, X_JOINT, X_JOINT_OLD, X_MOMENT, X_MOMENT_SLOPE

@@ -68,6 +68,13 @@ NEUTRAL: dict[str, Mapping[str, float]] = {
     "torque_sensor_hysteresis": {"fraction": 0.0, "width_Nm": 0.1},
     "torque_sensor_drift": {"coefficient_Nm_per_K": 0.0},
     "motor_torque_cogging": {"amplitude_Nm": 0.0},
+    "flange_climb": {"radius_m_per_rad": 0.0},
+    "input_play": {"gap_rad": 0.0},
+    "self_heating": {"fraction": 0.0},
+    "neighbour_tightens": {"coefficient_per_unit": 0.0},
+    "encoder_hub_slip": {"slip_rad": 0.0, "time_s": 1.0},
+    "torque_sensor_lag": {"lag_s": 0.0},
+    "joint_encoder_drift": {"coefficient_rad_per_K": 0.0},
 }
 SIZES = {
     "routing_friction": {"mu_angle": 0.2, "arc_length_m": 0.01},
@@ -90,6 +97,13 @@ SIZES = {
     "pretension_relaxation": {"fraction": 0.05, "time_constant_s": 0.5},
     "stiffening_mount": {"compliance_rad_per_Nm": 1e-3, "saturation_Nm": 0.5},
     "torque_sensor_hysteresis": {"fraction": 0.3, "width_Nm": 0.2},
+    "flange_climb": {"radius_m_per_rad": 1e-3, "from_rad": 0.2},
+    "input_play": {"gap_rad": 1e-3, "drag_Nm": 0.1},
+    "self_heating": {"fraction": 0.05, "lag_s": 2.0},
+    "neighbour_tightens": {"coefficient_per_unit": 0.05},
+    "encoder_hub_slip": {"slip_rad": 1e-3, "time_s": 1.0},
+    "torque_sensor_lag": {"lag_s": 0.05},
+    "joint_encoder_drift": {"coefficient_rad_per_K": 1e-4},
 }
 
 

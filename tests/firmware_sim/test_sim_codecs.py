@@ -24,6 +24,7 @@ from firmware_sim.firmware import (
 )
 from firmware_sim.plantlike import Readings
 from firmware_sim.wire.base import Answer
+from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.mit import MODELS, MitWire, decode_command, encode_command
 from firmware_sim.wire.odrive import OdriveWire
@@ -99,7 +100,7 @@ def test_mit_reply_bytes() -> None:
 
 
 def test_damiao_reply_carries_the_state_in_the_upper_four_bits() -> None:
-    wire, drive = MitWire(3, "DM-J4310-2EC", reply_id=0x13), drive_at()
+    wire, drive = DamiaoWire(3, "DM-J4310-2EC", reply_id=0x13), drive_at()
     frame = wire.answer(Answer.STATE, Frame(3), drive)
     assert frame is not None
     assert (frame.identifier, frame.data[0]) == (0x13, 0x03)
@@ -116,7 +117,10 @@ def test_damiao_reply_carries_the_state_in_the_upper_four_bits() -> None:
 def test_mit_special_frames(last: int, state: DriveState) -> None:
     wire, drive = MitWire(1), drive_at(position=0.5)
     heard = wire.hear(Frame(1, b"\xff" * 7 + bytes((last,))), drive, 0.0)
-    assert heard.answers
+    # TMotorCANControl, `zero`: "shut off communication with the motor for about a second"
+    assert bool(heard.answers) == (last != 0xFE)
+    assert bool(wire.hear(Frame(1, bytes(8)), drive, 0.9).answers) == (last != 0xFE)
+    assert wire.hear(Frame(1, bytes(8)), drive, 1.1).answers
     assert not heard.steps
     assert drive.state is state
     assert drive.position_rad == (0.0 if last == 0xFE else 0.5)
@@ -154,7 +158,9 @@ def test_odrive_identifiers_and_payloads_of_the_documentation() -> None:
 def test_odrive_answers() -> None:
     wire, drive = OdriveWire(1), drive_at(position=2 * math.pi, velocity=-math.pi)
     heartbeat = wire.answer(Answer.ASKED, Frame(0x21, remote=True), drive)
-    assert heartbeat == Frame(0x21, bytes.fromhex("0000000001000000"))  # no error, idle, success
+    assert heartbeat == Frame(
+        0x21, bytes.fromhex("0000000001000100")
+    )  # no error, idle, success, no trajectory
     encoder = wire.answer(Answer.ASKED, Frame(0x29, remote=True), drive)
     assert encoder == Frame(0x29, bytes.fromhex("0000803F000000BF"))  # 1 rev, -0.5 rev/s
     drive.request(Request.STOP, 0.0)
@@ -215,7 +221,7 @@ def test_shipped_tables_read_the_same_bytes_as_the_manuals() -> None:
     told = odrive.decode_message(0x2C, bytes.fromhex("B6F39D3FF40106FF"))
     assert told == {"Input_Pos": pytest.approx(1.234), "Vel_FF": 0.5, "Torque_FF": -0.25}
     assert (
-        odrive.decode_message(0x21, bytes.fromhex("0000000208030000"))["Axis_State"] == "closed_loop_control"
+        odrive.decode_message(0x21, bytes.fromhex("0000000208030000"))["Axis_State"] == "CLOSED_LOOP_CONTROL"
     )
     joint = cantools.database.load_file(LINKS / "cablecomp_joint.dbc")
     told = joint.decode_message(0x680, bytes.fromhex("40420F00B03CFF07"))

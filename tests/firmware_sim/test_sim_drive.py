@@ -108,6 +108,18 @@ def test_watchdog_stops_an_enabled_drive_and_only_that() -> None:
     assert idle.state is DriveState.DISABLED
 
 
+def test_a_drive_whose_silence_is_no_fault_lets_go_until_it_hears_again() -> None:
+    drive, plant = enabled(DriveConfig(command_timeout_s=0.02, timeout_faults=False)), TwoMass()
+    push = Setpoint(torque_Nm=0.5)
+    run(drive, plant, 0.019, push)
+    assert plant.last_command_Nm == pytest.approx(0.5)
+    run(drive, plant, 0.03)
+    assert (drive.state, plant.last_command_Nm) == (DriveState.ENABLED, 0.0)
+    assert drive.flags & DriveFlag.COMMAND_TIMEOUT
+    run(drive, plant, 0.002, push)
+    assert plant.last_command_Nm == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(
     ("readings", "flag"),
     [

@@ -5,13 +5,20 @@ from __future__ import annotations
 import csv
 import gzip
 import json
+from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from firmware_sim.plant import FORMS, PlantError
 from firmware_sim.trials.make import main, make
-from firmware_sim.trials.order import Wanted
+from firmware_sim.trials.order import KINDS, OTHER_FORMS, Wanted, order
+from firmware_sim.trials.suspects import CATALOGUE
+from firmware_sim.trials.tabletop import CASES
+
+PRIVATE = {"routing_friction:bending"}  # depends on a condition: for trials of several sessions
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
@@ -20,8 +27,30 @@ def _read(path: Path) -> dict[str, np.ndarray]:
     return {name: np.array([float(r[k]) for r in rows[1:]]) for k, name in enumerate(rows[0])}
 
 
+def _truth(folder: Path) -> tuple[dict[str, Any], Any]:
+    return json.loads((folder / "truth.json").read_text()), np.load(folder / "truth.npz")
+
+
+def test_everything_that_the_plant_can_do_otherwise_can_be_concealed() -> None:
+    assert {s.id for s in OTHER_FORMS} == set(FORMS) - PRIVATE
+
+
+def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
+    for laws in ("catalogue", "other", "mixed"):
+        wanted = Wanted(3, ("single",), laws, "none")
+        drawn = [order(wanted, k).suspects[0].id for k in range(4 * len(CATALOGUE))]
+        effects = Counter(name.partition(":")[0] for name in drawn)
+        assert effects == {s.id: 4 for s in CATALOGUE}
+        others = sum(":" in name for name in drawn)
+        assert {"catalogue": others == 0, "other": others == len(drawn)}.get(laws, 20 < others < 52)
+    every = Wanted(3, KINDS, "mixed", "none")
+    assert [order(every, k).kind for k in range(len(KINDS))] == list(KINDS)
+    first, second = order(Wanted(3, ("pair",), "mixed", "none"), 7).suspects
+    assert first.id.partition(":")[0] != second.id.partition(":")[0]
+
+
 def test_a_trial_depends_on_its_number_and_not_on_how_many_are_made(tmp_path: Path) -> None:
-    wanted = Wanted(5, ("single", "none"), "catalogue", "none")
+    wanted = Wanted(5, ("single", "none"), "other", "some")
     make(wanted, 2, tmp_path / "both")
     make(wanted, 1, tmp_path / "second", first=1)
     files = sorted(p for p in (tmp_path / "second" / "00001").rglob("*") if p.is_file())
@@ -32,24 +61,90 @@ def test_a_trial_depends_on_its_number_and_not_on_how_many_are_made(tmp_path: Pa
 
 
 def test_the_truth_stands_beside_the_recordings_it_belongs_to(tmp_path: Path) -> None:
-    make(Wanted(5, ("single",), "catalogue", "none"), 1, tmp_path)
+    make(Wanted(5, ("single", "pair"), "catalogue", "none"), 2, tmp_path)
+    for folder in sorted(tmp_path.iterdir()):
+        truth, angles = _truth(folder)
+        for k, entry in enumerate(truth["recordings"], start=1):
+            seen = _read(folder / entry["file"])
+            assert len(seen["time_s"]) == entry["rows"] == len(angles[f"joint_rad_{k}"])
+            np.testing.assert_allclose(seen["time_s"], angles[f"time_s_{k}"], atol=1e-6)
+            noise = seen["joint_position_rad"] - entry["zeros"]["joint_position"] - angles[f"joint_rad_{k}"]
+            assert np.std(noise) < 1.2 * truth["noise_floor_rad"]
+        added = angles["joint_rad_1"] - angles["plain_rad_1"]
+        assert 0.01 * truth["loop_rad"] < np.std(added) < 2.0 * truth["loop_rad"]
+        assert all(e["effect"] not in (folder / "joint.toml").read_text() for e in truth["effects"])
+        assert 9000 < sum(entry["rows"] for entry in truth["recordings"]) < 13000
+
+
+def test_imperfections_are_there_and_as_large_as_the_truth_says(tmp_path: Path) -> None:
+    make(Wanted(8, ("none",), "catalogue", "all"), 1, tmp_path)
     folder = tmp_path / "00000"
-    truth = json.loads((folder / "truth.json").read_text())
-    angles = np.load(folder / "truth.npz")
+    truth, angles = _truth(folder)
+    how, sensors = truth["imperfections"], truth["sensors"]
+    assert truth["effects"] == []
+    assert len({entry["session"] for entry in truth["recordings"]}) == len(truth["recordings"]) >= 2
     for k, entry in enumerate(truth["recordings"], start=1):
+        assert entry["history_s"] == pytest.approx(how["history"]["lasts_s"] + 1.1, abs=0.1)
+        assert entry["file"].startswith(f"recordings/session-{k}/")
         seen = _read(folder / entry["file"])
-        assert len(seen["time_s"]) == entry["samples"] == len(angles[f"joint_rad_{k}"])
-        noise = seen["joint_position_rad"] - truth["offset_rad"] - angles[f"joint_rad_{k}"]
-        assert np.std(noise) < 2.0 * truth["noise_floor_rad"]
-    added = angles["joint_rad_1"] - angles["plain_rad_1"]
-    assert 0.01 * truth["loop_rad"] < np.std(added) < 2.0 * truth["loop_rad"]
-    assert truth["effects"][0]["effect"] not in (folder / "joint.toml").read_text()
+        steps = np.diff(seen["time_s"])
+        assert np.all(steps > 0)
+        middle = np.median(steps)
+        # uneven by as much as was drawn, but for rows that are missing
+        assert np.percentile(np.abs(steps / middle - 1), 80) < 2 * how["uneven"]["jitter"] + 0.05
+        assert np.percentile(np.abs(steps / middle - 1), 50) > 0.2 * how["uneven"]["jitter"]
+        assert np.max(steps) > 4 * middle
+        quiet = np.isfinite(seen["joint_position_rad"])
+        noise = (seen["joint_position_rad"] - angles[f"joint_rad_{k}"])[quiet]
+        noise -= np.median(noise)
+        factor = how["noise_misstated"]["joint_position"]
+        coarse = how["quantisation"]["factor"] if "joint_position" in how["quantisation"]["channels"] else 1.0
+        expected = np.hypot(
+            factor * sensors["joint_position_noise_rad"],
+            coarse * sensors["joint_position_resolution_rad"] / 12**0.5,
+        )
+        spread = np.diff(np.percentile(noise, (15.865, 84.135)))[0] / 2
+        assert spread == pytest.approx(np.hypot(expected, _lagged(how, truth)), rel=0.3)
+
+
+def _lagged(how: dict[str, Any], truth: dict[str, Any]) -> float:
+    """What lag leaves between joint encoder and joint, RMS, about."""
+    shares = [how[n]["size_of_floor"] for n in ("late", "low_pass") if how[n]["channel"] == "joint_position"]
+    return float(np.sqrt(np.sum(np.square(shares)))) * truth["noise_floor_rad"] if shares else 0.0
+
+
+def test_sessions_stand_apart_and_what_depends_on_what_is_in_the_truth(tmp_path: Path) -> None:
+    make(Wanted(4, ("sessions",), "catalogue", "none"), len(CASES), tmp_path)
+    seen = set()
+    for folder in sorted(tmp_path.iterdir()):
+        truth, angles = _truth(folder)
+        case = next(c for c in CASES if c.name == truth["case"])
+        seen.add(case.name)
+        assert {(d["parameter"], d["on"]) for d in truth["depends_on"]} == set(case.depends)
+        channel = f"other_{case.condition}"
+        assert f'{case.condition} = "{channel}"' in (folder / "joint.toml").read_text()
+        tight = {entry["session"]: entry["pretension_N"] for entry in truth["recordings"]}
+        assert len(tight) == 2
+        apart = abs(np.log(tight["1"] / tight["2"]))
+        assert (apart > 0.14) == (("pretension_N", "session") in case.depends)
+        stands = [np.mean(_read(folder / entry["file"])[channel]) for entry in truth["recordings"]]
+        assert max(stands) - min(stands) > 0.3
+        assert all(e["effect"] == "routing_friction" for e in truth["effects"])
+        if any(on == case.condition for _, on in case.depends):
+            # what depends on the stand adds more where it stands further
+            loops = [
+                np.ptp(angles[f"joint_rad_{k}"] - angles[f"plain_rad_{k}"]) for k in range(1, len(stands) + 1)
+            ]
+            assert loops[int(np.argmax(stands))] > loops[int(np.argmin(stands))]
+    assert seen == {c.name for c in CASES}
 
 
 def test_what_cannot_be_made_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for more in (["--kinds", "several"], ["--count", "0"]):
+    for more in (["--kinds", "several"], ["--count", "0"], ["--seed", "-1"]):
         assert main(["--seed", "1", "--count", "1", "--out", str(tmp_path), *more]) == 2
         message = capsys.readouterr().err
         assert message.startswith("error: ")
         assert message.count("\n") == 1
         assert "accepted" in message
+    with pytest.raises(PlantError, match="catalogue, other, mixed"):
+        Wanted(1, ("single",), "mine", "none")

@@ -11,6 +11,7 @@ from pathlib import Path
 import can
 
 from cablecomp.links import BusLink, parse_link
+from cablecomp.links.records import EXTENDED
 
 CONFIGS = Path(__file__).parents[2] / "configs" / "links"
 TURN = 2 * math.pi
@@ -22,6 +23,8 @@ class Rig:
     def __init__(self, name: str, change: dict[str, str] | None = None) -> None:
         text = (CONFIGS / name).read_text(encoding="utf-8")
         channel = uuid.uuid4().hex
+        text = text.replace('interface = "socketcan" ', 'interface = "virtual" ')
+        text = text.replace('channel = "can0"', 'channel = "cablecomp"')
         for old, new in {'channel = "cablecomp"': f'channel = "{channel}"', **(change or {})}.items():
             assert old in text
             text = text.replace(old, new, 1)
@@ -31,12 +34,14 @@ class Rig:
 
     def tell(self, identifier: int, data: bytes | str) -> None:
         payload = bytes.fromhex(data) if isinstance(data, str) else data
-        self.client.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=payload))
+        number, extended = identifier & ~EXTENDED, bool(identifier & EXTENDED)
+        self.client.send(can.Message(arbitration_id=number, is_extended_id=extended, data=payload))
 
     def heard(self) -> list[tuple[int, bytes]]:
         out = []
         while (message := self.client.recv(0)) is not None:
-            out.append((message.arbitration_id, bytes(message.data)))
+            extended = EXTENDED if message.is_extended_id else 0
+            out.append((message.arbitration_id | extended, bytes(message.data)))
         return out
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ import pytest
 from cablecomp.errors import InputError
 from cablecomp.links import cansimple as c
 from cablecomp.links.cansimple import AxisState, Cmd, ControlMode
+from cablecomp.links.cansimple_firmware import FIRMWARES, error_of, error_words, state_of
 from cablecomp.links.records import CLIP_POSITION, CLIP_TORQUE, CLIP_VELOCITY, REMOTE, DriveState
 
 # Places of the signals as ODrive's CAN protocol page tables them (start bit = 8 x start byte).
@@ -20,7 +21,7 @@ BU_: H A
 BO_ 1 Heartbeat: 8 A
  SG_ Error : 0|32@1+ (1,0) [0|0] "" H
  SG_ State : 32|8@1+ (1,0) [0|0] "" H
-BO_ 7 Set_Axis_State: 4 H
+BO_ 7 Set_Axis_State: 8 H
  SG_ State : 0|32@1+ (1,0) [0|0] "" A
 BO_ 9 Encoder: 8 A
  SG_ Pos : 0|32@1- (1,0) [0|0] "" H
@@ -35,8 +36,10 @@ BO_ 12 Input_Pos: 8 H
 BO_ 13 Input_Vel: 8 H
  SG_ Vel : 0|32@1- (1,0) [0|0] "" A
  SG_ Torque_FF : 32|32@1- (1,0) [0|0] "" A
-BO_ 14 Input_Torque: 4 H
+BO_ 14 Input_Torque: 8 H
  SG_ Torque : 0|32@1- (1,0) [0|0] "" A
+BO_ 25 Absolute: 8 H
+ SG_ Pos : 0|32@1- (1,0) [0|0] "" A
 BO_ 15 Limits: 8 H
  SG_ Vel : 0|32@1- (1,0) [0|0] "" A
  SG_ Current : 32|32@1- (1,0) [0|0] "" A
@@ -46,6 +49,7 @@ SIG_VALTYPE_ 12 Pos : 1;
 SIG_VALTYPE_ 13 Vel : 1;
 SIG_VALTYPE_ 13 Torque_FF : 1;
 SIG_VALTYPE_ 14 Torque : 1;
+SIG_VALTYPE_ 25 Pos : 1;
 SIG_VALTYPE_ 15 Vel : 1;
 SIG_VALTYPE_ 15 Current : 1;
 """
@@ -74,14 +78,34 @@ def test_bytes_recorded_from_an_odrive() -> None:
     closed = c.parse_heartbeat(bytes.fromhex("00 00 00 00 08 00 00 00"))
     idle = c.parse_heartbeat(bytes.fromhex("00 00 00 00 01 00 00 00"))
     assert closed[:2] == (0, AxisState.CLOSED_LOOP)
-    assert c.drive_state(closed) == DriveState.ENABLED
-    assert c.drive_state(idle) == DriveState.DISABLED
+    for firmware in FIRMWARES.values():
+        assert state_of(firmware, closed) == DriveState.ENABLED
+        assert state_of(firmware, idle) == DriveState.DISABLED
 
 
 def test_states() -> None:
-    assert c.drive_state(c.Heartbeat(0x100, 8, b"")) == DriveState.FAULT
-    assert c.drive_state(c.Heartbeat(0, 3, b"")) == DriveState.CALIBRATING
-    assert c.drive_state(c.Heartbeat(0, 0, b"")) == DriveState.UNKNOWN
+    for firmware in FIRMWARES.values():
+        assert state_of(firmware, c.Heartbeat(0x100, 8, bytes(3))) == DriveState.FAULT
+        assert state_of(firmware, c.Heartbeat(0, 3, bytes(3))) == DriveState.CALIBRATING
+        assert state_of(firmware, c.Heartbeat(0, 0, bytes(3))) == DriveState.UNKNOWN
+
+
+def test_the_same_bytes_mean_other_things_to_the_two_firmwares() -> None:
+    # 0.5.6: bytes 5, 6, 7 bit 0 are motor, encoder, controller error, bit 63 trajectory done;
+    # 0.6.10: byte 5 is the result of the last procedure (13 = invalid state, 15 = not converging), 6 done
+    old, new = FIRMWARES["0.5"], FIRMWARES["0.6"]
+    refused = c.parse_heartbeat(bytes.fromhex("00 00 00 00 01 0D 00 00"))
+    assert error_words(old, error_of(old, refused)) == "motor error"
+    assert error_of(new, refused) == 0
+    done = c.parse_heartbeat(bytes.fromhex("00 00 00 00 08 00 00 80"))
+    assert state_of(old, done) == DriveState.ENABLED
+    failed = c.parse_heartbeat(bytes.fromhex("00 02 00 00 01 00 01 01"))
+    assert error_words(old, error_of(old, failed)) == "controller failed, encoder error, controller error"
+    assert error_words(new, error_of(new, failed)) == "dc bus under voltage"
+    expired = (0x800, 0x100_0000)
+    assert [error_words(f, e) for f, e in zip((old, new), expired, strict=True)] == [
+        "watchdog timer expired"
+    ] * 2
 
 
 def test_commands_lie_where_odrives_table_puts_them(table) -> None:
@@ -98,7 +122,9 @@ def test_commands_lie_where_odrives_table_puts_them(table) -> None:
     frame = c.set_controller_mode(3, ControlMode.TORQUE)
     assert frame.data == table.encode_message("Mode", {"Control": 1, "Input": 1})
     frame = c.set_axis_state(3, AxisState.CLOSED_LOOP)
-    assert frame == (0x67, bytes.fromhex("08 00 00 00"))
+    assert frame == (0x67, bytes.fromhex("08 00 00 00 00 00 00 00"))
+    frame = c.set_absolute_position(3, -2.5)
+    assert frame == (0x79, table.encode_message("Absolute", {"Pos": -2.5}))
 
 
 def test_payloads_lie_where_odrives_table_puts_them(table) -> None:
@@ -110,8 +136,6 @@ def test_payloads_lie_where_odrives_table_puts_them(table) -> None:
 
 def test_frames_without_payload() -> None:
     assert c.estop(1) == (0x22, b"")
-    assert c.clear_errors(1).identifier == 0x38
-    assert c.reboot(1).identifier == 0x36
 
 
 def test_saturation_is_reported() -> None:

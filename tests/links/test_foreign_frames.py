@@ -191,3 +191,31 @@ def test_noise_is_counted(multicast, payload: bytes) -> None:
     send(sender, payload)
     assert drained(port, before) == []
     assert port.counters.invalid == before + 1
+
+
+def test_a_reply_of_seven_bytes_has_a_temperature_and_no_error(rigs) -> None:
+    # CubeMars V1.1 boards: number, position, velocity, torque, degC
+    rig = rigs("mit-virtual.toml", {'model = "AK80-9"': 'model = "AK80-9"\nreply_length = 7'})
+    joint = rig.link.joints[0]
+    rig.tell(0, "01 FF FF 7F F7 FF FB")
+    assert rig.link.poll(1.0) == 4
+    assert joint.values[MOTOR_POSITION] == pytest.approx(12.5)
+    assert joint.values[joint.index("other_motor_temperature_degC")] == -5.0
+    assert joint.error == 0
+    rig.tell(0, OWN_CUBEMARS)
+    assert rig.link.poll(2.0) == 0
+    assert rig.link.status().invalid == 1
+
+
+def test_a_robstride_in_the_mit_protocol_tells_tenths_of_a_degree_and_faults_apart(rigs) -> None:
+    rig = rigs(
+        "mit-virtual.toml", {'model = "AK80-9"': 'model = "RS01"', "reply_id = 0 ": "reply_id = 0xFD "}
+    )
+    joint = rig.link.joints[0]
+    rig.tell(0xFD, "01 80 00 80 08 00 01 1C")
+    assert rig.link.poll(1.0) == 4
+    assert joint.values[joint.index("other_motor_temperature_degC")] == pytest.approx(28.4)
+    rig.tell(0xFD, "01 01 00 00 00 00 00 00")
+    assert rig.link.poll(2.0) == 0
+    assert joint.state is DriveState.FAULT
+    assert rig.link.error_text(0)

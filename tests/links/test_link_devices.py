@@ -46,7 +46,7 @@ def test_an_odrive(rigs) -> None:
     link.request(0, Request.ENABLE)
     assert rig.heard() == [
         (0x2B, bytes.fromhex("03 00 00 00 01 00 00 00")),
-        (0x27, bytes.fromhex("08 00 00 00")),
+        (0x27, bytes.fromhex("08 00 00 00 00 00 00 00")),
     ]
     rig.tell(0x21, "00 00 00 00 08 00 00 00")
     rig.tell(0x29, struct.pack("<ff", 2.0, -0.5))
@@ -64,7 +64,7 @@ def test_an_odrive(rigs) -> None:
     link.request(0, Request.ENABLE, Mode.TORQUE)
     rig.heard()
     link.send(0, MotorCommand(torque_Nm=-4.0))
-    assert rig.heard() == [(0x2E, struct.pack("<f", 0.5))]
+    assert rig.heard() == [(0x2E, struct.pack("<ff", 0.5, 0.0))]
     rig.tell(0x29, struct.pack("<ff", math.nan, 0.0))
     assert link.poll(2.0) == 0
     assert link.status().invalid == 1
@@ -73,7 +73,7 @@ def test_an_odrive(rigs) -> None:
     assert joint.state == DriveState.FAULT
     assert link.error_text(0) == "motor over temperature, watchdog timer expired"
     assert link.stop()
-    assert rig.heard() == [(0x22, b""), (0x27, bytes.fromhex("01 00 00 00"))]
+    assert rig.heard() == [(0x22, b""), (0x27, bytes.fromhex("01 00 00 00 00 00 00 00"))]
 
 
 def test_an_odrive_is_asked_for_what_it_does_not_send(rigs) -> None:

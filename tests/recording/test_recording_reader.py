@@ -82,7 +82,7 @@ def test_every_finite_float_survives_writing_and_reading(
         "joint_torque_Nm": array[:, 1].copy(),
         "other_x": array[::-1, 1].copy(),
     }
-    write_canonical(path, columns, ["made for a test"])
+    write_canonical(path, columns)
     table = read_all(path)
     for name, written in columns.items():
         assert table.columns[name].tobytes() == written.tobytes()

@@ -93,7 +93,7 @@ def _columns(count: int = 1500) -> dict[str, np.ndarray]:
 
 
 def _recording(tmp_path: Path, columns: dict[str, np.ndarray]) -> Recording:
-    write_canonical(tmp_path / "a.csv", columns, ["a comment"])
+    write_canonical(tmp_path / "a.csv", columns)
     return open_recording(tmp_path / "a.csv")
 
 
@@ -183,7 +183,7 @@ def test_without_a_joint_encoder_there_is_a_prediction_and_no_residual(tmp_path:
 def test_what_the_observer_refuses_is_told_with_the_files_line(tmp_path: Path) -> None:
     columns = _columns()
     columns["joint_torque_Nm"][1203] = 99.0
-    with pytest.raises(InputError, match=r"a\.csv: line 1206: load of 99\.0 N·m is beyond"):
+    with pytest.raises(InputError, match=r"a\.csv: line 1205: load of 99\.0 N·m is beyond"):
         replay(_recording(tmp_path, columns), PlayObserver(), [], config=joint())
 
 
@@ -213,7 +213,7 @@ def test_progress_and_gaps_are_told(tmp_path: Path) -> None:
         config=joint(),
     )
     assert told[-1] == (1.0, 1500)
-    assert [gap["line"] for gap in summary.gaps] == [703]
+    assert [gap["line"] for gap in summary.gaps] == [702]
     assert any("1 gap(s)" in note for note in summary.notes)
 
 

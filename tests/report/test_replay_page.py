@@ -154,7 +154,7 @@ def test_short_and_uncompared_recordings_have_a_page(absent: str | None, tmp_pat
     html = _replay(tmp_path, columns)
     assert ("<h2>Residual</h2>" in html) is (absent is None)
     rows = (tmp_path / "out" / "prediction.csv").read_text().splitlines()
-    assert (rows[1].split(",")[5] == "") is (absent is not None)
+    assert (rows[1].split(",")[5] == "NaN") is (absent is not None)
 
 
 @pytest.mark.parametrize("fault", ["load", "nan at the end", "cut"])

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rendering import as_text
 
 from cablecomp.config import load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.design import design_loop
 from cablecomp.control.options import load_control
 from cablecomp.report.design_page import design_page, design_rows, design_tables
-from cablecomp.report.info import as_text
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rendering import as_text
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
-from cablecomp.report.info import as_text, bench_table, design_table, quantity
+from cablecomp.report.info import bench_table, design_table, quantity
 from cablecomp.report.theory import theory_figures, write_theory_figures
 from cablecomp.thesis.bench.evaluate import BenchRecording, evaluate_bench
 from cablecomp.thesis.bench.vectors import DriveOnBench

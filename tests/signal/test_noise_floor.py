@@ -10,7 +10,6 @@ from cablecomp.signal.noise import (
     InputNoise,
     channel_noise,
     grid_step,
-    local_sensitivity,
     residual_floor,
 )
 from cablecomp.signal.smoothing import fit_to_noise, local_fit
@@ -83,15 +82,6 @@ def test_too_few_readings_are_refused() -> None:
 def test_residual_floor_adds_squares() -> None:
     floor = residual_floor(3e-5, [InputNoise(2.0, np.array([0.0, 2e-5]))], 2)
     assert floor == pytest.approx([3e-5, 5e-5])
-
-
-def test_sensitivity_is_the_slope_of_the_branch() -> None:
-    load = np.abs((TIME / 5.0) % 2.0 - 1.0)
-    rising = np.gradient(load, TIME) > 0.0
-    prediction = np.cumsum(np.gradient(load) * np.where(rising, 2.0, 0.5))
-    slope = local_sensitivity(TIME, prediction, load, 0.05)
-    away = np.abs((TIME % 5.0) - 2.5) < 2.0
-    assert slope[away] == pytest.approx(np.where(rising, 2.0, 0.5)[away], rel=1e-6)
 
 
 def test_a_local_fit_is_exact_on_parabolas_with_uneven_time() -> None:

@@ -87,6 +87,7 @@ class MitJoint:
     disturb: Callable[[MitJoint], None] | None = None
     terminal = None
     tick: int = 0
+    period_s: float = 1e-3
     sequence: int = 0
 
     def set_load(self, number: int, torque_Nm: float) -> None:
@@ -99,7 +100,7 @@ class MitJoint:
         return Truth(self.angle * RATIO)
 
     def advance(self, periods: int = 1) -> None:
-        """One period of 1 ms: hear, answer, move, say where the joint is."""
+        """One period: hear, answer, move, say where the joint is."""
         for _ in range(periods):
             self.tick += 1
             self.hear()
@@ -127,16 +128,17 @@ class MitJoint:
                 self.last = heard
             self.say(0, reply(1, self.tell(self.angle), self.speed, self.torque))
 
-    def move(self, dt: float = 1e-3) -> None:
-        for _ in range(10):
+    def move(self) -> None:
+        steps = round(self.period_s / 1e-4)
+        for _ in range(steps):
             h = self.last
             self.torque = 0.0
             if self.enabled:
                 pull = h.kp * (h.position - self.angle) + h.kd * (h.velocity - self.speed) + h.torque
                 self.torque = min(max(pull, -18.0), 18.0)
             self.greatest_torque = max(self.greatest_torque, abs(self.torque))
-            self.speed += 0.1 * dt * (self.torque - 1e-3 * self.speed) / self.inertia
-            self.angle += 0.1 * dt * self.speed
+            self.speed += 1e-4 * (self.torque - 1e-3 * self.speed) / self.inertia
+            self.angle += 1e-4 * self.speed
 
     def say(self, identifier: int, data: bytes, **kind: bool) -> None:
         if not self.mute:

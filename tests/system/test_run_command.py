@@ -1,6 +1,4 @@
-"""`cablecomp run` as a user meets it: links, protocols, exit codes, one line for bad input, the README's library
-form.
-"""
+"""`cablecomp run` as a user meets it: links, protocols, exit codes, one line for bad input."""
 
 from __future__ import annotations
 
@@ -17,7 +15,6 @@ from cablecomp.config import load_joint
 from cablecomp.control.compensator import preload_of
 from cablecomp.control.motors import control_for
 from cablecomp.links.load import load_link
-from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import SimulationWish
 
@@ -141,30 +138,6 @@ def test_a_run_that_had_to_stop_the_joint_says_so_by_its_exit_code(tmp_path: Pat
     assert cli.main([*arguments, "--fault", "silent:node=drive,start=0.3", "--out", str(tmp_path)]) == 3
     assert "stale" in json.loads((tmp_path / "run.json").read_text())["stop_reason"]
     assert (tmp_path / "report.html").exists()
-
-
-def test_the_readme_s_ten_lines_run_as_they_stand(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    """With a simulated joint put behind their bus, and a short run for their long one."""
-    text = (CONFIGS.parent / "README.md").read_text(encoding="utf-8")
-    blocks = [block.split("```")[0] for block in text.split("```python\n")[1:]]
-    (block,) = [b for b in blocks if "run_joint(" in b]
-    assert len([line for line in block.splitlines() if line and "import" not in line]) <= 10
-    path = CONFIGS / "joints/capstan-arm.toml"
-
-    def short(joint, link, control, protocol, options):
-        simulation = start_simulation(path, SimulationWish(link.redirect("virtual", "readme"), control))
-        try:
-            wanted = RunOptions(0.2, True, tmp_path)
-            return run_joint(joint, link.redirect("virtual", "readme"), control, protocol, wanted, simulation)
-        finally:
-            simulation.close()
-
-    monkeypatch.chdir(CONFIGS.parent)
-    monkeypatch.setattr("cablecomp.runtime.run.run_joint", short)
-    exec(compile(block, "README.md", "exec"), {})
-    assert capsys.readouterr().out.startswith("time is over\n")
 
 
 @pytest.mark.parametrize("mode", ["position", "force", "impedance"])

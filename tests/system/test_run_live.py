@@ -36,7 +36,7 @@ GAINS = {
 }
 """What `cablecomp design` gives for this joint."""
 OPTIONS = LiveOptions(between_false_alarms_s=3_600.0, learning_s=4.0, keep_s=8.0, after_s=2.0)
-SLIPS_AT_S = 8.0
+SLIPS_AT_S = 8.3
 
 
 def watched_run(out: Path, duration_s: float, slip_m: float = 0.0) -> tuple[RunReport, LiveRun]:

@@ -4,6 +4,7 @@ wire."""
 from __future__ import annotations
 
 import os
+import tomllib
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from cablecomp.errors import DeviceError
-from cablecomp.links import BusLink, BusState, DriveState, Mode, MotorCommand, Request, load_link
+from cablecomp.links import BusLink, BusState, DriveState, Mode, MotorCommand, Request, parse_link
 from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE, MOTOR_VELOCITY
 from firmware_sim.bench import Bench
 from firmware_sim.build import BenchConfig, make_bench
@@ -28,6 +29,10 @@ PROTOCOLS = {
     "mit": ("mit-virtual.toml", {"protocol": "mit"}),
     "damiao": ("damiao-socketcan.toml", {"protocol": "mit", "model": "DM4310", "reply_id": 0x11}),
     "odrive": ("odrive-virtual.toml", {"protocol": "odrive"}),
+    "odrive-0.5": ("odrive-v3-socketcan.toml", {"protocol": "odrive", "firmware": "0.5"}),
+    "robstride": ("robstride-socketcan.toml", {"protocol": "robstride", "model": "RS01"}),
+    "cubemars-v3": ("cubemars-v3-socketcan.toml", {"protocol": "cubemars"}),
+    "cubemars-servo": ("cubemars-servo-socketcan.toml", {"protocol": "cubemars"}),
     "dbc": ("dbc-virtual.toml", {"protocol": "dbc"}),
 }
 # Half a count of what each wire carries: motor position in rad, motor velocity in rad/s, motor torque in Nm
@@ -35,6 +40,10 @@ RESOLUTION = {
     "mit": (25 / 65535, 100 / 4095, 36 / 4095),
     "damiao": (25 / 65535, 60 / 4095, 20 / 4095),
     "odrive": (2e-6, 2e-5, 1e-5),
+    "odrive-0.5": (2e-6, 2e-5, 1e-5),
+    "robstride": (25.2 / 65535, 88 / 65535, 34 / 65535),
+    "cubemars-v3": (0.06 * 0.0175, 10 / 1800, 36 / 4095),  # the status has steps of 0.1 deg, 10 ERPM, 0.01 A
+    "cubemars-servo": (0.06 * 0.0175, 10 / 1800, 36 / 4095),
     "dbc": (1e-6, 0.025, 1e-3),
 }
 
@@ -86,7 +95,8 @@ class Meeting:
         self.bench: Bench = make_bench(config, Spring, open_port(bus), [parse_fault(f, 3) for f in faults])
         where = self.bench.port.describe()
         reach = {k: v for k, v in where.items() if k in ("port", "hop_limit")}
-        base = load_link(CONFIGS / name)
+        text = (CONFIGS / name).read_text(encoding="utf-8").replace("gear_ratio = 8.0", "gear_ratio = 1.0")
+        base = parse_link(tomllib.loads(text), name, CONFIGS)
         self.link = BusLink(base.redirect(where["interface"], where["channel"], **reach))
         self.link.open()
         self.now_s = 0.0
@@ -106,15 +116,20 @@ class Meeting:
     def cycle(self, command: MotorCommand) -> None:
         """One command to every joint, one step of each, and all that they tell."""
         self.now_s += 1e-3
-        wanted = [j.messages for j in self.link.joints]
-        before = [sum(m.received for m in messages) for messages in wanted]
+        joints = self.link.joints
+        places = (MOTOR_POSITION, MOTOR_TORQUE, JOINT_POSITION)
+        before = [[j.updates[place] for place in places] for j in joints]
         steps = self.bench.steps
-        for joint in range(len(self.link.joints)):
+        for joint in range(len(joints)):
             self.link.send(joint, command)
         self.until(
             lambda: (
-                self.bench.steps - steps == len(wanted)
-                and all(sum(m.received for m in w) >= b + 2 for w, b in zip(wanted, before, strict=True))
+                self.bench.steps - steps == len(joints)
+                and all(
+                    j.updates[place] > b
+                    for j, old in zip(joints, before, strict=True)
+                    for place, b in zip(places, old, strict=True)
+                )
             )
         )
 
@@ -146,11 +161,16 @@ def meet() -> Iterator[Any]:
 def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting = meet(protocol, wire)
     link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
-    mode = Mode.POSITION if protocol == "odrive" else Mode.IMPEDANCE
+
+    own_loops = protocol.startswith("odrive") or protocol == "cubemars-servo"
+    mode = Mode.POSITION if own_loops else Mode.IMPEDANCE
     assert link.request(0, Request.CLEAR_FAULTS)
     assert link.request(0, Request.ENABLE, mode)
     meeting.until(lambda: device.drive.state.name == "ENABLED")
-    gains = (None, None) if protocol in ("odrive", "dbc") else (60.0, 2.0)
+    meeting.until(
+        lambda: min(joint.updates[MOTOR_POSITION], joint.updates[JOINT_POSITION]) >= meeting.bench.steps
+    )
+    gains = (None, None) if own_loops or protocol == "dbc" else (60.0, 2.0)
     command = MotorCommand(0.4, 0.0, -device.plant.load_Nm, *gains)
     tolerance = RESOLUTION[protocol]
     for _ in range(120):
@@ -163,8 +183,9 @@ def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     assert joint.values[MOTOR_TORQUE] == pytest.approx(device.truth.motor_torque_Nm, abs=0.05)
     told = device.drive.setpoint
     assert told.position_rad == pytest.approx(0.4, abs=tolerance[0])
-    assert told.torque_Nm == pytest.approx(command.torque_Nm, abs=max(tolerance[2], 5e-4))
-    if protocol != "odrive":
+    feedforward = 0.0 if protocol == "cubemars-servo" else command.torque_Nm
+    assert told.torque_Nm == pytest.approx(feedforward, abs=max(tolerance[2], 5e-4))
+    if not own_loops:
         assert told.kp_Nm_per_rad == pytest.approx(200.0 if protocol == "dbc" else 60.0, abs=500 / 4095)
         assert told.kd_Nms_per_rad == pytest.approx(2.0, abs=5 / 4095)
     assert joint.device_s[JOINT_POSITION] == pytest.approx(device.time_s, abs=0.0111)

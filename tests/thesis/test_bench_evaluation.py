@@ -13,7 +13,7 @@ from cablecomp.errors import InputError
 from cablecomp.thesis.bench.evaluate import BenchRecording, evaluate_bench
 from cablecomp.thesis.bench.segments import segments_of
 from cablecomp.thesis.bench.vectors import DriveOnBench
-from cablecomp.thesis.closed_forms.stage import equivalent_of, total_ratio
+from cablecomp.thesis.closed_forms.stage import equivalent_of
 from cablecomp.thesis.geometry import sensor_deflection_rad
 
 JOINTS = Path(__file__).parents[2] / "configs" / "joints"
@@ -60,7 +60,7 @@ def record(
         for i in range(1, len(follow)):
             follow[i] = follow[i - 1] + step * (theta[i] - follow[i - 1])
         theta = follow
-    theta = theta + sensor_deflection_rad(load, total_ratio(config.drive), sensor)
+    theta = theta + sensor_deflection_rad(load, config.drive.ratio, sensor)
     theta = theta + noise * 3e-5 * rng.standard_normal(len(t)) + 0.37e-3  # encoder's zero is anywhere
     theta = np.round(theta / 6.283e-5) * 6.283e-5 if noise else theta
     reading = load + noise * 4e-3 * rng.standard_normal(len(t))

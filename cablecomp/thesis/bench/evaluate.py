@@ -16,6 +16,7 @@ import numpy as np
 
 from cablecomp.config import Drive, JointConfig
 from cablecomp.errors import InputError
+from cablecomp.signal.noise import reading_sigma
 from cablecomp.thesis.bench.friction import BenchData, branch_of, weighted_mean
 from cablecomp.thesis.bench.segments import Segment, Smoothed, noise_of, segments_of, trimmed
 from cablecomp.thesis.bench.types import (
@@ -28,7 +29,6 @@ from cablecomp.thesis.bench.types import (
 )
 from cablecomp.thesis.bench.vectors import DriveOnBench
 from cablecomp.thesis.closed_forms.series import acting_stages
-from cablecomp.thesis.closed_forms.stage import total_ratio
 from cablecomp.thesis.design import check_settled
 from cablecomp.thesis.geometry import sensor_deflection_rad
 
@@ -49,7 +49,7 @@ def bench_recording(columns: Mapping[str, Array], config: JointConfig) -> BenchR
             )
     deflection = np.asarray(columns["joint_position_rad"], dtype=float)
     if "motor_position_rad" in columns:
-        deflection = deflection - total_ratio(config.drive) * np.asarray(columns["motor_position_rad"])
+        deflection = deflection - config.drive.ratio * np.asarray(columns["motor_position_rad"])
     return BenchRecording(
         np.asarray(columns["time_s"], dtype=float),
         np.asarray(columns["joint_torque_Nm"], dtype=float),
@@ -103,7 +103,7 @@ def _prepare(recording: BenchRecording, config: JointConfig, sensor_stiffness: f
     load = (recording.load_Nm - sensors.joint_torque_offset_Nm) / sensors.joint_torque_gain
     segments, smoothed = segments_of(recording.time_s, load)
     loading, unloading, notes = _phases(segments, smoothed)
-    twist = sensor_deflection_rad(smoothed.value, total_ratio(config.drive), sensor_stiffness)
+    twist = sensor_deflection_rad(smoothed.value, config.drive.ratio, sensor_stiffness)
     for entry in config.effect:
         if entry.id == "series_compliance":
             twist = twist + float(entry.parameters.get("compliance_rad_per_Nm", 0.0)) * smoothed.value
@@ -127,10 +127,11 @@ def _prepare(recording: BenchRecording, config: JointConfig, sensor_stiffness: f
         notes = (*notes, "no hold at zero load before the ramp: its first samples are taken as the zero")
     _check_direction(deflection, smoothed.value, loading)
     resolution = sensors.joint_position_resolution_rad or 0.0
-    noise = max(noise_of(deflection), resolution / math.sqrt(12.0))
-    white = math.sqrt(max(noise**2 - resolution**2 / 12.0, 0.0))
+    quantised = reading_sigma(0.0, resolution)
+    noise = max(noise_of(deflection), quantised)
+    white = math.sqrt(max(noise**2 - quantised**2, 0.0))
     steps = white / resolution if resolution > 0.0 else math.inf
-    step = resolution / math.sqrt(12.0) * math.exp(-2.0 * math.pi**2 * min(steps, 5.0) ** 2)
+    step = quantised * math.exp(-2.0 * math.pi**2 * min(steps, 5.0) ** 2)
     return BenchData(
         recording.time_s,
         smoothed,

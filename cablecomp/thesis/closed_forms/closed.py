@@ -116,11 +116,6 @@ def closed_unloading_deflection_rad(moment_Nm: Number, peak_Nm: Number, stage: E
     return stage.angle_scale_rad * closed_unloading_normalised(m, peak, stage)
 
 
-def closed_hysteresis_rad(peak_Nm: Number, stage: EquivalentStage) -> Array:
-    """Deflection left after loading to `peak_Nm` and unloading to zero; rad, of the peak's sign."""
-    return closed_unloading_deflection_rad(np.zeros_like(np.asarray(peak_Nm, dtype=float)), peak_Nm, stage)
-
-
 def closed_stiffness_Nm_per_rad(
     moment_Nm: Number, stage: EquivalentStage, peak_Nm: Number | None = None
 ) -> Array:

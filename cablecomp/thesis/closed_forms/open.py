@@ -77,11 +77,6 @@ def open_stiffness_Nm_per_rad(
     return np.asarray(stage.EA_N * stage.mu_eff * stage.radius_m / compliance)
 
 
-def open_hysteresis_rad(peak_Nm: Number, stage: EquivalentStage) -> Array:
-    """Deflection left after loading to `peak_Nm` and unloading to zero; rad, of the peak's sign."""
-    return open_unloading_deflection_rad(np.zeros_like(np.asarray(peak_Nm, dtype=float)), peak_Nm, stage)
-
-
 def rotation_error_share(m: Number, strain: Number) -> Array:
     """Bound on the relative error of the non-rotating wrap for M > 0, m T0/EA (3-30); zero for M < 0.
 

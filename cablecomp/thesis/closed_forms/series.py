@@ -61,17 +61,6 @@ def series_stiffness_Nm_per_rad(moment_Nm: Number, drive: Drive) -> Array:
     return np.asarray(1.0 / compliance)
 
 
-def equal_moment_pretensions_N(drive: Drive) -> Array:
-    """Pretensions that give every stage of a series drive the same m, T0_i = T0_k N_ik R_k/R_i (5-33); N.
-
-    (5-33) as printed, T0_k N_ik, is this for equal output radii; in general m_i = N_ik M/(R_i T0_i) (5-31)
-    asks for the ratio of radii as well, as (5-1) has it.
-    """
-    last = drive.stage[-1]
-    radii = np.array([stage.output_radius_m for stage in drive.stage])
-    return np.asarray(last.pretension_N * stage_ratios(drive) * last.output_radius_m / radii)
-
-
 def _sum(drive: Drive, deflection: Callable[[float, EquivalentStage], Array]) -> Array:
     return np.asarray(
         sum(geared.ratio * deflection(geared.ratio, geared.stage) for geared in acting_stages(drive))

@@ -70,10 +70,6 @@ class EquivalentStage:
         """The same stage with wraps that never end."""
         return replace(self, wraps=UNENDING)
 
-    def with_pretension(self, pretension_N: float) -> EquivalentStage:
-        """The same stage at another pretension."""
-        return replace(self, pretension_N=pretension_N)
-
     def with_friction(self, factor: float) -> EquivalentStage:
         """The same stage with every coefficient of friction times `factor`."""
         wraps = tuple(replace(wrap, mu_wrap=wrap.mu_wrap * factor) for wrap in self.wraps)
@@ -89,13 +85,8 @@ def stage_ratios(drive: Drive) -> Array:
     """Ratios N_ik from every stage's output axis to the last stage's, N_ik = prod_{j>i} r_j/R_j, N_kk = 1
     (5-22).
     """
-    steps = np.array([stage.input_radius_m / stage.output_radius_m for stage in drive.stage])
+    steps = np.array([stage.ratio for stage in drive.stage])
     return np.append(np.cumprod(steps[:0:-1])[::-1], 1.0)
-
-
-def total_ratio(drive: Drive) -> float:
-    """Output angle over input angle of a rigid drive, prod r_j/R_j (6-2)."""
-    return float(np.prod([stage.input_radius_m / stage.output_radius_m for stage in drive.stage]))
 
 
 def settled_pretensions_N(drive: Drive) -> Array:

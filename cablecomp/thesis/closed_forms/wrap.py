@@ -9,7 +9,7 @@ positive when the cable is longer.
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -138,29 +138,6 @@ def unloading_shape(tau: Number, tau_peak: Number, mu_wrap: Number = math.inf) -
     return loading_shape(tau_peak, mu_wrap) + reversal_change(tau, tau_peak, mu_wrap)
 
 
-def loading_elongation_m(
-    tau: Number, mu: Number, radius_m: Number, EA_N: Number, pretension_N: Number, wrap_rad: Number = math.inf
-) -> Array:
-    """Elongation of a wrap loaded from uniform pretension, R T0/(EA mu*) (tau - 1 - ln tau) (2-48); m."""
-    return np.asarray(
-        _scale(mu, radius_m, EA_N, pretension_N) * loading_shape(tau, np.asarray(mu) * np.asarray(wrap_rad))
-    )
-
-
-def unloading_elongation_m(
-    tau: Number,
-    tau_peak: Number,
-    mu: Number,
-    radius_m: Number,
-    EA_N: Number,
-    pretension_N: Number,
-    wrap_rad: Number = math.inf,
-) -> Array:
-    """Elongation after a peak, R T0/(EA mu*) (2 sqrt(tau tau_peak) - tau - 1 - ln tau_peak) (2-79); m."""
-    shape = unloading_shape(tau, tau_peak, np.asarray(mu) * np.asarray(wrap_rad))
-    return np.asarray(_scale(mu, radius_m, EA_N, pretension_N) * shape)
-
-
 def loading_stiffness_N_per_m(tau: Number, mu: Number, radius_m: Number, EA_N: Number) -> Array:
     """Stiffness of the wrap during loading, k = (EA mu*/R) tau/(tau - 1) (2-49); N/m, infinite at tau = 1."""
     with np.errstate(divide="ignore"):
@@ -183,11 +160,6 @@ def bump_corner_tension(tau: Number, tau_peak: Number) -> Array:
     return np.asarray(np.sqrt(np.asarray(tau, dtype=float) * np.asarray(tau_peak)))
 
 
-def bump_erasing_load(tau_peak: Number) -> Array:
-    """Dimensionless tension that erases the bump without turning the pulley, 1/tau_peak (2-71)."""
-    return np.asarray(1.0 / np.asarray(tau_peak, dtype=float))
-
-
 def bump_erasing_rotation_rad(tau: Number, tau_peak: Number, mu: Number) -> Array:
     """Unwinding that erases the bump at constant load; rad.
 
@@ -204,10 +176,6 @@ def corner_after_unwinding_rad(corner_rad: Number, unwound_rad: Number) -> Array
     rad.
     """
     return np.asarray(np.asarray(corner_rad, dtype=float) - np.asarray(unwound_rad) / 2.0)
-
-
-def _scale(mu: Number, radius_m: Number, EA_N: Number, pretension_N: Number) -> Any:
-    return np.asarray(radius_m) * np.asarray(pretension_N) / (np.asarray(EA_N) * np.asarray(mu))
 
 
 def _three(tau: Number, tau_peak: Number, mu_wrap: Number) -> tuple[Array, Array, Array]:

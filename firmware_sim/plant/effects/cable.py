@@ -23,9 +23,9 @@ NONLINEAR_CABLE = EffectKind(
 
 
 def _strand(build: Build, p: Mapping[str, float]) -> None:
-    for c in build.cables:
-        c["play_compliance"] = p["fraction"] * c["free_m"] / c["EA"]
-        c["play_yield"] = p["yield_N"]
+    build.cables["plays"] = 1
+    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["radius"][:, 0] = p["yield_N"]
 
 
 STRAND_FRICTION = EffectKind(
@@ -131,6 +131,7 @@ INPUT_PULLEY_RUNOUT = EffectKind(
     ("motor_angle",),
     _in_runout,
     listed=False,
+    nearest=("pulley_runout",),
 )
 
 
@@ -166,6 +167,28 @@ GROOVE_CLIMB = EffectKind(
     ("joint_angle", "motor_angle"),
     _climb,
     listed=False,
+    nearest=("pulley_runout",),
+)
+
+
+def _flange(build: Build, p: Mapping[str, float]) -> None:
+    _climb(build, p)
+    for c in build.cables:
+        if c["shaft_out"] == build.output:
+            c["climb_beyond"], c["climb_from"] = 1, p["from_rad"]
+
+
+FLANGE_CLIMB = EffectKind(
+    "flange_climb",
+    "From some joint angle on the cables climb the drum's flange: the output radius is R + g max(q − q_f, 0).",
+    (
+        Parameter("radius_m_per_rad", "g", low=-0.01, high=0.02),
+        Parameter("from_rad", "q_f", 0.0),
+    ),
+    ("joint_angle", "motor_angle"),
+    _flange,
+    listed=False,
+    nearest=("pulley_runout",),
 )
 
 KINDS = (
@@ -178,4 +201,5 @@ KINDS = (
     PULLEY_RUNOUT,
     INPUT_PULLEY_RUNOUT,
     GROOVE_CLIMB,
+    FLANGE_CLIMB,
 )

@@ -89,6 +89,7 @@ FRICTION_AGEING = EffectKind(
     ("time", "reversal"),
     _ageing,
     listed=False,
+    nearest=("pretension_relaxation",),
 )
 
 
@@ -106,6 +107,7 @@ FRICTION_TEMPERATURE = EffectKind(
     ("temperature",),
     _warm,
     listed=False,
+    nearest=("thermal_pretension",),
 )
 
 KINDS = (

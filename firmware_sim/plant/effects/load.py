@@ -84,6 +84,7 @@ JOINT_VISCOUS_FRICTION = EffectKind(
     ("velocity",),
     _viscous,
     listed=False,
+    nearest=("bearing_friction", "viscous_slip"),
 )
 
 
@@ -102,6 +103,7 @@ PARALLEL_SPRING = EffectKind(
     ("joint_angle", "motor_angle"),
     _spring,
     listed=False,
+    nearest=("gravity_load",),
 )
 
 
@@ -121,6 +123,7 @@ TIP_LINK = EffectKind(
     ("acceleration", "load_rate"),
     _tip,
     listed=False,
+    nearest=("inertial_load", "series_compliance"),
 )
 
 KINDS = (

@@ -74,6 +74,7 @@ CREEPING_MOUNT = EffectKind(
     ("dwell", "load_rate"),
     _readout(mount_compliance="compliance_rad_per_Nm", mount_time_s="time_constant_s"),
     listed=False,
+    nearest=("viscous_slip", "series_compliance"),
 )
 
 STIFFENING_MOUNT = EffectKind(
@@ -86,6 +87,7 @@ STIFFENING_MOUNT = EffectKind(
     ("load",),
     _readout(bend_compliance="compliance_rad_per_Nm", mount_yield_Nm="saturation_Nm"),
     listed=False,
+    nearest=("series_compliance", "nonlinear_cable"),
 )
 
 FRAME_FLEX = EffectKind(
@@ -95,6 +97,7 @@ FRAME_FLEX = EffectKind(
     ("other:1",),
     _readout(flex_compliance="compliance_rad_per_unit"),
     listed=False,
+    nearest=("crosstalk",),
 )
 
 JOINT_ENCODER_RIPPLE = EffectKind(
@@ -109,6 +112,7 @@ JOINT_ENCODER_RIPPLE = EffectKind(
     ("joint_angle", "motor_angle"),
     _readout(joint_ripple="amplitude_rad", joint_ripple_order="order", joint_ripple_phase="phase_rad"),
     listed=False,
+    nearest=("pulley_runout",),
 )
 
 MOTOR_ENCODER_RIPPLE = EffectKind(
@@ -122,6 +126,7 @@ MOTOR_ENCODER_RIPPLE = EffectKind(
     ("motor_angle",),
     _readout(motor_ripple="amplitude_rad", motor_ripple_order="order", motor_ripple_phase="phase_rad"),
     listed=False,
+    nearest=("pulley_runout",),
 )
 
 TORQUE_SENSOR_QUADRATIC = EffectKind(
@@ -131,6 +136,7 @@ TORQUE_SENSOR_QUADRATIC = EffectKind(
     ("load",),
     _readout(torque_square="coefficient_per_Nm"),
     listed=False,
+    nearest=("series_compliance", "nonlinear_cable"),
 )
 
 TORQUE_SENSOR_HYSTERESIS = EffectKind(
@@ -143,6 +149,7 @@ TORQUE_SENSOR_HYSTERESIS = EffectKind(
     ("load_direction", "reversal"),
     _readout(torque_play_share="fraction", torque_play_Nm="width_Nm"),
     listed=False,
+    nearest=("strand_friction", "bearing_friction"),
 )
 
 TORQUE_SENSOR_DRIFT = EffectKind(
@@ -155,6 +162,7 @@ TORQUE_SENSOR_DRIFT = EffectKind(
     ("temperature",),
     _readout(torque_per_K="coefficient_Nm_per_K", torque_ref="reference_degC"),
     listed=False,
+    nearest=("thermal_pretension",),
 )
 
 MOTOR_TORQUE_COGGING = EffectKind(

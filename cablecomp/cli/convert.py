@@ -1,0 +1,33 @@
+"""`cablecomp convert`."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cablecomp.cli.shared import console
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.recording.convert import convert
+from cablecomp.recording.progress import progress_bar
+
+
+def convert_recording(
+    recording: Annotated[Path, typer.Argument(help="recording of any accepted kind")],
+    to: Annotated[Path, typer.Argument(help="file to write: .csv, .csv.gz, .parquet, .mcap or .npz")],
+    words: MapOption = None,
+    link: LinkOption = None,
+    dbc: DbcOption = None,
+    joint: JointOption = None,
+    begin: Annotated[float, typer.Option("--from", help="leave out rows before this time, s")] = -inf,
+    end: Annotated[float, typer.Option("--to", help="leave out rows after this time, s")] = inf,
+) -> None:
+    """Write a recording in canonical channels: SI units, our signs, one clock."""
+    source = sources(words, link, dbc, joint).open(recording)
+    with progress_bar(f"convert {recording.name}") as told:
+        rows = convert(source, to, (begin, end), told)
+    for note in source.notes:
+        console.print(f"note: {note}")
+    console.print(f"written: {to} ({rows:,} rows: {', '.join(source.channels)})", soft_wrap=True)

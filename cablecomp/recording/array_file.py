@@ -1,0 +1,183 @@
+"""Recordings in binary tables: Parquet, NumPy .npz and MATLAB .mat, all streamed; a row is counted from 1."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+import polars as pl
+from numpy.lib import format as npy
+
+from cablecomp.errors import InputError
+from cablecomp.recording.raw import NumberRows, RawTable
+from cablecomp.recording.table import FloatArray
+
+_ROWS: Final = 1 << 17
+_MOST_VALUES: Final = 1 << 27
+_MOST_COLUMNS: Final = 4096
+_EXPECTED: Final = "expected one numeric array per channel, all of one length"
+
+
+def open_parquet(path: Path) -> RawTable:
+    """Open Parquet; InputError if damaged or a column is not of numbers."""
+    try:
+        schema = pl.read_parquet_schema(path)
+        total = int(pl.scan_parquet(path).select(pl.len()).collect().item())
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise InputError(f"{path}: is damaged or cut Parquet ({first_line(error)}); export it anew") from None
+
+    def read(names: Sequence[str]) -> Iterator[NumberRows]:
+        for name in names:
+            if not (schema[name].is_numeric() or schema[name] == pl.Boolean):
+                raise InputError(f"{path}: column {name!r} holds {schema[name]}; numbers are expected")
+        wanted = [pl.col(name).cast(pl.Float64) for name in names]
+        for done in range(0, total, _ROWS):
+            try:
+                frame = pl.scan_parquet(path).slice(done, _ROWS).select(wanted).collect()
+            except (pl.exceptions.PolarsError, OSError) as error:
+                where = f"{path}: row {done + 1} or after"
+                raise InputError(f"{where}: damaged Parquet ({first_line(error)}); export it anew") from None
+            arrays = {name: frame[name].to_numpy() for name in names}
+            yield NumberRows(done + 1, arrays, (done + frame.height) / total)
+
+    return RawTable(tuple(schema), read)
+
+
+def open_npz(path: Path) -> RawTable:
+    """Open .npz; an array of n x k is k columns `name[0]`... InputError if damaged or of unequal lengths."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            heads = {info.filename: _npy_head(archive, info) for info in archive.infolist()}
+    except (OSError, ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: cannot be read as .npz ({first_line(error)}); {_EXPECTED}") from None
+    shapes = {name.removesuffix(".npy"): shape for name, (shape, _) in heads.items()}
+    columns = columns_of(path, shapes)
+
+    def read(names: Sequence[str]) -> Iterator[NumberRows]:
+        members = list(dict.fromkeys(columns[name][0] for name in names))
+        try:
+            yield from _read_npz(path, members, {name: columns[name] for name in names}, heads)
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: damaged .npz ({first_line(error)}); save it anew") from None
+
+    return RawTable(tuple(columns), read)
+
+
+def columns_of(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[str, int]]:
+    """Column name -> (array, column in it) of arrays that share their first length; single numbers are left out.
+
+    InputError if there is none, or lengths differ.
+    """
+    long = {name: shape for name, shape in shapes.items() if math.prod(shape) > 1 or shape == (1,)}
+    if not long:
+        raise InputError(f"{path}: holds no array; {_EXPECTED}")
+    rows = next(iter(long.values()))[0]
+    found: dict[str, tuple[str, int]] = {}
+    for name, shape in long.items():
+        if len(shape) > 2 or shape[0] != rows:
+            raise InputError(f"{path}: array {name!r} has shape {shape}; {_EXPECTED}, here {rows}")
+        if len(found) + math.prod(shape[1:]) > _MOST_COLUMNS:
+            raise InputError(f"{path}: has more than {_MOST_COLUMNS} columns; is it turned over? {_EXPECTED}")
+        plain = math.prod(shape[1:]) == 1
+        found |= {(name if plain else f"{name}[{k}]"): (name, k) for k in range(math.prod(shape[1:]))}
+    return found
+
+
+def _npy_head(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    with archive.open(info) as file:
+        return _read_head(file, info.filename)
+
+
+def _read_head(file: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    version = npy.read_magic(file)
+    reader = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, fortran, dtype = reader(file)
+    if dtype.kind not in "fiub":
+        raise ValueError(f"array {name.removesuffix('.npy')!r} holds {dtype}, not numbers")
+    if fortran and len(shape) > 1 and math.prod(shape[1:]) > 1:
+        raise ValueError(f"array {name.removesuffix('.npy')!r} is stored by columns (Fortran order)")
+    return tuple(int(n) for n in shape), dtype
+
+
+def _read_npz(
+    path: Path,
+    members: Sequence[str],
+    columns: Mapping[str, tuple[str, int]],
+    heads: Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]],
+) -> Iterator[NumberRows]:
+    """Read all members side by side, a block of rows at a time: memory does not grow with the file."""
+    with zipfile.ZipFile(path) as archive, ExitStack() as stack:
+        files = {}
+        for name in members:
+            files[name] = stack.enter_context(archive.open(f"{name}.npy"))
+            _read_head(files[name], name)
+        total = heads[f"{members[0]}.npy"][0][0]
+        for done in range(0, total, _ROWS):
+            count = min(_ROWS, total - done)
+            parts = {name: _rows_of(files[name], *heads[f"{name}.npy"], count) for name in members}
+            arrays = {
+                column: np.ascontiguousarray(parts[name][:, k]) for column, (name, k) in columns.items()
+            }
+            yield NumberRows(done + 1, arrays, (done + count) / total)
+
+
+def _rows_of(file: IO[bytes], shape: tuple[int, ...], dtype: np.dtype[Any], count: int) -> FloatArray:
+    width = math.prod(shape[1:])
+    data = file.read(count * width * dtype.itemsize)
+    return np.frombuffer(data, dtype).astype(np.float64).reshape(count, width)
+
+
+def open_mat(path: Path) -> RawTable:
+    """Open a MATLAB file up to version 7.2; InputError if damaged or it holds no numeric arrays of one length.
+
+    Vectors may lie either way; structures are not looked into.
+    """
+    from scipy.io import loadmat, whosmat  # a slow import, for this format alone
+
+    try:
+        numeric = ("double", "single", "logical")
+        held = {
+            name: tuple(int(n) for n in shape)
+            for name, shape, kind in whosmat(str(path))
+            if kind in numeric or kind.startswith(("int", "uint"))
+        }
+    except Exception as error:  # whatever scipy's parser makes of a damaged file
+        raise InputError(f"{path}: is a damaged MATLAB file ({first_line(error)}); save it anew") from None
+    if sum(math.prod(shape) for shape in held.values()) > _MOST_VALUES:
+        raise InputError(f"{path}: holds more than {_MOST_VALUES:,} numbers; save it in parts, or as CSV")
+    shapes = {name: _upright(shape) for name, shape in held.items()}
+    columns = columns_of(path, shapes)
+
+    def read(names: Sequence[str]) -> Iterator[NumberRows]:
+        wanted = list(dict.fromkeys(columns[name][0] for name in names))
+        try:
+            content = loadmat(str(path), variable_names=wanted)
+            whole = {
+                name: np.asarray(content[name], dtype=np.float64).reshape(shapes[name][0], -1)
+                if 1 in held[name]
+                else np.asarray(content[name], dtype=np.float64)
+                for name in wanted
+            }
+        except Exception as error:
+            raise InputError(
+                f"{path}: is a damaged MATLAB file ({first_line(error)}); save it anew"
+            ) from None
+        arrays = {name: np.ascontiguousarray(whole[columns[name][0]][:, columns[name][1]]) for name in names}
+        yield NumberRows(1, arrays, 1.0)
+
+    return RawTable(tuple(columns), read)
+
+
+def _upright(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """MATLAB's vectors are 1 x n or n x 1: both are n rows."""
+    return (max(shape),) if len(shape) == 2 and 1 in shape else shape
+
+
+def first_line(error: BaseException) -> str:
+    """The first line of a foreign error's text, else its kind."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,94 @@
+"""Writing a recording anew in canonical channels, streamed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from math import inf
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from cablecomp.errors import InputError
+from cablecomp.recording.atomic import atomic_file
+from cablecomp.recording.channels import order
+from cablecomp.recording.mcap_file import write_mcap
+from cablecomp.recording.reader import Recording
+from cablecomp.recording.table import Block
+from cablecomp.recording.writer import CsvWriter
+
+_ENDINGS: Final = (".csv", ".csv.gz", ".parquet", ".mcap", ".npz")
+
+
+def convert(
+    source: Recording,
+    to: Path,
+    between_s: tuple[float, float] = (-inf, inf),
+    progress: Callable[[float, int], None] | None = None,
+) -> int:
+    """Write the rows of `source` with times within `between_s` to `to`, by its ending; returns how many.
+
+    The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
+    reading does.
+    """
+    ending = next((e for e in _ENDINGS if to.name.endswith(e)), None)
+    if ending is None:
+        raise InputError(f"{to}: {', '.join(_ENDINGS)} are accepted endings")
+    counted = _Counted(source.blocks(), between_s, progress)
+    names = order(source.channels)
+    with atomic_file(to) as temporary:
+        part = temporary.with_name(f"{temporary.name}{ending}")
+        try:
+            _write(part, ending, names, counted)
+            if not counted.rows:
+                raise InputError(
+                    f"{source.path}: has no row between {between_s[0]:g} s and {between_s[1]:g} s"
+                )
+            part.rename(temporary)
+        finally:
+            part.unlink(missing_ok=True)
+    return counted.rows
+
+
+class _Counted:
+    """Blocks cut to a stretch of time, counted on the way."""
+
+    def __init__(
+        self,
+        blocks: Iterable[Block],
+        between_s: tuple[float, float],
+        progress: Callable[[float, int], None] | None,
+    ) -> None:
+        self._blocks, self._between, self._progress = blocks, between_s, progress
+        self.rows = 0
+
+    def __iter__(self) -> Iterator[Block]:
+        low, high = self._between
+        for block in self._blocks:
+            time = block.columns["time_s"]
+            first, last = np.searchsorted(time, [low, high], side="left")
+            last = int(np.searchsorted(time, high, side="right")) if np.isfinite(high) else len(time)
+            if last > first:
+                self.rows += int(last - first)
+                yield block.part(int(first), int(last))
+            if self._progress is not None:
+                self._progress(block.fraction, self.rows)
+            if len(time) and time[-1] > high:
+                return
+
+
+def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Block]) -> None:
+    if ending in (".csv", ".csv.gz"):
+        with CsvWriter(path, names) as writer:
+            for block in blocks:
+                writer.write(block.columns)
+    elif ending == ".mcap":
+        write_mcap(path, blocks)
+    else:
+        parts = list(blocks)
+        whole = {n: np.concatenate([b.columns[n] for b in parts]) for n in names} if parts else {}
+        if ending == ".npz":
+            np.savez_compressed(path, **whole)  # type: ignore[arg-type]  # its stub takes `allow_pickle` for an array
+        else:
+            pl.DataFrame(whole).write_parquet(path)

@@ -1,0 +1,53 @@
+"""Further forms of the catalogue's laws: the same physics in other words, one file per effect.
+
+A form goes by `effect:form`. The catalogue holds none of them; a diagnosis that knows the effect should know them
+again.
+"""
+
+from __future__ import annotations
+
+from firmware_sim.plant.effects.base import EffectKind
+from firmware_sim.plant.forms import (
+    bearing_friction,
+    clamp_slip,
+    clock_skew,
+    crosstalk,
+    gravity_load,
+    inertial_load,
+    nonlinear_cable,
+    position_dependent_friction,
+    pressure_dependent_friction,
+    pretension_relaxation,
+    pulley_runout,
+    routing_friction,
+    series_compliance,
+    strand_break,
+    strand_friction,
+    termination_backlash,
+    thermal_pretension,
+    viscous_slip,
+)
+
+_ROOMS = (
+    routing_friction,
+    viscous_slip,
+    pretension_relaxation,
+    thermal_pretension,
+    bearing_friction,
+    series_compliance,
+    termination_backlash,
+    nonlinear_cable,
+    strand_friction,
+    pressure_dependent_friction,
+    position_dependent_friction,
+    pulley_runout,
+    clock_skew,
+    inertial_load,
+    gravity_load,
+    clamp_slip,
+    strand_break,
+    crosstalk,
+)
+FORMS: dict[str, EffectKind] = {kind.id: kind for room in _ROOMS for kind in room.KINDS}
+
+__all__ = ["FORMS"]

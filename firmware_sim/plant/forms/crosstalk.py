@@ -1,0 +1,79 @@
+"""A neighbour's load in other forms: late, bent, and by the pose of this joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.columns import MOTOR_ANGLE, OTHER, TIME, UNSEEN_TORQUE
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.forms.courses import low_passed
+from firmware_sim.plant.records import Floats
+
+_GAIN = Parameter("load_coefficient", "k, N·m per unit of channel other_1", neutral=0.0)
+
+
+def _loading(build: Build, moment: Callable[[Floats], Floats]) -> None:
+    def fill(inputs: Floats) -> None:
+        inputs[:, UNSEEN_TORQUE] += moment(inputs)
+
+    build.schedules.append(fill)
+
+
+def _lagged(build: Build, p: Mapping[str, float]) -> None:
+    _loading(
+        build,
+        lambda inputs: p["load_coefficient"] * low_passed(inputs[:, OTHER], inputs[:, TIME], p["lag_s"]),
+    )
+
+
+LAGGED = form(
+    "crosstalk",
+    "lagged",
+    "The neighbour's load arrives late, through something soft and damped: M + k y, t_l ẏ = other_1 − y.",
+    (_GAIN, Parameter("lag_s", "t_l", 0.2, 0.0)),
+    ("other:1",),
+    _lagged,
+)
+
+
+def _quadratic(build: Build, p: Mapping[str, float]) -> None:
+    def moment(inputs: Floats) -> Floats:
+        other = inputs[:, OTHER]
+        return np.asarray(p["load_coefficient"] * other * (1.0 + p["bend_per_unit"] * other))
+
+    _loading(build, moment)
+
+
+QUADRATIC = form(
+    "crosstalk",
+    "quadratic",
+    "The neighbour's load counts more one way than the other: M + k other_1 (1 + b other_1).",
+    (_GAIN, Parameter("bend_per_unit", "b", 0.0)),
+    ("other:1",),
+    _quadratic,
+)
+
+
+def _posed(build: Build, p: Mapping[str, float]) -> None:
+    ratio = build.config.ratio
+
+    def moment(inputs: Floats) -> Floats:
+        pose = ratio * inputs[:, MOTOR_ANGLE] + p["phase_rad"]
+        return np.asarray(p["load_coefficient"] * inputs[:, OTHER] * np.cos(pose))
+
+    _loading(build, moment)
+
+
+POSED = form(
+    "crosstalk",
+    "posed",
+    "How much of the neighbour's load arrives depends on where this joint stands: M + k other_1 cos(q + φ).",
+    (_GAIN, Parameter("phase_rad", "φ", 0.0)),
+    ("other:1", "joint_angle"),
+    _posed,
+)
+
+KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, POSED)

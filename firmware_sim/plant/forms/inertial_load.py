@@ -1,0 +1,49 @@
+"""Unseen inertia in other forms: at the end of a flexible link, and changing with the joint's angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from firmware_sim.plant.assembly import Build, Tail
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+
+_INERTIA = Parameter("inertia_kgm2", "J", low=0.0, neutral=0.0)
+
+
+def _flexible(build: Build, p: Mapping[str, float]) -> None:
+    if p["inertia_kgm2"] > 0.0:
+        build.tails.append(
+            Tail(p["inertia_kgm2"], p["stiffness_Nm_per_rad"], p["damping_Nms_per_rad"], branch=True)
+        )
+
+
+FLEXIBLE = form(
+    "inertial_load",
+    "flexible_link",
+    "The inertia hangs on the pulley through a spring and a damper and swings after it; sensors sit on the pulley.",
+    (
+        _INERTIA,
+        Parameter("stiffness_Nm_per_rad", "of the link", low=1e-6),
+        Parameter("damping_Nms_per_rad", "of the link", 0.0, 0.0),
+    ),
+    ("acceleration",),
+    _flexible,
+)
+
+
+def _folding(build: Build, p: Mapping[str, float]) -> None:
+    shaft = build.shafts[build.output]
+    shaft["inertia"] += p["inertia_kgm2"]
+    shaft["inertia_swing"], shaft["inertia_phase"] = p["swing"], p["phase_rad"]
+
+
+FOLDING = form(
+    "inertial_load",
+    "folding_arm",
+    "An arm that folds as the joint turns: J (1 + w cos(q − φ)), with the torque −J′ q̇²/2 that goes with it.",
+    (_INERTIA, Parameter("swing", "w", 0.5, -0.95, 0.95), Parameter("phase_rad", "φ", 0.0)),
+    ("acceleration", "joint_angle"),
+    _folding,
+)
+
+KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING)

@@ -1,0 +1,98 @@
+"""A cable whose stiffness follows its tension, in other forms: saturating, a power law, a knee."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.records import TENSILE_LOW, TENSILE_POINTS, TENSILE_STEP, Floats
+
+_SUBSTEPS = 8
+
+
+def tensile_table(stiffness: Callable[[float], float]) -> Floats:
+    """T/T0 and its slope over strain · EA/T0, for EA(T)/EA(T0) = `stiffness`(T/T0)/`stiffness`(1).
+
+    dτ/dx = g(τ) from τ(1) = 1 both ways, by classical Runge–Kutta; slack where τ comes to 0.
+    """
+    whole = stiffness(1.0)
+
+    def slope(tau: float) -> float:
+        return stiffness(max(tau, 0.0)) / whole if tau > 0.0 else 0.0
+
+    def step(tau: float, h: float) -> float:
+        a = slope(tau)
+        b = slope(tau + 0.5 * h * a)
+        c = slope(tau + 0.5 * h * b)
+        return tau + h / 6.0 * (a + 2.0 * b + 2.0 * c + slope(tau + h * c))
+
+    table = np.zeros((2, TENSILE_POINTS))
+    start = round((1.0 - TENSILE_LOW) / TENSILE_STEP)
+    for way in (1, -1):
+        tau, k = 1.0, start
+        while 0 <= k < TENSILE_POINTS:
+            table[:, k] = max(tau, 0.0), slope(tau)
+            for _ in range(_SUBSTEPS):
+                tau = step(tau, way * TENSILE_STEP / _SUBSTEPS)
+            k += way
+    return table
+
+
+def _tabled(build: Build, stiffness: Callable[[float], float]) -> None:
+    build.cables["tabled"] = 1
+    build.tensile[:] = tensile_table(stiffness)
+
+
+def _saturating(build: Build, p: Mapping[str, float]) -> None:
+    _tabled(build, lambda tau: 1.0 - p["softness"] * math.exp(-tau / p["reach"]))
+
+
+SATURATING = form(
+    "nonlinear_cable",
+    "saturating",
+    "Strands bed in, and then are as stiff as they get: EA(T) in proportion to 1 − b e^(−T/(u T0)).",
+    (
+        Parameter("softness", "b", low=0.0, high=0.95, neutral=0.0),
+        Parameter("reach", "u", 0.7, 0.05, 10.0),
+    ),
+    ("load",),
+    _saturating,
+)
+
+
+def _power(build: Build, p: Mapping[str, float]) -> None:
+    _tabled(build, lambda tau: (tau + 0.02) ** p["exponent"])
+
+
+POWER_LAW = form(
+    "nonlinear_cable",
+    "power_law",
+    "Wires that touch as Hertz has it: EA(T) in proportion to (T/T0 + 0.02)^n.",
+    (Parameter("exponent", "n", low=-0.5, high=0.8, neutral=0.0),),
+    ("load",),
+    _power,
+)
+
+
+def _knee(build: Build, p: Mapping[str, float]) -> None:
+    _tabled(build, lambda tau: 1.0 + p["rise"] * 0.5 * (1.0 + math.tanh((tau - p["place"]) / p["width"])))
+
+
+KNEE = form(
+    "nonlinear_cable",
+    "knee",
+    "A core that carries only from some tension on: EA(T) rises by the share b around T = u T0.",
+    (
+        Parameter("rise", "b", low=-0.7, high=4.0, neutral=0.0),
+        Parameter("place", "u", 1.2, 0.1, 5.0),
+        Parameter("width", "over T0", 0.1, 0.03, 2.0),
+    ),
+    ("load",),
+    _knee,
+)
+
+KINDS: tuple[EffectKind, ...] = (SATURATING, POWER_LAW, KNEE)

@@ -1,0 +1,97 @@
+"""Relaxation in other forms; the clock is the one that all recordings of a joint share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.columns import PRETENSION_H, PRETENSION_L, TEMPERATURE, TIME
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.records import Floats
+
+_FRACTION = Parameter("fraction", "a", low=-0.5, high=0.9, neutral=0.0)
+_ROOM_DEGC = 20.0
+
+
+def lowered(build: Build, loss: Callable[[Floats], Floats]) -> None:
+    """Take `loss`, over T0, off the pretension of both cables."""
+
+    def fill(inputs: Floats) -> None:
+        lost = loss(inputs)
+        inputs[:, PRETENSION_H] -= lost
+        inputs[:, PRETENSION_L] -= lost
+
+    build.schedules.append(fill)
+
+
+def _power(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        age = np.maximum(inputs[:, TIME] + p["age_s"], 0.0) / p["scale_s"]
+        return np.asarray(
+            p["fraction"] * (age ** p["exponent"] - (p["age_s"] / p["scale_s"]) ** p["exponent"])
+        )
+
+    lowered(build, loss)
+
+
+POWER_LAW = form(
+    "pretension_relaxation",
+    "power_law",
+    "Creep by a power of time, begun long ago and going on from recording to recording: T0 (1 − a (((t + t_a)/t_s)^p "
+    "− (t_a/t_s)^p)), t the clock's time.",
+    (
+        _FRACTION,
+        Parameter("exponent", "p", 0.33, 0.1, 1.0),
+        Parameter("scale_s", "t_s", 100.0, 1e-3),
+        Parameter("age_s", "t_a, how long before the clock's zero it began", 0.0, 0.0),
+    ),
+    ("time",),
+    _power,
+)
+
+
+def _exponential(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        return np.asarray(-p["fraction"] * np.expm1(-np.maximum(inputs[:, TIME], 0.0) / p["time_constant_s"]))
+
+    lowered(build, loss)
+
+
+EXPONENTIAL = form(
+    "pretension_relaxation",
+    "exponential",
+    "A termination beds in and comes to rest: T0 (1 − a (1 − e^(−t/t_c))), t the clock's time.",
+    (_FRACTION, Parameter("time_constant_s", "t_c", 30.0, 1e-3)),
+    ("time",),
+    _exponential,
+)
+
+
+def _warm(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        time = np.maximum(inputs[:, TIME], 0.0)
+        quicker = np.exp2((inputs[:, TEMPERATURE] - _ROOM_DEGC) / p["doubling_K"])
+        rate = quicker / (p["time_constant_s"] + time)
+        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
+        before = np.log1p(time[0] / p["time_constant_s"])
+        return np.asarray(p["fraction"] * (before + np.concatenate([[0.0], np.cumsum(steps)])))
+
+    lowered(build, loss)
+
+
+WARM = form(
+    "pretension_relaxation",
+    "warm_creep",
+    "Creep that the temperature drives: dT0/dt = −a T0 2^((ϑ − 20 °C)/ΔK)/(t_c + t), t the clock's time.",
+    (
+        _FRACTION,
+        Parameter("time_constant_s", "t_c", 10.0, 1e-3),
+        Parameter("doubling_K", "ΔK, by which the rate doubles", 5.0, 0.5, 100.0),
+    ),
+    ("time", "temperature"),
+    _warm,
+)
+
+KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM)

@@ -1,0 +1,76 @@
+"""Wires that break in other forms: one after another, fraying, the other cable's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L, TIME
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.forms.courses import ramp, stairs
+from firmware_sim.plant.records import Floats
+
+_LOST = Parameter("fraction", "share of EA lost in the end", low=0.0, high=0.95, neutral=0.0)
+_TIME = Parameter("time_s", "when it begins")
+_WHICH = Parameter("cable_l", "1: wires of cable l", 0.0, 0.0, 1.0)
+
+
+def _stepwise(build: Build, p: Mapping[str, float]) -> None:
+    def fill(inputs: Floats) -> None:
+        column = SOFTENED_L if p["cable_l"] >= 0.5 else SOFTENED_H
+        inputs[:, column] += p["fraction"] * stairs(inputs[:, TIME], p["time_s"], p["duration_s"], p["steps"])
+
+    build.schedules.append(fill)
+
+
+IN_STEPS = form(
+    "strand_break",
+    "in_steps",
+    "Wires break one after another: EA of one cable falls in equal steps.",
+    (
+        _LOST,
+        _TIME,
+        Parameter("duration_s", "from the first to the last", 15.0, 0.0),
+        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        _WHICH,
+    ),
+    ("time", "load"),
+    _stepwise,
+)
+
+
+def _fraying(build: Build, p: Mapping[str, float]) -> None:
+    def fill(inputs: Floats) -> None:
+        column = SOFTENED_L if p["cable_l"] >= 0.5 else SOFTENED_H
+        inputs[:, column] += p["fraction"] * ramp(inputs[:, TIME], p["time_s"], p["duration_s"])
+
+    build.schedules.append(fill)
+
+
+FRAYING = form(
+    "strand_break",
+    "fraying",
+    "A cable frays: its EA falls at a steady rate for a while.",
+    (_LOST, _TIME, Parameter("duration_s", "how long", 15.0, 0.0), _WHICH),
+    ("time", "load"),
+    _fraying,
+)
+
+
+def _other(build: Build, p: Mapping[str, float]) -> None:
+    def fill(inputs: Floats) -> None:
+        inputs[:, SOFTENED_L] += p["fraction"] * ramp(inputs[:, TIME], p["time_s"], 0.0)
+
+    build.schedules.append(fill)
+
+
+OTHER_CABLE = form(
+    "strand_break",
+    "other_cable",
+    "Wires of cable l break at once: its EA falls by the fraction.",
+    (_LOST, _TIME),
+    ("time", "load"),
+    _other,
+)
+
+KINDS: tuple[EffectKind, ...] = (IN_STEPS, FRAYING, OTHER_CABLE)

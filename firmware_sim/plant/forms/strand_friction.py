@@ -1,0 +1,68 @@
+"""Friction between strands in other forms: many small plays (Masing), one that takes time, one that grows with T."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.records import PLAYS
+
+_FRACTION = Parameter(
+    "fraction", "extra stretch over elastic stretch of the free span", low=0.0, high=10.0, neutral=0.0
+)
+_YIELD = Parameter("yield_N", "radius of the play in tension", low=0.0)
+_ACTS = ("load_direction", "reversal")
+
+
+def _masing(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["plays"] = PLAYS
+    whole = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["compliance"] = whole[:, None] / PLAYS
+    build.plays["radius"] = p["yield_N"] * (np.arange(PLAYS) + 0.5) / PLAYS
+
+
+MASING = form(
+    "strand_friction",
+    "masing",
+    "Many contacts, each with its own limit from 0 to yield_N (Masing, Iwan): the loop rounds off at every reversal.",
+    (_FRACTION, _YIELD),
+    _ACTS,
+    _masing,
+)
+
+
+def _slow(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["plays"] = 1
+    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["radius"][:, 0], build.plays["time_s"][:, 0] = p["yield_N"], p["time_s"]
+
+
+RATE_DEPENDENT = form(
+    "strand_friction",
+    "rate_dependent",
+    "Greased strands: the play yields not at once but in its own time, t_y ṗ = T − p − yield beyond the yield.",
+    (_FRACTION, _YIELD, Parameter("time_s", "t_y", 0.2, 0.0)),
+    (*_ACTS, "load_rate"),
+    _slow,
+)
+
+
+def _proportional(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["plays"] = 1
+    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["share"][:, 0] = p["share"]
+
+
+PROPORTIONAL = form(
+    "strand_friction",
+    "proportional",
+    "The lay presses the strands together: the radius of the play is a share of the tension.",
+    (_FRACTION, Parameter("share", "radius over tension", 0.1, 0.0, 0.9)),
+    _ACTS,
+    _proportional,
+)
+
+KINDS: tuple[EffectKind, ...] = (MASING, RATE_DEPENDENT, PROPORTIONAL)

@@ -1,0 +1,99 @@
+"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.columns import PATH, PULLEY, Q_OUT, TIME
+from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.records import Floats
+
+_GAP = Parameter("gap_rad", "b, total clearance", low=0.0, high=0.5, neutral=0.0)
+
+
+def squeezed(time: Floats, path: Floats, gap: float, damping: float) -> Floats:
+    """Where the key stands in a greased gap: d ẋ = M between −b/2 and +b/2, at first where M presses it."""
+    half, x = 0.5 * gap, 0.5 * gap * float(np.sign(path[0]))
+    result = np.empty_like(path)
+    result[0] = x
+    way = 0.5 * (path[1:] + path[:-1]) * np.diff(time) / damping
+    for k, step in enumerate(way.tolist(), start=1):
+        x = min(max(x + step, -half), half)
+        result[k] = x
+    return result
+
+
+def _greased(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        outputs[:, Q_OUT] += squeezed(
+            inputs[:, TIME], outputs[:, PATH], p["gap_rad"], p["damping_Nms_per_rad"]
+        )
+
+    build.mounts.append(shift)
+
+
+GREASED = form(
+    "termination_backlash",
+    "greased",
+    "A gap full of grease: the key crosses it at the speed M/d, and lies on a flank only then.",
+    (_GAP, Parameter("damping_Nms_per_rad", "d", low=1e-9)),
+    ("load", "load_rate"),
+    _greased,
+)
+
+
+def dragged(path: Floats, pulley: Floats, gap: float, drag: float) -> Floats:
+    """Where a link stands in its gap that friction holds still while |M| is less than that."""
+    half, x = 0.5 * gap, 0.5 * gap * float(np.sign(path[0]))
+    result = np.empty_like(path)
+    turns = np.concatenate([[0.0], np.diff(pulley)])
+    for k, (m, turn) in enumerate(zip(path.tolist(), turns.tolist(), strict=True)):
+        x = min(max(x - turn, -half), half) if abs(m) < drag else (half if m > 0.0 else -half)
+        result[k] = x
+    return result
+
+
+def _dragging(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        outputs[:, Q_OUT] += dragged(outputs[:, PATH], outputs[:, PULLEY], p["gap_rad"], p["drag_Nm"])
+
+    build.mounts.append(shift)
+
+
+DRAGGING = form(
+    "termination_backlash",
+    "dragging_link",
+    "A link that drags: while |M| is below its own friction it stands still in space and the pulley turns under it.",
+    (_GAP, Parameter("drag_Nm", "the link's friction", low=0.0)),
+    ("load", "motor_angle"),
+    _dragging,
+)
+
+
+def _two(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        first = 0.5 * p["gap_rad"] * p["share"]
+        second = 0.5 * p["gap_rad"] * (1.0 - p["share"])
+        path = outputs[:, PATH]
+        outputs[:, Q_OUT] += first * np.sign(path) + second * np.sign(path - p["preload_Nm"])
+
+    build.mounts.append(shift)
+
+
+TWO = form(
+    "termination_backlash",
+    "two_clearances",
+    "Two clearances in a row, one of them preloaded by a spring washer: it opens not at M = 0, but at M_p.",
+    (
+        _GAP,
+        Parameter("share", "of the gap that opens at zero", 0.5, 0.0, 1.0),
+        Parameter("preload_Nm", "M_p", 0.0),
+    ),
+    ("load",),
+    _two,
+)
+
+KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO)

@@ -1,0 +1,305 @@
+"""One trial: a joint, what is concealed in it, an imperfect world around it, and the recordings made there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantError, PlantRun, StageConfig
+from firmware_sim.plant.records import Floats
+from firmware_sim.trials.courses import KINDS, RATES_HZ, Course, draw_course
+from firmware_sim.trials.history import uneven, with_history
+from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
+from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
+from firmware_sim.trials.measures import PlainDrive
+from firmware_sim.trials.order import OTHER_FORMS, Order, Wanted, order
+from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
+from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
+from firmware_sim.trials.spoil import Recorded, record
+from firmware_sim.trials.suspects import CATALOGUE, Scene, Suspect
+from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
+from firmware_sim.trials.trial import PAUSE_S, is_slack, plain_scene, usable
+
+SAMPLES = (10_000, 12_000)
+"""Of all recordings of a trial together."""
+
+RECORDINGS = {1: 0.2, 2: 0.5, 3: 0.3}
+_ATTEMPTS = 80
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """An effect that is there, and whether it is what the trial is about (`main`) or goes along (`companion`)."""
+
+    sized: Sized
+    role: str
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One recording: what was done, the drive as it was then, the zeros of its sensors, and what was recorded.
+
+    Angles are those of the joint without noise, as its encoder would show them: `true_rad` of the drive as it is,
+    `plain_rad` without any effect, `without` each by its id where there are several; one value per row.
+    """
+
+    course: Course
+    drive: PlantConfig
+    session: int
+    zeros: dict[str, float]
+    recorded: Recorded
+    true_rad: Floats
+    plain_rad: Floats
+    without: dict[str, Floats]
+
+
+@dataclass(frozen=True)
+class World:
+    """A trial with all its truth; `joint` holds the true drive of the first session and the nominal one."""
+
+    order: Order
+    joint: DrawnJoint
+    plain: PlainDrive
+    floor_rad: float
+    hidden: tuple[Hidden, ...]
+    legs: tuple[Leg, ...]
+    how: Imperfections
+    other: str
+
+
+def draw_world(wanted: Wanted, number: int) -> World:
+    """Draw a trial; the same wish and number give the same trial, bit for bit.
+
+    Joints that cannot show what is asked for, or that go slack, are drawn anew. Raises PlantError if none of a
+    bounded number will do.
+    """
+    asked = order(wanted, number)
+    for attempt in range(_ATTEMPTS):
+        rng = np.random.default_rng([wanted.seed, 21, number, attempt])
+        try:
+            world = _draw(rng, wanted, asked)
+        except PlantError:
+            continue
+        if world is not None:
+            return world
+    names = ", ".join(s.id for s in asked.suspects)
+    raise PlantError(f"trial {number} ({asked.kind}: {names}): no joint of {_ATTEMPTS} can show it")
+
+
+def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | None:
+    how = draw_imperfections(rng, wanted.imperfections, asked.kind)
+    if asked.case is not None:
+        how = how.having("sessions", sessions_of(rng, asked.case, drawn_numbers(rng, "sessions")))
+    if any(s.motor_torque for s in asked.suspects):
+        how = how.having("motor_torque", {"noise_of_range": log_uniform(rng, 0.002, 0.01)})
+    as_stated = asked.kind == "none" and wanted.imperfections == "none" and rng.uniform() < 0.3
+    joint = draw_joint(rng, as_stated, closed=any(s.closed for s in asked.suspects))
+    if asked.case is not None:
+        courses, sessions = table_courses(rng, joint, how)
+    else:
+        courses = _courses(rng, asked.suspects, joint, how)
+        sessions = tuple(range(len(courses))) if "sessions" in how else (0,) * len(courses)
+    scene, plain_run = plain_scene(joint, courses[0])
+    joint = joint.with_sensors(draw_sensors(rng, joint, scene.plain))
+    floor = noise_floor_rad(joint, scene.plain)
+    hidden = _conceal(rng, wanted, asked, how, scene, plain_run)
+    if hidden is None:
+        return None
+    course = courses[0].seen
+    torque_rate = float(np.std(np.gradient(course.load_Nm, course.time_s)))
+    rates = {
+        "joint_position": scene.plain.speed_rms,
+        "motor_position": scene.plain.speed_rms,
+        "joint_torque": scene.plain.compliance * torque_rate,
+    }
+    how = settled(how, rates, floor)
+    if "configuration" in how:
+        joint = _off(joint, how, scene.plain)
+    needed = any(s.neighbour for s in asked.suspects)
+    other = NEIGHBOUR if needed or rng.uniform() < 0.6 else ""
+    if asked.case is not None:
+        other = f"other_{asked.case.condition}"
+    legs = _legs(rng, joint, scene.plain, hidden, courses, sessions, how, other)
+    return None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other)
+
+
+def _courses(
+    rng: np.random.Generator, suspects: Sequence[Suspect], joint: DrawnJoint, how: Imperfections
+) -> tuple[Course, ...]:
+    """One to three courses on one clock, each with its history; an effect shows in the first at the latest."""
+    showing = [k for k in KINDS if all(k in s.courses for s in suspects)]
+    rate = float(rng.choice(RATES_HZ))
+    count = int(rng.choice(list(RECORDINGS), p=list(RECORDINGS.values())))
+    if "sessions" in how:
+        count = max(count, 2)
+    lasts = float(rng.uniform(*SAMPLES)) / rate / count
+    two_sided = any(s.two_sided for s in suspects)
+    within = usable(joint, not two_sided and rng.uniform() < 0.15)
+    warm = any(s.warm for s in suspects) or rng.uniform() < 0.2
+    same, kind = rng.uniform() < 0.6, str(rng.choice(showing))
+    start, found = 0.0, []
+    for k in range(count):
+        if k > 0 and not same:
+            kind = str(rng.choice(KINDS))
+        course = draw_course(rng, kind, within, warm, rate, lasts)
+        if "uneven" in how:
+            course = uneven(rng, course, how["uneven"]["jitter"])
+        course = course.later(start)
+        start = float(np.ceil(course.time_s[-1] + PAUSE_S))
+        if "history" in how:
+            course = with_history(rng, course, within, how["history"]["course"], how["history"]["lasts_s"])
+        found.append(course)
+    return tuple(found)
+
+
+def _conceal(
+    rng: np.random.Generator,
+    wanted: Wanted,
+    asked: Order,
+    how: Imperfections,
+    scene: Scene,
+    plain: PlantRun,
+) -> tuple[Hidden, ...] | None:
+    found = []
+    if asked.case is not None:
+        given = shape_of(rng, replace(scene, course=scene.course.seen), asked.case)
+        if given is None:
+            return ()
+        sized = give_size(scene, *given, log_uniform(rng, 0.1, LARGEST), plain)
+        return None if sized is None else (Hidden(sized, "main"),)
+    for suspect, size in zip(asked.suspects, _sizes(rng, asked.kind), strict=False):
+        sized = _sized(rng, suspect, size, (SMALLEST, LARGEST), scene, plain)
+        if sized is None:
+            return None
+        found.append(Hidden(sized, "main"))
+    if "companions" in how:
+        taken = {h.sized.spec.id.partition(":")[0] for h in found}
+        for size in how["companions"]["sizes"]:
+            suspect = _companion(rng, wanted, scene, taken)
+            sized = _sized(rng, suspect, size, (0.3 * size, 1.5 * size), scene, plain)
+            if sized is not None:  # what cannot show here is no company
+                found.append(Hidden(sized, "companion"))
+                taken.add(suspect.id.partition(":")[0])
+    return tuple(found)
+
+
+def _sizes(rng: np.random.Generator, kind: str) -> tuple[float, ...]:
+    """Sizes of what a trial is about, over the loop: of a pair half the time one large and one small."""
+    if kind != "pair":
+        return (log_uniform(rng, SMALLEST, LARGEST),)
+    if rng.uniform() < 0.5:
+        sizes = (log_uniform(rng, 0.15, LARGEST), log_uniform(rng, SMALLEST, 0.1))
+        return sizes if rng.uniform() < 0.5 else sizes[::-1]
+    return (log_uniform(rng, 0.05, LARGEST), log_uniform(rng, 0.05, LARGEST))
+
+
+def _sized(
+    rng: np.random.Generator,
+    suspect: Suspect,
+    size: float,
+    within: tuple[float, float],
+    scene: Scene,
+    plain: PlantRun,
+) -> Sized | None:
+    shape = suspect.shape(rng, replace(scene, course=scene.course.seen))
+    return give_size(scene, suspect.id, shape, size, plain, within, suspect.motor_torque)
+
+
+def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: set[str]) -> Suspect:
+    """A further effect that the course can show, of the laws asked for."""
+    laws = {"catalogue": CATALOGUE, "other": OTHER_FORMS, "mixed": (*CATALOGUE, *OTHER_FORMS)}[wanted.laws]
+    closed = scene.joint.true.circuit == "closed"
+    fit = [
+        s
+        for s in laws
+        if scene.course.kind in s.courses
+        and s.id.partition(":")[0] not in taken
+        and not (s.warm or s.neighbour or s.two_sided or (s.closed and not closed))
+    ]
+    return fit[int(rng.integers(len(fit)))]
+
+
+def _off(joint: DrawnJoint, how: Imperfections, plain: PlainDrive) -> DrawnJoint:
+    """The configuration off the joint: radii, length and wraps, of which no tolerance speaks, and one value beyond
+    its tolerance. Radii are off by no more than a third of the loop over the travel."""
+    numbers, stage = how["configuration"], joint.nominal.stages[0]
+    most = plain.loop_rad / (3.0 * joint.travel_rad)
+    values = dict(stage.__dict__)
+    for key in ("output_radius_m", "input_radius_m", "free_length_m"):
+        share = numbers[key] if key == "free_length_m" else float(np.clip(numbers[key], -most, most))
+        values[key] *= math.exp(share)
+    for key in ("wrap_output_rad", "wrap_input_rad"):
+        values[key] += numbers[key]
+    key = numbers["beyond_tolerance"]
+    true = joint.true.stages[0].__dict__[key]
+    values[key] = true * math.exp(numbers["sigmas"] * joint.tolerance[key])
+    stated = {name: float(f"{value:.4e}") for name, value in values.items()}
+    return replace(joint, nominal=replace(joint.nominal, stages=(StageConfig(**stated),)))
+
+
+def _legs(
+    rng: np.random.Generator,
+    joint: DrawnJoint,
+    plain: PlainDrive,
+    hidden: Sequence[Hidden],
+    courses: Sequence[Course],
+    sessions: Sequence[int],
+    how: Imperfections,
+    other: str,
+) -> tuple[Leg, ...] | None:
+    found = []
+    zeros, drive = {"joint_position": joint.offset_rad}, joint.true
+    for course, k in zip(courses, sessions, strict=True):
+        if "sessions" in how:
+            zeros, drive = session(joint, how, k)
+        leg = _leg(rng, replace(joint, true=drive), plain, hidden, course, how, other, zeros)
+        if leg is None:
+            return None
+        found.append(replace(leg, session=k))
+    return tuple(found)
+
+
+def session(joint: DrawnJoint, how: Imperfections, k: int) -> tuple[dict[str, float], PlantConfig]:
+    """Zeros and drive of session k."""
+    numbers = how["sessions"]
+    zeros = {
+        "joint_position": joint.offset_rad + numbers["joint_zero_rad"][k],
+        "joint_torque": numbers["torque_zero_of_load"][k] * joint.load_Nm,
+    }
+    factor = numbers["pretension_factor"][k] if joint.true.circuit == "closed" else 1.0
+    stage = replace(joint.stage, pretension_N=joint.stage.pretension_N * factor)
+    return zeros, replace(joint.true, stages=(stage,))
+
+
+def _leg(
+    rng: np.random.Generator,
+    joint: DrawnJoint,
+    plain: PlainDrive,
+    hidden: Sequence[Hidden],
+    course: Course,
+    how: Imperfections,
+    other: str,
+    zeros: dict[str, float],
+) -> Leg | None:
+    specs = [h.sized.spec for h in hidden]
+    scene = Scene(joint, course, plain)
+
+    def played(effects: Sequence[EffectSpec]) -> PlantRun:
+        return run_course(scene, effects, NORMAL)
+
+    run = played(specs)
+    if is_slack(run, joint):
+        return None
+    recorded = record(rng, run, joint.sensors, how, zeros, other)
+    rows = recorded.rows
+    without = {
+        s.id: played([o for o in specs if o is not s]).joint_position_rad[rows]
+        for s in specs
+        if len(specs) > 1
+    }
+    bare = run if not specs else played([])
+    true = run.joint_position_rad[rows]
+    return Leg(course, joint.true, 0, zeros, recorded, true, bare.joint_position_rad[rows], without)

@@ -1,0 +1,68 @@
+"""The guide is shown, written as one page, and its reference holds every public name."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import cablecomp
+from cablecomp.cli import main
+from cablecomp.guide import topics
+
+
+@pytest.mark.parametrize("name", topics.names())
+def test_every_topic_is_listed_and_shown(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["guide"]) == 0
+    assert f"cablecomp guide {name} " in capsys.readouterr().out
+    assert main(["guide", name]) == 0
+    said = capsys.readouterr().out
+    assert topics.title_of(name) in said
+    assert "not run" not in said
+
+
+def test_an_unknown_topic_names_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["guide", "cooking"]) == 2
+    assert "hardware" in capsys.readouterr().err
+
+
+class _Page(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.fetched: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for key, value in attrs:
+            if key == "id":
+                self.ids.append(value or "")
+            elif key == "href" and tag == "a":
+                self.links.append(value or "")
+            elif key in ("src", "href"):
+                self.fetched.append(value or "")
+
+
+def test_the_page_fetches_nothing_and_its_links_lead_somewhere(tmp_path: Path) -> None:
+    assert main(["guide", "--html", str(tmp_path / "guide.html")]) == 0
+    page = _Page()
+    page.feed((tmp_path / "guide.html").read_text(encoding="utf-8"))
+    assert page.fetched == []
+    assert len(set(page.ids)) == len(page.ids) == len(topics.names())
+    assert {link.removeprefix("#") for link in page.links if link.startswith("#")} == set(page.ids)
+
+
+def test_a_page_that_cannot_be_written_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["guide", "--html", str(tmp_path / "no" / "guide.html")]) == 2
+    assert "guide.html" in capsys.readouterr().err
+
+
+def test_the_reference_holds_every_public_name() -> None:
+    text = topics.text_of(topics.REFERENCE)
+    headings = set(re.findall(r"^### (\w+)$", text, re.MULTILINE))
+    assert set(cablecomp.__all__) <= headings
+    assert "`Observer.step`" in text

@@ -1,0 +1,303 @@
+"""Foreign columns: a mapping means what it says, is suggested rightly, is saved and found again."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cablecomp.cli.app import main
+from cablecomp.errors import ConfigError, InputError
+from cablecomp.recording.column_names import read_name
+from cablecomp.recording.inspection import inspect
+from cablecomp.recording.mapping import (
+    FOLDER_MAP,
+    ColumnMap,
+    Source,
+    column_of,
+    load_mapping,
+    mapping_from,
+    mapping_text,
+    save_mapping,
+)
+from cablecomp.recording.reader import open_recording, read_all
+from cablecomp.recording.suggest import as_mapping, suggest
+
+RATIO = 0.25
+
+
+def joint(rows: int = 4000) -> dict[str, np.ndarray]:
+    """A drive that gives way by 4 mrad/(N m), with friction of 0.03 N m at the motor: nothing of our mechanics."""
+    t = np.arange(rows) * 1e-3
+    q = 1.2 * np.sin(2.0 * np.pi * 0.5 * t) + 0.1 * np.sin(2.0 * np.pi * 3.1 * t)
+    load = 1.5 * np.sin(2.0 * np.pi * 0.8 * t + 0.4)
+    return {
+        "time_s": t,
+        "motor_position_rad": q,
+        "joint_position_rad": RATIO * q + 4e-3 * load,
+        "joint_torque_Nm": load,
+        "motor_torque_Nm": -RATIO * load + 0.03 * np.sign(np.gradient(q)),
+    }
+
+
+@pytest.mark.parametrize(
+    ("source", "channel", "reads", "means"),
+    [
+        (Source(column="x"), "motor_position_rad", 1.5, 1.5),
+        (Source(column="x", unit="deg"), "motor_position_rad", 90.0, math.pi / 2),
+        (Source(column="x", unit="°", sign=-1), "joint_position_rad", 90.0, -math.pi / 2),
+        (Source(column="x", counts_per_rev=8192), "motor_position_rad", 4096.0, math.pi),
+        (Source(column="x", counts_per_rev=8192, zero=100), "motor_position_rad", 4196.0, math.pi),
+        (
+            Source(column="x", unit="deg", zero=10, sign=-1, scale=0.1),
+            "motor_position_rad",
+            190.0,
+            -math.pi / 10,
+        ),
+        (Source(column="x", torque_constant_Nm_per_A=0.05), "motor_torque_Nm", 2.0, 0.1),
+        (Source(column="x", torque_constant_Nm_per_A=0.05, unit="mA"), "motor_torque_Nm", 2000.0, 0.1),
+        (Source(column="x", unit="ms", zero=500.0), "time_s", 1500.0, 1.0),
+        (Source(column="x", unit="degF"), "temperature_degC", 212.0, 100.0),
+        (Source(column="x", scale=3.0), "other_x", 2.0, 6.0),
+    ],
+)
+def test_a_source_means_sign_times_scale_times_si_of_column_less_zero(
+    source: Source, channel: str, reads: float, means: float
+) -> None:
+    column = column_of(channel, source)
+    assert column.factor * reads + column.offset == pytest.approx(means)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["motor_position_rad"], "CHANNEL=COLUMN"),
+        (["motor_position_rad=x,unit=furlong"], "unit 'furlong' is none for it; rad, mrad"),
+        (["motor_position=x"], r"channel.motor_position\]: no such channel"),
+        (["motor_position_rad=y"], "the file has no column 'y'; it has 'x'"),
+        (["motor_position_rad=x,sign=2"], "channel.motor_position_rad.sign"),
+        (["motor_position_rad=x,sign=left"], "sign is 'left'; a number is accepted"),
+        (["motor_position_rad=x,colour=2"], "unknown key `channel.motor_position_rad.colour`"),
+        (["motor_position_rad=x,unit=deg,counts_per_rev=9"], "say the same"),
+        (["joint_torque_Nm=x,counts_per_rev=9"], "counts_per_rev is for angles"),
+        (["motor_position_rad=x,torque_constant_Nm_per_A=1"], "takes a torque from a current"),
+        (["motor_position_rad=x,scale=0"], "scale 0"),
+        (["time_s=x,sign=-1"], "runs backwards"),
+    ],
+)
+def test_a_mapping_that_cannot_be_is_refused(words: list[str], says: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("x,time_s\n0,0\n1,1\n")
+    with pytest.raises(InputError, match=says):
+        read_all(path, mapping_from(words))
+
+
+def test_all_wrong_columns_are_said_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("x,time_s\n0,0\n1,1\n")
+    with pytest.raises(ConfigError) as caught:
+        read_all(path, mapping_from(["motor_position_rad=p", "joint_torque_Nm=q", "other_x=x,unit=V"]))
+    assert len(caught.value.lines) == 2
+
+
+_text = st.text(st.characters(blacklist_categories=["Cs", "Cc"]), min_size=1, max_size=12)
+_numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)
+_sources = st.builds(
+    Source,
+    column=_text,
+    unit=st.none() | st.sampled_from(["deg", "mrad"]),
+    sign=st.sampled_from([1, -1]),
+    scale=_numbers.filter(bool),
+    zero=_numbers,
+)
+
+
+@settings(deadline=None)
+@given(st.dictionaries(st.sampled_from(["motor_position_rad", "joint_position_rad", "other_x.y"]), _sources))
+def test_a_mapping_is_read_back_as_written(channels: dict[str, Source]) -> None:
+    import tomllib
+
+    mapping = ColumnMap(schema=1, channel=channels)
+    assert ColumnMap.model_validate(tomllib.loads(mapping_text(mapping))) == mapping
+
+
+def test_a_saved_mapping_is_found_and_said_and_leaves_canonical_files_alone(tmp_path: Path) -> None:
+    mapping = mapping_from(["motor_position_rad=enc,unit=deg", "time_s=ms,unit=ms"])
+    (tmp_path / "foreign.csv").write_text("ms,enc,state\n0,0,on\n1,90,off\n")
+    (tmp_path / "own.csv").write_text("time_s,motor_position_rad\n0,7\n")
+    with pytest.raises(InputError, match="`cablecomp inspect` suggests a mapping"):
+        read_all(tmp_path / "foreign.csv")
+    save_mapping(tmp_path / FOLDER_MAP, mapping, ["a comment"])
+    assert load_mapping(tmp_path / FOLDER_MAP) == mapping
+    table = read_all(tmp_path / "foreign.csv")
+    assert table.columns["motor_position_rad"].tolist() == pytest.approx([0.0, math.pi / 2])
+    assert any(FOLDER_MAP in note for note in open_recording(tmp_path / "foreign.csv").notes)
+    assert read_all(tmp_path / "own.csv").columns["motor_position_rad"].tolist() == [7.0]
+
+
+@pytest.mark.parametrize(
+    ("column", "channel", "unit"),
+    [
+        ("stamp_ms", "time_s", "ms"),
+        ("Time (s)", "time_s", "s"),
+        ("t", "time_s", None),
+        ("motor_pos", "motor_position_rad", None),
+        ("MotorAngle[deg]", "motor_position_rad", "deg"),
+        ("drive encoder deg", "motor_position_rad", "deg"),
+        ("/arm/measured_js.position[elbow]", "joint_position_rad", None),
+        ("link.theta_deg", "joint_position_rad", "deg"),
+        ("tau_motor", "motor_torque_Nm", None),
+        ("joint_trq [mNm]", "joint_torque_Nm", "mNm"),
+        ("/ft_sensor.wrench.torque.z", "joint_torque_Nm", None),
+        ("iq", "motor_current_A", None),
+        ("motor_current_mA", "motor_current_A", "mA"),
+        ("jointSpeed_rpm", "joint_velocity_rad_s", "rpm"),
+        ("cable tension 1 (N)", "tension_h_N", "N"),
+        ("cable tension 2 (N)", "tension_l_N", "N"),
+        ("winding_temp", "temperature_degC", None),
+    ],
+)
+def test_names_that_people_use_are_understood(column: str, channel: str, unit: str | None) -> None:
+    best = read_name(column)[0]
+    assert (best.channel, best.unit) == (channel, unit)
+
+
+@pytest.mark.parametrize("column", ["mode", "battery_voltage", "x", "fault_code", "status"])
+def test_names_that_tell_nothing_give_nothing(column: str) -> None:
+    assert read_name(column) == []
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    degrees=st.tuples(st.booleans(), st.booleans()),
+    signs=st.tuples(st.sampled_from([1, -1]), st.sampled_from([1, -1]), st.sampled_from([1, -1])),
+    time=st.sampled_from([("t", 1.0), ("t", 1e3), ("t", 1e6), ("stamp_ms", 1e3), ("time_us", 1e6)]),
+    named=st.booleans(),
+)
+def test_a_disguised_joint_is_seen_through(
+    degrees: tuple[bool, bool], signs: tuple[int, int, int], time: tuple[str, float], named: bool
+) -> None:
+    """Units and signs of joint, load and motor torque turned at random: the suggestion undoes them all."""
+    true = joint()
+    turn = [180.0 / math.pi if d else 1.0 for d in degrees]
+    suffix = ["_deg" if d and named else "" for d in degrees]
+    disguised = {
+        time[0]: 1.7e9 * (time[1] == 1e3) + true["time_s"] * time[1],
+        f"act_pos{suffix[0]}": true["motor_position_rad"] * turn[0],
+        f"out_angle{suffix[1]}": signs[0] * true["joint_position_rad"] * turn[1],
+        "load_torque": signs[1] * true["joint_torque_Nm"],
+        "motor_effort": signs[2] * true["motor_torque_Nm"],
+        "setpoint_motor_pos": true["motor_position_rad"] + 1.0,
+    }
+    mapping = as_mapping(suggest(disguised, RATIO))
+    if degrees == (True, True) and not named:
+        return  # a common factor of both angles cannot be told from a longer swing
+    for channel, values in true.items():
+        column = column_of(channel, mapping.channel[channel])
+        found = disguised[column.column] * column.factor + column.offset
+        np.testing.assert_allclose(found, values, atol=1e-3 if channel == "time_s" else 1e-9, err_msg=channel)
+
+
+def test_counts_per_turn_follow_from_the_other_encoder() -> None:
+    true = joint()
+    counts = np.round(true["motor_position_rad"] * 8192 / (2.0 * math.pi)) + 5000
+    found = {
+        s.channel: s
+        for s in suggest(
+            {"time_s": true["time_s"], "motor_enc": counts, "joint_pos_rad": true["joint_position_rad"]},
+            RATIO,
+        )
+    }
+    assert found["motor_position_rad"].source.counts_per_rev == 8192.0
+
+
+def test_inspection_sees_what_is_wrong_with_a_recording() -> None:
+    columns = joint(8000)
+    rng = np.random.default_rng(5)
+    columns["joint_position_rad"] += 1e-4 * rng.standard_normal(8000)
+    columns["joint_torque_Nm"] = np.clip(columns["joint_torque_Nm"], -1.2, 1.2)
+    columns["motor_torque_Nm"][2000:3500] = columns["motor_torque_Nm"][2000]
+    columns["time_s"] = columns["time_s"].copy()
+    columns["time_s"][5000:] += 0.5
+    columns["time_s"][6001] = columns["time_s"][6000]
+    seen = inspect(columns)
+    by_name = {c.name: c for c in seen.channels}
+    assert seen.rate_Hz == pytest.approx(1000.0)
+    assert [row for row, _ in seen.gaps] == [5000]
+    assert seen.gaps[0][1] == pytest.approx(0.501)
+    assert seen.duplicates == 1
+    assert by_name["joint_position_rad"].noise == pytest.approx(1e-4, rel=0.1)
+    assert by_name["motor_torque_Nm"].stuck_s == pytest.approx(1.5, abs=0.01)
+    clipped = float(np.mean(np.abs(columns["joint_torque_Nm"]) == 1.2))
+    assert by_name["joint_torque_Nm"].clipped == pytest.approx(clipped, abs=0.02)
+    assert by_name["motor_position_rad"].clipped == by_name["motor_torque_Nm"].clipped == 0.0
+
+
+def test_repeatability_is_the_difference_between_like_cycles() -> None:
+    t = np.arange(20_000) * 1e-3
+    q = np.sin(2.0 * np.pi * 0.25 * t)
+    jitter = 1e-3 * np.repeat([1.0, -1.0, 1.0, -1.0, 1.0], 4000)
+    seen = inspect({"time_s": t, "motor_position_rad": q, "joint_position_rad": q + jitter}).repeats
+    assert seen is not None
+    assert seen.cycles == 5
+    assert seen.period_s == pytest.approx(4.0, abs=2e-3)
+    assert seen.joint_rad == pytest.approx(2e-3, rel=1e-3)
+    noise = np.random.default_rng(1).standard_normal(20_000)
+    assert inspect({"time_s": t, "motor_position_rad": noise, "joint_position_rad": q}).repeats is None
+
+
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet", ".npz", ".mcap"])
+def test_convert_keeps_every_bit(ending: str, tmp_path: Path) -> None:
+    if ending == ".mcap":
+        pytest.importorskip("mcap", reason="optional package mcap is not installed")
+    pl.DataFrame(joint(3000)).write_csv(tmp_path / "a.csv")
+    assert main(["convert", str(tmp_path / "a.csv"), str(tmp_path / f"b{ending}")]) == 0
+    expected, found = (read_all(tmp_path / name).columns for name in ("a.csv", f"b{ending}"))
+    assert {n: v.tobytes() for n, v in found.items()} == {n: v.tobytes() for n, v in expected.items()}
+    assert (
+        main(["convert", str(tmp_path / "a.csv"), str(tmp_path / f"c{ending}"), "--from", "1", "--to", "1.5"])
+        == 0
+    )
+    time = read_all(tmp_path / f"c{ending}").columns["time_s"]
+    assert (time[0], time[-1], len(time)) == (1.0, 1.5, 501)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["a.csv", f"b{ending}", f"c{ending}"])
+
+
+def test_inspect_shows_suggests_and_saves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    true = joint(500)
+    path = tmp_path / "[red]a.csv"
+    names = {"t_ms": true["time_s"] * 1e3, "m_pos": true["motor_position_rad"], "state [x]": ["run"] * 500}
+    pl.DataFrame(names).write_csv(path)
+    assert main(["inspect", str(path), "--save"]) == 0
+    out = capsys.readouterr().out
+    assert "[red]a.csv" in out
+    assert "motor_position_rad" in out
+    assert read_all(path).columns["motor_position_rad"].tolist() == true["motor_position_rad"].tolist()
+    assert main(["inspect", str(path), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["text_columns"] == ["state [x]"]
+    assert answer["quality"]["rate_Hz"] == pytest.approx(1000.0)
+
+
+def test_what_is_written_opens_in_pandas_and_polars_with_their_defaults(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas", reason="optional package pandas is not installed")
+    from cablecomp.recording.recorder import Recorder
+
+    rows = np.random.default_rng(5).standard_normal((3000, 4))
+    rows[:, 0] = np.arange(3000) * 1e-3
+    rows[:2500, 2] = np.nan  # a temperature that comes late
+    names = ("time_s", "motor_position_rad", "temperature_degC", "other_x")
+    with Recorder(tmp_path / "recording.csv", names) as recorder:
+        for row in rows:
+            recorder.append(tuple(row))
+    for frame in (pandas.read_csv(tmp_path / "recording.csv"), pl.read_csv(tmp_path / "recording.csv")):
+        assert tuple(frame.columns) == names
+        for k, name in enumerate(names):
+            assert "float" in str(frame[name].dtype).lower()
+            np.testing.assert_array_equal(np.asarray(frame[name].to_numpy(), dtype=np.float64), rows[:, k])
