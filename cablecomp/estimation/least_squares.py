@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from cablecomp.estimation.evidence import JOINT
-from cablecomp.estimation.limits import HOPELESS
+from cablecomp.estimation.limits import HOPELESS, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray
@@ -108,7 +108,8 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
             if sum(q.session == r.session for q in problem.evidence) > 1
         ]
         if spread:
-            zero_sd[c] = max(float(np.sqrt(np.mean(np.square(spread)))), floor.zero_sd.get(c, 0.0))
+            seen = min(float(np.sqrt(np.mean(np.square(spread)))), ZERO * size)
+            zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
     return Weighing(sigma, zero_sd)
 
 

@@ -39,6 +39,8 @@ def weigh(
     """Every effect of the final model, most certain first."""
     final, groups = selection.final, selection.groups
     bounds = final.fit.at_bound()
+    # whoever took nothing off in any round stands in for nobody
+    able = {t.term.name for r in selection.rounds for t in r.tried if t.lead.gain > 0.0}
     found = []
     for term in final.terms:
         if not isinstance(term, Hypothesis):
@@ -49,7 +51,7 @@ def weigh(
             if bare is not None
             else Lead(1.0, 99.0, 10.0, np.zeros(1))
         )
-        kept, leads = rivals(final, term, pool, groups, rng)
+        kept, leads = rivals(final, term, [h for h in pool if h.name in able], groups, rng)
         nearest = min(leads.values(), key=lambda v: v.z, default=Lead(1.0, 10.0, 10.0, np.zeros(1)))
         follows = _follows(term, remainder)
         evidence = features(
