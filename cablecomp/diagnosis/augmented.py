@@ -10,6 +10,7 @@ from cablecomp.diagnosis.explain.selection import Model
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.standing import standing, value_of
+from cablecomp.signal.smoothing import FloatArray
 
 STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
 
@@ -56,7 +57,7 @@ def _patterns(members: Sequence[Evidence], names: Sequence[str], session: str, t
     return tuple("/".join(e.name.split("/")[-2:]) for e in members)
 
 
-def _zeros_of(zeros: Mapping[str, Mapping[str, Sequence[float]]], session: str) -> dict[str, float]:
+def _zeros_of(zeros: Mapping[str, Mapping[str, FloatArray]], session: str) -> dict[str, float]:
     found = {"joint_position_offset_rad": float(zeros[JOINT][session][0])}
     if MOTOR in zeros:
         found["motor_torque_offset_Nm"] = float(zeros[MOTOR][session][0])

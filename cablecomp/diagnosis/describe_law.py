@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from cablecomp.diagnosis.explain.scores import Groups, Lead, lead
 from cablecomp.diagnosis.explain.selection import Model
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 TERMS = 10
 """Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a drum is."""
@@ -79,10 +78,10 @@ def _ridge(T: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(T.T @ T + scale * np.eye(T.shape[1]), T.T @ y), dtype=np.float64)
 
 
-def _crossed(T: FloatArray, y: FloatArray, fold: Sequence[int] | FloatArray) -> FloatArray:
+def _crossed(T: FloatArray, y: FloatArray, fold: IntArray) -> FloatArray:
     """Prediction of each fold from the others."""
     predicted = np.zeros(len(y))
     for k in np.unique(fold):
-        out = np.asarray(fold) == k
+        out = fold == k
         predicted[out] = T[out] @ _ridge(T[~out], y[~out])
     return predicted

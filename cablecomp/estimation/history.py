@@ -57,7 +57,8 @@ def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
     within the share `most` of the recording."""
     motor = recording.at_rows("motor_position_rad")
     load = np.broadcast_to(
-        np.asarray(load_of(problem.config, recording.columns), dtype=np.float64), recording.columns["time_s"].shape
+        np.asarray(load_of(problem.config, recording.columns), dtype=np.float64),
+        recording.columns["time_s"].shape,
     )[recording.rows]
     ratio = np.prod([s.input_radius_m / s.output_radius_m for s in problem.config.drive.stage])
     moves = np.ptp(motor) * ratio > 0.3 * np.ptp(recording.at_rows(JOINT))

@@ -230,7 +230,7 @@ class Problem:
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _length(self) -> int:
-        return sum(s.stop - s.start for s in self.spans().values()) + sum(
+        return sum(int(s.stop - s.start) for s in self.spans().values()) + sum(
             z.penalty_rows for z in self.bases.values()
         )
 

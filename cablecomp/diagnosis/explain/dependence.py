@@ -51,9 +51,9 @@ class Dependence:
         own = [p for p in problem.parameters if p.base == self.parameter and p.session]
         common = replace(own[0], name=self.parameter)
         first = problem.parameters.index(own[0])
-        kept = [p for p in problem.parameters if p not in own]
-        kept.insert(first, common)
-        return replace(problem, parameters=tuple(kept))
+        others = [p for p in problem.parameters if p not in own]
+        others.insert(first, common)
+        return replace(problem, parameters=tuple(others))
 
 
 def may_depend(parameter: str, condition: str) -> bool:

@@ -144,7 +144,9 @@ def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArr
 
 def _kept(problem: Problem, out: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Evidence]:
     """The recordings with the rows that are out not counted; those with nothing left go."""
-    masks: list[dict[str, np.ndarray[tuple[int], np.dtype[np.bool_]]]] = [dict(e.counted) for e in problem.evidence]
+    masks: list[dict[str, np.ndarray[tuple[int], np.dtype[np.bool_]]]] = [
+        dict(e.counted) for e in problem.evidence
+    ]
     for c, span in problem.spans().items():
         owners = problem.owners(c)
         gone = out[span]
@@ -196,7 +198,7 @@ def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
     a, b, block = better[here], worse[here], groups.block[here]
     scale = float(np.median(np.abs(a))) / 0.6745
     la, lb = huber(a, scale), huber(b, scale)
-    difference = np.bincount(block, lb - la, minlength=groups.blocks)
+    difference: FloatArray = np.bincount(block, lb - la, minlength=groups.blocks).astype(np.float64)
     total = float(np.sum(difference))
     spread = difference - difference.mean()
     error = sqrt(float(np.sum(spread**2)) * len(difference) / max(len(difference) - 1, 1))

@@ -11,12 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import INSTANT, PHASE, Hypothesis, Start, at_instants
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
+
 
 @dataclass(frozen=True)
 class Anchor:

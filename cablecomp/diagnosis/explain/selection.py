@@ -176,7 +176,10 @@ def _one_round(
     fine = _finely(model, groups) if any(_wants_rates(a[0], model, before) for a in answers) else None
     if fine is not None:
         there = [anchor(fine.fit)]
-        answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], model, before) else a for a in answers]
+        answers = [
+            (ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], model, before) else a
+            for a in answers
+        ]
     dependences = (
         [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
     )
@@ -232,7 +235,9 @@ def _one_round(
     tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
     good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
-    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(x for a in answers for x in a)
+    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(
+        x for a in answers for x in a
+    )
 
 
 def searching(fit: Fit) -> Weighing:
@@ -262,11 +267,15 @@ def _cold(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
     if not any(p.sd >= DECADE for p in baseline.problem.parameters if np.isfinite(p.sd)):
         return None
     evidence = baseline.problem.evidence
-    torque = [float(np.std(e.columns[c])) for e in evidence for c in (MOTOR, "joint_torque_Nm") if c in e.columns]
+    torque = [
+        float(np.std(e.columns[c])) for e in evidence for c in (MOTOR, "joint_torque_Nm") if c in e.columns
+    ]
     found: dict[str, float] = {}
     for h in pool:
         values = dict(h.starts[0].values if h.effect.posture else h.starts[len(h.starts) // 2].values)
-        if h.amount.unit == "N m" and torque:  # a share of the torques that go round: moments are not known beforehand
+        if (
+            h.amount.unit == "N m" and torque
+        ):  # a share of the torques that go round: moments are not known beforehand
             values[h.amount.name] = 0.25 * float(np.median(torque))
         found |= {f"effect.{h.effect.id}.{k}": v for k, v in values.items() if not isinstance(v, str)}
     return found
@@ -302,7 +311,7 @@ def _by_conditions(
     """The same effect with an amount that grows with a condition, for each condition of three values and more."""
     cost, (term,), problem, x = c
     assert isinstance(term, Hypothesis)
-    found = []
+    found: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
     for condition in problem.evidence[0].condition:
         values = [e.condition[condition] for e in problem.evidence]
         if len(set(values)) < 3:
@@ -311,7 +320,9 @@ def _by_conditions(
         amount = next((p for p in problem.parameters if p.name == name), None)
         if amount is None or not may_depend(name, condition):
             continue
-        here = replace(amount, start=max(amount.value(float(x[problem.parameters.index(amount)])), amount.scale))
+        here = replace(
+            amount, start=max(amount.value(float(x[problem.parameters.index(amount)])), amount.scale)
+        )
         gain = by_condition(here, condition, float(np.ptp(values)))
         changed = replace(problem, parameters=(*problem.parameters, gain))
         try:
@@ -402,7 +413,9 @@ def rivals(
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]
     fitted = side_by_side(lambda a: rough(a, LIMITS.rough), answers)
-    roughs = sorted(((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost)
+    roughs = sorted(
+        ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
+    )
     losses: dict[str, FloatArray] = {term.name: _block_losses(model, model, groups)}
     leads: dict[str, Lead] = {}
     chosen = roughs[: LIMITS.promising // 2]
@@ -427,7 +440,8 @@ def _tried(fit: Fit) -> Fit | None:
 def _block_losses(model: Model, reference: Model, groups: Groups) -> FloatArray:
     here = groups.block >= 0
     scale = float(np.median(np.abs(reference.left_out[here]))) / 0.6745
-    return np.bincount(groups.block[here], huber(model.left_out[here], scale), minlength=groups.blocks)
+    sums = np.bincount(groups.block[here], huber(model.left_out[here], scale), minlength=groups.blocks)
+    return np.asarray(sums, dtype=np.float64)
 
 
 __all__ = ["Anchor", "Model", "Round", "Selection", "Tried", "rivals", "select", "without"]
