@@ -13,7 +13,9 @@ from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption,
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import Diagnosis, diagnose, report_json, write_diagnosis
 from cablecomp.effects import load_effects
+from cablecomp.errors import path_text
 from cablecomp.recording.atomic import atomic_directory
+from cablecomp.recording.inspection import require_motion
 from cablecomp.report.diagnosis_build import diagnosis_report
 
 
@@ -37,7 +39,9 @@ def diagnose_recordings(
         load_effects(path)
     joint = read_joint(config)
     reading = sources(words, link, dbc, which, joint)
-    data = {str(path): reading.read(path).columns for path in recordings}
+    data = {path_text(path): reading.read(path).columns for path in recordings}
+    for name, columns in data.items():
+        require_motion(columns, name)
     announce_compilation()
     with share_bar() as told:
         found = diagnose(joint, data, told, seed)
