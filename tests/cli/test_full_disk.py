@@ -14,7 +14,6 @@ import pytest
 COMMANDS = {
     "replay": ["replay", "a.csv", "--config", "tendon-finger", "--out", "out/replay"],
     "design": ["design", "--config", "tendon-finger", "--out", "out/design"],
-    "info": ["info", "--config", "tendon-finger", "--figures", "out/figures"],
     "csv": ["convert", "a.csv", "out.csv"],
     "gzip": ["convert", "a.csv", "out.csv.gz"],
     "parquet": ["convert", "a.csv", "out.parquet"],
@@ -53,7 +52,7 @@ def test_no_command_leaves_half_a_file_on_a_full_disk(tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=900,
         check=True,
     )
     for name, (code, error) in json.loads(done.stdout.splitlines()[-1]).items():
