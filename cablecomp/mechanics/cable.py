@@ -5,11 +5,9 @@ from __future__ import annotations
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
-from cablecomp.mechanics.profile import ROWS, B, Floats, Ints, wrap_commit, wrap_eval
+from cablecomp.mechanics.profile import LEAST_WRAP, ROWS, B, Floats, Ints, wrap_commit, wrap_eval
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
-
-OUT, IN = 0, 1
 
 
 @inlined_kernel
@@ -43,11 +41,15 @@ def drum_eval(
     v: float,
     w: float,
 ) -> tuple[float, float, float]:
-    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending."""
+    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending.
+
+    A solver's trial may unwind the drum: it is then taken to keep `LEAST_WRAP`, which `joint_ready` sees.
+    """
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     wrap = 2 * c + end
     mu = P[p + o.MU_OUT + end]
-    m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+    m = I[o.S_MEET] + o.MEET * wrap
+    w = w if w > LEAST_WRAP else LEAST_WRAP
     S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w, v, tau
     if L is not None:
         if P[p + o.VISCOUS] > 0.0:
@@ -93,6 +95,7 @@ def cable_eval(
     if L is not None:
         if P[p + o.GUIDE] > 0.0:
             w_in = P[p + o.W_IN] - P[p + o.SIGN] * x_in
+            w_in = w_in if w_in > LEAST_WRAP else LEAST_WRAP
             total, slope, tau_in = guide_split(P, I, S, J, L, G, c, v, x_in, w_in)
             slope *= dv
             S[q + o.Q_TENSION_IN] = tau_in * t0
@@ -150,7 +153,7 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
     error = 0.0
     for end in range(2):
         wrap = 2 * c + end
-        m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+        m = I[o.S_MEET] + o.MEET * wrap
         meet = (
             S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B],
             S[m + o.M_E],

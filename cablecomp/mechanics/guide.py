@@ -39,7 +39,7 @@ def guide_split(
     v1 = min(max(S[q + o.Q_GUIDE_END], low), high)
     side = a_side = e_arc = g1 = g2 = swap = 0.0
     slides = False
-    m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+    m = I[o.S_MEET] + o.MEET * wrap
     for iteration in range(60):
         tau1 = tau_of_v(L, 2, v1)
         e_in, a_in, k, ym, vm, cm, bm, tm = wrap_eval(G, L, 2, wrap, J[wrap], w_in, v1, tau1, P[p + o.MU_IN])
