@@ -43,14 +43,14 @@ def drum_eval(
 ) -> tuple[float, float, float]:
     """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending.
 
-    A solver's trial may unwind the drum: it is then taken to keep `LEAST_WRAP`, which `joint_ready` sees.
+    A solver's trial may unwind the drum: it is then taken to keep `LEAST_WRAP`, and `joint_ready` refuses it.
     """
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     wrap = 2 * c + end
     mu = P[p + o.MU_OUT + end]
     m = I[o.S_MEET] + o.MEET * wrap
-    w = w if w > LEAST_WRAP else LEAST_WRAP
     S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w, v, tau
+    w = w if w > LEAST_WRAP else LEAST_WRAP
     if L is not None:
         if P[p + o.VISCOUS] > 0.0:
             return viscous_eval(P, I, S, c, end, w, tau, mu)
@@ -95,7 +95,6 @@ def cable_eval(
     if L is not None:
         if P[p + o.GUIDE] > 0.0:
             w_in = P[p + o.W_IN] - P[p + o.SIGN] * x_in
-            w_in = w_in if w_in > LEAST_WRAP else LEAST_WRAP
             total, slope, tau_in = guide_split(P, I, S, J, L, G, c, v, x_in, w_in)
             slope *= dv
             S[q + o.Q_TENSION_IN] = tau_in * t0
@@ -142,16 +141,19 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
     """
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     q = I[o.S_CABLE] + o.CABLE_STATE * c
+    first = 0
     if L is not None:
         S[q + o.Q_PLAY] = S[q + o.Q_PLAY_TRY]
         if P[p + o.GUIDE] > 0.0:
             guide_commit(I, S, J, G, c)
         if P[p + o.VISCOUS] > 0.0:
             viscous_commit(I, S, 2 * c)
-            viscous_commit(I, S, 2 * c + 1)
-            return
+            if P[p + o.GUIDE] == 0.0:
+                viscous_commit(I, S, 2 * c + 1)
+                return
+            first = 1  # behind a guide the input drum slips without viscosity
     error = 0.0
-    for end in range(2):
+    for end in range(first, 2):
         wrap = 2 * c + end
         m = I[o.S_MEET] + o.MEET * wrap
         meet = (

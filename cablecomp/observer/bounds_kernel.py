@@ -15,7 +15,7 @@ from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import law_of, stacks
 from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.pretension import retension
-from cablecomp.mechanics.profile import B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
+from cablecomp.mechanics.profile import LEAST_WRAP, B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, tau_of_v, v_of_tau
 
 Side: TypeAlias = tuple[Floats, Ints, Floats, float]
@@ -124,6 +124,7 @@ def _cable(
         wrap = 2 * c + end
         mu = P[p + o.MU_OUT + end]
         w = P[p + o.W_OUT + end] + (P[p + o.SIGN] * x_out if end == 0 else -P[p + o.SIGN] * x_in)
+        w = max(w, LEAST_WRAP)
         eps = W[cable_block(I, c) + W_EPS] if end == 0 else eps_in
         shift = mu * eps * W[W_STEEP]
         end_v = v + sign * shift
