@@ -135,8 +135,9 @@ def _scalar_violations(model: Model, S: Floats) -> list[str]:
     if not np.all(np.isfinite(S[int(I[o.S_FILTER]) : int(I[o.S_MEET])])):
         found.append("the filter's, a term's or a grid's state is not finite")
     nodes = int(I[o.NODES])
-    guided = int(I[o.N_STACKS]) > 2 * int(I[o.N_CABLES])  # behind a guide the input drum has no use for its grid
-    for wrap in range(0, 2 * int(I[o.N_CABLES]) if nodes else 0, 2 if guided else 1):
+    wraps = 2 * int(I[o.N_CABLES])
+    # behind a guide the input drum has no use for its grid
+    for wrap in range(0, wraps if nodes else 0, 1 if int(I[o.N_STACKS]) == wraps else 2):
         b = int(I[o.S_WET]) + wrap * (W_HEAD + 4 * nodes)
         if not (1.0 <= S[b + W_COUNT] <= nodes and S[b + W_END] > 0.0):
             found.append(f"grid {wrap}: {S[b + W_COUNT]:g} nodes, end tension {S[b + W_END]:g}")
