@@ -32,3 +32,8 @@ class InternalError(CablecompError):
 def printable(text: str) -> str:
     """The text on one line, with everything that a terminal would act upon written out (`\\x1b`)."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(text.split()))
+
+
+def path_text(path: object) -> str:
+    """A path as text that can be written anywhere: bytes of its name that are no UTF-8 become `\ufffd`."""
+    return str(path).encode("utf-8", "surrogateescape").decode("utf-8", "replace")

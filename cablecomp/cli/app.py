@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -98,6 +99,9 @@ def _root(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point: runs a command, turns errors into one line on stderr and an exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
     try:
         code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
         sys.stdout.flush()
@@ -120,7 +124,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:  # a full disk, a place that may not be written: what was there stays as it was
         _drop_output()
         return _fail(
-            f"{error.filename or 'output'}: {error.strerror}; free some space or choose another place", 2
+            f"{error.filename or 'output'}: {error.strerror or error}; free some space or choose another place",
+            2,
         )
     except MemoryError:
         return _fail("not enough memory; give a shorter recording", 2)

@@ -15,8 +15,10 @@ from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
 from cablecomp.effects import load_effects
+from cablecomp.errors import path_text
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.folder import find_recordings
+from cablecomp.recording.inspection import require_motion
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 
@@ -60,7 +62,9 @@ def diagnose_recordings(
         load_effects(path)
     joint = read_joint(config)
     reading = sources(words, link, dbc, which, joint)
-    data = {str(path): reading.read(path).columns for path in find_recordings(recordings)}
+    data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
+    for name, columns in data.items():
+        require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
     if not as_json:
         announce_compilation()
     with share_bar() as told:

@@ -13,7 +13,7 @@ from rich.table import Table
 from cablecomp.cli.shared import console
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, Sources, sources
 from cablecomp.config import load_joint
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, path_text
 from cablecomp.recording.channels import CANONICAL
 from cablecomp.recording.inspection import ChannelQuality, Inspection, inspect
 from cablecomp.recording.mapping import (
@@ -64,7 +64,9 @@ def inspect_recording(
     if save:
         place = recording.parent / FOLDER_MAP
         save_mapping(
-            place, mapping, (f"what the columns of {recording.name} mean; check it before you trust it",)
+            place,
+            mapping,
+            (f"what the columns of {path_text(recording.name)} mean; check it before you trust it",),
         )
         console.print(f"saved: {place}")
 
@@ -185,7 +187,7 @@ def _json(
         }
     return {
         "schema": 1,
-        "recording": str(recording),
+        "recording": path_text(recording),
         "kind": raw.kind,
         "columns": list(raw.columns),
         "text_columns": list(raw.left_out),

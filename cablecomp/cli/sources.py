@@ -48,9 +48,9 @@ class Sources:
         """Open one recording; see `open_recording`."""
         return open_recording(path, self._mapping(path), self.decode)
 
-    def read(self, path: Path) -> Table:
+    def read(self, path: Path, gaps: bool = False) -> Table:
         """Read one recording whole; see `read_all`."""
-        return read_all(path, self._mapping(path), self.decode)
+        return read_all(path, self._mapping(path), self.decode, gaps)
 
     def _mapping(self, path: Path) -> ColumnMap | None:
         if not self.auto:

@@ -16,5 +16,8 @@ INSTANT_REACH_S: Final = 20.0
 """How far an event's instant may move from where it was found by asking."""
 ZERO: Final = 0.5
 """How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up what compliances do."""
+EXACT: Final = 0.003
+"""Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without it, calibration
+would answer a slightly wrong ratio by physics."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

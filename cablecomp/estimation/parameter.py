@@ -13,7 +13,7 @@ from math import exp, inf, log
 from cablecomp.config import JointConfig
 from cablecomp.effects import Effect
 from cablecomp.effects import Parameter as EffectParameter
-from cablecomp.estimation.limits import DECADES, INSTANT_REACH_S, INSTANT_STEP_S, OWN_SD, STEP
+from cablecomp.estimation.limits import DECADES, EXACT, INSTANT_REACH_S, INSTANT_STEP_S, OWN_SD, STEP
 
 DECADE = log(10.0)
 
@@ -71,7 +71,10 @@ class Parameter:
 def of_drive(config: JointConfig) -> tuple[Parameter, ...]:
     """What `[tolerance]` frees of the drive and its sensors: log-normal priors, 1 and more = known to a decade."""
     found = []
-    for name, tolerance in config.tolerance.items():
+    tolerances = dict(config.tolerance)
+    if not any(name.startswith(("input_radius_m", "output_radius_m")) for name in tolerances):
+        tolerances["input_radius_m"] = EXACT
+    for name, tolerance in tolerances.items():
         if tolerance <= 0.0:
             continue
         key, _, which = name.partition(".")

@@ -23,10 +23,9 @@ from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.cable import stacks
 from cablecomp.mechanics.jit import njit
-from cablecomp.mechanics.joint import joint_commit
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer import stepper as st
-from cablecomp.observer.observer import REASONS
+from cablecomp.observer.refusal import REASONS, Refusal
 from cablecomp.signal.smoothing import FloatArray, IntArray, group_means
 
 FRICTION = "motor_friction_Nm"
@@ -148,16 +147,13 @@ class PathModel:
         rows = np.full((len(columns["time_s"]), st.IN_OTHER), np.nan)
         rows[:, st.IN_TIME], rows[:, st.IN_MOTOR] = columns["time_s"], columns["motor_position_rad"]
         rows[:, st.IN_LOAD] = columns.get("joint_torque_Nm", 0.0)
-        options = np.zeros(st.OPTIONS)
-        sensors = self.joint.sensors
-        options[st.GAIN], options[st.OFFSET] = sensors.joint_torque_gain, sensors.joint_torque_offset_Nm
         S, J = model.S.copy(), model.J.copy()
         tables = cast(FloatArray, model.L)  # None is the plain law: compiled apart, never read
         joint_start(model.P, model.I, S, J, tables, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
         outs, tension = np.empty((len(rows), st.OUT_WIDTH)), np.empty((len(rows), 2))
-        done, status = _run(model.P, model.I, S, J, tables, options, rows, outs, tension)
+        done, status = _run(model.P, model.I, S, J, tables, rows, outs, tension)
         if status != o.STATUS_OK:
-            raise InputError(f"{recording.name}: at {rows[done, st.IN_TIME]:g} s {REASONS[status]}")
+            raise InputError(f"{recording.name}: at {rows[done, st.IN_TIME]:g} s {REASONS[Refusal(status)]}")
         torque = -self.joint.drive.stage[0].input_radius_m * (tension[:, 0] - tension[:, 1])
         if self.friction_Nm > 0.0:
             z = direction(columns["motor_position_rad"], self.presliding_rad)
@@ -171,7 +167,9 @@ def path_model(config: JointConfig, values: Mapping[str, float], recording: Path
     joint = path_config(config, values, recording)
     named = _named(values, recording)
     friction, presliding = named.get(FRICTION, 0.0), named.get(PRESLIDING, math.radians(0.15))
-    return PathModel(joint, assemble(joint, extend(joint)), friction, presliding)
+    model = assemble(joint, extend(joint))
+    model.P[model.I[o.P_SENSOR] + o.CUTOFF] = 0.0  # the loop's filter would lag
+    return PathModel(joint, model, friction, presliding)
 
 
 def _named(values: Mapping[str, float], recording: PathRecording) -> dict[str, float]:
@@ -197,7 +195,6 @@ def _run(
     S: FloatArray,
     J: IntArray,
     L: FloatArray,
-    F: FloatArray,
     rows: FloatArray,
     outs: FloatArray,
     tension: FloatArray,
@@ -206,10 +203,9 @@ def _run(
     cables."""
     G = stacks(I, S)
     for k in range(rows.shape[0]):
-        status = st.predict(P, I, S, J, L, G, F, rows[k], outs[k])
+        status = st.take(P, I, S, J, L, G, rows[k], outs[k])
         if status != o.STATUS_OK:
             return k, status
-        joint_commit(P, I, S, J, L, G)
         for c in range(2):
             tension[k, c] = S[I[o.S_CABLE] + o.CABLE_STATE * c + o.Q_TENSION_IN]
     return rows.shape[0], o.STATUS_OK

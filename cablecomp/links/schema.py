@@ -115,7 +115,7 @@ class LinkConfig(Frozen):
 
     schema_: Literal[1] = Field(alias="schema")
     name: Name
-    rate_Hz: Positive = 1000.0
+    rate_Hz: Annotated[float, Field(ge=1, le=20_000, allow_inf_nan=False)] = 1000.0
     bus: Annotated[CanBus | SerialBus, Field(discriminator="kind")]
     timeouts: Timeouts = Timeouts()
     device: tuple[Device, ...] = Field(min_length=1)

@@ -85,31 +85,35 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
             for n_i, stage in zip(inner, group, strict=True):
                 cables.append(_cable(stage, n_i, last, sign, config, extra))
         structure += [first_h, len(group), closed, first_h + len(group) * closed]
-    wet = o.CONTEXT + o.MEET * 2 * n_cables
-    sizes = {
-        "cable": o.CABLE_STATE * n_cables,
-        "context": wet,
-        "terms": sum(t.state_size for t in extra.terms),
-    }
     s_cable = 0
-    s_context = sizes["cable"]
-    s_term = s_context + sizes["context"]
-    s_wet = s_term + sizes["terms"]
+    s_context = o.CABLE_STATE * n_cables
+    s_filter = s_context + o.CONTEXT
+    s_term = s_filter + o.FILTER
+    s_wet = s_term + sum(t.state_size for t in extra.terms)
     nodes = WET_NODES if extra.viscous_Ns_per_m_rad > 0.0 else 0
-    s_profile = s_wet + (W_HEAD + 4 * nodes) * 2 * n_cables
+    s_meet = s_wet + (W_HEAD + 4 * nodes) * 2 * n_cables
+    s_profile = s_meet + o.MEET * 2 * n_cables
     capacity = config.observer.max_pieces
     n_stacks = (3 if extra.guide_angle > 0.0 else 2) * n_cables
-    S = np.zeros(s_profile + n_stacks * ROWS * capacity)
-    header = [
-        n_circuits, n_cables, capacity, len(extra.terms), n_stacks, s_profile, s_cable, s_context, s_term, s_wet, nodes
-    ]  # fmt: skip
+    s_spare = s_profile + n_stacks * ROWS * capacity
+    S = np.zeros(s_spare + s_meet)
     p_terms = len(joints) + o.CABLE * n_cables
+    p_sensor = p_terms + sum(len(t.parameters) for t in extra.terms)
+    header = [
+        n_circuits, n_cables, capacity, len(extra.terms), n_stacks, s_profile, s_cable, s_context, s_term, s_wet, nodes,
+        s_filter, s_meet, s_spare, p_sensor,
+    ]  # fmt: skip
     parameters: list[float] = []
     for term in extra.terms:
         structure += [term.address, p_terms + len(parameters), s_term]
         parameters += term.parameters
         s_term += term.state_size
-    P = np.array([*joints, *np.ravel(cables), *parameters, 0.0])
+    sensors = [
+        config.sensors.joint_torque_gain,
+        config.sensors.joint_torque_offset_Nm,
+        2.0 * np.pi * config.observer.input_filter_Hz,
+    ]
+    P = np.array([*joints, *np.ravel(cables), *parameters, *sensors])
     I = np.array(header + structure, dtype=np.int64)
     S[s_context + o.X_RADIUS] = stages[-1].output_radius_m
     return Model(P, I, S, np.zeros(n_stacks, dtype=np.int64), extra.law)
@@ -137,6 +141,7 @@ def _cable(
     row[o.VISCOUS] = extra.viscous_Ns_per_m_rad
     row[o.JOINT_DRUM] = float(stage is config.drive.stage[-1])
     row[o.MERGE] = config.observer.merge_tolerance
+    row[o.PER_BREAKING] = 0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N
     return row
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
-from cablecomp.mechanics.profile import ROWS, B, Floats, Ints, wrap_commit, wrap_eval
+from cablecomp.mechanics.profile import LEAST_WRAP, ROWS, B, Floats, Ints, wrap_commit, wrap_eval
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
-
-OUT, IN = 0, 1
 
 
 @inlined_kernel
@@ -43,12 +41,16 @@ def drum_eval(
     v: float,
     w: float,
 ) -> tuple[float, float, float]:
-    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending."""
+    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending.
+
+    A solver's trial may unwind the drum: it is then taken to keep `LEAST_WRAP`, and `joint_ready` refuses it.
+    """
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     wrap = 2 * c + end
     mu = P[p + o.MU_OUT + end]
-    m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+    m = I[o.S_MEET] + o.MEET * wrap
     S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w, v, tau
+    w = w if w > LEAST_WRAP else LEAST_WRAP
     if L is not None:
         if P[p + o.VISCOUS] > 0.0:
             return viscous_eval(P, I, S, c, end, w, tau, mu)
@@ -139,18 +141,21 @@ def cable_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c
     """
     p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
     q = I[o.S_CABLE] + o.CABLE_STATE * c
+    first = 0
     if L is not None:
         S[q + o.Q_PLAY] = S[q + o.Q_PLAY_TRY]
         if P[p + o.GUIDE] > 0.0:
             guide_commit(I, S, J, G, c)
         if P[p + o.VISCOUS] > 0.0:
             viscous_commit(I, S, 2 * c)
-            viscous_commit(I, S, 2 * c + 1)
-            return
+            if P[p + o.GUIDE] == 0.0:
+                viscous_commit(I, S, 2 * c + 1)
+                return
+            first = 1  # behind a guide the input drum slips without viscosity
     error = 0.0
-    for end in range(2):
+    for end in range(first, 2):
         wrap = 2 * c + end
-        m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+        m = I[o.S_MEET] + o.MEET * wrap
         meet = (
             S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B],
             S[m + o.M_E],

@@ -75,8 +75,6 @@ def circuit_solve(
     floor = P[j + o.J_SLACK]
     pull = moment / radius
     x = x_guess
-    if not unwound_ok(P, I, first_h, count, closed, first_l, x_in, x):
-        return x, 0.0, o.STATUS_UNWOUND
     last_h = I[o.S_CABLE] + o.CABLE_STATE * (first_h + count - 1)
     last_l = I[o.S_CABLE] + o.CABLE_STATE * (first_l + count - 1)
     unit = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first_l + count - 1) + o.T0]
@@ -144,23 +142,6 @@ def circuit_solve(
             if not low < tension < high:
                 tension = 0.5 * (low + high)
     return x, 0.0, o.STATUS_DIVERGED
-
-
-@kernel
-def unwound_ok(
-    P: Floats, I: Ints, first_h: int, count: int, closed: int, first_l: int, x_in: float, x_out: float
-) -> bool:
-    """True if every drum keeps some cable at these shaft angles (rigid intermediate shafts)."""
-    for chain in range(1 + closed):
-        first = first_h if chain == 0 else first_l
-        x = x_in
-        for j in range(count):
-            p = o.JOINT * I[o.N_CIRCUITS] + o.CABLE * (first + j)
-            after = x_out if j == count - 1 else P[p + o.RATIO] * x
-            if P[p + o.W_OUT] + P[p + o.SIGN] * after < 1e-3 or P[p + o.W_IN] - P[p + o.SIGN] * x < 1e-3:
-                return False
-            x = after
-    return True
 
 
 @kernel

@@ -12,7 +12,7 @@ import math
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.arc import arc_commit, arc_eval
 from cablecomp.mechanics.jit import kernel
-from cablecomp.mechanics.profile import Floats, Ints, wrap_eval
+from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints, wrap_eval
 from cablecomp.mechanics.tables import strain_of_tau, tau_of_v
 
 
@@ -39,13 +39,15 @@ def guide_split(
     v1 = min(max(S[q + o.Q_GUIDE_END], low), high)
     side = a_side = e_arc = g1 = g2 = swap = 0.0
     slides = False
-    m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+    m = I[o.S_MEET] + o.MEET * wrap
+    S[m + o.M_W] = w_in
+    w_in = w_in if w_in > LEAST_WRAP else LEAST_WRAP
     for iteration in range(60):
         tau1 = tau_of_v(L, 2, v1)
         e_in, a_in, k, ym, vm, cm, bm, tm = wrap_eval(G, L, 2, wrap, J[wrap], w_in, v1, tau1, P[p + o.MU_IN])
         S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = e_in, k, ym, vm
         S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
-        S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w_in, v1, tau1
+        S[m + o.M_END], S[m + o.M_TAU] = v1, tau1
         e_arc, change, g1, g2, _, _, swap = arc_eval(G, arc, J[arc], v1, v2, 1.0)
         e_span, a_span = strain_of_tau(L, 2, tau1)
         side = P[p + o.R_IN] * e_in + span * e_span

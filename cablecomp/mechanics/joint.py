@@ -6,10 +6,10 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
-from cablecomp.mechanics.jit import inlined_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
 from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
-from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints
 
 
 @kernel
@@ -154,13 +154,55 @@ def _follow_pretension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Flo
 
 
 @kernel
-def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
-    """Make the solved sample the state."""
+def terms_sane(I: Ints, S: Floats) -> bool:
+    """True if the terms' answers are finite and all factors positive."""
+    x = I[o.S_CONTEXT]
+    total = S[x + o.X_MOMENT] + S[x + o.X_LENGTH_H] + S[x + o.X_LENGTH_L] + S[x + o.X_READING]
+    total += S[x + o.X_MOTOR_MOMENT]
+    for k in range(x + o.X_PRETENSION_H, x + o.X_STIFFNESS_L + 1):
+        total += S[k]
+        if not S[k] > 0.0:
+            return False
+    return math.isfinite(total)
+
+
+@leaf_kernel
+def joint_ready(I: Ints, S: Floats) -> int:
+    """Whether the pending solution may become the state: cable left on every drum, every number finite, tensions positive.
+
+    What commits write through (places along the profiles) is bounded by just these.
+    """
+    m = I[o.S_MEET]
+    for _ in range(2 * I[o.N_CABLES]):
+        if not S[m + o.M_W] > LEAST_WRAP:
+            return o.STATUS_UNWOUND
+        if not (0.0 < S[m + o.M_TAU] < 1e300 and abs(S[m + o.M_TOTAL]) < 1e300):
+            return o.STATUS_DIVERGED
+        m += o.MEET
+    return o.STATUS_OK if abs(S[I[o.S_CONTEXT] + o.X_JOINT]) < 1e300 else o.STATUS_DIVERGED
+
+
+@leaf_kernel
+def strength_used(P: Floats, I: Ints, S: Floats) -> float:
+    """Greatest share of its breaking force that any cable bears in the pending solution; 0 where none is stated."""
+    worst = 0.0
+    for c in range(I[o.N_CABLES]):
+        per_breaking = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * c + o.PER_BREAKING]
+        q = I[o.S_CABLE] + o.CABLE_STATE * c
+        worst = max(worst, per_breaking * max(S[q + o.Q_TENSION], S[q + o.Q_TENSION_IN]))
+    return worst
+
+
+@kernel
+def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> int:
+    """Make the solved sample the state, unless a term's last word forbids it (the status says so)."""
     x = I[o.S_CONTEXT]
     if I[o.N_TERMS] > 0:
         S[x + o.X_COMMIT] = 1.0
         run_terms(P, I, S)
         S[x + o.X_COMMIT] = 0.0
+        if not terms_sane(I, S):
+            return o.STATUS_EFFECT
     for ic in range(I[o.N_CIRCUITS]):
         circuit_commit(P, I, S, J, L, G, ic)
     if I[o.N_TERMS] > 0:
@@ -170,3 +212,4 @@ def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -
     S[x + o.X_JOINT_OLDER] = S[x + o.X_JOINT_OLD]
     S[x + o.X_JOINT_OLD] = S[x + o.X_JOINT]
     S[x + o.X_FIRST] = 0.0
+    return o.STATUS_OK

@@ -19,23 +19,30 @@ from __future__ import annotations
     S_TERM,
     S_WET,
     NODES,
+    S_FILTER,
+    S_MEET,
+    S_SPARE,
+    P_SENSOR,
     HEADER,
-) = range(12)
+) = range(16)
 #   one circuit: first cable of chain h, cables in a chain, 1 if closed, first cable of chain l
 C_FIRST_H, C_COUNT, C_CLOSED, C_FIRST_L, CIRCUIT = range(5)
 #   one term: address of its compiled function, offset of its parameters in P, offset of its state in S
 T_ADDRESS, T_PARAMETER, T_STATE, TERM = range(4)
 
-# --- parameters P: circuits, then cables, then term parameters
+# --- parameters P: circuits, then cables, then term parameters, then the sensors'
 #   one circuit: product of r/R, moment factor N_ik, output radius, slack tension
 J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
 #   one cable
 (
     R_OUT, R_IN, LENGTH, EA, T0, MU_OUT, MU_IN, W_OUT, W_IN, SCALE, WEIGHT, SIGN, RATIO, RADIUS,
-    GUIDE, GUIDE_LENGTH, PLAY_SHARE, PLAY_YIELD, VISCOUS, MERGE, JOINT_DRUM, CABLE,
-) = range(22)  # fmt: skip
+    GUIDE, GUIDE_LENGTH, PLAY_SHARE, PLAY_YIELD, VISCOUS, MERGE, JOINT_DRUM, PER_BREAKING, CABLE,
+) = range(23)  # fmt: skip
+#   the sensors: gain and offset of the load channel, angular frequency of the input filter (0 = off)
+GAIN, OFFSET, CUTOFF, SENSOR = range(4)
 
-# --- state S: profiles [2 cables, 5, capacity], cables [.., CABLE_STATE], context, term states
+# --- state S: cables [.., CABLE_STATE], context, input filter, term states, viscous grids; pending steps of the wraps (no
+#   state: every solution writes them anew); profiles [stacks, 6, capacity]; an undo copy of all before the pending steps
 #   one cable: tension at output and input end, stretch, its derivative, shaft angle at its output, play, play trial,
 #   pretension and stiffness factors, length offset, error bound of the stretch, warm start and reference of the solver;
 #   with a guide: stretch of the input side, end values of the guide, input shaft, and the same pending;
@@ -46,9 +53,12 @@ J_RATIO, J_MOMENT, J_RADIUS, J_SLACK, JOINT = range(5)
     Q_SIDE_TRY, Q_GUIDE_TRY, Q_SHAFT_IN_TRY, Q_MISS, Q_MISS_OLD, CABLE_STATE,
 ) = range(23)  # fmt: skip
 
-#   one wrap's pending step in the context: last point kept, meeting point (y, v, C, B, exp v), wrap angle,
+#   one wrap's pending step: last point kept, meeting point (y, v, C, B, exp v), wrap angle,
 #   end value and its exp
 M_TOTAL, M_K, M_Y, M_V, M_C, M_B, M_E, M_W, M_END, M_TAU, MEET = range(11)
+
+# --- input filter: 1 once started; value and slope of the motor angle and of the load
+STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, FILTER = range(6)
 
 # --- context of the terms: what they may read ...
 (
@@ -63,4 +73,7 @@ OTHERS = 4
     X_READING, X_COMPLIANCE, X_RIGID, X_MOTOR_MOMENT, CONTEXT,
 ) = range(X_OTHER + OTHERS, X_OTHER + OTHERS + 13)  # fmt: skip
 
-STATUS_OK, STATUS_UNWOUND, STATUS_SLACK, STATUS_DIVERGED, STATUS_NAN = range(5)
+(
+    STATUS_OK, STATUS_UNWOUND, STATUS_SLACK, STATUS_DIVERGED, STATUS_NAN, STATUS_BACKWARD, STATUS_BREAKS, STATUS_EFFECT,
+    STATUS_UNREACHABLE, STATUS_UNKNOWN,
+) = range(10)  # fmt: skip

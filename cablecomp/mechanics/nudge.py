@@ -63,7 +63,7 @@ def cable_nudge(P: Floats, I: Ints, S: Floats, J: Ints, G: Floats, c: int, step:
     q = I[o.S_CABLE] + o.CABLE_STATE * c
     r = step / S[q + o.Q_TENSION]
     dv = r * (1.0 - 0.5 * r)
-    m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * 2 * c
+    m = I[o.S_MEET] + o.MEET * 2 * c
     if not wrap_nudge(S, G, m, 2 * c, J[2 * c], P[p + o.MU_OUT], dv, P[p + o.SIGN] * turn):
         return False
     if not wrap_nudge(S, G, m + o.MEET, 2 * c + 1, J[2 * c + 1], P[p + o.MU_IN], dv, 0.0):

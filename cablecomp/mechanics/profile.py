@@ -32,6 +32,7 @@ Meet: TypeAlias = tuple[float, float, int, float, float, float, float, float]
 
 Y, V, C, D, B, E = 0, 1, 2, 3, 4, 5
 ROWS = 6
+LEAST_WRAP = 1e-3  # [rad] of cable that a drum has to keep
 
 # 8-point Gauss-Legendre on [0, 1]
 _x, _w = np.polynomial.legendre.leggauss(8)
@@ -119,7 +120,7 @@ def wrap_eval(
 ) -> Meet:
     """What wrap i would hold at wrap angle w and end value v, without committing it.
 
-    Returns (integral of e, its derivative by v, last point kept, and the point where the cone meets the old profile:
+    `w` is above 0. Returns (integral of e, its derivative by v, last point kept, and the point where the cone meets the old profile:
     y, v, C, B, exp(v) there). `tau` is exp(v).
     """
     top = n - 1
@@ -127,7 +128,7 @@ def wrap_eval(
     yp, vp, tp = G[i, Y, top], G[i, V, top], G[i, E, top]
     if w < yp:
         k -= 1
-        while G[i, Y, k] > w:
+        while G[i, Y, k] > w:  # ends at the termination, y = 0, at the latest
             k -= 1
         y1, v1 = G[i, Y, k], G[i, V, k]
         s1 = groove(L, law, y1)

@@ -8,7 +8,7 @@ from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.arc import arc_fill
 from cablecomp.mechanics.cable import law_of, stacks
 from cablecomp.mechanics.jit import kernel
-from cablecomp.mechanics.profile import Floats, Ints, wrap_fill
+from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints, wrap_fill
 from cablecomp.mechanics.tables import v_of_tau
 from cablecomp.mechanics.viscous import viscous_fill
 
@@ -51,10 +51,10 @@ def joint_start(
                     mu = P[p + o.MU_OUT] if end == 0 else P[p + o.MU_IN]
                     law = law_of(P, p, end)
                     v = v_of_tau(L, law, 1.0)
-                    J[2 * c + end] = wrap_fill(G, L, law, 2 * c + end, max(w, 1e-3), v, -slope * mu)
+                    J[2 * c + end] = wrap_fill(G, L, law, 2 * c + end, max(w, LEAST_WRAP), v, -slope * mu)
                     if I[o.NODES] > 0:
                         reach = P[p + o.W_OUT + end] + VISCOUS_TRAVEL
-                        viscous_fill(I, S, 2 * c + end, max(w, 1e-3), max(reach, w + 1.0))
+                        viscous_fill(I, S, 2 * c + end, max(w, LEAST_WRAP), max(reach, w + 1.0))
                 if I[o.N_STACKS] > 2 * I[o.N_CABLES]:
                     arc = 2 * I[o.N_CABLES] + c
                     J[arc] = arc_fill(G, arc, P[p + o.GUIDE], 0.0)

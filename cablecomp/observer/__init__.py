@@ -5,6 +5,7 @@ Imports effects, the kernel and the configuration. Start reading at `observer.py
 
 from cablecomp.observer.erase import ErasePlan, plan_erase
 from cablecomp.observer.observer import Observer
+from cablecomp.observer.refusal import Refusal, SampleRefused
 from cablecomp.observer.wraps import WrapProfile
 
-__all__ = ["ErasePlan", "Observer", "WrapProfile", "plan_erase"]
+__all__ = ["ErasePlan", "Observer", "Refusal", "SampleRefused", "WrapProfile", "plan_erase"]

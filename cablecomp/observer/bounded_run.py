@@ -11,7 +11,7 @@ from cablecomp.observer.stepper import find_load, step_one
 
 @kernel
 def run_bounded(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats, spare: Floats, inverse: bool,
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats, inverse: bool,
     W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints, interval: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Step through rows of readings; `interval` gets the lowest and the highest joint angle [rad] of the drive.
@@ -21,9 +21,9 @@ def run_bounded(
     for k in range(rows.shape[0]):
         status = o.STATUS_OK
         if inverse:
-            status = find_load(P, I, S, J, L, F, rows[k], outs[k], spare)
+            status = find_load(P, I, S, J, L, rows[k], outs[k])
         if status == o.STATUS_OK:
-            status = step_one(P, I, S, J, L, F, rows[k], outs[k])
+            status = step_one(P, I, S, J, L, rows[k], outs[k])
         if status != o.STATUS_OK:
             return k, status
         interval[k, 0], interval[k, 1] = bounds_step(P, I, L, S, W, SL, JL, SU, JU)

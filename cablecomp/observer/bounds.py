@@ -21,7 +21,7 @@ from cablecomp.observer.bounds_kernel import (
     steepest,
 )
 
-Kernel: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
+Kernel: TypeAlias = tuple[Any, Any, Any, Any, Any]
 EXTREME = 30.0  # |ln(T/T0)| beyond anything
 
 
@@ -43,6 +43,7 @@ class BoundPair:
         self.numbers[W_STEEP] = steepest(model.L)
         self.numbers[W_PAST_LOW] = -EXTREME if low is None else math.log(low)
         self.numbers[W_PAST_HIGH] = EXTREME if high is None else math.log(high)
+        self._unstarted = self.numbers.copy()
 
     def start(self, time_s: float, motor: float) -> None:
         """Know nothing but the position of the motor [rad]."""
@@ -51,6 +52,12 @@ class BoundPair:
             joint_start(m.P, m.I, S, J, m.L, time_s, motor, 0.0)
         sides_start(m.P, m.I, m.L, self.numbers, *self._low, *self._up)
 
+    def forget(self) -> None:
+        """Be as before `start`."""
+        self.numbers[:] = self._unstarted
+        for S, J in self.states():
+            S[:], J[:] = self._model.S, self._model.J
+
     def step(self, S_nominal: Floats) -> tuple[float, float]:
         """Follow a step that the observer's own state has just committed: lowest and highest joint angle [rad]."""
         m = self._model
@@ -58,11 +65,11 @@ class BoundPair:
         return float(low), float(high)
 
     def run(
-        self, kernel: Kernel, rows: Floats, outs: Floats, spare: Floats, inverse: bool, interval: Floats
+        self, kernel: Kernel, rows: Floats, outs: Floats, inverse: bool, interval: Floats
     ) -> tuple[int, int]:
         """Step the observer's own state and the bounds through rows of readings; `interval` gets lowest and highest joint
         angle. With `inverse` each load is found from both encoders. Returns rows done and the status that stopped it."""
-        return run_bounded(*kernel, rows, outs, spare, inverse, self.numbers, *self._low, *self._up, interval)
+        return run_bounded(*kernel, rows, outs, inverse, self.numbers, *self._low, *self._up, interval)
 
     def states(self) -> list[tuple[Floats, Ints]]:
         """The two histories, for a snapshot (with `numbers`)."""

@@ -15,7 +15,7 @@ from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import law_of, stacks
 from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.pretension import retension
-from cablecomp.mechanics.profile import B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
+from cablecomp.mechanics.profile import LEAST_WRAP, B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
 from cablecomp.mechanics.tables import TABLED, dv_dtau, strain_of_tau, tau_of_v, v_of_tau
 
 Side: TypeAlias = tuple[Floats, Ints, Floats, float]
@@ -124,6 +124,7 @@ def _cable(
         wrap = 2 * c + end
         mu = P[p + o.MU_OUT + end]
         w = P[p + o.W_OUT + end] + (P[p + o.SIGN] * x_out if end == 0 else -P[p + o.SIGN] * x_in)
+        w = max(w, LEAST_WRAP)
         eps = W[cable_block(I, c) + W_EPS] if end == 0 else eps_in
         shift = mu * eps * W[W_STEEP]
         end_v = v + sign * shift
@@ -131,7 +132,7 @@ def _cable(
         e_wrap, a_wrap, k, ym, vm, cm, bm, tm = wrap_eval(
             G, L, law_of(P, p, end), wrap, J[wrap], w, end_v, end_tau, mu
         )
-        m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+        m = I[o.S_MEET] + o.MEET * wrap
         S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = e_wrap, k, ym, vm
         S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
         S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w, end_v, end_tau
@@ -185,7 +186,7 @@ def chain_turning(
         unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA] * P[p + o.WEIGHT]
         soft = P[p + o.LENGTH]
         for end in range(2):
-            m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * (2 * c + end)
+            m = I[o.S_MEET] + o.MEET * (2 * c + end)
             mu = P[p + o.MU_OUT + end] * W[W_STEEP]
             radius = P[p + o.R_OUT + end]
             slid = unit * radius * mu * (S[m + o.M_TOTAL] + S[m + o.M_W])
@@ -204,7 +205,7 @@ def chain_commit(P: Floats, I: Ints, L: Floats, side: Side, first: int, count: i
         p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
         for end in range(2):
             wrap = 2 * c + end
-            m = o.CONTEXT + I[o.S_CONTEXT] + o.MEET * wrap
+            m = I[o.S_MEET] + o.MEET * wrap
             meet = (
                 S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B],
                 S[m + o.M_E],

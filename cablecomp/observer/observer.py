@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,23 +14,18 @@ from cablecomp.config import JointConfig
 from cablecomp.durable import write_durably
 from cablecomp.effects import extend
 from cablecomp.effects.catalogue import is_bounded, other_channels
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, InternalError
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
+from cablecomp.mechanics.invariants import heights_fit, profile_violations, violations
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer import stepper as st
-from cablecomp.observer.bounds import BoundPair
+from cablecomp.observer.bounds import BoundPair, Kernel
+from cablecomp.observer.refusal import refused
 from cablecomp.observer.snapshot import pack, unpack
 from cablecomp.observer.wraps import WrapProfile, wrap_profiles
 from cablecomp.signals import NAN, Estimate, Sample
-
-REASONS = {
-    o.STATUS_UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, wrap_input_rad and the angles' zero",
-    o.STATUS_SLACK: "the load would slacken the cable of an open circuit (T0 + M/R <= 0); check pretension_N and the load's sign",
-    o.STATUS_DIVERGED: "the tensions could not be solved; check the configuration's orders of magnitude",
-    o.STATUS_NAN: "has no finite time, motor angle or load; leave it out or mend the channel",
-}
 
 
 class Observer:
@@ -39,7 +34,10 @@ class Observer:
     State: the tension profile on every wrap (sheet, section 1.1). `step` commits a sample, `peek` predicts without
     committing; `run` steps through a block with the same compiled code. Time is an argument of every call. With
     `bounds` two extreme histories run beside it: the true deflection lies between, whatever happened before the start
-    (NaN where an effect of the configuration gives no guarantee). Raises InputError for a sample that the joint cannot take.
+    (NaN where an effect of the configuration gives no guarantee).
+
+    A sample that the joint cannot take raises SampleRefused (an InputError that carries the reason), and then leaves no
+    trace: the state is what it was before, bit for bit. What `step` takes `run` takes, and the other way round.
     """
 
     def __init__(self, config: JointConfig, *, bounds: bool = False) -> None:
@@ -47,51 +45,42 @@ class Observer:
         self.model: Model = assemble(config, extend(config))
         self.channels = other_channels(config)
         self._S, self._J = self.model.S.copy(), self.model.J.copy()
-        self._F = np.zeros(st.OPTIONS)
-        self._F[st.GAIN] = config.sensors.joint_torque_gain
-        self._F[st.OFFSET] = config.sensors.joint_torque_offset_Nm
-        self._F[st.CUTOFF] = 2.0 * np.pi * config.observer.input_filter_Hz
         # every array is written in place for good, so one tuple serves all calls
-        self._arrays = (self.model.P, self.model.I, self._S, self._J, self.model.L, self._F)
+        self._arrays: Kernel = (self.model.P, self.model.I, self._S, self._J, self.model.L)
         self._row = np.zeros(st.IN_OTHER + len(self.channels))
         self._out = np.zeros(st.OUT_WIDTH)
-        self._spare = np.zeros(int(self.model.I[o.S_PROFILE]) + st.OPTIONS)
         self._ratio = config.drive.ratio
-        self._breaking = config.drive.stage[-1].breaking_force_N
+        self._spare = int(self.model.I[o.S_SPARE])
         self._last_time = -math.inf
         self._source = config.observer.load
         self._motor_zero = config.sensors.motor_torque_offset_Nm
+        self._zero_load = config.sensors.joint_torque_offset_Nm
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
 
     # --- the three ways to use it ---------------------------------------------------------------------------------
 
     def step(self, sample: Sample) -> Estimate:
         """Commit one sample and say what the joint does."""
-        self._read(sample)
+        fresh = self._read(sample)
+        status = o.STATUS_OK
         if self._source == "both_encoders":
-            self._solve_load()
-        status = st.step_one(*self._kernel(), self._row, self._out)
-        if status != o.STATUS_OK:
-            self._check(status, sample.time_s)
-        self._last_time = sample.time_s
-        low, high = NAN, NAN
-        if self._bounds is not None:
-            low, high = self._bounds.step(self._S)
-        return self._estimate(sample, low, high)
+            status = st.find_load(*self._arrays, self._row, self._out)
+        if status == o.STATUS_OK:
+            status = st.step_one(*self._arrays, self._row, self._out)
+        return self._taken(sample, status, fresh)
 
     def peek(self, sample: Sample) -> Estimate:
         """Predict the joint for a sample (for instance the load expected next) and commit nothing."""
-        self._read(sample)
-        self._check(st.peek_one(*self._kernel(), self._row, self._out, self._spare), sample.time_s)
-        return self._estimate(sample, NAN, NAN)
+        fresh = self._read(sample)
+        return self._peeked(sample, st.peek_one(*self._arrays, self._row, self._out), fresh)
 
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the last sample."""
         row = self._row
         row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_LOAD] = time_s, motor_position_rad, joint_torque_Nm
-        status = st.peek_one(*self._kernel(), row, self._out, self._spare)
+        status = st.peek_one(*self._arrays, row, self._out)
         if status != o.STATUS_OK:
-            self._check(status, time_s)
+            self._refuse(status, time_s, False)
         return float(self._out[st.OUT_JOINT]) - self._ratio * motor_position_rad
 
     def run(
@@ -99,25 +88,22 @@ class Observer:
     ) -> dict[str, NDArray[np.float64]]:
         """Step through a block of samples given as canonical channels; returns the estimates as columns.
 
-        Raises InputError naming the sample (counted from 0 within the block) that cannot be taken; those before it are committed.
+        Raises SampleRefused naming the sample (counted from 0 within the block) that cannot be taken; those before it are
+        committed.
         """
         rows = self._rows(columns)
         outs = np.empty((len(rows), st.OUT_WIDTH))
         low = np.full(len(rows), NAN)
         high = np.full(len(rows), NAN)
-        if len(rows) and not np.isfinite(self._last_time):
+        fresh = len(rows) > 0 and self._last_time == -math.inf
+        if fresh:
             self._start(rows[0, st.IN_TIME], rows[0, st.IN_MOTOR])
         done, status = self._run_rows(rows, outs, low, high)
-        self._check(status, rows[min(done, len(rows) - 1), st.IN_TIME], done)
-        if self._breaking is not None:
-            over = np.fmax(outs[:, st.OUT_T_H], outs[:, st.OUT_T_L]) > self._breaking
-            if np.any(over):
-                k = int(np.argmax(over))
-                raise InputError(
-                    f"sample {k}: at {rows[k, st.IN_TIME]:g} s {self._too_much(float(np.nanmax(outs[k, st.OUT_T_H : st.OUT_T_L + 1])))}"
-                )
-        if len(rows):
-            self._last_time = float(rows[-1, st.IN_TIME])
+        if done:
+            self._last_time = float(rows[done - 1, st.IN_TIME])
+        if status != o.STATUS_OK:
+            self._out[:] = outs[done]
+            self._refuse(status, rows[done, st.IN_TIME], fresh and done == 0, done)
         offset = self._ratio * rows[:, st.IN_MOTOR]
         return {
             "deflection_rad": outs[:, st.OUT_JOINT] - offset,
@@ -134,19 +120,19 @@ class Observer:
 
     def inverse(self, sample: Sample) -> Estimate:
         """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
-        self._read(sample)
-        self._solve_load()
-        self._check(st.peek_one(*self._kernel(), self._row, self._out, self._spare), sample.time_s)
-        return self._estimate(sample, NAN, NAN)
+        fresh = self._read(sample)
+        status = st.find_load(*self._arrays, self._row, self._out)
+        if status == o.STATUS_OK:
+            status = st.peek_one(*self._arrays, self._row, self._out)
+        return self._peeked(sample, status, fresh)
 
     def step_inverse(self, sample: Sample) -> Estimate:
         """As `inverse`, and commits the sample with the torque found."""
-        self._read(sample)
-        self._solve_load()
-        self._check(st.step_one(*self._kernel(), self._row, self._out), sample.time_s)
-        self._last_time = sample.time_s
-        low, high = (NAN, NAN) if self._bounds is None else self._bounds.step(self._S)
-        return self._estimate(sample, low, high)
+        fresh = self._read(sample)
+        status = st.find_load(*self._arrays, self._row, self._out)
+        if status == o.STATUS_OK:
+            status = st.step_one(*self._arrays, self._row, self._out)
+        return self._taken(sample, status, fresh)
 
     # --- state ----------------------------------------------------------------------------------------------------
 
@@ -155,8 +141,21 @@ class Observer:
         return pack(self.config, self.model.I, *self._parts(), self._last_time)
 
     def restore(self, data: bytes) -> None:
-        """Take up a state from `snapshot`; raises InputError if it is damaged or belongs to another joint."""
-        self._last_time = unpack(data, self.config, self.model.I, *self._parts())
+        """Take up a state from `snapshot`; raises InputError, and changes nothing, if it is damaged, belongs to another joint or
+        holds what no joint can be in."""
+        before = [part.copy() for part in self._all_arrays()], self._last_time
+        try:
+            self._last_time = unpack(data, self.config, self.model.I, *self._parts())
+            found = self._violations()
+            if found:
+                raise InputError(
+                    f"snapshot: holds an impossible state ({found[0]}); start from a known state instead"
+                )
+        except InputError:
+            for part, old in zip(self._all_arrays(), before[0], strict=True):
+                part[:] = old
+            self._last_time = before[1]
+            raise
 
     def save(self, path: Path) -> None:
         """Write the snapshot to a file: a power cut leaves the old file or the new one; raises OSError."""
@@ -172,15 +171,31 @@ class Observer:
 
     def vector(self) -> Floats:
         """The state as one vector of floats, bounds left out; `set_vector` takes it up (for solvers that own the state)."""
-        return np.concatenate([self._S, self._J.astype(np.float64), self._F, [self._last_time]])
+        return np.concatenate([self._S[: self._spare], self._J.astype(np.float64), [self._last_time]])
 
     def set_vector(self, vector: Floats) -> None:
-        """Take up a state given by `vector` of an observer of the same configuration."""
-        s, j = len(self._S), len(self._J)
-        self._S[:] = vector[:s]
-        self._J[:] = vector[s : s + j]
-        self._F[:] = vector[s + j : s + j + len(self._F)]
+        """Take up a state given by `vector` of an observer of the same configuration; all zeros = nothing is known yet.
+
+        Raises InputError, and changes nothing, if it cannot be such a state.
+        """
+        heights = vector[self._spare : -1]
+        known = bool(np.any(heights))
+        if len(vector) != self._spare + len(self._J) + 1 or (known and not heights_fit(self.model, heights)):
+            raise InputError(
+                f"{self.config.name}: this vector is no state of the joint; give one from Observer.vector"
+            )
+        if not known:
+            self._forget()
+            return
+        self._S[: self._spare] = vector[: self._spare]
+        self._J[:] = heights
         self._last_time = float(vector[-1])
+
+    def check_state(self) -> None:
+        """Verify every invariant of the state (`mechanics.invariants`); raises InternalError that names the first broken one."""
+        found = self._violations()
+        if found:
+            raise InternalError(f"{self.config.name}: the observer's state is broken: {found[0]}")
 
     def copy(self) -> Observer:
         """An independent observer in the same state."""
@@ -233,20 +248,28 @@ class Observer:
 
     # --- inside ---------------------------------------------------------------------------------------------------
 
-    def _kernel(self) -> tuple[Any, Any, Any, Any, Any, Any]:
-        return self._arrays
-
     def _bound_pair(self) -> BoundPair:
         options = self.config.observer
         return BoundPair(self.model, (options.past_tension_min, options.past_tension_max))
 
     def _parts(self) -> tuple[list[tuple[Floats, Ints]], list[Floats]]:
         """All that makes up the state: histories, further numbers."""
-        states, numbers = [(self._S, self._J)], [self._F]
-        if self._bounds is not None:
-            states += self._bounds.states()
-            numbers.append(self._bounds.numbers)
-        return states, numbers
+        states: list[tuple[Floats, Ints]] = [(self._S, self._J)]
+        if self._bounds is None:
+            return states, []
+        return states + self._bounds.states(), [self._bounds.numbers]
+
+    def _all_arrays(self) -> list[Floats | Ints]:
+        states, numbers = self._parts()
+        return [array for state in states for array in state] + list(numbers)
+
+    def _violations(self) -> list[str]:
+        if self._last_time == -math.inf:
+            return []
+        found = violations(self.model, self._S, self._J)
+        for S, J in [] if self._bounds is None else self._bounds.states():
+            found += profile_violations(self.model, S, J)
+        return found
 
     def _start(self, time_s: float, motor: float) -> None:
         m = self.model
@@ -254,11 +277,14 @@ class Observer:
         if self._bounds is not None:
             self._bounds.start(time_s, motor)
 
-    def _read(self, sample: Sample) -> None:
-        if sample.time_s < self._last_time:
-            raise InputError(
-                f"sample at {sample.time_s:g} s comes after one at {self._last_time:g} s; time must not run backwards"
-            )
+    def _forget(self) -> None:
+        """Know nothing, as before the first sample."""
+        self._S[:], self._J[:], self._last_time = self.model.S, self.model.J, -math.inf
+        if self._bounds is not None:
+            self._bounds.forget()
+
+    def _read(self, sample: Sample) -> bool:
+        """Write a sample's readings into the kernel's row; True if the state was started for it, as it is the first."""
         row = self._row
         row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_JOINT] = (
             sample.time_s,
@@ -269,13 +295,16 @@ class Observer:
         if self._source == "motor_torque":
             row[st.IN_LOAD] = -(sample.motor_torque_Nm - self._motor_zero) / self._ratio
         elif self._source == "none":
-            row[st.IN_LOAD] = self._F[st.OFFSET]
+            row[st.IN_LOAD] = self._zero_load
         row[st.IN_TEMPERATURE] = sample.temperature_degC
         if self.channels:
+            row[st.IN_OTHER :] = NAN
             for k, value in enumerate(sample.other[: len(self.channels)]):
                 row[st.IN_OTHER + k] = value
-        if self._last_time == -math.inf:
-            self._start(sample.time_s, sample.motor_position_rad)
+        if self._last_time != -math.inf:
+            return False
+        self._start(sample.time_s, sample.motor_position_rad)
+        return True
 
     def _rows(self, columns: Mapping[str, NDArray[np.float64]]) -> Floats:
         time = columns["time_s"]
@@ -285,7 +314,7 @@ class Observer:
         if self.config.observer.load == "motor_torque":
             rows[:, st.IN_LOAD] = -(_need(columns, "motor_torque_Nm") - self._motor_zero) / self._ratio
         elif self.config.observer.load == "none":
-            rows[:, st.IN_LOAD] = self._F[st.OFFSET]
+            rows[:, st.IN_LOAD] = self._zero_load
         elif self.config.observer.load == "joint_torque":
             rows[:, st.IN_LOAD] = _need(columns, "joint_torque_Nm")
         if "joint_position_rad" in columns:
@@ -301,28 +330,39 @@ class Observer:
         inverse = self.config.observer.load == "both_encoders"
         if self._bounds is None:
             if inverse:
-                return st.run_inverse(*self._kernel(), rows, outs, self._spare)
-            return st.run_block(*self._kernel(), rows, outs)
+                return st.run_inverse(*self._arrays, rows, outs)
+            return st.run_block(*self._arrays, rows, outs)
         interval = np.empty((len(rows), 2))
-        answer = self._bounds.run(self._kernel(), rows, outs, self._spare, inverse, interval)
+        answer = self._bounds.run(self._arrays, rows, outs, inverse, interval)
         shift = outs[:, st.OUT_JOINT] - outs[:, st.OUT_DRIVE] - self._ratio * rows[:, st.IN_MOTOR]
         low[:], high[:] = interval[:, 0] + shift, interval[:, 1] + shift
         return answer
 
-    def _solve_load(self) -> None:
-        status = st.find_load(*self._kernel(), self._row, self._out, self._spare)
-        self._check(status, self._row[st.IN_TIME])
-
-    def _check(self, status: int, time_s: float, index: int | None = None) -> None:
+    def _taken(self, sample: Sample, status: int, fresh: bool) -> Estimate:
+        """What a step ends with: the estimate, or the refusal."""
         if status != o.STATUS_OK:
-            where = f"sample at {time_s:g} s" if index is None else f"sample {index}: at {time_s:g} s"
-            raise InputError(f"{where} {REASONS[status]}")
+            self._refuse(status, sample.time_s, fresh)
+        self._last_time = sample.time_s
+        low, high = NAN, NAN
+        if self._bounds is not None:
+            low, high = self._bounds.step(self._S)
+        return self._estimate(sample, low, high)
 
-    def _too_much(self, tension: float) -> str:
-        return f"puts {tension:.4g} N on a cable that breaks at {self._breaking:g} N; lower the load or check breaking_force_N"
+    def _peeked(self, sample: Sample, status: int, fresh: bool) -> Estimate:
+        """What a prediction ends with; nothing is left of it."""
+        if status != o.STATUS_OK:
+            self._refuse(status, sample.time_s, fresh)
+        if fresh:
+            self._forget()
+        return self._estimate(sample, NAN, NAN)
+
+    def _refuse(self, status: int, time_s: float, fresh: bool, index: int | None = None) -> NoReturn:
+        if fresh:
+            self._forget()
+        raise refused(status, float(time_s), self._last_time, float(self._out[st.OUT_STRENGTH]), index)
 
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
-        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque = self._out.tolist()
+        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque, _ = self._out.tolist()
         rigid = self._ratio * sample.motor_position_rad
         shift = joint - drive - rigid
         return Estimate(

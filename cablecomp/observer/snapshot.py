@@ -14,7 +14,7 @@ from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.profile import ROWS, Floats, Ints
 
 MAGIC = b"CABLECMP"
-VERSION = 1
+VERSION = 2
 State = tuple[Floats, Ints]
 
 
@@ -30,7 +30,7 @@ def pack(
     ]
     parts += [row.tobytes() for row in numbers]
     for S, J in states:
-        parts += [J.astype("<i8").tobytes(), S[: I[o.S_PROFILE]].tobytes()]
+        parts += [J.astype("<i8").tobytes(), S[: I[o.S_MEET]].tobytes()]
         parts += [np.ascontiguousarray(_used(I, S, J, wrap)).tobytes() for wrap in range(len(J))]
     body = b"".join(parts)
     return body + hashlib.sha256(body).digest()
@@ -39,7 +39,7 @@ def pack(
 def unpack(
     data: bytes, config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats]
 ) -> float:
-    """Fill the states from a snapshot and return the time of its last sample; nothing is touched unless all of it is sound."""
+    """Fill the states from a snapshot and return the time of its last sample; after an InputError they may be half filled."""
     body, digest = data[:-32], data[-32:]
     if len(data) < 60 or not body.startswith(MAGIC):
         raise InputError(
@@ -60,14 +60,25 @@ def unpack(
         raise InputError(
             f"snapshot: holds {count} histories, this observer {len(states)}; open it with the same `bounds`"
         )
+    try:
+        return _fill(body, I, states, numbers)
+    except ValueError:
+        raise InputError(
+            "snapshot: holds more or less than its joint's state; start from a known state instead"
+        ) from None
+
+
+def _fill(body: bytes, I: Ints, states: Sequence[State], numbers: Sequence[Floats]) -> float:
     (last_time,) = struct.unpack_from("<d", body, 28)
     place = 36
     for row in numbers:
         row[:] = np.frombuffer(body, "<f8", len(row), place)
         place += 8 * len(row)
-    small = int(I[o.S_PROFILE])
+    small = int(I[o.S_MEET])
     for S, J in states:
         J[:] = np.frombuffer(body, "<i8", len(J), place)
+        if J.min() < 0 or J.max() > I[o.CAPACITY]:
+            raise ValueError("profile longer than its room")
         place += 8 * len(J)
         S[:small] = np.frombuffer(body, "<f8", small, place)
         place += 8 * small
@@ -75,6 +86,8 @@ def unpack(
             used = ROWS * int(J[wrap])
             _used(I, S, J, wrap)[:] = np.frombuffer(body, "<f8", used, place).reshape(ROWS, -1)
             place += 8 * used
+    if place != len(body):
+        raise ValueError("bytes left over")
     return float(last_time)
 
 

@@ -6,43 +6,63 @@ import math
 
 from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.cable import stacks
-from cablecomp.mechanics.jit import inlined_kernel, kernel
-from cablecomp.mechanics.joint import advance, joint_commit, joint_solve
+from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
+from cablecomp.mechanics.joint import (
+    advance,
+    joint_commit,
+    joint_ready,
+    joint_solve,
+    strength_used,
+    terms_sane,
+)
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 
-# options F: [torque gain, torque offset, filter angular frequency, 0]; filter state follows: value and slope of angle and load
-GAIN, OFFSET, CUTOFF, STARTED, MOTOR_1, MOTOR_2, LOAD_1, LOAD_2, OPTIONS = range(9)
 # one row of inputs
 IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
 # one row of outputs
 (
     OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_T_H_IN, OUT_T_L_IN, OUT_MOTOR_TORQUE,
-    OUT_WIDTH,
-) = range(10)  # fmt: skip
+    OUT_STRENGTH, OUT_WIDTH,
+) = range(11)  # fmt: skip
 
 
-@kernel
-def smooth(F: Floats, dt: float, motor: float, load: float) -> tuple[float, float]:
+@leaf_kernel
+def smooth(P: Floats, I: Ints, S: Floats, dt: float, motor: float, load: float) -> tuple[float, float]:
     """Causal input filter: an alpha-beta tracker of value and slope, critically damped; it follows ramps without lag.
 
     Uneven steps are exact in the gains; off at cutoff 0.
     """
-    if F[CUTOFF] <= 0.0:
+    cutoff = P[I[o.P_SENSOR] + o.CUTOFF]
+    f = I[o.S_FILTER]
+    if cutoff <= 0.0:
         return motor, load
-    if F[STARTED] == 0.0:
-        F[STARTED] = 1.0
-        F[MOTOR_1], F[LOAD_1] = motor, load
-        F[MOTOR_2] = F[LOAD_2] = 0.0
+    if S[f + o.STARTED] == 0.0:
+        S[f + o.STARTED] = 1.0
+        S[f + o.MOTOR_1], S[f + o.LOAD_1] = motor, load
+        S[f + o.MOTOR_2] = S[f + o.LOAD_2] = 0.0
         return motor, load
     if dt <= 0.0:
-        return F[MOTOR_1], F[LOAD_1]
-    keep = math.exp(-F[CUTOFF] * dt)
+        return S[f + o.MOTOR_1], S[f + o.LOAD_1]
+    keep = math.exp(-cutoff * dt)
     follow, turn = 1.0 - keep * keep, (1.0 - keep) * (1.0 - keep) / dt
-    miss = motor - (F[MOTOR_1] + F[MOTOR_2] * dt)
-    F[MOTOR_1], F[MOTOR_2] = motor - (1.0 - follow) * miss, F[MOTOR_2] + turn * miss
-    miss = load - (F[LOAD_1] + F[LOAD_2] * dt)
-    F[LOAD_1], F[LOAD_2] = load - (1.0 - follow) * miss, F[LOAD_2] + turn * miss
-    return F[MOTOR_1], F[LOAD_1]
+    miss = motor - (S[f + o.MOTOR_1] + S[f + o.MOTOR_2] * dt)
+    S[f + o.MOTOR_1], S[f + o.MOTOR_2] = motor - (1.0 - follow) * miss, S[f + o.MOTOR_2] + turn * miss
+    miss = load - (S[f + o.LOAD_1] + S[f + o.LOAD_2] * dt)
+    S[f + o.LOAD_1], S[f + o.LOAD_2] = load - (1.0 - follow) * miss, S[f + o.LOAD_2] + turn * miss
+    return S[f + o.MOTOR_1], S[f + o.LOAD_1]
+
+
+@leaf_kernel
+def admissible(I: Ints, S: Floats, J: Ints, row: Floats) -> int:
+    """Whether a row of readings can be taken at all: started state, finite readings, time that does not run backwards."""
+    if J[0] < 2:
+        return o.STATUS_UNKNOWN
+    if not (math.isfinite(row[IN_MOTOR]) and math.isfinite(row[IN_LOAD]) and math.isfinite(row[IN_TIME])):
+        return o.STATUS_NAN
+    for j in range(IN_TEMPERATURE, row.shape[0]):
+        if math.isinf(row[j]):
+            return o.STATUS_NAN
+    return o.STATUS_OK if row[IN_TIME] >= S[I[o.S_CONTEXT] + o.X_TIME] else o.STATUS_BACKWARD
 
 
 @inlined_kernel
@@ -66,20 +86,27 @@ def motor_side(P: Floats, I: Ints, S: Floats, out: Floats) -> None:
 
 
 @inlined_kernel
-def predict(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, F: Floats, row: Floats, out: Floats
-) -> int:
-    """Solve the joint for one row of readings without committing it; `out` gets the outputs. Returns a status."""
-    if not (math.isfinite(row[IN_MOTOR]) and math.isfinite(row[IN_LOAD]) and math.isfinite(row[IN_TIME])):
-        return o.STATUS_NAN
+def predict(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, row: Floats, out: Floats) -> int:
+    """Solve the joint for one row of readings without committing it; `out` gets the outputs. Returns a status.
+
+    The scalar state is left pending in any case: whoever commits nothing puts it back (`keep`, `put_back`).
+    """
+    status = admissible(I, S, J, row)
+    if status != o.STATUS_OK:
+        return status
     x = I[o.S_CONTEXT]
-    raw = (row[IN_LOAD] - F[OFFSET]) / F[GAIN]
+    raw = (row[IN_LOAD] - P[I[o.P_SENSOR] + o.OFFSET]) / P[I[o.P_SENSOR] + o.GAIN]
     dt = row[IN_TIME] - S[x + o.X_TIME]
-    motor, load = smooth(F, dt, row[IN_MOTOR], raw)
+    motor, load = smooth(P, I, S, dt, row[IN_MOTOR], raw)
     advance(P, I, S, row[IN_TIME], motor, load, row[IN_TEMPERATURE])
     for j in range(row.shape[0] - IN_OTHER):
         S[x + o.X_OTHER + j] = row[IN_OTHER + j]
     status = joint_solve(P, I, S, J, L, G)
+    ready = joint_ready(I, S)
+    if status == o.STATUS_OK or (status == o.STATUS_DIVERGED and ready == o.STATUS_UNWOUND):
+        status = ready
+    if I[o.N_TERMS] > 0 and not terms_sane(I, S):
+        status = o.STATUS_EFFECT
     drive = S[x + o.X_JOINT] + S[x + o.X_RIGID] * (row[IN_MOTOR] - motor)
     out[OUT_DRIVE] = drive
     out[OUT_JOINT] = drive + S[x + o.X_READING]
@@ -88,94 +115,121 @@ def predict(
     out[OUT_T_L] = S[x + o.X_TENSION_L]
     out[OUT_COMPLIANCE] = S[x + o.X_COMPLIANCE]
     motor_side(P, I, S, out)
+    out[OUT_STRENGTH] = 0.0
     return status
 
 
 @kernel
-def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats) -> int:
-    """One sample, committed."""
-    G = stacks(I, S)
-    status = predict(P, I, S, J, L, G, F, row, out)
+def keep(I: Ints, S: Floats) -> None:
+    """Copy everything but the profiles (which nothing but a commit touches) aside."""
+    copy_floats(S, 0, S, I[o.S_SPARE], I[o.S_MEET])
+
+
+@kernel
+def put_back(I: Ints, S: Floats) -> None:
+    """Undo what happened since `keep`, bit for bit."""
+    copy_floats(S, I[o.S_SPARE], S, 0, I[o.S_MEET])
+
+
+@inlined_kernel
+def take(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, row: Floats, out: Floats) -> int:
+    """One sample, committed; or refused (the status says why), and the state is what it was, bit for bit."""
+    keep(I, S)
+    status = predict(P, I, S, J, L, G, row, out)
     if status == o.STATUS_OK:
-        joint_commit(P, I, S, J, L, G)
+        out[OUT_STRENGTH] = strength_used(P, I, S)
+        status = joint_commit(P, I, S, J, L, G) if out[OUT_STRENGTH] <= 1.0 else o.STATUS_BREAKS
+    if status != o.STATUS_OK:
+        put_back(I, S)
     return status
 
 
 @kernel
-def peek_one(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats, spare: Floats
-) -> int:
-    """One sample, nothing committed: everything but the profiles (which a prediction never touches) is put back."""
-    small = I[o.S_PROFILE]
-    copy_floats(S, 0, spare, 0, small)
-    copy_floats(F, 0, spare, small, OPTIONS)
-    status = predict(P, I, S, J, L, stacks(I, S), F, row, out)
-    copy_floats(spare, 0, S, 0, small)
-    copy_floats(spare, small, F, 0, OPTIONS)
+def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
+    """One sample, committed or refused."""
+    return take(P, I, S, J, L, stacks(I, S), row, out)
+
+
+@kernel
+def peek_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
+    """One sample, nothing committed. A cable that would break is no reason to refuse a prediction."""
+    keep(I, S)
+    status = predict(P, I, S, J, L, stacks(I, S), row, out)
+    put_back(I, S)
     return status
 
 
 @kernel
 def run_block(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
 ) -> tuple[int, int]:
     """Step through a block of rows; returns how many were done and the status of the row that stopped it."""
     G = stacks(I, S)
     for k in range(rows.shape[0]):
-        status = predict(P, I, S, J, L, G, F, rows[k], outs[k])
+        status = take(P, I, S, J, L, G, rows[k], outs[k])
         if status != o.STATUS_OK:
             return k, status
-        joint_commit(P, I, S, J, L, G)
     return rows.shape[0], o.STATUS_OK
 
 
 @kernel
-def find_load(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, row: Floats, out: Floats, spare: Floats
-) -> int:
+def find_load(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
     """The load [N m] under which the joint encoder would read row[IN_JOINT], by Newton's method; written to row[IN_LOAD].
 
     Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
-    are slack every load near zero fits, and the nearest is taken.
+    are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a load that the joint
+    cannot take (an open circuit's cable slack, a drum unwound): if that is what the angle asks for, it is refused.
     """
+    if not math.isfinite(row[IN_JOINT]):
+        return o.STATUS_NAN
     x = I[o.S_CONTEXT]
     low, high = -1e300, 1e300
-    load = S[x + o.X_LOAD] * F[GAIN] + F[OFFSET]
-    for _ in range(60):
+    below = above = o.STATUS_OK  # what is wrong with the loads at the ends of the bracket
+    load = S[x + o.X_LOAD] * P[I[o.P_SENSOR] + o.GAIN] + P[I[o.P_SENSOR] + o.OFFSET]
+    reach = P[o.J_RADIUS] * P[o.JOINT * I[o.N_CIRCUITS] + o.T0]
+    taken = 0.0  # the last load that the joint could take
+    for _ in range(200):
         row[IN_LOAD] = load
-        status = peek_one(P, I, S, J, L, F, row, out, spare)
-        if status != o.STATUS_OK and status != o.STATUS_SLACK:
+        status = peek_one(P, I, S, J, L, row, out)
+        if status == o.STATUS_SLACK or status == o.STATUS_UNWOUND or status == o.STATUS_DIVERGED:
+            reach *= 2.0
+            if status == o.STATUS_SLACK or load < taken:
+                low, below = load, status
+                new = low + reach
+            else:
+                high, above = load, status
+                new = high - reach
+        elif status != o.STATUS_OK:
             return status
-        if status == o.STATUS_SLACK:  # an open circuit's cable would go slack: more load is needed
-            low = max(low, load)
-            load = 0.5 * (load + high) if high < 1e299 else 0.5 * load
-            continue
-        miss = out[OUT_JOINT] - row[IN_JOINT]
-        if abs(miss) < 1e-13:
-            return o.STATUS_OK
-        if miss > 0.0:
-            high = load
         else:
-            low = load
-        step = -miss / max(out[OUT_COMPLIANCE], 1e-12)
-        new = load + step
+            miss = out[OUT_JOINT] - row[IN_JOINT]
+            taken = load
+            if abs(miss) < 1e-13:
+                return o.STATUS_OK
+            if miss > 0.0:
+                high, above = load, o.STATUS_OK
+            else:
+                low, below = load, o.STATUS_OK
+            new = load - miss / max(out[OUT_COMPLIANCE], 1e-12)
         if not low < new < high:
             new = 0.5 * (low + high)
         if abs(new - load) <= 1e-14 + 1e-13 * abs(load):
-            return o.STATUS_OK
+            if below == above == o.STATUS_OK:
+                return o.STATUS_OK
+            return o.STATUS_UNREACHABLE
         load = new
-    return o.STATUS_OK
+    return o.STATUS_UNREACHABLE
 
 
 @kernel
 def run_inverse(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, F: Floats, rows: Floats, outs: Floats, spare: Floats
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
 ) -> tuple[int, int]:
     """As `run_block`, with every row's load found from both encoders."""
     for k in range(rows.shape[0]):
-        status = find_load(P, I, S, J, L, F, rows[k], outs[k], spare)
+        status = find_load(P, I, S, J, L, rows[k], outs[k])
         if status == o.STATUS_OK:
-            status = step_one(P, I, S, J, L, F, rows[k], outs[k])
+            status = step_one(P, I, S, J, L, rows[k], outs[k])
         if status != o.STATUS_OK:
             return k, status
     return rows.shape[0], o.STATUS_OK

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -53,7 +54,15 @@ def open_npz(path: Path) -> RawTable:
     try:
         with zipfile.ZipFile(path) as archive:
             heads = {info.filename: _npy_head(archive, info) for info in archive.infolist()}
-    except (OSError, ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile) as error:
+    except (
+        OSError,
+        ValueError,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise InputError(f"{path}: cannot be read as .npz ({first_line(error)}); {_EXPECTED}") from None
     shapes = {name.removesuffix(".npy"): shape for name, (shape, _) in heads.items()}
     columns = columns_of(path, shapes)
@@ -62,7 +71,7 @@ def open_npz(path: Path) -> RawTable:
         members = list(dict.fromkeys(columns[name][0] for name in names))
         try:
             yield from _read_npz(path, members, {name: columns[name] for name in names}, heads)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path}: damaged .npz ({first_line(error)}); save it anew") from None
 
     return RawTable(tuple(columns), read)

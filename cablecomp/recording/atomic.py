@@ -30,9 +30,11 @@ def atomic_directory(out: Path | str) -> Iterator[Path]:
     try:
         yield temporary
         _move_into(temporary, out)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(temporary, ignore_errors=True)
         _remove_empty(made)
+        if isinstance(error, OSError):
+            raise InputError(f"{out}: cannot be written ({_why(error)}); nothing was left there") from None
         raise
 
 
@@ -46,7 +48,7 @@ def atomic_file(path: Path | str) -> Iterator[Path]:
         replace_durably(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+        raise InputError(f"{path}: cannot be written ({_why(error)}); choose another place") from None
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
@@ -93,3 +95,8 @@ def _remove_empty(directories: list[Path]) -> None:
             directory.rmdir()
         except OSError:
             return
+
+
+def _why(error: OSError) -> str:
+    """What the system said; an error raised by a package may carry it in its text alone."""
+    return error.strerror or (str(error).splitlines() or ["for no reason given"])[0]

@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 
 from cablecomp.errors import InputError
+from cablecomp.recording.array_file import first_line
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.recording.channels import order
 from cablecomp.recording.mcap_file import write_mcap
@@ -91,4 +92,7 @@ def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Blo
         if ending == ".npz":
             np.savez_compressed(path, **whole)  # type: ignore[arg-type]  # its stub takes `allow_pickle` for an array
         else:
-            pl.DataFrame(whole).write_parquet(path)
+            try:
+                pl.DataFrame(whole).write_parquet(path)
+            except pl.exceptions.PolarsError as error:
+                raise OSError(first_line(error)) from None

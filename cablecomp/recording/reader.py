@@ -38,6 +38,7 @@ class Recording:
     line_word: str
     raw: Callable[[], Iterator[RawRows]]
     notes: tuple[str, ...] = ()
+    gaps: bool = False
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -93,13 +94,18 @@ def open_recording(
 
 
 def read_all(
-    path: Path | str, mapping: ColumnMap | None = None, decode: Callable[[], DecodeFrame] | None = None
+    path: Path | str,
+    mapping: ColumnMap | None = None,
+    decode: Callable[[], DecodeFrame] | None = None,
+    gaps: bool = False,
 ) -> Table:
     """Read a whole recording into memory; errors as `open_recording` and `Recording.blocks`.
 
+    `gaps`: cells without a finite number stay as NaN, with a remark, in every channel but the clock.
+
     InputError as well for one of over 200 million values.
     """
-    recording = open_recording(path, mapping, decode)
+    recording = replace(open_recording(path, mapping, decode), gaps=gaps)
     blocks, values = [], 0
     for block in recording.blocks():
         values += block.rows * len(block.columns)
@@ -168,6 +174,7 @@ class _Checks:
     """Converts units and refuses what must not be bridged; remembers the last time stamp between pieces."""
 
     def __init__(self, recording: Recording) -> None:
+        self._gaps = recording.gaps
         self._recording = recording
         self._last_time: float | None = None
         self._usual_step = 0.0
@@ -197,6 +204,9 @@ class _Checks:
             bad &= ~empty
         if not bad.any():
             return []
+        if self._gaps and column.name != "time_s":
+            values[bad] = np.nan
+            return [Remark("empty", raw.first_line + int(np.argmax(bad)), int(bad.sum()), column.name)]
         row = int(np.argmax(bad))
         cell = raw.cell(row, column.column)
         found = f"holds {cell!r}" if cell else "is empty"

@@ -12,7 +12,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, path_text
 from cablecomp.recording.assumptions import assumptions
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.replay_summary import ReplaySummary
@@ -137,7 +137,7 @@ class _Run:
         line = self._fit.line()
         channels = self._recording.channels
         return ReplaySummary(
-            recording=str(self._recording.path),
+            recording=path_text(self._recording.path),
             joint=self._config.name,
             samples=self.samples,
             duration_s=self._last_time - self._first_time,

@@ -19,9 +19,11 @@ CONFIGS = Path(__file__).parents[2] / "configs" / "joints"
 
 
 def joint(name: str = "snow-closed-rig", **stage: float) -> JointConfig:
-    """A shipped joint, with stage values changed."""
+    """A shipped joint whose cables never break, with stage values changed."""
     data = load_joint(CONFIGS / f"{name}.toml").model_dump(by_alias=True)
-    data["drive"]["stage"] = tuple({**part, **stage} for part in data["drive"]["stage"])
+    data["drive"]["stage"] = tuple(
+        {**part, "breaking_force_N": None, **stage} for part in data["drive"]["stage"]
+    )
     return parse_joint(data, "changed")
 
 

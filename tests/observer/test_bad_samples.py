@@ -49,7 +49,7 @@ def test_wrap_used_up_by_rotation() -> None:
 def test_a_load_beyond_what_the_cable_carries() -> None:
     config = joint("closed", {"breaking_force_N": 80.0})
     load = np.linspace(0.0, 1.5 * pull_unit(config), 20)
-    with pytest.raises(InputError, match="breaks at 80 N"):
+    with pytest.raises(InputError, match="times its breaking force"):
         Observer(config).run(columns(load))
 
 
