@@ -166,7 +166,7 @@ def _score(out: Path, truth: Truth) -> Row:
     try:
         yardstick = measure_truth(load_joint(folder / "joint.toml"), recordings, truth)
     except InputError:
-        yardstick = Yardstick(nan, nan, False, nan, nan, nan)
+        yardstick = Yardstick(nan, nan, False, nan, nan)
     verdict, timing = _verdict(place)
     if verdict is None:
         return failed_trial(truth, yardstick, timing["failed"] or "no verdict", _seconds(timing))

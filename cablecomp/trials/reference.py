@@ -1,36 +1,41 @@
-"""The yardstick of a blind trial: what the true model itself reaches on the same rows and blocks."""
+"""The yardstick of a blind trial: what the true model itself reaches on the same rows, fitted as a hypothesis is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.fitting import INFLATION, Problem, solve
-from cablecomp.diagnosis.forms import PHASE
-from cablecomp.diagnosis.hypotheses import Fold, all_rows, fold_of
-from cablecomp.diagnosis.judge import judge
-from cablecomp.diagnosis.selection import LEVEL
-from cablecomp.diagnosis.setting import Setting, set_up
+from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
+from cablecomp.diagnosis.errors_left import errors_of
+from cablecomp.diagnosis.explain.scores import Groups, Lead, lead, left_out, make_groups
+from cablecomp.diagnosis.explain.selection import searching
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
-from cablecomp.identification.parameters import free_parameters
+from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.parameter import of_effect
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.estimation.simulate import knows_rates
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.sealed import Truth
 
-_HELD = (PHASE, "time_s", "reference_degC")
+_HELD = ("phase_rad", "time_s", "reference_degC")
+EVALUATIONS = 12
 
 
 @dataclass(frozen=True)
 class Yardstick:
     """What the truth reaches.
 
-    `true_rmse_rad`: RMSE of the true model with true parameters; `baseline_rmse_rad`: held-out RMSE of the
-    recalibrated drive; `decidable`: the true effects, refitted, beat the recalibrated drive on held-out
-    blocks beyond the margin (in a pair: each of them beats the model without it as well); `gain`: share of
-    the baseline's held-out mean square that they remove, with `z` and `margin`.
+    `true_rmse_rad`: RMSE of the true model with true parameters; `baseline_rmse_rad`: held-out RMSE of the recalibrated drive;
+    `decidable`: the true effects, refitted, beat the recalibrated drive on data left out by what an effect has to bring
+    (in a pair: each of them beats the model without it as well); `gain`: share of the baseline's square on data left
+    out that they take off, with its `z`.
     """
 
     true_rmse_rad: float
@@ -38,77 +43,88 @@ class Yardstick:
     decidable: bool
     gain: float
     z: float
-    margin: float
 
 
 def measure_truth(
     config: JointConfig, recordings: Sequence[Mapping[str, FloatArray]], truth: Truth, seed: int = 0
 ) -> Yardstick:
-    """Fit the true effects and the calibration on either half, judge them on the other, as a hypothesis is.
+    """Fit the true effects with the calibration and compare them with the drive alone, on data left out.
 
     Raises InputError if the joint cannot follow the recordings.
     """
     rng = np.random.default_rng(seed)
-    setting = set_up(config, recordings, rng)
-    both = all_rows(setting.layout)
-    rows = both.heldout
-    unit = setting.problem.sigma * INFLATION
-    true = replace(setting.problem, config=truth.model).residual(truth.model) * unit
-    baseline = fold_of(setting.problem, setting.calibrated, setting.layout)
+    body = gather_body(config, {f"recording-{k + 1}": c for k, c in enumerate(recordings)}, "one")
+    drive = calibrate_drive(config, body.used, rng)
+    groups = make_groups(drive.fit)
+    true = replace(
+        drive.fit.problem, config=truth.model, parameters=(), fine=knows_rates(truth.model), bases={}
+    )
+    rmse = _rms(true.left(np.empty(0)), true)
+    baseline = errors_of(drive.fit, body.final, groups.by).heldout_rmse_rad
     known = [e.id for e in truth.effects if e.known]
-    rmse, base = _rms(true[rows]), _rms(baseline.residual_rad[rows])
-    if not known:
-        return Yardstick(rmse, base, False, 0.0, 0.0, 0.0)
-    whole = _fold_with(setting, truth, known)
+    whole = _with(drive, truth, known) if known else None
     if whole is None:
-        return Yardstick(rmse, base, False, 0.0, 0.0, 0.0)
-    verdict = judge(baseline.residual_rad, {"truth": whole.residual_rad}, both, rng, LEVEL)
-    score = verdict.scores[0]
-    decidable = score.supported
+        return Yardstick(rmse, baseline, False, 0.0, 0.0)
+    step = _step(whole, _with(drive, truth, [], whole.problem), groups)
+    decidable = _enough(step)
     for name in known if len(known) > 1 else ():
-        less = _fold_with(setting, truth, [n for n in known if n != name])
-        if less is not None:
-            alone = judge(less.residual_rad, {"truth": whole.residual_rad}, both, rng, LEVEL).scores[0]
-            decidable = decidable and alone.supported
-    return Yardstick(rmse, base, decidable, score.heldout_gain, score.z, score.margin)
+        less = _with(drive, truth, [n for n in known if n != name], whole.problem)
+        decidable = decidable and less is not None and _enough(_step(whole, less, groups))
+    return Yardstick(rmse, baseline, decidable, step.gain, step.z)
 
 
-def _fold_with(setting: Setting, truth: Truth, names: Sequence[str]) -> Fold | None:
-    """These true effects fitted with the calibration, from their true values, on either half."""
+def _step(whole: Fit, less: Fit | None, groups: Groups) -> Lead:
+    assert less is not None
+    return lead(left_out(whole, groups), left_out(less, groups), groups)
+
+
+def _enough(step: Lead) -> bool:
+    return step.z > LIMITS.z and step.gain > LIMITS.gain
+
+
+def _with(drive: Calibrated, truth: Truth, names: Sequence[str], like: Problem | None = None) -> Fit | None:
+    """These true effects fitted with the calibration from their true values; None where the drive cannot follow.
+
+    `like`: take its weights and its way to run, so that both fits compare. Without it, the weights are those with which a
+    search leaves the model that holds these effects.
+    """
+    config = drive.fit.problem.config
     entries = tuple(e for e in truth.model.effect if e.id in names)
-    config = setting.problem.config.model_copy(update={"effect": entries})
-    free = [p.name for p in setting.problem.parameters]
+    free = list(drive.fit.problem.parameters)
     for entry in entries:
-        known = catalogue()[entry.id]
-        free += [
-            f"effect.{entry.id}.{p.name}" for p in known.parameters if _is_free(p.name, entry.parameters)
-        ]
-    problem = replace(setting.problem, config=config, parameters=free_parameters(config, free))
-    start = _true_coordinates(problem, truth)
-    mask = setting.layout.heldout | setting.layout.training
+        effect = catalogue()[entry.id]
+        values = {
+            k: float(v)
+            for k, v in entry.parameters.items()
+            if not isinstance(v, str) and v and k not in _HELD
+        }
+        free += of_effect(effect, values, config)
+    problem = replace(
+        drive.fit.problem,
+        config=config.model_copy(update={"effect": (*config.effect, *entries)}),
+        parameters=tuple(free),
+        fine=like.fine if like else knows_rates(truth.model),
+    )
+    start = np.array([p.x(float(truth.true.get(p.base, p.start))) for p in free])
     try:
-        model = solve(problem, (), start, mask, iterations=15, renew=True)
+        if like is not None:
+            return solve(problem.with_weighing(like.weighing), start, EVALUATIONS)
+        fit = solve(problem, start, EVALUATIONS)
+        return solve(problem.with_weighing(_sharper(fit, drive)), fit.x, EVALUATIONS)
     except InputError:
         return None
-    return None if model is None else fold_of(problem, model, setting.layout)
 
 
-def _is_free(name: str, values: Mapping[str, float | str]) -> bool:
-    value = values.get(name)
-    return isinstance(value, float | int) and value != 0.0 and name not in _HELD
+def _sharper(fit: Fit, drive: Calibrated) -> Weighing:
+    """A search's weights beyond the better of this fit and the drive alone."""
+    mine, theirs = searching(fit), searching(drive.fit)
+    sigma = {c: min(mine.sigma[c], theirs.sigma[c]) for c in mine.sigma}
+    return Weighing(sigma, mine.zero_sd)
 
 
-def _true_coordinates(problem: Problem, truth: Truth) -> FloatArray:
-    """Calibration at the truth; effects stand there already."""
-    values = {**truth.true, "joint_position_offset_rad": truth.offset_rad}
-    found = np.zeros(len(problem.parameters))
-    for k, p in enumerate(problem.parameters):
-        if p.name in values:
-            value = values[p.name]
-            x = np.log(value / p.nominal) / p.unit if p.logarithmic else (value - p.nominal) / p.unit
-            found[k] = float(np.clip(x, p.low, p.high))
-    return found
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def _rms(parts: Sequence[FloatArray], problem: Problem) -> float:
+    """RMS on counted rows, weighed by the time that they stand for."""
+    joined = np.concatenate([
+        (e.weight * p)[e.counted["joint_position_rad"]] for e, p in zip(problem.evidence, parts, strict=True)
+    ])  # fmt: skip
+    return sqrt(float(np.mean(joined**2)))

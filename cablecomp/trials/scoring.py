@@ -42,11 +42,27 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Bound:
+    """How large an effect that was concealed and not named could be, as stated (None: any size), against what is true."""
+
+    what: str
+    true: float
+    below: float | None
+
+    @property
+    def held(self) -> bool:
+        """Whether the truth lies below."""
+        return self.below is None or abs(self.true) <= self.below
+
+
+@dataclass(frozen=True)
 class Row:
     """The score of one trial.
 
-    `decidable`: the true model itself beats the recalibrated drive beyond its margin; `located`: the first
-    covariate, or an interval, is what the concealed effect acts through (None if nothing is concealed);
+    `decidable`: the true model itself beats the recalibrated drive beyond its margin; `located`: the first covariate of
+    the calibrated drive's residual, before any name, or an interval, is what the concealed effect acts through (None if
+    nothing is concealed); `bounds`: of what was concealed and not named; `final_rad`: RMSE after modelling on data kept for
+    the end;
     `said_tied`, `proposed`, `settled`: of confounded trials (None otherwise); `heldout_rad`, `baseline_rad`,
     `true_rad`, `floor_rad`: RMSE after modelling, of the recalibrated drive, of the true model with true
     parameters, of noise alone as the recording's own (averaged) rows have it; `failed`: why there is no
@@ -70,7 +86,9 @@ class Row:
     proposed: bool | None
     settled: bool | None
     estimates: tuple[Estimate, ...]
+    bounds: tuple[Bound, ...]
     heldout_rad: float
+    final_rad: float
     baseline_rad: float
     true_rad: float
     floor_rad: float
@@ -89,7 +107,7 @@ class Row:
 
     @property
     def wrong(self) -> bool:
-        """Whether any name given is not true."""
+        """Whether any name given (confidence 0.5 and more) is not true."""
         return any(not n.right for n in self.named)
 
     @property
@@ -140,7 +158,9 @@ def score_trial(
         verdict["next_experiment"] is not None if confounded else None,
         _settled(truth, second) if confounded else None,
         tuple(_estimates(truth, verdict)),
+        tuple(_bounds(truth, verdict)),
         _number(verdict["augmented"]["heldout_rmse_rad"]),
+        _number(verdict["augmented"]["final_rmse_rad"]),
         yardstick.baseline_rmse_rad,
         yardstick.true_rmse_rad,
         _number(verdict["noise_floor_rad"]),
@@ -169,6 +189,8 @@ def failed_trial(truth: Truth, yardstick: Yardstick, why: str, seconds: float = 
         confounded,
         confounded,
         (),
+        (),
+        nan,
         nan,
         yardstick.baseline_rmse_rad,
         yardstick.true_rmse_rad,
@@ -228,7 +250,11 @@ def _estimates(truth: Truth, verdict: Mapping[str, Any]) -> list[Estimate]:
     """Stated values of what was named rightly, and of the calibration, where the verdict rests on them."""
     found: list[Estimate] = []
     right = {m["effect"]: m for m in verdict["missing_physics"] if m["effect"] in truth.names}
-    if truth.effects and (verdict["verdict"] != "explained" or len(right) != len(truth.effects)):
+    if (
+        len(right) != len(truth.effects)
+        or len(verdict["missing_physics"]) != len(right)
+        or verdict["empirical"]
+    ):
         return found  # the values of a model that is not the true one say nothing about their uncertainty
     calibration = dict(truth.true)
     for effect in truth.effects:
@@ -245,6 +271,19 @@ def _estimates(truth: Truth, verdict: Mapping[str, Any]) -> list[Estimate]:
         if name in calibration and entry["sd"]:
             found.append(Estimate(name, calibration[name], float(entry["value"]), float(entry["sd"])))
     return [e for e in found if isfinite(e.z)]
+
+
+def _bounds(truth: Truth, verdict: Mapping[str, Any]) -> list[Bound]:
+    """What was said of the size of known effects that are there and were not named."""
+    said = {u["effect"]: u for u in verdict["could_be_unseen"]}
+    found = []
+    for effect in truth.effects:
+        channel = effect.parameters.get("channel")
+        entry = said.get(f"{effect.id}:{channel}" if channel else effect.id)
+        true = effect.parameters.get(entry["parameter"]) if entry else None
+        if entry and isinstance(true, float | int):
+            found.append(Bound(f"{effect.id}.{entry['parameter']}", float(true), entry["below"]))
+    return found
 
 
 def _in_terms_of(

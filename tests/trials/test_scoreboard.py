@@ -25,7 +25,7 @@ from cablecomp.trials.scoreboard import Rate, as_json, scoreboard
 from cablecomp.trials.scoring import Row, failed_trial, score_trial
 from cablecomp.trials.sealed import TrueEffect, Truth, digest, open_sealed
 
-SURE = Yardstick(1e-5, 5e-5, True, 0.9, 20.0, 2.5)
+SURE = Yardstick(1e-5, 5e-5, True, 0.9, 20.0)
 
 
 def truth(kind: str = "single", *effects: TrueEffect, partner: str = "", number: int = 0) -> Truth:
@@ -42,11 +42,13 @@ def verdict(*names: str, **changes: Any) -> dict[str, Any]:
     said: dict[str, Any] = {
         "verdict": "explained" if names else "consistent",
         "noise_floor_rad": 1e-5,
-        "augmented": {"heldout_rmse_rad": 1.05e-5},
+        "augmented": {"heldout_rmse_rad": 1.05e-5, "final_rmse_rad": 1.1e-5},
         "calibration": {},
         "mismatch": [{"covariate": "load", "intervals_s": [[3.0, 5.0]]}],
         "missing_physics": [{"effect": n, "confidence": 0.97, "parameters": {}} for n in names],
         "not_excluded": [],
+        "empirical": [],
+        "could_be_unseen": [],
         "next_experiment": None,
     }
     return said | changes
@@ -133,6 +135,31 @@ def test_coverage_counts_stated_intervals_and_turns_phases_round() -> None:
     assert found["pulley_runout.phase_rad"] == pytest.approx((2 * np.pi - 6.2) / 0.1)
     assert found["EA_N"] == pytest.approx(0.02 * JOINT.drive.stage[0].EA_N / 200.0)
     assert not row(one, verdict("gravity_load")).estimates  # values of a wrong model prove nothing
+
+
+def test_what_was_not_named_is_held_against_its_stated_bound() -> None:
+    one = truth(
+        "single",
+        effect("bearing_friction", torque_Nm=0.02),
+        effect("crosstalk", load_coefficient=0.1, channel="other_x"),
+    )
+
+    def said(friction: float | None, cross: float | None) -> dict[str, Any]:
+        unseen = [
+            {"effect": "bearing_friction", "parameter": "torque_Nm", "below": friction},
+            {"effect": "crosstalk:other_x", "parameter": "load_coefficient", "below": cross},
+            {"effect": "crosstalk:other_y", "parameter": "load_coefficient", "below": 0.001},
+        ]
+        return verdict(could_be_unseen=unseen)
+
+    assert [b.held for b in row(one, said(0.03, 0.2)).bounds] == [True, True]
+    assert [b.held for b in row(one, said(0.01, None)).bounds] == [False, True]
+    assert target([row(one, said(0.01, None))], "below its stated bound") == 0.5
+
+
+def test_what_was_kept_for_the_end_is_held_against_what_was_promised() -> None:
+    rows = [row(truth("nothing"), verdict(augmented={"heldout_rmse_rad": 2.0, "final_rmse_rad": 3.0}))]
+    assert target(rows, "kept for the end") == pytest.approx(1.5)
 
 
 def test_a_pretension_at_another_reference_is_another_pretension() -> None:
