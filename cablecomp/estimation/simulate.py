@@ -17,7 +17,7 @@ from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer import stepper as st
-from cablecomp.observer.observer import REASONS
+from cablecomp.observer.refusal import REASONS, Refusal
 from cablecomp.signal.smoothing import FloatArray
 
 _PLACES: Final[Mapping[str, int]] = {
@@ -57,16 +57,14 @@ class Simulator:
             past[:, st.IN_TIME] -= np.arange(before, 0, -1) * 0.05
             past[:, st.IN_MOTOR], past[:, st.IN_LOAD] = history[:, 0], history[:, 1]
             rows = np.concatenate([past, rows])
-        model, options = self.model, np.zeros(st.OPTIONS)
-        options[st.GAIN] = self.joint.sensors.joint_torque_gain
-        options[st.OFFSET] = self.joint.sensors.joint_torque_offset_Nm
+        model = self.model
         S, J = model.S.copy(), model.J.copy()
         joint_start(model.P, model.I, S, J, model.L, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
         outs = np.empty((len(rows), st.OUT_WIDTH))
-        done, status = st.run_block(model.P, model.I, S, J, model.L, options, rows, outs)
+        done, status = st.run_block(model.P, model.I, S, J, model.L, rows, outs)
         if status != o.STATUS_OK:
             at = rows[min(done, len(rows) - 1), st.IN_TIME]
-            raise InputError(f"{recording.name}: at {at:g} s {REASONS[status]}")
+            raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")
         return outs[before:]
 
     def _rows(self, recording: Evidence, kept: Any) -> FloatArray:
