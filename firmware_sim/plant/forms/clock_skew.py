@@ -90,7 +90,8 @@ MOTOR_LATE = form(
 def _held(time: Floats, p: Mapping[str, float]) -> Floats:
     if p["delay_s"] == 0.0:
         return np.zeros_like(time)
-    return np.asarray(np.mod(time - time[0], 2.0 * p["delay_s"]))
+    period, since = 2.0 * p["delay_s"], time - time[0]
+    return np.asarray(since - period * np.floor(since / period + 1e-9))
 
 
 STALE = form(
