@@ -1,7 +1,7 @@
-"""How probable it is that a name is right: a logistic model of the evidence of the case, learnt on trials.
+"""How probable it is that a name is right: a logistic model of the evidence of the case.
 
 p = 1/(1 + exp(-(b + sum_k w_k (f_k - centre_k)/scale_k))). The features are those below; weights, centres and scales are in
-`confidence.json` beside this file, with the trials they were learnt on; `python -m cablecomp.trials.learn` learns them anew.
+`confidence.json` beside this file, with the trials that set them.
 """
 
 from __future__ import annotations
