@@ -1,4 +1,4 @@
-"""Recordings in binary tables: Parquet, NumPy .npz and MATLAB .mat, all streamed; a row is counted from 1."""
+"""Recordings in arrays: NumPy .npz, streamed, and MATLAB .mat; a row is counted from 1."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
-import polars as pl
 from numpy.lib import format as npy
 
 from cablecomp.errors import InputError
@@ -22,31 +21,6 @@ _ROWS: Final = 1 << 17
 _MOST_VALUES: Final = 1 << 27
 _MOST_COLUMNS: Final = 4096
 _EXPECTED: Final = "expected one numeric array per channel, all of one length"
-
-
-def open_parquet(path: Path) -> RawTable:
-    """Open Parquet; InputError if damaged or a column is not of numbers."""
-    try:
-        schema = pl.read_parquet_schema(path)
-        total = int(pl.scan_parquet(path).select(pl.len()).collect().item())
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise InputError(f"{path}: is damaged or cut Parquet ({first_line(error)}); export it anew") from None
-
-    def read(names: Sequence[str]) -> Iterator[NumberRows]:
-        for name in names:
-            if not (schema[name].is_numeric() or schema[name] == pl.Boolean):
-                raise InputError(f"{path}: column {name!r} holds {schema[name]}; numbers are expected")
-        wanted = [pl.col(name).cast(pl.Float64) for name in names]
-        for done in range(0, total, _ROWS):
-            try:
-                frame = pl.scan_parquet(path).slice(done, _ROWS).select(wanted).collect()
-            except (pl.exceptions.PolarsError, OSError) as error:
-                where = f"{path}: row {done + 1} or after"
-                raise InputError(f"{where}: damaged Parquet ({first_line(error)}); export it anew") from None
-            arrays = {name: frame[name].to_numpy() for name in names}
-            yield NumberRows(done + 1, arrays, (done + frame.height) / total)
-
-    return RawTable(tuple(schema), read)
 
 
 def open_npz(path: Path) -> RawTable:

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import polars as pl
 
 from cablecomp.errors import InputError
-from cablecomp.recording.array_file import first_line
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.recording.channels import order
-from cablecomp.recording.mcap_file import write_mcap
+from cablecomp.recording.mcap_writer import write_mcap
+from cablecomp.recording.parquet_file import write_parquet
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.table import Block
 from cablecomp.recording.writer import CsvWriter
@@ -92,7 +91,4 @@ def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Blo
         if ending == ".npz":
             np.savez_compressed(path, **whole)  # type: ignore[arg-type]  # its stub takes `allow_pickle` for an array
         else:
-            try:
-                pl.DataFrame(whole).write_parquet(path)
-            except pl.exceptions.PolarsError as error:
-                raise OSError(first_line(error)) from None
+            write_parquet(path, whole)

@@ -11,10 +11,11 @@ import numpy as np
 
 from cablecomp.errors import InputError
 from cablecomp.recording.can_log import DecodeFrame
-from cablecomp.recording.join import JoinRule, TopicFacts, join
+from cablecomp.recording.join import JoinRule, join
 from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source_file import Messages, open_file
 from cablecomp.recording.table import FloatArray
+from cablecomp.recording.topics import TopicFacts
 
 _MOST_ROWS = 400_000
 _MOST_FIELDS = 256

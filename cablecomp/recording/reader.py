@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -12,13 +12,13 @@ import numpy as np
 from cablecomp.errors import ConfigError, InputError
 from cablecomp.recording.can_log import DecodeFrame
 from cablecomp.recording.channels import Column, may_be_empty, order, parse_header
+from cablecomp.recording.checks import Checks, regrouped, some
 from cablecomp.recording.join import JoinRule, join
 from cablecomp.recording.mapping import ColumnMap, columns_by, find_mapping, load_mapping, meaning
 from cablecomp.recording.raw import RawRows, RawTable
 from cablecomp.recording.source_file import Messages, open_file
-from cablecomp.recording.table import Block, FloatArray, Remark, Table
+from cablecomp.recording.table import Block, Table
 
-_GAP_FACTOR: Final = 10.0
 _MOST_VALUES: Final = 200_000_000
 
 
@@ -60,8 +60,8 @@ class Recording:
         Raises InputError with the line for: a cell that is empty, NaN or infinite (empty cells are remarked
         upon and let through in `temperature_degC` and `other_*`), time running backwards, malformed rows.
         """
-        checked = _Checks(self)
-        return _regrouped((checked.block(piece) for piece in _some(self.raw(), self.path)), rows)
+        checks = Checks(self.path, self.columns, self.line_word, self.gaps)
+        return regrouped((checks.block(piece) for piece in some(self.raw(), self.path)), rows)
 
 
 def open_recording(
@@ -168,123 +168,3 @@ def _joined_rows(
     ages = [name for name in joined.names if name.startswith("other_age_") and name not in by_channel]
     columns += [Column(name, name, 1.0, 0.0) for name in ages]
     return RawTable(joined.names, lambda names: joined.read()), tuple(columns), joined.notes
-
-
-class _Checks:
-    """Converts units and refuses what must not be bridged; remembers the last time stamp between pieces."""
-
-    def __init__(self, recording: Recording) -> None:
-        self._gaps = recording.gaps
-        self._recording = recording
-        self._last_time: float | None = None
-        self._usual_step = 0.0
-
-    def block(self, raw: RawRows) -> Block:
-        columns, remarks = {}, []
-        for column in self._recording.columns:
-            values = _converted(raw.arrays[column.column], column)
-            remarks += self._finite(values, raw, column)
-            columns[column.name] = values
-        remarks += self._time(columns["time_s"], raw.first_line)
-        if raw.left_out:
-            remarks.append(Remark("stale", raw.first_line, raw.left_out))
-        if not raw.ends_with_break:
-            remarks.append(Remark("end", raw.first_line + len(columns["time_s"]) - 1, 1))
-        return Block(raw.first_line, columns, raw.fraction, tuple(remarks))
-
-    def _finite(self, values: FloatArray, raw: RawRows, column: Column) -> list[Remark]:
-        if np.isfinite(values).all():
-            return []
-        bad = ~np.isfinite(values)
-        empty = np.isnan(values)
-        if may_be_empty(column.name):
-            if not (bad & ~empty).any():
-                count, first = int(empty.sum()), int(np.argmax(empty))
-                return [Remark("empty", raw.first_line + first, count, column.name)] if count else []
-            bad &= ~empty
-        if not bad.any():
-            return []
-        if self._gaps and column.name != "time_s":
-            values[bad] = np.nan
-            return [Remark("empty", raw.first_line + int(np.argmax(bad)), int(bad.sum()), column.name)]
-        row = int(np.argmax(bad))
-        cell = raw.cell(row, column.column)
-        found = f"holds {cell!r}" if cell else "is empty"
-        raise InputError(
-            f"{self._where(raw.first_line + row)}: column {column.column!r} {found}; a finite number is "
-            "expected, gaps are not bridged: remove the row or record that channel again"
-        )
-
-    def _time(self, time: FloatArray, first_line: int) -> list[Remark]:
-        before = time[0] if self._last_time is None else self._last_time
-        with np.errstate(over="ignore"):
-            steps = np.diff(time, prepend=before)
-        if steps.min() < 0.0:
-            row = int(np.argmax(steps < 0.0))
-            earlier = time[row] - steps[row]
-            raise InputError(
-                f"{self._where(first_line + row)}: time runs backwards, from {earlier:.9g} s to "
-                f"{time[row]:.9g} s; sort the rows or split the file there"
-            )
-        start = 1 if self._last_time is None else 0
-        self._last_time = float(time[-1])
-        return self._odd_steps(steps[start:], first_line + start)
-
-    def _odd_steps(self, steps: FloatArray, first_line: int) -> list[Remark]:
-        forward = steps[steps > 0.0]
-        if len(forward) >= 3:
-            self._usual_step = float(np.median(forward))
-        remarks = []
-        if self._usual_step > 0.0:
-            for row in np.flatnonzero(steps > _GAP_FACTOR * self._usual_step):
-                remarks.append(Remark("gap", first_line + int(row), float(steps[row])))
-        repeats = steps == 0.0
-        if repeats.any():
-            remarks.append(Remark("repeat", first_line + int(np.argmax(repeats)), int(repeats.sum())))
-        return remarks
-
-    def _where(self, line: int) -> str:
-        return f"{self._recording.path}: {self._recording.line_word} {line}"
-
-
-def _converted(values: FloatArray, column: Column) -> FloatArray:
-    if column.factor != 1.0:
-        with np.errstate(over="ignore"):
-            values = values * column.factor
-    return values + column.offset if column.offset else values
-
-
-def _some(pieces: Iterator[RawRows], path: Path) -> Iterator[RawRows]:
-    found = False
-    for piece in pieces:
-        if len(next(iter(piece.arrays.values()))):
-            found = True
-            yield piece
-    if not found:
-        raise InputError(f"{path}: has column names but no rows; expected at least one row of numbers")
-
-
-def _regrouped(blocks: Iterator[Block], rows: int) -> Iterator[Block]:
-    """Cut and join blocks into equal ones; a remark goes with the block of its line or an earlier one."""
-    held: list[Block] = []
-    for block in blocks:
-        held.append(block)
-        if sum(part.rows for part in held) < rows:
-            continue
-        whole = _joined(held)
-        full = whole.rows - whole.rows % rows
-        for start in range(0, full, rows):
-            part = whole.part(start, start + rows)
-            remarks = whole.remarks if start == 0 else ()
-            yield Block(part.first_line, part.columns, part.fraction, remarks)
-        held = [whole.part(full, whole.rows)] if full < whole.rows else []
-    if held:
-        yield _joined(held)
-
-
-def _joined(blocks: Sequence[Block]) -> Block:
-    if len(blocks) == 1:
-        return blocks[0]
-    columns = {name: np.concatenate([block.columns[name] for block in blocks]) for name in blocks[0].columns}
-    remarks = tuple(remark for block in blocks for remark in block.remarks)
-    return Block(blocks[0].first_line, columns, blocks[-1].fraction, remarks)

@@ -7,17 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cablecomp.errors import InputError
-from cablecomp.recording.array_file import open_mat, open_npz, open_parquet
+from cablecomp.recording.array_file import open_mat, open_npz
 from cablecomp.recording.bag_file import open_bag
 from cablecomp.recording.can_log import DecodeFrame, open_can_log
 from cablecomp.recording.channels import Column
 from cablecomp.recording.csv_text import open_csv
-from cablecomp.recording.join import TopicFacts, survey
 from cablecomp.recording.mapping import meaning
 from cablecomp.recording.mcap_file import open_mcap
 from cablecomp.recording.messages import MessageLog
+from cablecomp.recording.parquet_file import open_parquet
 from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source import identify
+from cablecomp.recording.topics import TopicFacts, survey
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from flipped_bits import same_or_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -267,6 +268,19 @@ def test_convert_keeps_every_bit(ending: str, tmp_path: Path) -> None:
     time = read_all(tmp_path / f"c{ending}").columns["time_s"]
     assert (time[0], time[-1], len(time)) == (1.0, 1.5, 501)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["a.csv", f"b{ending}", f"c{ending}"])
+
+
+@pytest.mark.parametrize("ending", [".parquet", ".npz", ".csv.gz"])
+def test_no_flipped_bit_in_what_we_write_changes_what_is_read(ending: str, tmp_path: Path) -> None:
+    pl.DataFrame(joint(300)).write_csv(tmp_path / "a.csv")
+    path = tmp_path / f"b{ending}"
+    assert main(["convert", str(tmp_path / "a.csv"), str(path)]) == 0
+    same_or_refused(path, path.read_bytes(), 5)
+
+
+def test_parquet_without_checksums_says_so(tmp_path: Path) -> None:
+    pl.DataFrame(joint(300)).write_parquet(tmp_path / "a.parquet")
+    assert any("no checksums" in note for note in open_recording(tmp_path / "a.parquet").notes)
 
 
 def test_inspect_shows_suggests_and_saves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

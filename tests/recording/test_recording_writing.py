@@ -115,7 +115,7 @@ def test_a_recorder_refuses_what_is_not_canonical_and_a_place_it_cannot_write(tm
 
 def test_mcap_is_read_back_as_written(tmp_path: Path) -> None:
     pytest.importorskip("mcap", reason="optional package mcap is not installed")
-    from cablecomp.recording.mcap_file import write_mcap
+    from cablecomp.recording.mcap_writer import write_mcap
 
     rows = _rows(40_000)
     columns = {name: np.ascontiguousarray(rows[:, k]) for k, name in enumerate(CHANNELS)}
