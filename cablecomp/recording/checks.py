@@ -19,7 +19,8 @@ _GAP_FACTOR: Final = 10.0
 class Checks:
     """Converts units and refuses what must not be bridged; remembers the last time stamp between pieces."""
 
-    def __init__(self, path: Path, columns: Sequence[Column], line_word: str) -> None:
+    def __init__(self, path: Path, columns: Sequence[Column], line_word: str, gaps: bool = False) -> None:
+        self._gaps = gaps
         self._path, self._columns, self._word = path, columns, line_word
         self._last_time: float | None = None
         self._usual_step = 0.0
