@@ -14,8 +14,8 @@ from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlConfig, load_control
+from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.examples import example
-from cablecomp.identification.calibrate import calibrate
 from cablecomp.links.load import load_link
 from cablecomp.links.schema import LinkConfig
 from cablecomp.report.compare_page import HEADERS, summary_rows, write_comparison
@@ -67,8 +67,11 @@ def compare_controllers(
 
 
 def _calibrated(config: JointConfig, columns: Columns) -> Calibrated:
-    found = calibrate(config, [columns])
-    rows = tuple((v.name, f"{v.value:.5g} ± {v.sd:.2g} (nominal {v.nominal:.5g})") for v in found.values)
+    found = calibrate(config, {"calibration": columns})
+    rows = tuple(
+        (v.name, f"{v.value:.5g} ± {v.sd:.2g}" + ("" if v.nominal is None else f" (nominal {v.nominal:.5g})"))
+        for v in found.values
+    )
     return Calibrated(found.config, rows, found.warnings)
 
 

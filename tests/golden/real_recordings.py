@@ -1,5 +1,5 @@
-"""Print the tables of the README's "Real recordings": `python tests/golden/real_recordings.py
-[jaw|sheath|search]`."""
+"""Print errors on recordings of real hardware, by the command's own diagnosis and by models that do not know the drive:
+`python tests/golden/real_recordings.py [jaw|sheath|jaw-baselines|sheath-baselines]`."""
 
 from __future__ import annotations
 
@@ -8,102 +8,87 @@ from collections.abc import Callable
 from typing import Final
 
 import jaw_recordings as jaw
+import numpy as np
 import recordings as files
 import sheath_recordings as sheath
 from recordings import KINDS, degrees, own_zero
 
-from cablecomp.identification.path_fit import MOTOR, misfit_of
-from cablecomp.identification.path_selection import Trial, best_of, select_effects
-
-SUSPECTS: Final = (
-    "routing_friction", "bearing_friction", "nonlinear_cable", "termination_backlash", "series_compliance",
-    "strand_friction", "gravity_load", "pulley_runout", "inertial_load", "clock_skew",
-)  # fmt: skip
+from cablecomp.diagnosis.result import Diagnosis
 
 
-def table_of_the_jaw() -> None:
-    """Errors in degrees, full cycles: load left out (one zero per session, per recording), pitch left out."""
-    _row("jaw [deg]", ("in sample", "load left out", "same, zero per rec.", *jaw.PITCHES, "pitches together"))
+def jaw_by_diagnosis() -> None:
+    """All straight recordings; every load left out once; every wrist pitch left out once."""
+    config = files.joint("davinci-jaw")
+    _show("all straight recordings", files.diagnosed(config, jaw.straight()))
+    found = {}
+    for level in jaw.LOADS:
+        joint = files.diagnosed(config, jaw.straight(without=level)).augmented_joint
+        judged = [p for p in jaw.straight() if jaw.load_of(p) == level]
+        found |= {str(p): files.replayed(joint, p, jaw.GROUP) for p in judged}
+    print(
+        f"load left out {degrees(found):.3f} deg, one zero per recording {degrees(own_zero(found)):.3f} deg"
+    )
+    for pitch in jaw.PITCHES:
+        train, judged = jaw.pitch_split(pitch)
+        joint = files.diagnosed(config, train).augmented_joint
+        left = {str(p): files.replayed(joint, p, jaw.GROUP) for p in judged}
+        print(f"{pitch} left out {degrees(left):.3f} deg")
+
+
+def jaw_baselines() -> None:
+    """In sample, load left out (one zero per session, per recording), wrist pitches left out."""
     for motor_torque in (False, True):
         for kind in KINDS:
-            inside = jaw.baseline(kind, jaw.straight(), jaw.straight(), motor_torque)
             left_out = jaw.baseline_loads(kind, motor_torque)
-            pitches = {p: jaw.baseline_pitch(kind, p, motor_torque) for p in jaw.PITCHES}
-            together = {n: m for parts in pitches.values() for n, m in parts.items()}
-            name = kind + ", motor torque" * motor_torque
-            _row(name, (inside, left_out, own_zero(left_out), *pitches.values(), together))
-    for effects in ((), jaw.FOUND):
-        found = jaw.fit(jaw.fitted(jaw.straight()), effects)
-        inside = misfit_of(found, jaw.whole(jaw.straight()))
-        left_out = jaw.loads_left_out(effects)
-        pitches = {p: jaw.pitch_left_out(p, effects) for p in jaw.PITCHES}
-        together = {n: m for parts in pitches.values() for n, m in parts.items()}
-        name = "Snow's drive alone" if not effects else "with the effects found"
-        _row(name, (inside, left_out, own_zero(left_out), *pitches.values(), together))
-        unseen = {p: jaw.pitch_unseen(found, p) for p in jaw.PITCHES}
-        together = {n: m for parts in unseen.values() for n, m in parts.items()}
-        _row("  no pitch seen", ("", "", "", *unseen.values(), together))
-    left_out = jaw.loads_left_out(law=True)
-    _row("  and a law of motor angle", ("", left_out, own_zero(left_out)))
-    print(f"motor torque left: {found.misfit[MOTOR] * 1e3:.2f} mNm; fitted:")
-    print("  " + ", ".join(f"{k} {v:.4g}" for k, v in found.values.items()))
-
-
-def table_of_the_sheath() -> None:
-    """Errors in degrees: one model fitted to all bends, and every bend left out once."""
-    _row("sheath [deg]", ("all bends", *(f"{b} left out" for b in sheath.BENDS), "left out, together"))
-    for kind in KINDS:
-        left_out = sheath.baseline_left_out(kind)
-        _row(
-            kind,
-            (
-                sheath.baseline(kind, sheath.BENDS, sheath.BENDS),
-                *({b: m} for b, m in left_out.items()),
+            cells = [
+                jaw.baseline(kind, jaw.straight(), jaw.straight(), motor_torque),
                 left_out,
-            ),
-        )
-    left_out = sheath.bends_left_out()
-    _row("sheath drive", (sheath.all_bends(), *({b: m} for b, m in left_out.items()), left_out))
-    print("fitted: " + ", ".join(f"{k} {v:.4g}" for k, v in sheath.fit(sheath.BENDS).values.items()))
+                own_zero(left_out),
+            ]
+            cells += [jaw.baseline(kind, *jaw.pitch_split(p), motor_torque) for p in jaw.PITCHES]
+            print(
+                f"{kind + ', motor torque' * motor_torque:26}",
+                *(f"{degrees(c):8.3f}" for c in cells),
+                flush=True,
+            )
 
 
-def search() -> None:
-    """What the search finds missing from the jaw's drive: every hypothesis with its held-out square."""
-    train = ("L_4/10", "L_4/42", "L_4/14", "L_4/40", "L_2/10", "L_2/42")
-    judge = ("L_4/11", "L_4/43", "L_2/41", "L_2/13")
+def sheath_by_diagnosis() -> None:
+    """All bends in one call; every bend left out once."""
+    config = files.joint("tendon-sheath")
+    _show("all bends", files.diagnosed(config, [sheath.path(b) for b in sheath.BENDS]))
 
-    def show(trial: Trial) -> None:
+
+def sheath_baselines() -> None:
+    """All bends in one fit, every bend left out once, a fit of its own per bend."""
+    for kind in KINDS:
+        own = [sheath.baseline(kind, [b], [b]) for b in sheath.BENDS]
+        cells = [sheath.baseline(kind, sheath.BENDS, sheath.BENDS), sheath.baseline_left_out(kind), *own]
+        print(f"{kind:26}", *(f"{degrees(c):8.3f}" for c in cells), flush=True)
+
+
+def _show(what: str, d: Diagnosis) -> None:
+    names = ", ".join(f"{n.effect} ({n.confidence:.2f})" for n in d.named)
+    print(f"{what}: {d.verdict}; {names or 'no name'}; {d.runtime_s:.0f} s")
+    for name, e in (("calibrated drive", d.baseline), ("augmented", d.augmented)):
+        values = [float(np.degrees(v)) for v in (e.rmse_rad, e.heldout_rmse_rad, e.final_rmse_rad)]
         print(
-            f"  {'+'.join(trial.effects) or 'the drive alone':70} held out {trial.heldout:7.3f}", flush=True
+            f"  {name}: fitted {values[0]:.3f}, {d.heldout_by}s left out {values[1]:.3f}, for the end {values[2]:.3f} deg"
         )
-
-    trials = select_effects(
-        jaw.config(),
-        [jaw.recording(n) for n in train],
-        [jaw.recording(n) for n in judge],
-        SUSPECTS,
-        jaw.SCALE,
-        show,
-    )
-    print(f"missing: {', '.join(best_of(trials).effects)}")
-
-
-def _row(name: str, cells: tuple[object, ...]) -> None:
-    texts = [f"{degrees(c):.3f}" if isinstance(c, dict) else str(c) for c in cells]
-    print(f"{name:26}" + "".join(f"{t:>21}" for t in texts), flush=True)
 
 
 PARTS: Final[dict[str, Callable[[], None]]] = {
-    "jaw": table_of_the_jaw, "sheath": table_of_the_sheath, "search": search,
+    "jaw": jaw_by_diagnosis, "sheath": sheath_by_diagnosis,
+    "jaw-baselines": jaw_baselines, "sheath-baselines": sheath_baselines,
 }  # fmt: skip
 
 
 def main() -> int:
-    """Print what is asked for, or the two tables."""
+    """Print what is asked for, or everything."""
     if files.root() is None:
         print("set CABLECOMP_RECORDINGS to the folder of the recordings", file=sys.stderr)
         return 2
-    for part in sys.argv[1:] or ("jaw", "sheath"):
+    for part in sys.argv[1:] or PARTS:
         if part not in PARTS:
             print(f"`{part}` is no part; accepted are {', '.join(PARTS)}", file=sys.stderr)
             return 2

@@ -1,92 +1,68 @@
-"""Verdicts on recordings of real hardware: what was missing, and how well it predicts what it was not
-fitted to.
+"""Verdicts of the diagnosis on recordings of real hardware.
 
-Set CABLECOMP_RECORDINGS to the folder of the recordings; without it these tests are skipped. `pytest -s`
-shows the figures; `python tests/golden/real_recordings.py` prints the README's tables, with baselines. Left
-out here are the loads and bends at both ends, which are the hardest, and the middle ones; there, every one.
+Set CABLECOMP_RECORDINGS to the folder of the recordings; without it these tests are skipped. `pytest -s` shows the figures;
+`python tests/golden/real_recordings.py` goes through all recordings, with baselines.
 """
 
 from __future__ import annotations
 
 import jaw_recordings as jaw
+import numpy as np
 import pytest
 import recordings as files
 import sheath_recordings as sheath
-from recordings import degrees
 
-from cablecomp.identification.path_fit import MOTOR
-from cablecomp.identification.path_selection import heldout_square
+from cablecomp.diagnosis.result import Diagnosis
 
 pytestmark = pytest.mark.skipif(
     files.root() is None, reason="CABLECOMP_RECORDINGS does not name the folder of the real recordings"
 )
 
-TRAIN = ("L_4/11", "L_4/14", "L_4/10", "L_2/10", "L_2/12")
-LOADS, BENDS = "024", (0, 120, 240)
-JUDGE = ("L_4/12", "L_2/11", "L_2/13")
+
+@pytest.fixture(scope="module")
+def one_jaw() -> Diagnosis:
+    """20 s of the jaw alone, nothing known of its drive but orders of magnitude."""
+    (path,) = [p for p in jaw.of_session("L_4") if p.name == "01.csv.gz"]
+    return files.diagnosed(files.joint("davinci-jaw"), [path])
 
 
-def square_left_out(effects: tuple[str, ...]) -> float:
-    """Mean square over scale, of joint angle and motor torque, on recordings that were not fitted."""
-    found = jaw.fit(TRAIN, effects, iterations=12)
-    return heldout_square(found, [jaw.recording(n) for n in JUDGE], jaw.SCALE)
+@pytest.fixture(scope="module")
+def bends() -> Diagnosis:
+    """Five bends of the sheath in one call."""
+    return files.diagnosed(files.joint("tendon-sheath"), [sheath.path(b) for b in sheath.BENDS])
 
 
-def test_each_effect_found_on_the_jaw_is_needed_on_recordings_left_out() -> None:
-    whole = square_left_out(jaw.FOUND)
-    print(f"\n  jaw, with {', '.join(jaw.FOUND)}: left-out square {whole:.2f}")
-    for effect in jaw.FOUND:
-        without = square_left_out(tuple(e for e in jaw.FOUND if e != effect))
-        print(f"  jaw, without {effect}: {without:.2f}")
-        assert without > 1.05 * whole
+def degrees(value_rad: float) -> float:
+    return float(np.degrees(value_rad))
 
 
-def test_loads_left_out_are_predicted() -> None:
-    physics, law = jaw.loads_left_out(levels=LOADS), jaw.loads_left_out(law=True, levels=LOADS)
-    for level in LOADS:
-        each = [degrees({n: m for n, m in parts.items() if n[-1] == level}) for parts in (physics, law)]
-        print(
-            f"\n  jaw, load {10 + 10 * int(level)} % left out: {each[0]:.3f}, with the law {each[1]:.3f}",
-            end="",
-        )
-    print(f"\n  jaw, these left out: effects alone {degrees(physics):.3f} deg, one zero per recording "
-          f"{degrees(files.own_zero(physics)):.3f}; with the law of motor angle {degrees(law):.3f} deg")  # fmt: skip
-    assert degrees(law) <= 0.30
-    assert degrees(files.own_zero(physics)) <= 0.30
+def test_one_jaw_recording_names_the_friction_of_the_path(one_jaw: Diagnosis) -> None:
+    print(f"\n  jaw, one recording: {one_jaw.verdict}, {[(n.effect, n.confidence) for n in one_jaw.named]}")
+    assert "routing_friction" in {n.effect for n in one_jaw.named}
+    assert one_jaw.verdict in ("explained", "partly explained")
 
 
-def test_the_torques_of_both_ends_agree_with_one_path() -> None:
-    torque = max(jaw.without_load(level, jaw.FOUND)[0].misfit[MOTOR] for level in LOADS)
-    print(f"\n  jaw, motor torque left: {torque * 1e3:.2f} mNm of a loop of +-50 to 70 mNm")
-    assert torque < 0.05 * 0.06
+def test_what_it_names_predicts_what_it_was_not_fitted_to(one_jaw: Diagnosis) -> None:
+    before, after = one_jaw.baseline, one_jaw.augmented
+    print(f"\n  jaw, one recording, kept for the end: {degrees(before.final_rmse_rad):.2f} -> "
+          f"{degrees(after.final_rmse_rad):.2f} deg")  # fmt: skip
+    assert after.heldout_rmse_rad < 0.75 * before.heldout_rmse_rad
+    assert after.final_rmse_rad < before.final_rmse_rad
 
 
-def test_a_wrist_pitch_is_predicted_once_its_lightest_load_has_shown_the_pretension() -> None:
-    found = {p: jaw.pitch_left_out(p) for p in jaw.PITCHES}
-    for pitch, misfits in found.items():
-        print(f"\n  jaw, {pitch} left out: {degrees(misfits):.3f} deg", end="")
-    together = {n: m for misfits in found.values() for n, m in misfits.items()}
-    print(f"\n  jaw, every pitch left out once: {degrees(together):.3f} deg")
-    assert degrees(together) <= 0.45
+def test_the_sheath_is_routing_friction_that_depends_on_its_bend(bends: Diagnosis) -> None:
+    print(f"\n  sheath: {bends.verdict}, {[(n.effect, n.confidence, n.depends_on) for n in bends.named]}")
+    (routing,) = [n for n in bends.named if n.effect == "routing_friction"]
+    assert routing.depends_on is not None
+    assert routing.depends_on["on"] == "sheath_bend_rad"
+    assert routing.depends_on["per_unit"] > 0.0
 
 
-@pytest.mark.parametrize("kind", ["linear", "polynomial", "plays"])
-def test_models_without_the_drive_predict_left_out_pitches_worse(kind: str) -> None:
-    ours = {n: m for p in jaw.PITCHES for n, m in jaw.pitch_left_out(p).items()}
-    theirs = {n: m for p in jaw.PITCHES for n, m in jaw.baseline_pitch(kind, p).items()}
-    assert degrees(ours) < degrees(theirs)
-
-
-def test_one_sheath_drive_for_all_bends() -> None:
-    found = sheath.all_bends()
-    each = ", ".join(f"{b} deg {degrees({b: m}):.2f}" for b, m in found.items())
-    print(f"\n  sheath, one drive, all bends: {degrees(found):.2f} deg ({each})")
-    assert degrees(found) <= 1.5
-
-
-def test_bends_left_out_are_predicted() -> None:
-    found = sheath.bends_left_out(BENDS)
-    for bend, misfit in found.items():
-        print(f"\n  sheath, {bend} deg left out: {degrees({bend: misfit}):.2f} deg", end="")
-    print(f"\n  sheath, these left out: {degrees(found):.2f} deg")
-    assert degrees(found) <= 2.5
+def test_one_drive_for_all_bends(bends: Diagnosis) -> None:
+    e = bends.augmented
+    print(
+        f"\n  sheath, one drive: fitted {degrees(e.rmse_rad):.2f}, bend left out {degrees(e.heldout_rmse_rad):.2f} deg"
+    )
+    assert bends.heldout_by in ("recording", "condition", "session")
+    assert degrees(e.rmse_rad) <= 1.35
+    assert degrees(e.heldout_rmse_rad) <= 1.9

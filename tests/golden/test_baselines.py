@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from cablecomp.errors import InputError
-from cablecomp.identification.baseline_operators import bouc_wen, plays
-from cablecomp.identification.baselines import (
+from baseline_operators import bouc_wen, plays
+from baselines import (
     BASELINES,
     fit_bouc_wen,
     fit_linear,
@@ -15,6 +13,8 @@ from cablecomp.identification.baselines import (
     fit_polynomial,
     rmse,
 )
+
+from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
 
 TIME = np.arange(4_000) * 5e-3

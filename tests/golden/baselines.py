@@ -9,10 +9,10 @@ from types import MappingProxyType
 from typing import Final, Literal, Protocol
 
 import numpy as np
+from baseline_operators import bouc_wen, plays
 from scipy.optimize import lsq_linear, minimize
 
 from cablecomp.errors import InputError
-from cablecomp.identification.baseline_operators import bouc_wen, plays
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import FloatArray, fit_to_noise
 

@@ -1,0 +1,47 @@
+"""A fit's parameters as values with their 1-sigma, the zeros among them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.result import Value
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.least_squares import Fit, covariance
+from cablecomp.estimation.standing import value_of
+
+
+def drive_values(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
+    """The drive's parameters and the joint encoder's zeros; nominal values as `config` has them."""
+    return (*_parameters(fit, config, effects=False), *_zeros(fit, config))
+
+
+def effect_values(fit: Fit) -> tuple[Value, ...]:
+    """The effects' parameters, named `effect.ID.KEY`."""
+    return _parameters(fit, fit.problem.config, effects=True)
+
+
+def _parameters(fit: Fit, config: JointConfig, *, effects: bool) -> tuple[Value, ...]:
+    sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))
+    found = []
+    for p, x, s in zip(fit.problem.parameters, fit.x, sd, strict=True):
+        if p.name.startswith("effect.") == effects:
+            nominal = None if effects or p.condition else value_of(config, p.base)
+            found.append(
+                Value(p.name, p.value(float(x)), float(s * abs(p.slope(float(x)))), nominal, p.session)
+            )
+    return tuple(found)
+
+
+def _zeros(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
+    problem = fit.problem
+    zeros = problem.zeros(fit.x)[JOINT]
+    many = len(problem.sessions) > 1
+    found = []
+    for session in problem.sessions:
+        count = sum(int(e.counted[JOINT].sum()) for e in problem.evidence if e.session == session)
+        name = "joint_position_offset_rad" + (f"@{session}" if many else "")
+        sd = problem.weighing.sigma[JOINT] / max(count, 1) ** 0.5
+        nominal = config.sensors.joint_position_offset_rad
+        found.append(Value(name, float(zeros[session][0]), sd, nominal, session if many else None))
+    return tuple(found)

@@ -1,0 +1,95 @@
+"""Calibration: what was put in comes out, within its stated uncertainty; priors, bounds and zeros do what they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cablecomp.config import JointConfig, load_joint, with_values
+from cablecomp.diagnosis.calibrate import Calibration, calibrate
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
+
+NOMINAL = load_joint(Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml")
+TRUE = {"EA_N": 16900.0, "pretension_N": 56.0, "mu_output": 0.15, "mu_input": 0.10}
+
+
+def recording(
+    config: JointConfig, seed: int, noise_rad: float = 2e-5, offset_rad: float = 0.0
+) -> dict[str, FloatArray]:
+    """30 s of the given joint's own observer, both pulleys turning, with encoder noise."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 30.0, 0.02)
+    swell = np.minimum(1.0, time / 2.0)
+    columns = {
+        "time_s": time,
+        "motor_position_rad": 1.8 * np.sin(0.7 * time + 0.3 * seed) * swell,
+        "joint_torque_Nm": 1.6 * np.sin(1.9 * time) * np.cos(0.23 * time + seed) * swell,
+        "temperature_degC": np.full(len(time), 20.0),
+    }
+    joint = Observer(config).run(columns)["joint_position_rad"]
+    columns["joint_position_rad"] = joint + offset_rad + noise_rad * rng.standard_normal(len(time))
+    return columns
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Calibration:
+    return calibrate(NOMINAL, {"one": recording(with_values(NOMINAL, TRUE), 1)})
+
+
+def test_true_parameters_lie_within_four_sd(fitted: Calibration) -> None:
+    for name, true in TRUE.items():
+        found = fitted[name]
+        assert abs(found.value - true) < 4.0 * found.sd + 2e-3 * true, found
+
+
+def test_what_is_left_comes_down_to_the_noise(fitted: Calibration) -> None:
+    assert fitted.nominal_rmse_rad > 5.0 * fitted.noise_rad
+    assert fitted.rmse_rad < 1.3 * fitted.noise_rad
+
+
+def test_the_configuration_holds_the_values(fitted: Calibration) -> None:
+    stage = fitted.config.drive.stage[0]
+    for name in TRUE:
+        assert getattr(stage, name) == fitted[name].value
+        assert fitted[name].nominal == getattr(NOMINAL.drive.stage[0], name)
+
+
+def test_each_session_has_its_own_zero() -> None:
+    true = with_values(NOMINAL, TRUE)
+    pair = {"a/1": recording(true, 1, offset_rad=3e-3), "b/1": recording(true, 2, offset_rad=-2e-3)}
+    found = calibrate(NOMINAL, pair)
+    apart = found["joint_position_offset_rad@a"].value - found["joint_position_offset_rad@b"].value
+    assert apart == pytest.approx(5e-3, abs=5e-5)
+    own = {s.name: s.values["joint_position_offset_rad"] for s in found.config.sessions}
+    assert own["a"] - own["b"] == pytest.approx(apart)
+
+
+def test_two_recordings_know_more_than_one(fitted: Calibration) -> None:
+    true = with_values(NOMINAL, TRUE)
+    both = calibrate(NOMINAL, {"one": recording(true, 1), "two": recording(true, 2)}, sessions="one")
+    assert both["mu_output"].sd < fitted["mu_output"].sd
+
+
+def test_without_information_the_prior_stays_and_that_is_said() -> None:
+    columns = recording(NOMINAL, 1)
+    columns["joint_torque_Nm"] = 0.0 * columns["joint_torque_Nm"]
+    columns["motor_position_rad"] = 0.0 * columns["motor_position_rad"]
+    rng = np.random.default_rng(2)
+    columns["joint_position_rad"] = 2e-5 * rng.standard_normal(len(columns["time_s"]))
+    found = calibrate(NOMINAL, {"one": columns})
+    mu, prior = found["mu_output"], NOMINAL.tolerance["mu_output"]
+    assert mu.value == pytest.approx(NOMINAL.drive.stage[0].mu_output, rel=0.05)
+    assert mu.sd == pytest.approx(prior * mu.value, rel=0.1)
+    assert any(line.startswith("mu_output: these recordings tell nothing") for line in found.warnings)
+
+
+def test_a_missing_channel_is_named() -> None:
+    columns = recording(NOMINAL, 1)
+    del columns["joint_position_rad"]
+    with pytest.raises(InputError, match="joint_position_rad") as caught:
+        calibrate(NOMINAL, {"one": columns})
+    assert "\n" not in str(caught.value)
