@@ -19,8 +19,8 @@ from cablecomp.estimation.parameter import Parameter, by_condition, own_of
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
-PER_SESSION: Final = ("pretension_N", "mu_output", "mu_input")
-"""What of the drive mounting it anew may change: how tight the cables are, how they run in their grooves."""
+PER_SESSION: Final = ("pretension_N",)
+"""What of the drive mounting it anew may change: how tight the cables are."""
 POSTURES: Final = ("_rad", "_deg", "_m")
 """Ends of the names of conditions that say how the path lies."""
 PROMISING = 3

@@ -92,7 +92,7 @@ def select(
     groups: Groups,
     rng: np.random.Generator,
     progress: Progress,
-    budget_s: float = 35.0,
+    budget_s: float = 150.0,
 ) -> Selection:
     """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is not missed.
 
