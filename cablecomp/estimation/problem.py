@@ -238,7 +238,9 @@ class Problem:
         sigma, spread = self.weighing.sigma[channel], self.weighing.zero_sd.get(channel, 0.0)
         width = 2 if channel == MOTOR else 1
         sessions = self.sessions
-        n_dep = len(self.evidence) if spread > 0.0 else 0
+        # a recording alone in its session has no zero beside the session's; whether there are penalties must not hang on weights
+        n_dep = len(self.evidence) if len(self.evidence) > len(sessions) else 0
+        spread = max(spread, 1e-6 * sigma)
         blocks = []
         for k, r in enumerate(self.evidence):
             if channel not in r.counted:
