@@ -1,0 +1,76 @@
+"""One body of evidence: who belongs to which session, one clock, what is kept for the end stays unseen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from turning import JOINT, recorded
+
+from cablecomp.config import parse_joint
+from cablecomp.diagnosis.body import FEW, gather_body, session_names
+from cablecomp.errors import InputError
+
+PLAIN = JOINT.model_dump(by_alias=True, exclude_none=True)
+ANGLE = "joint_position_rad"
+
+
+def test_recordings_of_a_folder_are_one_session() -> None:
+    names = ["data/monday/1.csv", "data/monday/2.csv", "data/tuesday/1.csv", "loose.csv"]
+    assert list(session_names(JOINT, names).values()) == ["monday", "monday", "tuesday", "all"]
+    assert set(session_names(JOINT, names, "one").values()) == {"all"}
+
+
+def test_a_session_of_the_configuration_claims_its_recordings_unless_told_otherwise() -> None:
+    claimed = parse_joint({**PLAIN, "session": [{"name": "warm", "recordings": ["tuesday/*"]}]}, "x")
+    names = ["data/monday/1.csv", "data/tuesday/1.csv"]
+    assert list(session_names(claimed, names).values()) == ["monday", "warm"]
+    assert list(session_names(claimed, names, "folder").values()) == ["monday", "tuesday"]
+
+
+def test_the_end_of_few_recordings_is_kept_and_never_used() -> None:
+    body = gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": recorded(seed=2)})
+    assert body.final_by == "block"
+    for used, final in zip(body.used, body.final, strict=True):
+        assert not np.any(used.counted[ANGLE] & final.counted[ANGLE])
+        assert np.mean(used.counted[ANGLE] | final.counted[ANGLE]) > 0.98  # but for readings set aside
+        assert used.rows[used.counted[ANGLE]].max() < used.rows[final.counted[ANGLE]].min()
+        assert 0.10 < final.counted[ANGLE].mean() < 0.20
+
+
+def test_whole_recordings_of_many_are_kept_and_every_session_stays_represented() -> None:
+    short = {f"{'abcd'[k % 4]}/{k}": recorded(seed=k, duration_s=6.0) for k in range(FEW + 4)}
+    body = gather_body(JOINT, short)
+    assert body.final_by == "recording"
+    used, final = {e.name for e in body.used}, {e.name for e in body.final}
+    assert final
+    assert not used & final
+    assert used | final == set(short)
+    assert {e.session for e in body.final} <= {e.session for e in body.used}
+
+
+def test_clocks_go_on_one_after_the_other() -> None:
+    body = gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": recorded(seed=2)})
+    first, second = (e.columns["time_s"] for e in body.used)
+    assert second[0] > first[-1]
+    assert body.used[1].shift_s == pytest.approx(float(second[0]) - 0.0, abs=0.05)
+
+
+def test_a_condition_is_the_channels_median_and_has_to_be_there() -> None:
+    bent = parse_joint({**PLAIN, "condition": {"bend_rad": "other_bend"}}, "x")
+    columns = recorded()
+    with pytest.raises(InputError, match="other_bend"):
+        gather_body(bent, {"a/1": columns})
+    columns["other_bend"] = np.full(len(columns["time_s"]), 0.7)
+    (only,) = gather_body(bent, {"a/1": columns}).used
+    assert only.condition == {"bend_rad": pytest.approx(0.7)}
+
+
+def test_no_recording_is_refused() -> None:
+    with pytest.raises(InputError, match="one or more"):
+        gather_body(JOINT, {})
+
+
+def test_sessions_are_told_of_names_on_any_system() -> None:
+    assert session_names(JOINT, [str(Path("a") / "b.csv")]) == {str(Path("a") / "b.csv"): "a"}

@@ -1,0 +1,133 @@
+"""The diagnosis on recordings of the simulated plant: nothing is named where nothing is missing, and what is, is."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.config import JointConfig, parse_joint
+from cablecomp.config_text import joint_text
+from cablecomp.diagnosis.diagnose import diagnose
+from cablecomp.diagnosis.result import Diagnosis, report_json
+from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
+
+STAGE = {
+    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0,
+    "pretension_N": 60.0, "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
+}  # fmt: skip
+NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 3e-3, "motor_position_rad": 2e-5}
+BEARING = EffectSpec("bearing_friction", {"torque_Nm": 0.03, "load_coefficient": 0.0, "presliding_rad": 2e-4})
+ROUTING = EffectSpec("routing_friction", {"mu_angle": 0.3, "arc_length_m": 0.01})
+
+
+def joint() -> JointConfig:
+    """The nominal joint; what is known of it, and how well."""
+    return parse_joint(
+        {
+            "schema": 1,
+            "name": "small",
+            "drive": {"circuit": "closed", "stage": [STAGE]},
+            "tolerance": {"EA_N": 0.04, "pretension_N": 0.06, "mu_output": 0.25, "mu_input": 0.25},
+        },
+        "small",
+    )
+
+
+def recording(effects: list[EffectSpec], seed: int = 3) -> dict[str, FloatArray]:
+    """24 s at 50 Hz of the plant: both pulleys turning, load of two frequencies, noise on all channels."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 24.0, 0.02)
+    soft = 1.0 - np.exp(-time)
+    motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
+    load = soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
+    config = PlantConfig.from_dict(
+        {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [STAGE]}}
+    )
+    found = simulate(config, time, motor, load, effects=effects).channels()
+    columns = {"time_s": time}
+    for name, sigma in NOISE.items():
+        columns[name] = found[name] + sigma * rng.standard_normal(len(time))
+    return columns
+
+
+def diagnosed(effects: list[EffectSpec]) -> Diagnosis:
+    return diagnose(joint(), {"small/1": recording(effects)})
+
+
+def parsed(d: Diagnosis) -> dict[str, Any]:
+    """The report as a reader of the file has it; no NaN gets in."""
+    found: dict[str, Any] = json.loads(json.dumps(report_json(d), allow_nan=False))
+    return found
+
+
+@pytest.fixture(scope="module")
+def nothing() -> Diagnosis:
+    return diagnosed([])
+
+
+@pytest.fixture(scope="module")
+def routing() -> Diagnosis:
+    return diagnosed([ROUTING])
+
+
+def test_nothing_missing_is_consistent(nothing: Diagnosis) -> None:
+    assert nothing.verdict == "consistent"
+    assert not nothing.named
+    assert nothing.augmented == nothing.baseline
+    assert nothing.baseline.heldout_rmse_rad < 1.5 * nothing.noise_floor_rad
+
+
+def test_consistent_says_what_these_data_could_have_shown(nothing: Diagnosis) -> None:
+    below = {u["effect"]: u["below"] for u in nothing.could_be_unseen}
+    assert below["bearing_friction"] is not None
+    assert below["bearing_friction"] < BEARING.parameters["torque_Nm"]
+
+
+def test_routing_friction_is_named_and_predicts_what_nobody_had_seen(routing: Diagnosis) -> None:
+    (found,) = routing.named
+    assert found.effect == "routing_friction"
+    assert routing.verdict in ("explained", "partly explained")
+    assert routing.augmented.heldout_rmse_rad < 0.5 * routing.baseline.heldout_rmse_rad
+    assert routing.augmented.final_rmse_rad < 0.5 * routing.baseline.final_rmse_rad
+    assert found.heldout_gain > 0.5
+
+
+def test_bearing_friction_is_named_with_its_size() -> None:
+    found = diagnosed([BEARING])
+    (named,) = found.named
+    assert named.effect == "bearing_friction"
+    torque = named.parameters["torque_Nm"]
+    assert not isinstance(torque, str)
+    assert abs(torque.value - 0.03) < 4.0 * torque.sd + 0.03 * 0.03
+
+
+def test_the_report_holds_what_the_contract_says(routing: Diagnosis) -> None:
+    report = parsed(routing)
+    assert report["schema"] == 2
+    for key in (
+        "recordings", "sessions", "verdict", "noise_floor_rad", "repeatability_rad", "baseline", "augmented", "heldout",
+        "channels", "calibration", "mismatch", "missing_physics", "candidates", "not_excluded", "empirical",
+        "next_experiment", "could_be_unseen", "remainder", "runtime_s",
+    ):  # fmt: skip
+        assert key in report, key
+    assert set(report["baseline"]) == {"rmse_rad", "heldout_rmse_rad", "final_rmse_rad"}
+    assert report["sessions"] == {"small": ["small/1"]}
+    assert all(m["confidence"] >= 0.5 for m in report["missing_physics"])
+
+
+def test_the_augmented_joint_is_written_and_read_as_it_is(routing: Diagnosis) -> None:
+    import tomllib
+
+    again = parse_joint(tomllib.loads(joint_text(routing.augmented_joint)), "again")
+    assert [e.id for e in again.effect] == ["routing_friction"]
+
+
+def test_the_same_seed_gives_the_same_report(nothing: Diagnosis) -> None:
+    again, before = parsed(diagnosed([])), parsed(nothing)
+    for report in (again, before):
+        report.pop("runtime_s")
+    assert again == before

@@ -1,0 +1,125 @@
+"""Predictive scores: leaving out is refitting, better models lead, clearly worse ones leave the confidence set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.diagnosis.explain.scores import Groups, confidence_set, huber, lead, left_out, selected_in
+from cablecomp.signal.smoothing import FloatArray
+
+BLOCKS, ROWS = 30, 20
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A fit of a linear model, with what `left_out` asks of it."""
+
+    problem: Any
+    x: FloatArray
+    residual: FloatArray
+    J: FloatArray
+
+
+def groups(folds: int = 6) -> Groups:
+    block = np.repeat(np.arange(BLOCKS), ROWS)
+    return Groups(block, block % folds, "block")
+
+
+def linear(y: FloatArray, A: FloatArray, prior_sd: float) -> Linear:
+    """argmin |y - A x|^2 + |x/prior_sd|^2, priors as rows."""
+    n = A.shape[1]
+    J = np.vstack([-A, np.eye(n) / prior_sd])
+    x = np.linalg.lstsq(np.vstack([A, np.eye(n) / prior_sd]), np.concatenate([y, np.zeros(n)]), rcond=None)[0]
+    problem = SimpleNamespace(
+        bounds=lambda: (np.full(n, -1e3), np.full(n, 1e3)),
+        parameters=[SimpleNamespace(base="gain", sd=prior_sd) for _ in range(n)],
+    )
+    return Linear(problem, x, np.concatenate([y - A @ x, x / prior_sd]), J)
+
+
+def test_leaving_a_fold_out_is_fitting_without_it() -> None:
+    rng = np.random.default_rng(1)
+    g = groups()
+    A = rng.standard_normal((BLOCKS * ROWS, 4))
+    y = A @ np.array([1.0, -2.0, 0.5, 0.0]) + rng.standard_normal(len(A))
+    found = left_out(linear(y, A, 1.5), g)  # type: ignore[arg-type]
+    for fold in range(g.folds):
+        out = g.fold == fold
+        without = linear(y[~out], A[~out], 1.5)
+        np.testing.assert_allclose(found[out], y[out] - A[out] @ without.x, atol=1e-6)
+
+
+def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:
+    """A free step per block fits every block, and predicts none."""
+    rng = np.random.default_rng(2)
+    g = Groups(np.repeat(np.arange(BLOCKS), ROWS), np.repeat(np.arange(BLOCKS), ROWS), "block")
+    y = rng.standard_normal(BLOCKS * ROWS)
+    steps = (g.block[:, None] == np.arange(BLOCKS)).astype(np.float64)
+    plain = linear(y, np.ones((len(y), 1)), 1.5)
+    fitted = linear(y, np.column_stack([np.ones(len(y)), steps]), 1.0)
+    step = lead(left_out(fitted, g), left_out(plain, g), g)  # type: ignore[arg-type]
+    assert np.mean(fitted.residual[: len(y)] ** 2) < np.mean(plain.residual[: len(y)] ** 2)
+    assert step.gain < 0.02
+
+
+def test_the_better_model_leads_by_what_it_takes_off() -> None:
+    rng = np.random.default_rng(3)
+    g = groups()
+    better = rng.standard_normal(BLOCKS * ROWS)
+    worse = better + 0.8 * np.sin(np.arange(len(better)) * 0.37)
+    forth, back = lead(better, worse, g), lead(worse, better, g)
+    assert forth.gain == pytest.approx(0.32 / 1.32, abs=0.05)
+    assert forth.z > 3.0
+    assert back.gain < 0.0
+    assert back.z < 0.0
+    same = lead(better, better, g)
+    assert (same.gain, same.z) == (0.0, 0.0)
+
+
+def test_chance_does_not_lead_far() -> None:
+    """Two models that differ by noise of their own: |z| > 3 hardly ever."""
+    rng = np.random.default_rng(4)
+    g = groups()
+    common = rng.standard_normal((200, BLOCKS * ROWS))
+    far = sum(
+        abs(lead(r + 0.3 * rng.standard_normal(r.size), r + 0.3 * rng.standard_normal(r.size), g).z) > 3.0
+        for r in common
+    )
+    assert far <= 6
+
+
+def test_what_an_outlier_adds_grows_no_faster_than_itself() -> None:
+    """Huber: ten times as far off counts ten times, not a hundred times."""
+    near, far = huber(np.array([50.0, 500.0]), 1.0)
+    assert far / near == pytest.approx(10.0, rel=0.1)
+    inside = np.linspace(-2.0, 2.0, 9)
+    np.testing.assert_allclose(huber(inside, 1.0), inside**2)
+
+
+def test_the_confidence_set_keeps_the_best_and_drops_what_is_clearly_worse() -> None:
+    rng = np.random.default_rng(6)
+    base = rng.gamma(4.0, 1.0, BLOCKS)
+    losses = {
+        "best": base,
+        "as good": base + 0.05 * rng.standard_normal(BLOCKS),
+        "worse": base + 3.0 + rng.standard_normal(BLOCKS),
+    }
+    kept = confidence_set(losses, rng)
+    assert "best" in kept
+    assert "as good" in kept
+    assert "worse" not in kept
+    assert confidence_set({"alone": base}, rng) == ("alone",)
+
+
+def test_models_are_chosen_in_shares_that_add_up() -> None:
+    rng = np.random.default_rng(7)
+    good = 1.0 + 0.2 * rng.standard_normal(BLOCKS)
+    shares = selected_in({"good": good, "poor": 0.2 * rng.standard_normal(BLOCKS)}, rng)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert shares["good"] > 0.99
+    assert selected_in({}, rng) == {}

@@ -1,0 +1,92 @@
+"""Recordings as a fit takes them: thinned by travel, turning points kept, what is no reading not counted."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from turning import JOINT, recorded
+
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import Evidence, gather, rows_for, thinned
+from cablecomp.estimation.simulate import simulator
+from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
+
+
+def gathered(columns: dict[str, FloatArray], judged: int = 300) -> Evidence:
+    return gather(JOINT, "one", columns, "all", fine_rows=5000, judged_rows=judged)
+
+
+def test_thinning_keeps_every_turning_point() -> None:
+    """Between two kept rows motor and load go one way, but for a fiftieth of their range."""
+    columns = recorded()
+    rows = thinned(columns, "joint_torque_Nm", 150)
+    assert len(rows) < 250
+    for key in ("motor_position_rad", "joint_torque_Nm"):
+        values = columns[key]
+        for a, b in pairwise(rows):
+            low, high = sorted((values[a], values[b]))
+            part = values[a : b + 1]
+            assert max(low - part.min(), part.max() - high) <= 0.021 * np.ptp(values)
+
+
+def test_a_law_without_rates_is_told_on_thinned_rows_as_on_all() -> None:
+    columns = recorded(noise_rad=0.0)
+    e = gathered(columns, 200)
+    thin = simulator(JOINT).predict(e)["joint_position_rad"]
+    whole = Observer(JOINT).run({k: e.columns[k] for k in columns})["joint_position_rad"][e.rows]
+    turned = e.at_rows("motor_position_rad")
+    deflection = whole - np.polyval(np.polyfit(turned, whole, 1), turned)
+    assert np.std(thin - whole) < 0.02 * np.std(deflection)
+
+
+def test_holds_keep_rows_by_time() -> None:
+    columns = recorded(duration_s=40.0)
+    held = columns["time_s"] > 20.0
+    for key in ("motor_position_rad", "joint_torque_Nm", "joint_position_rad"):
+        columns[key][held] = columns[key][np.argmax(held)]
+    rows = thinned(columns, "joint_torque_Nm", 200)
+    assert np.diff(columns["time_s"][rows]).max() < 2.0
+    assert np.count_nonzero(held[rows]) > 20
+
+
+def test_what_is_no_reading_does_not_count_and_moves_nothing() -> None:
+    columns = recorded()
+    clean = gathered(columns)
+    gap = slice(400, 430)
+    broken = {k: v.copy() for k, v in columns.items()}
+    broken["joint_position_rad"][gap] = np.nan
+    broken["joint_position_rad"][700] += 0.5
+    e = gathered(broken)
+    counted = e.counted["joint_position_rad"]
+    inside = (e.rows >= 400) & (e.rows < 430)
+    assert not counted[inside].any()
+    assert e.outliers > clean.outliers
+    assert not counted[e.rows == 700].any()
+    far = (np.abs(e.rows - 415) > 20) & (np.abs(e.rows - 700) > 2)
+    np.testing.assert_allclose(
+        e.at_rows("joint_position_rad")[far], broken["joint_position_rad"][e.rows[far]], atol=1e-12
+    )
+
+
+def test_rows_of_all_recordings_are_shared_out_by_their_length() -> None:
+    fine, judged = rows_for([1_000, 100_000, 9_000], 1_200)
+    assert all(f >= j for f, j in zip(fine, judged, strict=True))
+    assert min(judged) >= 60
+    assert judged[1] > 5 * judged[2]
+
+
+def test_a_weight_is_the_root_of_the_time_that_a_row_stands_for() -> None:
+    e = gathered(recorded(), 150)
+    assert np.mean(e.weight**2) == pytest.approx(1.0)
+    share = np.gradient(e.columns["time_s"][e.rows])
+    np.testing.assert_allclose(e.weight**2 / share, e.weight[0] ** 2 / share[0])
+
+
+def test_a_channel_with_hardly_a_reading_is_named() -> None:
+    columns = recorded()
+    columns["joint_position_rad"][30:] = np.nan
+    with pytest.raises(InputError, match=r"joint_position_rad. has 30 finite"):
+        gathered(columns)

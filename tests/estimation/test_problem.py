@@ -1,0 +1,155 @@
+"""The fitting problem: zeros projected out are zeros solved for, priors are rows, a solution is a minimum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from turning import JOINT, recorded
+
+from cablecomp.config import with_values
+from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.estimation.history import forgotten
+from cablecomp.estimation.least_squares import covariance, solve, weighed
+from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
+
+SIGMA, SPREAD = 2e-5, 1e-4
+ANGLE = "joint_position_rad"
+
+
+def evidence(columns: dict[str, FloatArray], name: str, session: str) -> Evidence:
+    return gather(JOINT, name, columns, session, fine_rows=2000, judged_rows=160)
+
+
+@pytest.fixture(scope="module")
+def three() -> tuple[Evidence, ...]:
+    """Two recordings of one session, one of another, each with a zero of its own."""
+    return tuple(
+        evidence(recorded(offset_rad=zero, seed=k), f"{k}", s)
+        for k, (zero, s) in enumerate(((1e-3, "a"), (1.2e-3, "a"), (-4e-3, "b")))
+    )
+
+
+def problem(parts: tuple[Evidence, ...], spread: float = SPREAD) -> Problem:
+    return Problem(JOINT, of_drive(JOINT), parts, Weighing({ANGLE: SIGMA}, {ANGLE: spread} if spread else {}))
+
+
+def test_zeros_projected_out_are_those_of_an_explicit_least_squares_fit(three: tuple[Evidence, ...]) -> None:
+    """min over zeros of |w (m - z)/s|^2 + |d/spread|^2, z = session's + recording's departure d."""
+    p = problem(three)
+    misfits = p.misfits(p.start)[ANGLE]
+    rows, design = [], []
+    for k, (e, m) in enumerate(zip(three, misfits, strict=True)):
+        w = e.weight[e.counted[ANGLE]] / SIGMA
+        rows.append(w * m[e.counted[ANGLE]])
+        columns = np.zeros((len(w), 5))
+        columns[:, p.sessions.index(e.session)] = w
+        columns[:, 2 + k] = w
+        design.append(columns)
+    penalty = np.hstack([np.zeros((3, 2)), np.eye(3) / SPREAD])
+    A = np.vstack([*design, penalty])
+    b = np.concatenate([*rows, np.zeros(3)])
+    solved = np.linalg.lstsq(A, b, rcond=None)[0]
+    left = b - A @ solved
+    found = p.residual(p.start)[: len(b)]
+    np.testing.assert_allclose(found, left, atol=1e-7 * np.abs(b).max())
+    zeros = p.zeros(p.start)[ANGLE]
+    for k, e in enumerate(three):
+        assert zeros[e.name][0] == pytest.approx(
+            solved[p.sessions.index(e.session)] + solved[2 + k], abs=1e-9
+        )
+
+
+def test_zeros_of_the_recordings_come_out(three: tuple[Evidence, ...]) -> None:
+    p = problem(three, spread=1e-2)
+    zeros = p.zeros(p.start)[ANGLE]
+    assert [zeros[e.name][0] for e in three] == pytest.approx([1e-3, 1.2e-3, -4e-3], abs=2e-5)
+
+
+def test_priors_are_departures_in_units_of_their_sd() -> None:
+    p = problem((evidence(recorded(), "one", "a"),), spread=0.0)
+    moved = p.start.copy()
+    moved[0] += 2.0 * p.parameters[0].sd
+    assert p.prior(p.start) == pytest.approx(np.zeros(len(p.start)))
+    assert p.prior(moved)[0] == pytest.approx(2.0)
+
+
+def test_the_fit_finds_what_made_the_recording_and_no_step_leads_lower() -> None:
+    true = {"EA_N": 1.05 * JOINT.drive.stage[0].EA_N, "mu_output": 0.15, "mu_input": 0.10}
+    p = problem((evidence(recorded(with_values(JOINT, true)), "one", "a"),), spread=0.0)
+    fit = solve(p, evaluations=20)
+    fit = solve(p.with_weighing(weighed(fit, Weighing({ANGLE: SIGMA}, {}))), fit.x, 10)
+    sd = np.sqrt(np.diag(covariance(fit)))
+    for k, q in enumerate(fit.problem.parameters):
+        if q.name in true:
+            assert abs(fit.values[q.name] - true[q.name]) < 4.0 * sd[k] * q.slope(float(fit.x[k]))
+        for step in (0.3 * sd[k], -0.3 * sd[k]):
+            moved = fit.x.copy()
+            moved[k] += step
+            r = fit.problem.residual(moved)
+            assert 0.5 * float(r @ r) >= fit.cost - 0.02 * fit.cost
+
+
+def test_own_values_apply_to_their_session_alone(three: tuple[Evidence, ...]) -> None:
+    p = problem(three)
+    place = next(k for k, q in enumerate(p.parameters) if q.name == "mu_output")
+    own = own_of(p.parameters[place], p.sessions)
+    free = replace(p, parameters=(*p.parameters[:place], *own, *p.parameters[place + 1 :]))
+    x = free.start.copy()
+    x[place + 1] += 0.3  # session b
+    common, moved = free.misfits(free.start)[ANGLE], free.misfits(x)[ANGLE]
+    for a, b in zip(common[:2], moved[:2], strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert np.abs(common[2] - moved[2]).max() > SIGMA
+
+
+def test_a_gain_by_condition_adds_rate_times_condition(three: tuple[Evidence, ...]) -> None:
+    bent = tuple(replace(e, condition={"bend": c}) for e, c in zip(three, (0.0, 1.0, 2.0), strict=True))
+    p = problem(bent)
+    mu = next(q for q in p.parameters if q.name == "mu_output")
+    free = replace(p, parameters=(*p.parameters, by_condition(mu, "bend", 2.0)))
+    x = free.start.copy()
+    x[-1] = free.parameters[-1].x(0.02)
+    stood = [free.joint(x, e).drive.stage[0].mu_output for e in bent]
+    base = JOINT.drive.stage[0].mu_output
+    assert stood == pytest.approx([base, base + 0.02, base + 0.04])
+
+
+@pytest.mark.parametrize(
+    "p",
+    [Parameter("a", 3.0, 0.1, 50.0, True), Parameter("b", 0.2, -1.0, 1.0, False, 0.4)],
+    ids=["log", "linear"],
+)
+def test_coordinates_turn_into_values_and_back(p: Parameter) -> None:
+    for value in (p.low, p.start, p.high):
+        x = p.x(value)
+        assert p.value(x) == pytest.approx(value)
+        assert (p.value(x + 1e-6) - p.value(x - 1e-6)) / 2e-6 == pytest.approx(p.slope(x), rel=1e-6)
+    assert p.value(p.x(2.0 * p.high)) == pytest.approx(p.high)
+
+
+def held(load: FloatArray) -> dict[str, FloatArray]:
+    """A load course with the motor at rest."""
+    time = 0.02 * np.arange(len(load))
+    columns = {"time_s": time, "motor_position_rad": np.zeros(len(load)), "joint_torque_Nm": load}
+    return {**columns, "joint_position_rad": Observer(JOINT).run(columns)["joint_position_rad"]}
+
+
+def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_as_ever() -> None:
+    """Return-point memory: a swing to both extremes wipes out every smaller one before it."""
+    ramp = np.linspace(0.0, 1.0, 60)
+    swing = np.concatenate([2.0 * ramp, 2.0 - 4.0 * ramp, -2.0 + 3.0 * ramp])
+    small = np.concatenate([1.0 - 1.6 * ramp, -0.6 + 1.4 * ramp, 0.8 - 1.5 * ramp])
+    first, last = (
+        evidence(held(np.concatenate(order)), "one", "a")
+        for order in ((swing, small, small), (small, small, swing))
+    )
+    p = problem((first, last))
+    wiped, kept = (forgotten(p, p.start, e, 1e-7) for e in (first, last))
+    assert wiped.left_rad <= 1e-7
+    assert 0 < wiped.first < len(first.rows) // 2
+    assert kept.left_rad > 1e-6

@@ -1,0 +1,54 @@
+"""Changes of variable: a cable that only stiffens needs no table, and is the same law as with one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cablecomp.mechanics.tables import (
+    groove,
+    law_table,
+    plain_law,
+    stiffening_law,
+    strain_of_tau,
+    tau_of_v,
+    v_of_tau,
+)
+
+WRAP = 12.0
+
+
+def one(values: np.ndarray) -> np.ndarray:
+    """Friction that neither tension nor place changes."""
+    return np.ones_like(values)
+
+
+@pytest.mark.parametrize("stiffening", [-0.4, 0.0, 0.3, 0.9])
+def test_a_stiffening_cable_without_a_table_is_the_tabled_law(stiffening: float) -> None:
+    short = np.stack([stiffening_law(stiffening)])
+    table = np.stack([law_table(one, one, WRAP, stiffening)])
+    for tau in np.geomspace(0.05, 8.0, 40):
+        v = v_of_tau(short, 0, tau)
+        assert v_of_tau(table, 0, tau) == pytest.approx(v, abs=1e-9)
+        assert tau_of_v(table, 0, v) == pytest.approx(tau_of_v(short, 0, v), rel=1e-9)
+        assert strain_of_tau(table, 0, tau) == pytest.approx(strain_of_tau(short, 0, tau), rel=1e-9)
+    for y in np.linspace(0.0, WRAP, 25):
+        assert groove(table, 0, y) == pytest.approx(groove(short, 0, y), abs=1e-9)
+
+
+@pytest.mark.parametrize("stiffening", [-0.4, 0.5])
+def test_strain_is_the_integral_of_the_stiffness_named(stiffening: float) -> None:
+    """de/dtau = 1/(1 + b (tau - 1)), e(1) = 0."""
+    law = np.stack([stiffening_law(stiffening)])
+    assert strain_of_tau(law, 0, 1.0)[0] == 0.0
+    for tau in (0.5, 1.0, 1.7, 2.4):
+        slope = (strain_of_tau(law, 0, tau + 1e-6)[0] - strain_of_tau(law, 0, tau - 1e-6)[0]) / 2e-6
+        assert slope == pytest.approx(1.0 / (1.0 + stiffening * (tau - 1.0)), rel=1e-6)
+        assert strain_of_tau(law, 0, tau)[1] == pytest.approx(slope, rel=1e-6)
+
+
+def test_no_stiffening_is_the_plain_law() -> None:
+    none, plain = np.stack([stiffening_law(0.0)]), np.stack([plain_law()])
+    for tau in (0.3, 1.0, 3.0):
+        assert strain_of_tau(none, 0, tau) == pytest.approx(strain_of_tau(plain, 0, tau))
+        assert v_of_tau(none, 0, tau) == v_of_tau(plain, 0, tau) == pytest.approx(np.log(tau))
