@@ -110,7 +110,7 @@ class BusLink:
         receivers: list[Receiver] = []
         for ends in config.joint:
             joint = JointReadings(ends.name, extra_channels(config, ends))
-            drive = None if ends.motor is None else make_drive(config, ends.motor, joint)
+            drive = make_drive(config, ends, joint)
             readings.append(joint)
             drives.append(drive)
             receivers += drive.receivers() if drive is not None else ()
