@@ -9,7 +9,7 @@ from typing import Literal
 from firmware_sim.errors import SimError
 from firmware_sim.joint import Asked, HeardFrame, SimulatedJoint
 from firmware_sim.ports.base import Port
-from firmware_sim.wire.frame import LAST_BYTE, Frame
+from firmware_sim.wire.frame import FD, LAST_BYTE, Frame
 from firmware_sim.wire.tables import SYNC_ID
 
 Stepping = Literal["command", "sync"]
@@ -47,7 +47,7 @@ class Bench:
     def _listeners(self, frame: Frame) -> tuple[SimulatedJoint, ...]:
         found = self._route.get(frame.key)
         if found is None and frame.extended:
-            found = self._route.get(LAST_BYTE | frame.identifier & 0xFF)
+            found = self._route.get(LAST_BYTE | frame.key & FD | frame.identifier & 0xFF)
         return found or ()
 
     def _hear(self, joint: SimulatedJoint, frame: Frame) -> HeardFrame:

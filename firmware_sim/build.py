@@ -18,17 +18,20 @@ from firmware_sim.wire.cubemars import CubeMarsWire
 from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.dbc import DbcWire, load_map
 from firmware_sim.wire.mit import MitWire, model_of
+from firmware_sim.wire.moteus import MoteusWire
 from firmware_sim.wire.odrive import FirmwareName, OdriveRates, OdriveWire
 from firmware_sim.wire.robstride import RobStrideWire
 from firmware_sim.wire.tables import MOST_JOINTS
 
-PROTOCOLS = ("mit", "cubemars", "robstride", "odrive", "dbc")
+PROTOCOLS = ("mit", "cubemars", "robstride", "moteus", "odrive", "dbc")
+FD_PROTOCOLS = ("moteus",)
 MakePlant = Callable[[int], PlantLike]
 
 
 @dataclass(frozen=True)
 class BenchConfig:
-    """What a bench consists of, apart from its plants and its port."""
+    """What a bench consists of, apart from its plants and its port; `gains_per_turn`: a moteus's own kp and kd
+    (N m/turn, N m s/turn)."""
 
     protocol: str = "mit"
     joints: int = 1
@@ -38,6 +41,7 @@ class BenchConfig:
     rates: OdriveRates = field(default_factory=OdriveRates)
     firmware: FirmwareName = "0.6"
     torque_constant: float = 0.1
+    gains_per_turn: tuple[float, float] = (4.0, 0.05)
     drive: DriveConfig = field(default_factory=DriveConfig)
     sensor: SensorNodeConfig = field(default_factory=SensorNodeConfig)
     timing: Timing = field(default_factory=Timing)
@@ -59,6 +63,8 @@ def make_wire(config: BenchConfig, number: int) -> DriveWire:
         return CubeMarsWire(number, config.model)
     if config.protocol == "robstride":
         return RobStrideWire(number, config.model)
+    if config.protocol == "moteus":
+        return MoteusWire(number, *config.gains_per_turn)
     if config.protocol == "odrive":
         return OdriveWire(number, config.rates, config.torque_constant, config.firmware)
     mapped = None if config.map_path is None else load_map(config.map_path)

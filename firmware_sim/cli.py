@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from firmware_sim.bench import Bench
-from firmware_sim.build import PROTOCOLS, BenchConfig, MakePlant, make_bench
+from firmware_sim.build import FD_PROTOCOLS, PROTOCOLS, BenchConfig, MakePlant, make_bench
 from firmware_sim.errors import SimError
 from firmware_sim.faults import describe_faults, parse_fault
 from firmware_sim.firmware import DriveConfig, SensorNodeConfig
@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None, make_plant: MakePlant | None = 
             maker = scenario.plant_maker(options.config, told, options.seed)
             specs += told.faults
         faults = [parse_fault(text, options.seed + i) for i, text in enumerate(specs)]
-        port = open_port(options.bus, options.link, options.bitrate)
+        port = open_port(options.bus, options.link, options.bitrate, fd=config.protocol in FD_PROTOCOLS)
         try:
             bench = make_bench(config, maker, port, faults)
             return _run(bench, options)

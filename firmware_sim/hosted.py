@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from firmware_sim.build import BenchConfig, make_bench
+from firmware_sim.build import FD_PROTOCOLS, BenchConfig, make_bench
 from firmware_sim.faults import Fault
 from firmware_sim.plant import NORMAL, LinkSpec, MotorSpec, Plant, PlantConfig, PlantReadings, Resolution
 from firmware_sim.plantlike import Readings, readings_of
@@ -85,7 +85,8 @@ class HostedJoints:
             self.plants[number] = LoadedPlant(plant)
             return self.plants[number]
 
-        self.bench = make_bench(spec.bench, make, open_port(spec.bus, None, None), spec.faults)
+        port = open_port(spec.bus, fd=spec.bench.protocol in FD_PROTOCOLS)
+        self.bench = make_bench(spec.bench, make, port, spec.faults)
         self._periods = 0
 
     @property

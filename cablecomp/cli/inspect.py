@@ -54,7 +54,7 @@ def inspect_recording(
     if known is None and saved is not None:
         known = load_mapping(saved)
     ratio = None if config is None else load_joint(config).drive.ratio
-    found = suggest(raw.columns, ratio)
+    found = suggest(raw.columns, ratio, raw.units)
     mapping = as_mapping(found) if known is None else joined_maps(as_mapping(found), known)
     seen, notes, why = _looked_at(recording, mapping, reading)
     if as_json:

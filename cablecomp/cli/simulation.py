@@ -11,7 +11,14 @@ from cablecomp.control.options import MotorModel
 from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.device_mit import reply_receiver
 from cablecomp.links.schema import LinkConfig, MotorEnd, SerialBus
-from cablecomp.links.schema_devices import CanSimpleDevice, CubeMarsDevice, Device, MitDevice, RobStrideDevice
+from cablecomp.links.schema_devices import (
+    CanSimpleDevice,
+    CubeMarsDevice,
+    Device,
+    MitDevice,
+    MoteusDevice,
+    RobStrideDevice,
+)
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from firmware_sim.build import BenchConfig
 from firmware_sim.errors import SimError
@@ -95,6 +102,9 @@ def _bench_of(device: Device, end: MotorEnd) -> BenchConfig:
         return BenchConfig(protocol="mit", model=device.model or "AK80-9", reply_id=reply)
     if isinstance(device, CubeMarsDevice | RobStrideDevice):
         return BenchConfig(protocol=device.protocol, model=device.model or "AK80-9")
+    if isinstance(device, MoteusDevice):
+        gains = (device.kp_Nm_per_turn or 4.0, device.kd_Nms_per_turn or 0.05)
+        return BenchConfig(protocol="moteus", gains_per_turn=gains)
     if isinstance(device, CanSimpleDevice):
         return BenchConfig(protocol="odrive", firmware=device.firmware)
     return BenchConfig(protocol="dbc")

@@ -55,7 +55,8 @@ class Sources:
     def _mapping(self, path: Path) -> ColumnMap | None:
         if not self.auto:
             return self.mapping
-        found = as_mapping(suggest(raw_columns(path, self.decode).columns, self.ratio))
+        raw = raw_columns(path, self.decode)
+        found = as_mapping(suggest(raw.columns, self.ratio, raw.units))
         found = found if self.mapping is None else joined_maps(found, self.mapping)
         console.print(f"{path} is read so:\n{mapping_text(found)}", style="dim")
         return found

@@ -9,7 +9,7 @@ from cablecomp.errors import InputError
 from cablecomp.links import dbc
 from cablecomp.links.dbc import Field, Layout
 from cablecomp.links.dbc_source import ALWAYS, Entry, Source, Status
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, chain, grid
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, calibration, chain, grid
 from cablecomp.links.readings import DeviceClock, JointReadings
 from cablecomp.links.records import CHANNELS, DriveState, Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd, SensorEnd
@@ -33,19 +33,6 @@ def claims(device: DbcDevice, end: MotorEnd | SensorEnd, folder: Path) -> tuple[
         names.append(device.command.message)
     found = [dbc.layout(folder / device.dbc, n.replace("{node}", str(end.node))) for n in names]
     return tuple(Claim(layout.identifier, f"message {layout.name}") for layout in found)
-
-
-def calibration(end: MotorEnd | SensorEnd, channel: str) -> Linear:
-    """How a channel at the joint comes from what the device reports in SI units."""
-    if isinstance(end, MotorEnd):
-        return Gear(end).from_shaft(channel)
-    if channel == "joint_position_rad":
-        return Linear(float(end.position_sign), -end.position_offset_rad)
-    if channel == "joint_velocity_rad_s":
-        return Linear(float(end.position_sign))
-    if channel == "joint_torque_Nm":
-        return Linear(float(end.torque_sign), -end.torque_offset_Nm)
-    return Linear(1.0)
 
 
 def build_sources(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from cablecomp.links.records import Frame, Mode, MotorCommand, Request
-from cablecomp.links.schema import MotorEnd
+from cablecomp.links.schema import MotorEnd, SensorEnd
 from cablecomp.links.units import Linear
 from cablecomp.signals import Grid, Wire
 
@@ -111,6 +111,19 @@ class Gear:
     def gain(self) -> float:
         """Stiffness or damping at the shaft per stiffness or damping at the pulley."""
         return 1.0 / self._ratio**2
+
+
+def calibration(end: MotorEnd | SensorEnd, channel: str) -> Linear:
+    """How a channel at the joint comes from what the device reports in SI units."""
+    if isinstance(end, MotorEnd):
+        return Gear(end).from_shaft(channel)
+    if channel == "joint_position_rad":
+        return Linear(float(end.position_sign), -end.position_offset_rad)
+    if channel == "joint_velocity_rad_s":
+        return Linear(float(end.position_sign))
+    if channel == "joint_torque_Nm":
+        return Linear(float(end.torque_sign), -end.torque_offset_Nm)
+    return Linear(1.0)
 
 
 def grid(counts: Linear, low: int, high: int) -> Grid:

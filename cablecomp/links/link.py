@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 from cablecomp.errors import InputError
 from cablecomp.links.devices import Drive, Receiver, Take
-from cablecomp.links.port_can import can_port
+from cablecomp.links.port_can import can_port, fd_options
 from cablecomp.links.port_line import serial_port
 from cablecomp.links.ports import Port
 from cablecomp.links.protocols import extra_channels, make_drive, sensor_receivers
@@ -110,7 +110,7 @@ class BusLink:
         receivers: list[Receiver] = []
         for ends in config.joint:
             joint = JointReadings(ends.name, extra_channels(config, ends))
-            drive = None if ends.motor is None else make_drive(config, ends.motor, joint)
+            drive = make_drive(config, ends, joint)
             readings.append(joint)
             drives.append(drive)
             receivers += drive.receivers() if drive is not None else ()
@@ -245,7 +245,8 @@ def make_port(config: LinkConfig) -> Port:
     """The port that a configuration names; nothing is opened yet."""
     bus = config.bus
     if isinstance(bus, CanBus):
-        return can_port(bus.interface, bus.channel, bus.bitrate, bus.options)
+        options = {**fd_options(bus.interface, bus.fd, bus.bitrate, bus.data_bitrate), **bus.options}
+        return can_port(bus.interface, bus.channel, bus.bitrate, options)
     return serial_port(bus.port, bus.baud)
 
 

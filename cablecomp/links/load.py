@@ -10,7 +10,8 @@ from cablecomp.errors import InputError
 from cablecomp.examples import resolve
 from cablecomp.links.devices import Claim
 from cablecomp.links.protocols import claims_of
-from cablecomp.links.schema import LinkConfig
+from cablecomp.links.schema import CanBus, LinkConfig
+from cablecomp.links.schema_devices import MoteusDevice
 
 
 def _tuples(data: Any) -> Any:
@@ -34,8 +35,19 @@ def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkC
         raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
     lines = data.lines() if isinstance(data, TomlTable) else None
     config = validated(LinkConfig, {**_tuples(data), "folder": folder}, where, lines)
+    _check_fd(config, where)
     _check_identifiers(config, where)
     return config
+
+
+def _check_fd(config: LinkConfig, where: str) -> None:
+    """Raise InputError where a device needs CAN FD on a bus without it."""
+    wanting = next((d for d in config.device if isinstance(d, MoteusDevice)), None)
+    if wanting is not None and isinstance(config.bus, CanBus) and not config.bus.fd:
+        raise InputError(
+            f"{where}: device `{wanting.id}` speaks `{wanting.protocol}`, which needs CAN FD; set bus.fd = true, "
+            "on an interface that can"
+        )
 
 
 def _check_identifiers(config: LinkConfig, where: str) -> None:

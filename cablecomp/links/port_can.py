@@ -16,7 +16,7 @@ from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.port_line import slcan_port
 from cablecomp.links.port_socket import MulticastPort, SocketCanPort
 from cablecomp.links.ports import Port, PortBase, Sink
-from cablecomp.links.records import EXTENDED, REMOTE, BusState
+from cablecomp.links.records import EXTENDED, FD, REMOTE, SWITCH, BusState
 
 _STANDARD_MASK, _EXTENDED_MASK = 0x7FF, 0x1FFF_FFFF
 
@@ -50,7 +50,7 @@ def _open_bus(
     known = sorted(can.VALID_INTERFACES)
     if interface not in known:
         raise InputError(f"unknown CAN interface `{interface}`; python-can has {', '.join(known)}")
-    chosen = {"channel": channel, "bitrate": bitrate}
+    chosen = {"channel": channel, "bitrate": None if "timing" in options else bitrate}
     wanted = {k: v for k, v in chosen.items() if v is not None}
     try:
         return can.Bus(interface=interface, ignore_config=True, **wanted, **options)
@@ -61,11 +61,27 @@ def _open_bus(
         ) from None
 
 
+def fd_options(interface: str, fd: bool, bitrate: int | None, data_bitrate: int | None) -> dict[str, Any]:
+    """What python-can's interfaces are told of CAN FD: slcan both bit rates as one timing, of which its text
+    carries no more; the others `fd` and `data_bitrate`."""
+    if not fd:
+        return {}
+    if interface != "slcan":
+        return {"fd": True} if data_bitrate is None else {"fd": True, "data_bitrate": data_bitrate}
+    if bitrate is None or data_bitrate is None:
+        return {}
+    points = {"nom_sample_point": 80.0, "data_sample_point": 80.0}
+    timing = can.BitTimingFd.from_sample_point(80_000_000, bitrate, data_bitrate=data_bitrate, **points)
+    return {"timing": timing}
+
+
 def message_identifier(message: Any) -> int:
     """Identifier of a python-can message with its flags."""
     identifier: int = message.arbitration_id
     if message.is_extended_id:
         identifier |= EXTENDED
+    if message.is_fd:
+        identifier |= FD
     return identifier | REMOTE if message.is_remote_frame else identifier
 
 
@@ -74,11 +90,13 @@ def make_message(identifier: int, data: bytes) -> Any:
     bus expect."""
     if identifier <= _STANDARD_MASK:  # the usual case; by position, which is twice as quick as by keyword
         return can.Message(time.time(), identifier, False, False, False, None, len(data), data)
-    extended, remote = bool(identifier & EXTENDED), bool(identifier & REMOTE)
+    extended, remote, fd = bool(identifier & EXTENDED), bool(identifier & REMOTE), bool(identifier & FD)
     return can.Message(
         arbitration_id=identifier & (_EXTENDED_MASK if extended else _STANDARD_MASK),
         is_extended_id=extended,
         is_remote_frame=remote,
+        is_fd=fd,
+        bitrate_switch=bool(identifier & SWITCH),
         dlc=8 if remote else len(data),
         data=None if remote else data,
         timestamp=time.time(),
@@ -126,7 +144,7 @@ class VirtualPort(PortBase):
                 self.heard()
                 off = False
             identifier = message.arbitration_id
-            if message.is_extended_id or message.is_remote_frame:
+            if message.is_extended_id or message.is_remote_frame or message.is_fd:
                 identifier = message_identifier(message)
             sink(identifier, message.data)
         self.counters.backlogs += bool(waiting)

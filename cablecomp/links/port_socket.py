@@ -12,9 +12,11 @@ from typing import Any
 import msgpack
 
 from cablecomp.links.ports import PortBase, Sink
-from cablecomp.links.records import ERROR, EXTENDED, REMOTE, BusState
+from cablecomp.links.records import ERROR, EXTENDED, FD, REMOTE, SWITCH, BusState
 
 _FRAME = Struct("=IB3x8s")
+_FD_FRAME = Struct("=IBB2x64s")
+_FD_SWITCH = 0x01  # CANFD_BRS
 _MEMINFO, _MEMINFO_DROPS = 55, 8
 _STANDARD_MASK, _EXTENDED_MASK = 0x7FF, 0x1FFF_FFFF
 
@@ -52,7 +54,8 @@ class _SocketPort(PortBase):
 
 
 class SocketCanPort(_SocketPort):
-    """Linux's CAN sockets: `struct can_frame` of 16 bytes, read into one buffer (linux/can.h)."""
+    """Linux's CAN sockets: `struct can_frame` of 16 bytes and `struct canfd_frame` of 72, read into one
+    buffer (linux/can.h)."""
 
     def __init__(self, attach: Callable[[], tuple[socket.socket, Any]]) -> None:
         super().__init__()
@@ -82,14 +85,18 @@ class SocketCanPort(_SocketPort):
                 return found
             found += 1
             identifier, length, data = unpack(buffer)
-            if size != 16 or length > 8:
+            if size == _FD_FRAME.size and length <= 64:
+                identifier |= FD
+                data = bytes(buffer[8 : 8 + length])
+            elif size != 16 or length > 8:
                 self.counters.invalid += 1
-            elif identifier & ERROR:
+                continue
+            if identifier & ERROR:
                 self.note_error(identifier & _EXTENDED_MASK, data[:length])
             else:
                 if self.state == BusState.OFF:
                     self.heard()
-                sink(identifier, data if length == 8 else data[:length])
+                sink(identifier, data if length >= 8 else data[:length])
         self.counters.backlogs += 1
         return found
 
@@ -98,8 +105,12 @@ class SocketCanPort(_SocketPort):
         try:
             if self._socket is None:
                 raise OSError("closed")
-            length = 8 if identifier & REMOTE else len(data)
-            self._socket.send(_FRAME.pack(identifier, length, data))
+            if identifier & FD:
+                switch = _FD_SWITCH if identifier & SWITCH else 0
+                packed = _FD_FRAME.pack(identifier & 0xFFFF_FFFF, len(data), switch, data)
+            else:
+                packed = _FRAME.pack(identifier, 8 if identifier & REMOTE else len(data), data)
+            self._socket.send(packed)
         except OSError as error:
             self.counters.send_failures += 1
             if self.state == BusState.ACTIVE:
@@ -164,7 +175,9 @@ class MulticastPort(_SocketPort):
             fields = msgpack.unpackb(datagram)
             identifier, data, extended = fields["arbitration_id"], fields["data"], fields["is_extended_id"]
             # anybody may send to the group, and a frame's takers rely on what they are given
-            if type(identifier) is not int or type(data) is not bytes or fields["is_fd"] or len(data) > 8:
+            if type(identifier) is not int or type(data) is not bytes:
+                raise ValueError
+            if len(data) > (64 if fields["is_fd"] else 8):
                 raise ValueError
             if not 0 <= identifier <= (_EXTENDED_MASK if extended else _STANDARD_MASK):
                 raise ValueError
@@ -173,6 +186,8 @@ class MulticastPort(_SocketPort):
                 return
             if extended:
                 identifier |= EXTENDED
+            if fields["is_fd"]:
+                identifier |= FD
             if fields["is_remote_frame"]:
                 identifier |= REMOTE
         except (ValueError, KeyError, TypeError, msgpack.UnpackException):
@@ -194,8 +209,8 @@ class MulticastPort(_SocketPort):
             "channel": None,
             "dlc": 8 if remote else len(data),
             "data": b"" if remote else data,
-            "is_fd": False,
-            "bitrate_switch": False,
+            "is_fd": bool(identifier & FD),
+            "bitrate_switch": bool(identifier & SWITCH),
             "error_state_indicator": False,
         }
         try:

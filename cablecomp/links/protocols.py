@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cablecomp.errors import InputError
-from cablecomp.links import device_cansimple, device_cubemars, device_dbc, device_mit, device_robstride
+from cablecomp.links import (
+    device_cansimple,
+    device_cubemars,
+    device_dbc,
+    device_mit,
+    device_moteus,
+    device_robstride,
+)
 from cablecomp.links.device_cansimple import CanSimpleDrive
 from cablecomp.links.device_cubemars import CubeMarsDrive
 from cablecomp.links.device_damiao import DamiaoDrive
 from cablecomp.links.device_dbc import DbcDrive, build_sources
 from cablecomp.links.device_mit import MitDrive
+from cablecomp.links.device_moteus import MoteusDrive
 from cablecomp.links.device_robstride import RobStrideDrive
 from cablecomp.links.devices import Claim, Drive, Receiver
 from cablecomp.links.readings import JointReadings
@@ -21,6 +29,7 @@ from cablecomp.links.schema_devices import (
     DbcDevice,
     Device,
     MitDevice,
+    MoteusDevice,
     RobStrideDevice,
 )
 
@@ -38,14 +47,40 @@ def _extra(device: Device) -> tuple[str, ...]:
         return (device_cubemars.TEMPERATURE,)
     if isinstance(device, RobStrideDevice):
         return (device_robstride.TEMPERATURE,)
+    if isinstance(device, MoteusDevice):
+        return device_moteus.EXTRAS
     if isinstance(device, CanSimpleDevice):
         return device_cansimple.extra_channels(device)
     return device_dbc.extra_channels(device)
 
 
-def make_drive(config: LinkConfig, end: MotorEnd, joint: JointReadings) -> Drive:
-    """The drive of a joint."""
-    device = config.device_of(end)
+def second_encoder(config: LinkConfig, ends: JointEnds) -> SensorEnd | None:
+    """The joint's sensor, if it is the encoder on the second input of its own drive; raises InputError where it
+    would be another drive's."""
+    end = ends.sensor
+    if end is None or isinstance(config.device_of(end), DbcDevice):
+        return None
+    if ends.motor is None or (ends.motor.device, ends.motor.node) != (end.device, end.node):
+        raise InputError(
+            f"joint `{ends.name}`: sensor `{end.device}` {end.node} is a drive, and not this joint's own; a `dbc` "
+            "device, or the joint's own drive with the joint's encoder on its second input, is accepted"
+        )
+    return end
+
+
+def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> Drive | None:
+    """The drive of a joint, None where it has none on this link."""
+    end = ends.motor
+    if end is None:
+        return None
+    device, second = config.device_of(end), second_encoder(config, ends)
+    if isinstance(device, MoteusDevice):
+        return MoteusDrive(device, end, joint, second)
+    if second is not None:
+        raise InputError(
+            f"joint `{ends.name}`: device `{device.id}` speaks `{device.protocol}`, which tells of no second "
+            "encoder; a `dbc` device or a `moteus` drive is accepted as the joint's sensor"
+        )
     if isinstance(device, MitDevice):
         damiao = device_mit.family_of(device) == "damiao"
         return DamiaoDrive(device, end, joint) if damiao else MitDrive(device, end, joint)
@@ -59,15 +94,10 @@ def make_drive(config: LinkConfig, end: MotorEnd, joint: JointReadings) -> Drive
 
 
 def sensor_receivers(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> tuple[Receiver, ...]:
-    """Who takes the frames of a joint's sensor node; raises InputError for a device that is none."""
-    if ends.sensor is None:
+    """Who takes the frames of a joint's sensor node; nobody where the drive itself reads the joint's encoder."""
+    device = None if ends.sensor is None else config.device_of(ends.sensor)
+    if ends.sensor is None or not isinstance(device, DbcDevice):
         return ()
-    device = config.device_of(ends.sensor)
-    if not isinstance(device, DbcDevice):
-        raise InputError(
-            f"joint `{ends.name}`: sensor device `{device.id}` speaks `{device.protocol}`; "
-            "a `dbc` device is accepted"
-        )
     return build_sources(device, ends.sensor, config.folder, joint)
 
 
@@ -87,7 +117,7 @@ def _claims(config: LinkConfig, end: MotorEnd | SensorEnd) -> tuple[Claim, ...]:
     device = config.device_of(end)
     if isinstance(device, DbcDevice):
         return device_dbc.claims(device, end, config.folder)
-    if isinstance(end, SensorEnd):  # refused by `sensor_receivers`
+    if isinstance(end, SensorEnd):  # the drive's second encoder: on the drive's own identifiers
         return ()
     if isinstance(device, MitDevice):
         return device_mit.claims(device, end)
@@ -95,4 +125,6 @@ def _claims(config: LinkConfig, end: MotorEnd | SensorEnd) -> tuple[Claim, ...]:
         return device_cubemars.claims(end)
     if isinstance(device, RobStrideDevice):
         return device_robstride.claims(device, end)
+    if isinstance(device, MoteusDevice):
+        return device_moteus.claims(device, end)
     return device_cansimple.claims(end)

@@ -13,6 +13,16 @@ REMOTE: Final = 0x4000_0000
 ERROR: Final = 0x2000_0000
 """Identifier flag: error message of the controller, not a frame on the wire (CAN_ERR_FLAG of linux/can.h)."""
 
+FD: Final = 0x1_0000_0000
+"""Identifier flag: a CAN FD frame of up to 64 bytes; beyond the 32 bits of linux/can.h, where the length of
+`struct canfd_frame` says it. Frames of both kinds may share an identifier and are told apart by it."""
+SWITCH: Final = 0x2_0000_0000
+"""Flag of an FD frame to send: its data go at the second, quicker bit rate; never set on what was received."""
+FD_LENGTHS: Final = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+"""Lengths that an FD frame can have, in the order of their codes (ISO 11898-1)."""
+NUMBER: Final = 0x1FFF_FFFF
+"""The identifier itself, without its flags."""
+
 CHANNELS: Final = (
     "motor_position_rad",
     "motor_velocity_rad_s",
@@ -116,7 +126,8 @@ class MotorCommand(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """One frame to send: identifier with its flags (`EXTENDED`, `REMOTE`) and 0…8 data bytes."""
+    """One frame to send: identifier with its flags (`EXTENDED`, `REMOTE`, `FD`, `SWITCH`) and 0…8 data bytes,
+    with `FD` one of `FD_LENGTHS`."""
 
     identifier: int
     data: bytes

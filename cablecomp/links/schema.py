@@ -26,15 +26,24 @@ ModeName = Literal["torque", "velocity", "position", "impedance"]
 
 
 class CanBus(Frozen):
-    """A CAN bus through python-can: `interface`, `channel`, `bitrate`, `options` go to `can.Bus`."""
+    """A CAN bus through python-can: `interface`, `channel`, `bitrate`, `options` go to `can.Bus`, and for CAN FD
+    `fd` and `data_bitrate`."""
 
     kind: Literal["can"]
     interface: Name
     channel: str | int | None = None
     bitrate: Annotated[int, Field(gt=0)] | None = None
+    fd: bool = False
+    data_bitrate: Annotated[int, Field(gt=0)] | None = None
     options: dict[str, Any] = Field(default_factory=dict)
     max_frames_per_poll: Annotated[int, Field(ge=1, le=100_000)] = 2048
     sync_id: Annotated[int, Field(ge=0, le=0x7FF)] | None = None
+
+    @model_validator(mode="after")
+    def _both_rates(self) -> Self:
+        if self.data_bitrate is not None and not (self.fd and self.bitrate):
+            raise ValueError("`data_bitrate` goes with `fd = true` and `bitrate`; both are accepted with it")
+        return self
 
 
 class SerialBus(Frozen):
@@ -148,7 +157,8 @@ class LinkConfig(Frozen):
         else:
             if interface == "slcan":
                 options = {"sleep_after_open": 0, **options}
-            bus = CanBus(kind="can", interface=interface, channel=channel, options=options, **shared)
+            fd = isinstance(self.bus, CanBus) and self.bus.fd
+            bus = CanBus(kind="can", interface=interface, channel=channel, options=options, fd=fd, **shared)
         return self.model_copy(update={"bus": bus})
 
     def at_terminal(self, path: str) -> LinkConfig:

@@ -82,6 +82,22 @@ class RobStrideDevice(Frozen):
     host: Annotated[int, Field(ge=0, le=0xFF)] = 0xFD
 
 
+class MoteusDevice(Frozen):
+    """A moteus; `host`: the number that this side goes by.
+
+    `kp_Nm_per_turn`, `kd_Nms_per_turn`: gains as set in the drive (`servo.pid_position`), which commands take
+    parts of. `joint_encoder`: the slot of the encoder at the joint, if the joint's sensor is this drive.
+    """
+
+    protocol: Literal["moteus"]
+    id: Name
+    host: Annotated[int, Field(ge=0, le=127)] = 0
+    kp_Nm_per_turn: Positive | None = None
+    kd_Nms_per_turn: Positive | None = None
+    torque_limit_Nm: Positive | None = None
+    joint_encoder: Annotated[int, Field(ge=0, le=2)] = 1
+
+
 class CanSimpleDevice(Frozen):
     """An ODrive: `cyclic` names what it sends by itself, `polled` what is asked for with every command
     (firmware 0.6: all)."""
@@ -206,6 +222,6 @@ class DbcDevice(Frozen):
 
 
 Device = Annotated[
-    MitDevice | CubeMarsDevice | RobStrideDevice | CanSimpleDevice | DbcDevice,
+    MitDevice | CubeMarsDevice | RobStrideDevice | MoteusDevice | CanSimpleDevice | DbcDevice,
     Field(discriminator="protocol"),
 ]

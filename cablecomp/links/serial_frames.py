@@ -1,7 +1,8 @@
 """Records on a serial line: COBS( identifier u32 little-endian, length u8, data, CRC-16 big-endian ), closed
 by one zero byte.
 
-Identifiers and data are those of the CAN bus. COBS: Cheshire & Baker, "Consistent Overhead Byte Stuffing",
+Identifiers and data are those of the CAN bus; bit 29 of the identifier marks an FD frame of up to 64 bytes.
+COBS: Cheshire & Baker, "Consistent Overhead Byte Stuffing",
 IEEE/ACM Trans. Networking 7(2), 1999: no zero inside a record, one byte more per 254. CRC-16/CCITT-FALSE:
 polynomial 0x1021, start 0xFFFF, not reflected, check value 0x29B1 for "123456789".
 """
@@ -13,9 +14,11 @@ from collections.abc import Callable
 from struct import Struct
 
 from cablecomp.errors import InputError
+from cablecomp.links.records import FD, FD_LENGTHS, SWITCH
 
 _HEAD = Struct("<IB")
-MAX_RECORD = 5 + 8 + 2
+_FD_BIT = 0x2000_0000
+MAX_RECORD = 5 + 64 + 2
 MAX_ENCODED = MAX_RECORD + 1
 Sink = Callable[[int, bytes], None]
 
@@ -63,8 +66,15 @@ def cobs_decode(code: bytes) -> bytes | None:
 
 
 def pack_record(identifier: int, data: bytes) -> bytes:
-    """One record with its closing zero; raises InputError for more than 8 data bytes."""
-    if len(data) > 8:
+    """One record with its closing zero; raises InputError for more than 8 data bytes, with FD for a length that
+    an FD frame cannot have."""
+    if identifier & FD:
+        if len(data) not in FD_LENGTHS:
+            raise InputError(
+                f"serial record: {len(data)} data bytes; {FD_LENGTHS} are accepted in an FD frame"
+            )
+        identifier = identifier & ~(FD | SWITCH) | _FD_BIT
+    elif len(data) > 8:
         raise InputError(f"serial record: {len(data)} data bytes; 0 to 8 are accepted")
     body = _HEAD.pack(identifier, len(data)) + data
     return cobs_encode(body + crc_hqx(body, 0xFFFF).to_bytes(2, "big")) + b"\x00"
@@ -106,6 +116,12 @@ class RecordReader:
             if body is None or len(body) < 7 or crc_hqx(body, 0xFFFF) or body[4] != len(body) - 7:
                 self.invalid += 1
                 continue
-            sink(int.from_bytes(body[:4], "little"), body[5:-2])
+            identifier = int.from_bytes(body[:4], "little")
+            if identifier & _FD_BIT:
+                identifier ^= _FD_BIT | FD
+            elif len(body) > 15:
+                self.invalid += 1
+                continue
+            sink(identifier, body[5:-2])
             found += 1
         return found

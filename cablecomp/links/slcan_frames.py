@@ -1,22 +1,31 @@
 """CAN frames as text on a serial line (slcan): `t1233AABBCC`, `T` extended, `r`/`R` remote, closed by a
-carriage return.
+carriage return; CAN FD: `d`/`D`, with the quicker data rate `b`/`B`, the length as a code of one hexadecimal
+digit.
 
 Source: Lawicel CANUSB/CAN232 manual (ASCII commands t, T, r, R; `z`/`Z` or an empty line acknowledges, BEL
-refuses).
+refuses); CANable 2.0's firmware and python-can (`d`, `D`, `b`, `B`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from cablecomp.links.records import EXTENDED, REMOTE
+from cablecomp.links.records import EXTENDED, FD, FD_LENGTHS, REMOTE, SWITCH
 
 Sink = Callable[[int, bytes], None]
-MAX_LINE = 32
+MAX_LINE = 144
+_FD_CODES = {length: f"{code:X}" for code, length in enumerate(FD_LENGTHS)}
 
 
 def pack_line(identifier: int, data: bytes) -> bytes:
-    """Text of one frame with its carriage return; flags EXTENDED and REMOTE choose the letter."""
+    """Text of one frame with its carriage return; flags choose the letter."""
+    if identifier & FD:
+        letter = "b" if identifier & SWITCH else "d"
+        if identifier & EXTENDED:
+            head = f"{letter.upper()}{identifier & 0x1FFF_FFFF:08X}"
+        else:
+            head = f"{letter}{identifier & 0x7FF:03X}"
+        return f"{head}{_FD_CODES[len(data)]}{data.hex().upper()}\r".encode()
     remote = identifier & REMOTE
     if identifier & EXTENDED:
         head = f"{'R' if remote else 'T'}{identifier & 0x1FFF_FFFF:08X}{len(data)}"
@@ -28,15 +37,17 @@ def pack_line(identifier: int, data: bytes) -> bytes:
 def parse_line(line: bytes) -> tuple[int, bytes] | None:
     """Identifier with flags and data of one line (without its end), None if it is not a frame."""
     kind = line[:1]
-    if kind in (b"t", b"r"):
+    fd = kind in (b"d", b"D", b"b", b"B")
+    if kind in (b"t", b"r", b"d", b"b"):
         split, flags = 4, 0
-    elif kind in (b"T", b"R"):
+    elif kind in (b"T", b"R", b"D", b"B"):
         split, flags = 9, EXTENDED
     else:
         return None
     try:
         identifier = int(line[1:split], 16)
-        length = int(line[split : split + 1])
+        code = line[split : split + 1]
+        length = FD_LENGTHS[int(code, 16)] if fd else int(code)
         if kind in (b"r", b"R"):
             return (identifier | flags | REMOTE, b"") if length <= 8 else None
         data = bytes.fromhex(line[split + 1 : split + 1 + 2 * length].decode("ascii"))
@@ -44,7 +55,8 @@ def parse_line(line: bytes) -> tuple[int, bytes] | None:
         return None
     # A time stamp of four digits may follow the data; anything else means that bytes were lost.
     extra = len(line) - (split + 1 + 2 * length)
-    return (identifier | flags, data) if len(data) == length <= 8 and extra in (0, 4) else None
+    whole = len(data) == length <= (64 if fd else 8) and extra in (0, 4)
+    return (identifier | flags | (FD if fd else 0), data) if whole else None
 
 
 class LineReader:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
 
 from cablecomp.errors import InputError
+from cablecomp.recording.channels import is_channel
 from cablecomp.recording.raw import NumberRows, RawTable
 from cablecomp.recording.table import FloatArray
 
@@ -39,7 +41,7 @@ def open_npz(path: Path) -> RawTable:
     ) as error:
         raise InputError(f"{path}: cannot be read as .npz ({first_line(error)}); {_EXPECTED}") from None
     shapes = {name.removesuffix(".npy"): shape for name, (shape, _) in heads.items()}
-    columns = columns_of(path, shapes)
+    columns, notes = columns_of(path, shapes)
 
     def read(names: Sequence[str]) -> Iterator[NumberRows]:
         members = list(dict.fromkeys(columns[name][0] for name in names))
@@ -48,27 +50,39 @@ def open_npz(path: Path) -> RawTable:
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path}: damaged .npz ({first_line(error)}); save it anew") from None
 
-    return RawTable(tuple(columns), read)
+    return RawTable(tuple(columns), read, notes=notes)
 
 
-def columns_of(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[str, int]]:
-    """Column name -> (array, column in it) of arrays that share their first length; single numbers are left out.
+class ArrayColumns(NamedTuple):
+    """`columns`: name -> (array, column in it); `notes`: what was left out."""
 
-    InputError if there is none, or lengths differ.
+    columns: dict[str, tuple[str, int]]
+    notes: tuple[str, ...]
+
+
+def columns_of(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> ArrayColumns:
+    """The columns of arrays that share the length that most have; others (parameters, say) are left out.
+
+    InputError if there is no array, or one that is named as a channel is of another length.
     """
-    long = {name: shape for name, shape in shapes.items() if math.prod(shape) > 1 or shape == (1,)}
-    if not long:
+    lengths = Counter(shape[0] for shape in shapes.values() if shape and 0 not in shape)
+    if not lengths:
         raise InputError(f"{path}: holds no array; {_EXPECTED}")
-    rows = next(iter(long.values()))[0]
+    rows = max(lengths, key=lambda n: (n > 1, lengths[n], n))
     found: dict[str, tuple[str, int]] = {}
-    for name, shape in long.items():
-        if len(shape) > 2 or shape[0] != rows:
-            raise InputError(f"{path}: array {name!r} has shape {shape}; {_EXPECTED}, here {rows}")
-        if len(found) + math.prod(shape[1:]) > _MOST_COLUMNS:
+    left_out = []
+    for name, shape in shapes.items():
+        width = math.prod(shape[1:])
+        if not shape or len(shape) > 2 or shape[0] != rows:
+            if is_channel(name):
+                raise InputError(f"{path}: array {name!r} has shape {shape}; {_EXPECTED}, here {rows}")
+            left_out.append(f"{name} {shape}")
+            continue
+        if len(found) + width > _MOST_COLUMNS:
             raise InputError(f"{path}: has more than {_MOST_COLUMNS} columns; is it turned over? {_EXPECTED}")
-        plain = math.prod(shape[1:]) == 1
-        found |= {(name if plain else f"{name}[{k}]"): (name, k) for k in range(math.prod(shape[1:]))}
-    return found
+        found |= {(name if width == 1 else f"{name}[{k}]"): (name, k) for k in range(width)}
+    words = f"arrays of another length left out: {', '.join(left_out[:12])}"
+    return ArrayColumns(found, (words,) if left_out else ())
 
 
 def _npy_head(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int, ...], np.dtype[Any]]:
@@ -134,7 +148,7 @@ def open_mat(path: Path) -> RawTable:
     if sum(math.prod(shape) for shape in held.values()) > _MOST_VALUES:
         raise InputError(f"{path}: holds more than {_MOST_VALUES:,} numbers; save it in parts, or as CSV")
     shapes = {name: _upright(shape) for name, shape in held.items()}
-    columns = columns_of(path, shapes)
+    columns, notes = columns_of(path, shapes)
 
     def read(names: Sequence[str]) -> Iterator[NumberRows]:
         wanted = list(dict.fromkeys(columns[name][0] for name in names))
@@ -153,7 +167,7 @@ def open_mat(path: Path) -> RawTable:
         arrays = {name: np.ascontiguousarray(whole[columns[name][0]][:, columns[name][1]]) for name in names}
         yield NumberRows(1, arrays, 1.0)
 
-    return RawTable(tuple(columns), read)
+    return RawTable(tuple(columns), read, notes=notes)
 
 
 def _upright(shape: tuple[int, ...]) -> tuple[int, ...]:

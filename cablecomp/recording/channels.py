@@ -101,6 +101,15 @@ def parse_header(columns: Iterable[str]) -> tuple[Column, ...]:
     return tuple(parsed.values())
 
 
+def is_channel(name: str) -> bool:
+    """Whether a column's name is that of a channel, in any of its units."""
+    try:
+        parse_column(name)
+    except InputError:
+        return False
+    return True
+
+
 def _with_unit(name: str, quantity: str, units: Mapping[str, Unit]) -> Column:
     suffix = name[len(quantity) + 1 :]
     unit = units.get(suffix)

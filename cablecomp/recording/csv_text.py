@@ -12,28 +12,13 @@ import numpy as np
 import polars as pl
 
 from cablecomp.errors import InputError
+from cablecomp.recording.csv_head import Head, number, plain_breaks, read_head, seconds_since
 from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source import Piece, Truncated, ahead, chunks
 from cablecomp.recording.table import FloatArray
 
-_HEAD_LIMIT: Final = 1 << 20
 _BREAK: Final = b"\n"
 _LINE_LIMIT: Final = 1 << 20
-_MOST_COLUMNS: Final = 4096
-_SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
-
-
-@dataclass(frozen=True)
-class Head:
-    """What stands before the first row: `first_line` is the line of the first row, counted from 1."""
-
-    columns: tuple[str, ...]
-    comments: tuple[str, ...]
-    separator: str
-    decimal_comma: bool
-    header_line: int
-    first_line: int
-    size: int
 
 
 @dataclass(frozen=True)
@@ -67,37 +52,9 @@ def open_csv(path: Path, gzipped: bool) -> RawTable:
     odd = gzipped and path.suffix != ".gz"
     notes = (f"is gzip although it is named {path.suffix or path.name}; read unpacked",) if odd else ()
     where = f"line {head.header_line}: "
-    return RawTable(head.columns, read, "line", where, head.comments, notes=notes)
-
-
-def read_head(path: Path, gzipped: bool) -> Head:
-    """Read comments and header line; InputError if there is no header or it holds numbers."""
-    text = b""
-    try:
-        for piece in chunks(path, gzipped, 1 << 16):
-            text += piece.data
-            head = _parse_head(text)
-            if head is not None and text.count(b"\n") >= head.first_line:
-                break
-            if len(text) > _HEAD_LIMIT:
-                break
-    except Truncated as error:
-        raise InputError(f"{path}: {error}, before the first row; copy or record the file anew") from None
-    head = _parse_head(text)
-    if head is None:
-        raise InputError(
-            f"{path}: has no header line; expected column names such as time_s,motor_position_rad"
-        )
-    if len(head.columns) > _MOST_COLUMNS:
-        raise InputError(
-            f"{path}: line {head.header_line}: has {len(head.columns)} columns; {_MOST_COLUMNS} are accepted"
-        )
-    if _is_number(head.columns[0]):
-        raise InputError(
-            f"{path}: line {head.header_line}: holds numbers where the column names are expected; "
-            "add a header line such as time_s,motor_position_rad,joint_torque_Nm"
-        )
-    return head
+    units = {name: unit for name, unit in zip(head.columns, head.units, strict=False) if unit}
+    units |= dict.fromkeys(head.dates, "s")
+    return RawTable(head.columns, read, "line", where, head.comments, units, notes)
 
 
 def read_rows(path: Path, gzipped: bool, head: Head, names: Sequence[str]) -> Iterator[Rows]:
@@ -112,7 +69,7 @@ def read_rows(path: Path, gzipped: bool, head: Head, names: Sequence[str]) -> It
         for piece in _pieces(path, gzipped):
             data, fraction = carriage + piece.data, piece.fraction
             carriage = b"\r" if data.endswith(b"\r") else b""
-            data = _plain_breaks(data[: len(data) - len(carriage)])
+            data = plain_breaks(data[: len(data) - len(carriage)])
             if skip:
                 drop = min(skip, len(data))
                 data, skip = data[drop:], skip - drop
@@ -126,7 +83,7 @@ def read_rows(path: Path, gzipped: bool, head: Head, names: Sequence[str]) -> It
                 yield rows
     except Truncated as error:
         raise InputError(f"{path}: line {line}: {error}; copy or record the file anew") from None
-    rest = (tail + _plain_breaks(carriage)).rstrip(b"\n")
+    rest = (tail + plain_breaks(carriage)).rstrip(b"\n")
     if rest:
         yield parser.parse(rest, line, 1.0, last=not tail.endswith(b"\n"))
 
@@ -157,7 +114,7 @@ class _Parser:
         separators and no refusal, no row is short either.
         """
         places = {name: f"c{i}" for i, name in enumerate(self.head.columns)}
-        kinds = {place: pl.Float64 if name in self.names else pl.String for name, place in places.items()}
+        kinds = {place: pl.Float64 if name in self._numbers else pl.String for name, place in places.items()}
         rows = text.count(b"\n") + (not text.endswith(b"\n"))
         if text.count(self.head.separator.encode()) != rows * (len(places) - 1):
             return None
@@ -169,7 +126,18 @@ class _Parser:
             return None
         if frame.height != rows:
             return None
-        return [frame[places[name]].to_numpy() for name in self.names]
+        return [
+            frame[places[name]].to_numpy() if name in self._numbers else self._dates(frame[places[name]])
+            for name in self.names
+        ]
+
+    @property
+    def _numbers(self) -> set[str]:
+        return set(self.names) - self.head.dates
+
+    def _dates(self, cells: pl.Series) -> FloatArray:
+        values = [seconds_since(cell or "", self.head.day) for cell in cells]
+        return np.array([np.nan if value is None else value for value in values])
 
     def _slow(self, text: bytes, line: int, last: bool) -> list[FloatArray]:
         """Parse row by row: allows empty cells, and names the line and column of what is wrong."""
@@ -194,7 +162,7 @@ class _Parser:
         values = []
         for name in self.names:
             cell = cells[self.head.columns.index(name)]
-            value = _number(cell)
+            value = seconds_since(cell, self.head.day) if name in self.head.dates else number(cell)
             if value is None:
                 raise InputError(
                     f"{where}: column {name!r} holds {_shown(cell)}{ending or '; a number is expected there'}"
@@ -203,53 +171,12 @@ class _Parser:
         return values
 
 
-def _parse_head(text: bytes) -> Head | None:
-    size, comments = 0, []
-    shift = 3 if text.startswith(b"\xef\xbb\xbf") else 0
-    lines = _plain_breaks(text[shift:].removesuffix(b"\r")).split(b"\n")
-    for number, raw in enumerate(lines, start=1):
-        size += len(raw) + 1
-        line = raw.decode("utf-8", "replace").strip()
-        if not line:
-            continue
-        if line.startswith("#"):
-            comments.append(line[1:].strip())
-            continue
-        separator = max(_SEPARATORS, key=line.count)
-        names = (name.strip().strip('"').strip() for name in line.split(separator))
-        columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
-        first = lines[number].decode("utf-8", "replace") if number < len(lines) else ""
-        comma = separator != "," and "," in first
-        return Head(columns, tuple(comments), separator, comma, number, number + 1, size + shift)
-    return None
-
-
 def _whole_lines(text: bytes) -> tuple[bytes, bytes]:
     """Split into whole lines and the rest; breaks at the end go to the rest: a file may end in them."""
     body = text[: text.rfind(b"\n") + 1].rstrip(b"\n")
     if not body:
         return b"", text
     return body + b"\n", text[len(body) + 1 :]
-
-
-def _plain_breaks(text: bytes) -> bytes:
-    return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text
-
-
-def _number(cell: str) -> float | None:
-    if "_" in cell:
-        return None
-    text = cell.strip()
-    if not text:
-        return float("nan")
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _is_number(text: str) -> bool:
-    return bool(text) and _number(text) is not None
 
 
 def _shown(cell: str) -> str:

@@ -183,6 +183,21 @@ def column_of(channel: str, source: Source, stated_unit: str | None = None) -> C
     )
 
 
+def check_units(columns: Iterable[Column], units: Mapping[str, str]) -> None:
+    """Raise InputError if a file states another unit for a column than the column's own name does."""
+    for column in columns:
+        stated = units.get(column.column)
+        if stated is None or meaning(column.column) != column or column.name not in CANONICAL:
+            continue
+        quantity = next(q for q, table in QUANTITIES.items() if column.name == f"{q}_{next(iter(table))}")
+        unit = unit_named(stated, QUANTITIES[quantity])
+        if unit is None or (unit.factor, unit.offset) != (column.factor, column.offset):
+            raise InputError(
+                f"column {column.column!r} stands over the unit {stated!r}, which is not that of its name; "
+                "mend one of them, or say by a mapping which holds"
+            )
+
+
 def meaning(name: str) -> Column | None:
     """What a column's own name says, if it is a channel's."""
     try:

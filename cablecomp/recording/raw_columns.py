@@ -25,13 +25,15 @@ _MOST_FIELDS = 256
 class RawColumns:
     """Columns by their own names, of one length (NaN = empty), at most 400 000 rows.
 
-    `kind` is the file's; `left_out` are columns that hold no numbers; `topics` those of a log of messages.
+    `kind` is the file's; `left_out` are columns that hold no numbers; `topics` those of a log of messages;
+    `units` what the file states.
     """
 
     kind: str
     columns: dict[str, FloatArray]
     left_out: tuple[str, ...]
     topics: dict[str, TopicFacts]
+    units: dict[str, str]
     notes: tuple[str, ...]
 
 
@@ -48,10 +50,10 @@ def raw_columns(path: Path, decode: Callable[[], DecodeFrame] | None = None) -> 
         joined = join(source.log, source.topics, ordered, (), JoinRule(leader, hold_s=1e9))
         table = RawTable(joined.names, lambda names: joined.read(), notes=joined.notes)
         columns = _stacked(table, ("time_s", *wanted))
-        return RawColumns(kind, columns, (), source.topics, table.notes)
+        return RawColumns(kind, columns, (), source.topics, {}, table.notes)
     names, text = _numeric(path, source)
     table = replace(source, names=names)
-    return RawColumns(kind, _stacked(table, names), text, {}, source.notes)
+    return RawColumns(kind, _stacked(table, names), text, {}, dict(source.units), source.notes)
 
 
 def _stacked(table: RawTable, names: tuple[str, ...]) -> dict[str, FloatArray]:

@@ -14,7 +14,14 @@ from cablecomp.recording.can_log import DecodeFrame
 from cablecomp.recording.channels import Column, may_be_empty, order, parse_header
 from cablecomp.recording.checks import Checks, regrouped, some
 from cablecomp.recording.join import JoinRule, join
-from cablecomp.recording.mapping import ColumnMap, columns_by, find_mapping, load_mapping, meaning
+from cablecomp.recording.mapping import (
+    ColumnMap,
+    check_units,
+    columns_by,
+    find_mapping,
+    load_mapping,
+    meaning,
+)
 from cablecomp.recording.raw import RawRows, RawTable
 from cablecomp.recording.source_file import Messages, open_file
 from cablecomp.recording.table import Block, Table
@@ -130,7 +137,9 @@ def _columns(path: Path, table: RawTable, mapping: ColumnMap | None) -> tuple[Co
     try:
         if mapping is not None:
             return columns_by(mapping, table.names, table.units)
-        return parse_header(table.names)
+        columns = parse_header(table.names)
+        check_units(columns, table.units)
+        return columns
     except ConfigError as error:
         raise ConfigError(f"{path}: {line}" for line in error.lines) from None
     except InputError as error:

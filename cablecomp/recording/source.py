@@ -12,7 +12,7 @@ from typing import BinaryIO, Final, Literal, NamedTuple
 from cablecomp.errors import InputError
 from cablecomp.recording.can_log import can_kind
 
-Kind = Literal["text", "parquet", "mcap", "npz", "mat", "bag", "blf", "asc", "candump", "trc", "mf4"]
+Kind = Literal["text", "parquet", "mcap", "npz", "mat", "hdf5", "bag", "blf", "asc", "candump", "trc", "mf4"]
 
 CHUNK: Final = 1 << 22
 _SNIFF: Final = 8192
@@ -22,6 +22,7 @@ _READABLE: Final[dict[bytes, Kind]] = {
     b"\x89MCAP0\r\n": "mcap",
     b"PK\x03\x04": "npz",
     b"MATLAB 5": "mat",
+    b"\x89HDF\r\n\x1a\n": "hdf5",
     b"#ROSBAG": "bag",
     b"SQLite format 3": "bag",
 }
@@ -30,7 +31,6 @@ _FOREIGN: Final[dict[bytes, str]] = {
     b"\xfd7zXZ\x00": "xz-compressed",
     b"\x28\xb5\x2f\xfd": "zstd-compressed",
     b"7z\xbc\xaf": "a 7-zip archive",
-    b"\x89HDF": "HDF5 (or MATLAB 7.3: save it with -v7)",
     b"ARROW1": "an Arrow file",
     b"%PDF": "a PDF",
     b"\x89PNG": "a PNG image",
@@ -38,7 +38,10 @@ _FOREIGN: Final[dict[bytes, str]] = {
     b"\xfe\xff": "UTF-16 text",
     b"\xd0\xcf\x11\xe0": "an old Excel file",
 }
-_ACCEPTED: Final = "accepted are CSV text (plain or gzip), Parquet, .npz, .mat, MCAP, ROS bags, CAN logs (BLF, ASC, candump, TRC, MF4)"
+_ACCEPTED: Final = (
+    "accepted are CSV text (plain or gzip), Parquet, .npz, .mat, HDF5, MCAP, ROS bags, "
+    "CAN logs (BLF, ASC, candump, TRC, MF4)"
+)
 
 
 class Truncated(Exception):
@@ -137,7 +140,9 @@ def ahead(pieces: Iterator[Piece], depth: int = 3) -> Iterator[Piece]:
 def _kind(path: Path, head: bytes, wrapper: str) -> Kind:
     for magic, kind in _READABLE.items():
         if head.startswith(magic):
-            return kind
+            return "hdf5" if kind == "mat" and head[512:520].startswith(b"\x89HDF") else kind
+    if head.startswith(b"MATLAB 7.3"):
+        return "hdf5"
     for magic, name in _FOREIGN.items():
         if head.startswith(magic):
             raise InputError(f"{path}: is {wrapper}{name}; {_ACCEPTED}: convert it first")

@@ -12,6 +12,7 @@ from cablecomp.recording.bag_file import open_bag
 from cablecomp.recording.can_log import DecodeFrame, open_can_log
 from cablecomp.recording.channels import Column
 from cablecomp.recording.csv_text import open_csv
+from cablecomp.recording.hdf5_file import open_hdf5
 from cablecomp.recording.mapping import meaning
 from cablecomp.recording.mcap_file import open_mcap
 from cablecomp.recording.messages import MessageLog
@@ -52,6 +53,8 @@ def open_file(path: Path, decode: Callable[[], DecodeFrame] | None = None) -> tu
         return kind, open_parquet(path)
     if kind == "npz":
         return kind, open_npz(path)
+    if kind == "hdf5":
+        return kind, open_hdf5(path)
     if kind == "mat":
         return kind, open_mat(path)
     log = _open_log(path, kind, decode)

@@ -46,14 +46,17 @@ class Suggestion:
     why: list[str] = field(default_factory=list)
 
 
-def suggest(columns: Mapping[str, FloatArray], ratio: float | None = None) -> list[Suggestion]:
+def suggest(
+    columns: Mapping[str, FloatArray], ratio: float | None = None, units: Mapping[str, str] | None = None
+) -> list[Suggestion]:
     """Suggest sources for channels, best known first, from columns of equal length (NaN = empty).
 
-    `ratio`: joint angle per motor angle of the rigid drive, product of r/R, if the joint is known. Signs follow
+    `ratio`: joint angle per motor angle of the rigid drive, product of r/R, if the joint is known; `units`: those
+    that the file states itself. Signs follow
     from what the drive allows: motor and joint turn together, the joint gives way to its load, the motor holds
     against it and does net work.
     """
-    found = {s.channel: s for s in _by_names(columns)}
+    found = {s.channel: s for s in _by_names(columns, units or {})}
     values = {name: _filled(column) for name, column in columns.items()}
     _time(found, values)
     _angles(found, values, ratio)
@@ -66,7 +69,7 @@ def as_mapping(suggestions: list[Suggestion]) -> ColumnMap:
     return ColumnMap(schema=1, channel={s.channel: s.source for s in suggestions})
 
 
-def _by_names(columns: Mapping[str, FloatArray]) -> list[Suggestion]:
+def _by_names(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> list[Suggestion]:
     """Give each channel the column whose name fits best; each column once."""
     offers: list[tuple[float, int, str, NameReading]] = []
     for k, name in enumerate(columns):
@@ -74,7 +77,8 @@ def _by_names(columns: Mapping[str, FloatArray]) -> list[Suggestion]:
         if own is not None and own.name in CANONICAL:
             offers.append((2.0, k, name, NameReading(own.name, 1.0, None)))
             continue
-        offers += [(reading.fit, k, name, reading) for reading in read_name(name)]
+        stated = f"{name} [{units[name]}]" if name in units else name
+        offers += [(reading.fit, k, name, reading) for reading in read_name(stated)]
     taken: dict[str, Suggestion] = {}
     used: set[str] = set()
     for fit, _, name, reading in sorted(offers, key=lambda offer: (-offer[0], offer[1])):

@@ -69,7 +69,8 @@ class DriveConfig:
 
 
 class DriveReport(NamedTuple):
-    """What the drive tells of itself; the angle is NaN-free and counts from the encoder's own zero."""
+    """What the drive tells of itself; the angle is NaN-free and counts from the encoder's own zero. The second
+    encoder is the one at the joint, for drives that have an input for it."""
 
     state: DriveState
     mode: Mode
@@ -81,6 +82,8 @@ class DriveReport(NamedTuple):
     current_A: float
     temperature_degC: float
     homed: bool
+    second_position_rad: float = math.nan
+    second_velocity_rad_s: float = math.nan
 
 
 class Drive:
@@ -256,6 +259,8 @@ class Drive:
             0.0 if r is None else r.motor_current_A,
             25.0 if r is None else r.temperature_degC,
             self.homed,
+            math.nan if r is None else r.joint_position_rad,
+            math.nan if r is None else r.joint_velocity_rad_s,
         )
 
     # ---- inside ----------------------------------------------------------------------------------

@@ -45,7 +45,12 @@ class CanPort:
             return None
         self.received += 1
         return Frame(
-            message.arbitration_id, bytes(message.data), message.is_remote_frame, message.is_extended_id
+            message.arbitration_id,
+            bytes(message.data),
+            message.is_remote_frame,
+            message.is_extended_id,
+            message.is_fd,
+            message.bitrate_switch,
         )
 
     def send(self, frames: list[Frame], now_s: float) -> None:
@@ -58,6 +63,8 @@ class CanPort:
                 data=frame.data,
                 is_extended_id=frame.extended,
                 is_remote_frame=frame.remote,
+                is_fd=frame.fd,
+                bitrate_switch=frame.switch,
                 check=False,
             )
             try:

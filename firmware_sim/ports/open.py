@@ -17,17 +17,18 @@ BUSES = "virtual[:CHANNEL], udp_multicast[:GROUP[:PORT]], slcan, serial, or INTE
 GROUP, UDP_PORT = "239.74.163.2", 43113
 
 
-def open_port(bus: str, link: Path | None = None, bitrate: int | None = None) -> Port:
-    """Open a port; `link` names a pseudo-terminal, `bitrate` is for real interfaces. Raises SimError."""
+def open_port(bus: str, link: Path | None = None, bitrate: int | None = None, *, fd: bool = False) -> Port:
+    """Open a port; `link` names a pseudo-terminal, `bitrate` is for real interfaces, `fd` lets them carry FD
+    frames. Raises SimError."""
     interface, _, rest = bus.partition(":")
     if interface == "slcan" and not rest:
         return SlcanPort(link)
     if interface == "serial" and not rest:
         return SerialPort(link)
-    return open_can(interface, rest, bitrate)
+    return open_can(interface, rest, bitrate, fd=fd)
 
 
-def open_can(interface: str, rest: str, bitrate: int | None = None) -> CanPort:
+def open_can(interface: str, rest: str, bitrate: int | None = None, *, fd: bool = False) -> CanPort:
     """A python-can bus as a port."""
     options: dict[str, Any] = {"interface": interface, "channel": rest}
     if interface == "virtual":
@@ -35,11 +36,12 @@ def open_can(interface: str, rest: str, bitrate: int | None = None) -> CanPort:
     elif interface == "udp_multicast":
         group, _, port = rest.partition(":")
         # Hop limit 0: the frames never leave this computer.
-        options |= {"channel": group or GROUP, "port": _udp_port(port), "hop_limit": 0, "fd": False}
+        options |= {"channel": group or GROUP, "port": _udp_port(port), "hop_limit": 0, "fd": fd}
     elif not rest:
         raise SimError(f"bus {interface!r}: {BUSES} is accepted")
-    elif bitrate is not None:
-        options["bitrate"] = bitrate
+    else:
+        options |= {"fd": True} if fd else {}
+        options |= {"bitrate": bitrate} if bitrate is not None else {}
     try:
         bus = can.Bus(**options)
     except (can.CanError, OSError, ValueError, ImportError) as error:

@@ -1,7 +1,7 @@
 """The same messages on a serial line: COBS-framed records with a CRC.
 
-Record = identifier (u32, little-endian; bit 31 = 29-bit identifier, bit 30 = remote request) | length of
-the data (u8, 0…8) |
+Record = identifier (u32, little-endian; bit 31 = 29-bit identifier, bit 30 = remote request, bit 29 = FD
+frame) | length of the data (u8, 0…8, FD 0…64) |
 data | CRC-16/CCITT-FALSE of all that precedes (big-endian, so that the CRC over a whole record is 0). On
 the line: COBS of
 the record, then one zero byte. Identifiers and data are those of the CAN bus.
@@ -15,8 +15,8 @@ import struct
 
 from firmware_sim.wire.frame import Frame
 
-EXTENDED, REMOTE = 1 << 31, 1 << 30
-LONGEST = 64  # bytes between two zeros beyond which a piece is noise
+EXTENDED, REMOTE, FD = 1 << 31, 1 << 30, 1 << 29
+LONGEST = 80  # bytes between two zeros beyond which a piece is noise
 
 
 def _table() -> tuple[int, ...]:
@@ -78,6 +78,7 @@ def cobs_decode(code: bytes) -> bytes | None:
 def encode_record(frame: Frame) -> bytes:
     """The bytes of one frame on the line, closing zero included."""
     identifier = frame.identifier | (EXTENDED if frame.extended else 0) | (REMOTE if frame.remote else 0)
+    identifier |= FD if frame.fd else 0
     body = struct.pack("<IB", identifier, len(frame.data)) + frame.data
     return cobs_encode(body + struct.pack(">H", crc16(body))) + b"\x00"
 
@@ -88,8 +89,10 @@ def decode_record(code: bytes) -> Frame | None:
     if body is None or len(body) < 7 or crc16(body) != 0 or len(body) != 7 + body[4]:
         return None
     (identifier,) = struct.unpack_from("<I", body)
-    remote, extended = bool(identifier & REMOTE), bool(identifier & EXTENDED)
-    return Frame(identifier & 0x1FFF_FFFF, body[5:-2], remote, extended)
+    remote, extended, fd = bool(identifier & REMOTE), bool(identifier & EXTENDED), bool(identifier & FD)
+    if body[4] > (64 if fd else 8):
+        return None
+    return Frame(identifier & 0x1FFF_FFFF, body[5:-2], remote, extended, fd)
 
 
 class RecordReader:

@@ -5,7 +5,8 @@ Understood: S0…S8 and sXXYY (bit rate), O (open), L (open, listen only), C (cl
 (data frame),
 rIIIL, RIIIIIIIIL (remote request), V and N (version, serial number), F (status flags), Z0/Z1 (time stamps),
 M and m
-(acceptance). Time stamps: four hexadecimal digits, ms, modulo 60 000. Source: Lawicel AB, CANUSB manual,
+(acceptance); FD frames as CANable 2.0 has them: d, D, with the data bit rate b, B, the length a code of one
+hexadecimal digit. Time stamps: four hexadecimal digits, ms, modulo 60 000. Source: Lawicel AB, CANUSB manual,
 "CANUSB commands".
 """
 
@@ -16,7 +17,8 @@ from typing import NamedTuple
 from firmware_sim.wire.frame import Frame
 
 OK, REFUSED = b"\r", b"\x07"
-LONGEST = 32
+LONGEST = 160
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
 class Spoken(NamedTuple):
@@ -59,6 +61,8 @@ class SlcanAdapter:
         """One frame from the bus as the adapter passes it on; nothing while the channel is closed."""
         if not self.open or self.bus_off:
             return b""
+        if frame.fd:
+            return self._encode_fd(frame)
         letter = (b"R" if frame.extended else b"r") if frame.remote else (b"T" if frame.extended else b"t")
         identifier = b"%08X" % frame.identifier if frame.extended else b"%03X" % frame.identifier
         line = letter + identifier + b"%d" % len(frame.data)
@@ -68,11 +72,17 @@ class SlcanAdapter:
             line += b"%04X" % (int(now_s * 1e3) % 60_000)
         return line + OK
 
+    def _encode_fd(self, frame: Frame) -> bytes:
+        letter = b"b" if frame.switch else b"d"
+        head = (letter.upper() + b"%08X" if frame.extended else letter + b"%03X") % frame.identifier
+        code = b"%X" % FD_LENGTHS.index(len(frame.data))
+        return head + code + frame.data.hex().upper().encode() + OK
+
     def _command(self, line: bytes, frames: list[Frame]) -> bytes:
         if not line:
             return OK
         letter = line[:1]
-        if letter in b"tTrR":
+        if letter in b"tTrRdDbB":
             return self._transmit(line, frames)
         if letter in (b"O", b"L"):
             if self.open:
@@ -96,18 +106,21 @@ class SlcanAdapter:
         return REFUSED
 
     def _transmit(self, line: bytes, frames: list[Frame]) -> bytes:
-        remote, extended = line[:1] in b"rR", line[:1] in b"TR"
+        remote, extended, fd = line[:1] in b"rR", line[:1] in b"TRDB", line[:1] in b"dDbB"
         digits = 8 if extended else 3
         try:
             identifier = int(line[1 : 1 + digits], 16)
-            length = int(line[1 + digits : 2 + digits])
+            code = int(line[1 + digits : 2 + digits], 16)
+            length = FD_LENGTHS[code] if fd else code
             data = b"" if remote else bytes.fromhex(line[2 + digits :].decode("ascii"))
         except (ValueError, UnicodeDecodeError):
             return REFUSED
         whole = (
-            length <= 8 and (remote or len(data) == length) and identifier < (1 << (29 if extended else 11))
+            length <= (64 if fd else 8)
+            and (remote or len(data) == length)
+            and identifier < (1 << (29 if extended else 11))
         )
         if not whole or not self.open or self.listen_only or self.bus_off:
             return REFUSED
-        frames.append(Frame(identifier, data, remote, extended))
+        frames.append(Frame(identifier, data, remote, extended, fd, line[:1] in b"bB"))
         return (b"Z" if extended else b"z") + OK

@@ -21,6 +21,8 @@ FRAMES = st.builds(
     Frame,
     st.integers(0, 0x7FF),
     st.binary(max_size=8),
+    fd=st.just(False),
+    switch=st.just(False),
 )
 
 

@@ -142,6 +142,30 @@ def test_a_saved_mapping_is_found_and_said_and_leaves_canonical_files_alone(tmp_
     assert read_all(tmp_path / "own.csv").columns["motor_position_rad"].tolist() == [7.0]
 
 
+def test_a_row_of_units_is_understood(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("Time,enc,load,state\n[ms],[deg],[mNm],[-]\n0,0,0,1\n10,90,500,1\n")
+    columns = read_all(
+        path, mapping_from(["time_s=Time", "motor_position_rad=enc", "joint_torque_Nm=load"])
+    ).columns
+    assert columns["time_s"].tolist() == [0.0, 0.01]
+    assert columns["motor_position_rad"].tolist() == pytest.approx([0.0, math.pi / 2])
+    assert columns["joint_torque_Nm"].tolist() == [0.0, 0.5]
+    path.write_text("time_s,motor_position_deg\ns,deg\n0,0\n1,180\n")
+    assert read_all(path).columns["motor_position_rad"].tolist() == pytest.approx([0.0, math.pi])
+
+
+@pytest.mark.parametrize("how", ["{}", "{}Z", "{}+02:00"])
+def test_dates_and_times_become_seconds(how: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    stamps = ["2024-03-31T23:59:59.9999995", "2024-03-31 23:59:59.999999750", "2024-04-01T00:00:01"]
+    path.write_text(
+        "when,motor_position_rad\n" + "".join(f"{how.format(s)},{k}\n" for k, s in enumerate(stamps))
+    )
+    time = read_all(path, mapping_from(["time_s=when"])).columns["time_s"]
+    assert np.diff(time) == pytest.approx([2.5e-7, 1.00000025], abs=1e-11)
+
+
 @pytest.mark.parametrize(
     ("column", "channel", "unit"),
     [
@@ -315,3 +339,43 @@ def test_what_is_written_opens_in_pandas_and_polars_with_their_defaults(tmp_path
         for k, name in enumerate(names):
             assert "float" in str(frame[name].dtype).lower()
             np.testing.assert_array_equal(np.asarray(frame[name].to_numpy(), dtype=np.float64), rows[:, k])
+
+
+def test_matlab_files_of_both_kinds_read_alike(tmp_path: Path) -> None:
+    import scipy.io
+
+    true = joint(400)
+    table = np.column_stack([true["motor_position_rad"], true["joint_position_rad"]])
+    scipy.io.savemat(tmp_path / "a.mat", {"time_s": true["time_s"], "angles": table, "rate": 1000.0})
+    files = [tmp_path / "a.mat"]
+    try:
+        import h5py
+    except ImportError:
+        pass
+    else:  # as MATLAB lays it down: turned over, behind a head of 512 bytes
+        with h5py.File(tmp_path / "b.mat", "w", userblock_size=512) as file:
+            for name, values in (
+                ("time_s", true["time_s"][None, :]),
+                ("angles", table.T),
+                ("rate", [[1000.0]]),
+            ):
+                file.create_dataset(name, data=values, chunks=None).attrs["MATLAB_class"] = np.bytes_(
+                    "double"
+                )
+        head = bytearray((tmp_path / "b.mat").read_bytes())
+        head[:19] = b"MATLAB 7.3 MAT-file"
+        (tmp_path / "b.mat").write_bytes(head)
+        files.append(tmp_path / "b.mat")
+    for path in files:
+        columns = read_all(
+            path, mapping_from(["motor_position_rad=angles[0]", "joint_position_rad=angles[1]"])
+        ).columns
+        for name in ("time_s", "motor_position_rad", "joint_position_rad"):
+            assert columns[name].tobytes() == true[name].tobytes(), path
+
+
+def test_units_that_the_file_states_count_in_a_suggestion(tmp_path: Path) -> None:
+    columns = {"t": np.arange(5.0), "m_pos": np.arange(5.0)}
+    found = {s.channel: s.source for s in suggest(columns, units={"t": "ms", "m_pos": "deg"})}
+    assert found["time_s"].unit == "ms"
+    assert found["motor_position_rad"].unit == "deg"

@@ -16,7 +16,7 @@ from cablecomp.errors import DeviceError
 from cablecomp.links import BusLink, BusState, DriveState, Mode, MotorCommand, Request, parse_link
 from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE, MOTOR_VELOCITY
 from firmware_sim.bench import Bench
-from firmware_sim.build import BenchConfig, make_bench
+from firmware_sim.build import FD_PROTOCOLS, BenchConfig, make_bench
 from firmware_sim.errors import SimError
 from firmware_sim.faults import parse_fault
 from firmware_sim.firmware import DriveConfig
@@ -33,6 +33,8 @@ PROTOCOLS = {
     "robstride": ("robstride-socketcan.toml", {"protocol": "robstride", "model": "RS01"}),
     "cubemars-v3": ("cubemars-v3-socketcan.toml", {"protocol": "cubemars"}),
     "cubemars-servo": ("cubemars-servo-socketcan.toml", {"protocol": "cubemars"}),
+    "moteus": ("moteus-socketcan.toml", {"protocol": "moteus", "gains_per_turn": (1000.0, 10.0)}),
+    "moteus-dual": ("moteus-dual-encoder.toml", {"protocol": "moteus", "gains_per_turn": (1000.0, 10.0)}),
     "dbc": ("dbc-virtual.toml", {"protocol": "dbc"}),
 }
 # Half a count of what each wire carries: motor position in rad, motor velocity in rad/s, motor torque in Nm
@@ -44,6 +46,7 @@ RESOLUTION = {
     "robstride": (25.2 / 65535, 88 / 65535, 34 / 65535),
     "cubemars-v3": (0.06 * 0.0175, 10 / 1800, 36 / 4095),  # the status has steps of 0.1 deg, 10 ERPM, 0.01 A
     "cubemars-servo": (0.06 * 0.0175, 10 / 1800, 36 / 4095),
+    "moteus": (2e-6, 2e-5, 1e-5),
     "dbc": (1e-6, 0.025, 1e-3),
 }
 
@@ -92,7 +95,8 @@ class Meeting:
             "udp_multicast": f"udp_multicast:239.74.163.2:{20000 + os.getpid() % 20000}",
         }.get(wire, wire)
         config = BenchConfig(joints=joints, drive=DriveConfig(torque_limit_Nm=8.0), **options)
-        self.bench: Bench = make_bench(config, Spring, open_port(bus), [parse_fault(f, 3) for f in faults])
+        port = open_port(bus, fd=config.protocol in FD_PROTOCOLS)
+        self.bench: Bench = make_bench(config, Spring, port, [parse_fault(f, 3) for f in faults])
         where = self.bench.port.describe()
         reach = {k: v for k, v in where.items() if k in ("port", "hop_limit")}
         text = (CONFIGS / name).read_text(encoding="utf-8").replace("gear_ratio = 8.0", "gear_ratio = 1.0")
@@ -157,7 +161,7 @@ def meet() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("wire", WIRES)
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", [p for p in PROTOCOLS if p != "moteus-dual"])
 def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting = meet(protocol, wire)
     link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
@@ -202,6 +206,18 @@ def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting.until(lambda: device.drive.state.name == "DISABLED")
     assert link.stop()
     meeting.until(lambda: device.drive.state.name in ("DISABLED", "FAULT"))
+
+
+def test_the_joints_encoder_on_the_drives_second_input(meet: Any) -> None:
+    meeting = meet("moteus-dual", "virtual")
+    link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
+    link.request(0, Request.ENABLE, Mode.IMPEDANCE)
+    meeting.until(lambda: device.drive.state.name == "ENABLED")
+    for _ in range(50):
+        meeting.cycle(MotorCommand(-0.3, 0.0, -device.plant.load_Nm, 60.0, 2.0))
+        assert joint.values[JOINT_POSITION] == pytest.approx(device.truth.joint_position_rad, abs=1e-6)
+    assert joint.values[JOINT_POSITION] < -0.05
+    assert joint.updates[JOINT_TORQUE] == 0
 
 
 def test_eight_joints_on_one_bus(meet: Any) -> None:

@@ -1,0 +1,154 @@
+"""The head of a CSV text: comments, names, separator, perhaps a row of units, and which columns hold dates."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from cablecomp.errors import InputError
+from cablecomp.recording.source import Truncated, chunks
+from cablecomp.units import UNITS, unit_named
+
+_HEAD_LIMIT: Final = 1 << 20
+_MOST_COLUMNS: Final = 4096
+_SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
+_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands before the first row: `first_line` is the line of the first row, counted from 1.
+
+    `units`: those of a row of units below the names. `dates`: columns that hold dates and times (ISO 8601), read
+    as seconds since midnight of `day`.
+    """
+
+    columns: tuple[str, ...]
+    comments: tuple[str, ...]
+    separator: str
+    decimal_comma: bool
+    header_line: int
+    first_line: int
+    size: int
+    units: tuple[str, ...] = ()
+    dates: frozenset[str] = frozenset()
+    day: datetime = datetime(1970, 1, 1)
+
+
+def read_head(path: Path, gzipped: bool) -> Head:
+    """Read comments and header line; InputError if there is no header or it holds numbers."""
+    text = b""
+    try:
+        for piece in chunks(path, gzipped, 1 << 16):
+            text += piece.data
+            head = _parse_head(text)
+            if head is not None and text.count(b"\n") > head.first_line:
+                break
+            if len(text) > _HEAD_LIMIT:
+                break
+    except Truncated as error:
+        raise InputError(f"{path}: {error}, before the first row; copy or record the file anew") from None
+    head = _parse_head(text)
+    if head is None:
+        raise InputError(
+            f"{path}: has no header line; expected column names such as time_s,motor_position_rad"
+        )
+    if len(head.columns) > _MOST_COLUMNS:
+        raise InputError(
+            f"{path}: line {head.header_line}: has {len(head.columns)} columns; {_MOST_COLUMNS} are accepted"
+        )
+    if _is_number(head.columns[0]):
+        raise InputError(
+            f"{path}: line {head.header_line}: holds numbers where the column names are expected; "
+            "add a header line such as time_s,motor_position_rad,joint_torque_Nm"
+        )
+    return head
+
+
+def _parse_head(text: bytes) -> Head | None:
+    size, comments = 0, []
+    shift = 3 if text.startswith(b"\xef\xbb\xbf") else 0
+    lines = plain_breaks(text[shift:].removesuffix(b"\r")).split(b"\n")
+    for number, raw in enumerate(lines, start=1):
+        size += len(raw) + 1
+        line = raw.decode("utf-8", "replace").strip()
+        if not line:
+            continue
+        if line.startswith("#"):
+            comments.append(line[1:].strip())
+            continue
+        separator = max(_SEPARATORS, key=line.count)
+        names = (name.strip().strip('"').strip() for name in line.split(separator))
+        columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
+        first = lines[number].decode("utf-8", "replace") if number < len(lines) else ""
+        comma = separator != "," and "," in first
+        found = Head(columns, tuple(comments), separator, comma, number, number + 1, size + shift)
+        return _below(found, lines[number : number + 2])
+    return None
+
+
+def _below(head: Head, lines: list[bytes]) -> Head:
+    """Take in a row of units, if there is one, and look for dates in the first row."""
+    rows = [
+        [cell.strip().strip('"') for cell in line.decode("utf-8", "replace").split(head.separator)]
+        for line in lines
+    ]
+    if rows and len(rows[0]) == len(head.columns) and any(rows[0]) and all(map(_is_unit, rows[0])):
+        units = tuple(cell.strip("[]()") for cell in rows.pop(0))
+        first_line, size = head.first_line + 1, head.size + len(lines[0]) + 1
+        head = replace(head, units=units, first_line=first_line, size=size)
+    if not rows or len(rows[0]) != len(head.columns):
+        return head
+    dated = {name: cell for name, cell in zip(head.columns, rows[0], strict=True) if _DATE.fullmatch(cell)}
+    if not dated:
+        return head
+    day = min(seconds_since(cell, datetime(1970, 1, 1)) or 0.0 for cell in dated.values()) // 86400.0
+    return replace(
+        head, dates=frozenset(dated), day=datetime.fromtimestamp(day * 86400.0, UTC).replace(tzinfo=None)
+    )
+
+
+def seconds_since(cell: str, day: datetime) -> float | None:
+    """Seconds from midnight of `day` (UTC) to a date and time; None if the cell holds none."""
+    text = cell.strip()
+    if not _DATE.fullmatch(text):
+        return None
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    at = at if at.tzinfo is None else at.astimezone(UTC).replace(tzinfo=None)
+    whole = (at.replace(microsecond=0) - day).total_seconds()
+    fraction = re.search(r"\.\d+", text)
+    return whole + (float(fraction[0]) if fraction else 0.0)
+
+
+def _is_unit(cell: str) -> bool:
+    bare = cell.strip("[]()")
+    known = any(unit_named(bare, table) is not None for table in UNITS.values())
+    return not bare or known or bare in ("-", "1", "V", "%", "bool", "counts", "raw")
+
+
+def plain_breaks(text: bytes) -> bytes:
+    """Line breaks of any kind as `\\n`."""
+    return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text
+
+
+def number(cell: str) -> float | None:
+    """The number in a cell, NaN of an empty one, None if it holds anything else."""
+    if "_" in cell:
+        return None
+    text = cell.strip()
+    if not text:
+        return float("nan")
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _is_number(text: str) -> bool:
+    return bool(text) and number(text) is not None
