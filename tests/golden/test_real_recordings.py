@@ -60,7 +60,6 @@ def test_the_sheath_is_routing_friction_that_depends_on_its_bend(bends: Diagnosi
     assert routing.depends_on["per_unit"] > 0.0
 
 
-@pytest.mark.xfail(strict=False, reason="reached 1.43 deg in sample where 1.35 is asked")
 def test_one_drive_for_all_bends(bends: Diagnosis) -> None:
     e = bends.augmented
     print(
