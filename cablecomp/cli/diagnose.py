@@ -9,12 +9,11 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, announce_compilation, console, read_joint, share_bar
+from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint, share_bar
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
-from cablecomp.effects import load_effects
 from cablecomp.errors import path_text
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.folder import find_recordings
@@ -46,27 +45,20 @@ def diagnose_recordings(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of surrogates and resampling")] = 0,
-    effects: Annotated[
-        list[Path] | None, typer.Option(help="Python file that registers an effect of your own")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print diagnosis.json in place of the summary")
-    ] = False,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     words: MapOption = None,
     link: LinkOption = None,
     dbc: DbcOption = None,
     which: JointOption = None,
 ) -> None:
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
-    for path in effects or ():
-        load_effects(path)
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     reading = sources(words, link, dbc, which, joint)
     data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
     for name, columns in data.items():
         require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
-    if not as_json:
-        announce_compilation()
+    announce_compilation()
     with share_bar() as told:
         found = diagnose(joint, data, told, seed, None if session is None else session.value)
     with atomic_directory(out) as folder:

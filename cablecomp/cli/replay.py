@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from cablecomp.cli.shared import Config, announce_compilation, console, read_joint
+from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config import in_session, session_of
 from cablecomp.observer import Observer
@@ -31,13 +31,15 @@ def replay(
         str | None,
         typer.Option(help="whose own values hold; the [[session]] that names the recording if absent"),
     ] = None,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     words: MapOption = None,
     link: LinkOption = None,
     dbc: DbcOption = None,
     which: JointOption = None,
 ) -> None:
     """Stream a recording through the observer that the controller runs; compare with what was measured."""
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     source = sources(words, link, dbc, which, joint).open(recording)
     found = session_of(joint, recording, session)
     joint = in_session(joint, found)
@@ -46,6 +48,9 @@ def replay(
         summary = write_replay(
             source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), told
         )
+    if as_json:
+        typer.echo(summary.to_json(), nl=False)
+        return
     table = Table(show_header=False, box=None)
     if summary.rmse_rad is not None:
         table.add_row("prediction error, RMS", f"{1e3 * summary.rmse_rad:.5g} mrad")
