@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint, share_bar
+from cablecomp.cli.beliefs import believe
+from cablecomp.cli.shared import (
+    Config,
+    EffectsOption,
+    JsonOption,
+    announce_compilation,
+    console,
+    read_joint,
+    share_bar,
+)
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.errors import path_text
@@ -41,8 +51,10 @@ def calibrate_joint(
     for name, columns in data.items():
         require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
     announce_compilation()
+    doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:
         found = calibrate(joint, data, seed, progress=told)
+    found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         (folder / "joint.calibrated.toml").write_text(calibrated_text(found), encoding="utf-8")
         text = json.dumps(calibration_json(found), indent=1)

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, Control, EffectsOption, JsonOption, console, control_of, echo_json, read_joint
+from cablecomp.cli.shared import (
+    Config,
+    Control,
+    EffectsOption,
+    JsonOption,
+    console,
+    control_of,
+    echo_json,
+    read_joint,
+)
 from cablecomp.control.design import design_loop
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.design_page import design_page, design_tables

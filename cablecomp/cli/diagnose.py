@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint, share_bar
+from cablecomp.cli.beliefs import believe
+from cablecomp.cli.shared import (
+    Config,
+    EffectsOption,
+    JsonOption,
+    announce_compilation,
+    console,
+    read_joint,
+    share_bar,
+)
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
@@ -59,8 +69,10 @@ def diagnose_recordings(
     for name, columns in data.items():
         require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
     announce_compilation()
+    doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:
         found = diagnose(joint, data, told, seed, None if session is None else session.value)
+    found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         write_diagnosis(found, folder)
         page = diagnosis_page(found, joint_text(found.augmented_joint))

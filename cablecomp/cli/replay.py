@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from cablecomp.cli.beliefs import believe_streamed
 from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config import in_session, session_of
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
+from cablecomp.recording.replay import required_channels
 from cablecomp.report.replay_page import write_replay
 
 
@@ -44,6 +47,8 @@ def replay(
     found = session_of(joint, recording, session)
     joint = in_session(joint, found)
     announce_compilation()
+    source.require(required_channels(joint), f"with [observer] load = {joint.observer.load!r}")
+    source = dataclasses.replace(source, notes=(*source.notes, *believe_streamed(joint, source)))
     with progress_bar(f"replay {recording.name}") as told:
         summary = write_replay(
             source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), told

@@ -10,7 +10,17 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.live import LiveRun
-from cablecomp.cli.shared import DEMO_LINK, Config, Control, EffectsOption, JsonOption, console, control_of, echo_json, read_joint
+from cablecomp.cli.shared import (
+    DEMO_LINK,
+    Config,
+    Control,
+    EffectsOption,
+    JsonOption,
+    console,
+    control_of,
+    echo_json,
+    read_joint,
+)
 from cablecomp.config import JointConfig
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlMode

@@ -84,7 +84,13 @@ def _plain(value: Any) -> Any:
         return float(value) if isfinite(value) else None
     if isinstance(value, complex):
         return {"real": _plain(value.real), "imaginary": _plain(value.imag)}
-    return value.item() if isinstance(value, np.generic) else value if isinstance(value, int | str) or value is None else str(value)
+    return (
+        value.item()
+        if isinstance(value, np.generic)
+        else value
+        if isinstance(value, int | str) or value is None
+        else str(value)
+    )
 
 
 def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
@@ -95,7 +101,9 @@ def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
 def announce_compilation() -> None:
     """Say so before the first use of this very version compiles its kernels."""
     if not is_compiled():
-        Console(stderr=True).print("compiling the kernels, once for this version (under a minute) ...", style="dim")
+        Console(stderr=True).print(
+            "compiling the kernels, once for this version (under a minute) ...", style="dim"
+        )
 
 
 @contextmanager

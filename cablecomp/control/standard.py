@@ -64,9 +64,7 @@ def calibration_protocol(config: JointConfig, share: float = 0.8) -> Protocol:
         Ramp(duration_s=3.0 * slower, position_rad=s.low_rad, load_Nm=m),
         Ramp(duration_s=4.0 * slower, position_rad=s.high_rad, load_Nm=base - 0.8 * (m - base)),
         Ramp(duration_s=3.0 * slower, position_rad=0.3 * s.high_rad, load_Nm=base + 0.5 * (m - base)),
-        SineSweep(
-            amplitude=0.35 * m if base == 0.0 else 0.2 * m, from_Hz=0.15, to_Hz=0.4, duration_s=10.0
-        ),
+        SineSweep(amplitude=0.35 * m if base == 0.0 else 0.2 * m, from_Hz=0.15, to_Hz=0.4, duration_s=10.0),
         Ramp(duration_s=3.0 * slower, position_rad=s.low_rad, load_Nm=base - 0.5 * (m - base)),
         Ramp(duration_s=4.0 * slower, position_rad=0.0, load_Nm=base + 0.9 * (m - base)),
         Unload(rate_Nm_s=0.5 * m, dwell_s=0.5),

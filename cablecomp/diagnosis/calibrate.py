@@ -20,9 +20,11 @@ from cablecomp.diagnosis.explain.selection import Model
 from cablecomp.diagnosis.motion import Advice, what_would_tell
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.values import drive_values
+from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.limits import EXACT
+from cablecomp.signal.noise import channel_noise
 
 UNTOLD = 0.9
 """Share of its prior's sd from which a parameter's own sd says that the recordings told nothing of it."""
@@ -84,16 +86,16 @@ def calibrate(
     fit = on_every_sample(drive, recordings)
     progress("what could not be told", 0.9)
     unknown = _not_told(fit)
+    spread, tied = _spread(fit), _tied(fit)
     fit = _without(fit, tuple(unknown))
     joint = augmented_joint(config, Model((), fit, fit.residual), (), body.names)
-    at_nominal = fit.problem.start if not unknown else _nominal(fit)
     return Calibration(
-        _with_tolerances(joint, fit),
-        drive_values(fit, config),
+        _with_tolerances(joint, fit, spread),
+        tuple(_as_wide(v, fit, spread) for v in drive_values(fit, config)),
         tuple(_kept(drive, name, why) for name, why in unknown.items()),
-        _tied(fit),
+        tied,
         rms_left(fit),
-        rms_left(replace(fit, x=at_nominal)),
+        rms_left(replace(fit, x=fit.problem.start)),
         float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])),
         _warnings(drive, fit),
         fit,
@@ -110,8 +112,18 @@ def _everything(body: Body) -> list[Evidence]:
     ]
 
 
-def _nominal(fit: Fit) -> np.ndarray:
-    return fit.problem.start
+def _spread(fit: Fit) -> dict[str, float]:
+    """1-sigma of every parameter's coordinate, all others free: what is not told later on widens the rest as well."""
+    sd = np.sqrt(np.diag(covariance(fit)))
+    return {p.name: float(s) for p, s in zip(fit.problem.parameters, sd, strict=True)}
+
+
+def _as_wide(value: Value, fit: Fit, spread: Mapping[str, float]) -> Value:
+    """The value with the sd that it had while all others were free."""
+    for p, x in zip(fit.problem.parameters, fit.x, strict=True):
+        if p.name == value.name:
+            return replace(value, sd=spread[p.name] * abs(p.slope(float(x))))
+    return value
 
 
 def _not_told(fit: Fit) -> dict[str, str]:
@@ -155,13 +167,12 @@ def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:
     return tuple(found)
 
 
-def _with_tolerances(joint: JointConfig, fit: Fit) -> JointConfig:
+def _with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) -> JointConfig:
     """Tolerances of what is known now: what the fit leaves, never less than what a drawing does."""
     tolerance = dict(joint.tolerance)
-    sd = np.sqrt(np.diag(covariance(fit)))
-    for p, s in zip(fit.problem.parameters, sd, strict=True):
+    for p in fit.problem.parameters:
         if p.name in tolerance:
-            tolerance[p.name] = float(f"{max(float(s), EXACT if p.log else 0.0):.2g}")
+            tolerance[p.name] = float(f"{max(spread[p.name], EXACT if p.log else 0.0):.2g}")
     return joint.model_copy(update={"tolerance": tolerance})
 
 
@@ -172,6 +183,20 @@ def _warnings(drive: Calibrated, fit: Fit) -> tuple[str, ...]:
         found.append(
             f"{100 * drive.lost_rows / total:.0f} % of the rows were given up to the history before the first sample"
         )
+    count = max(_count_rad(e) for e in fit.problem.evidence) * fit.problem.config.drive.ratio
+    if count > float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
+        found.append(
+            f"one count of the motor encoder turns the joint by {1e6 * count:.2g} urad, more than the joint encoder's noise: "
+            "a motor that hunts within a count shakes friction loose unseen; mu_input is what acts then, not the material's"
+        )
     if rms_left(fit) > 2.0 * float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
         found.append("more than noise is left: `cablecomp diagnose` says what the model lacks")
     return tuple(found)
+
+
+def _count_rad(e: Evidence) -> float:
+    """The motor angle's resolution as the recording shows it [rad]; 0 where it cannot be told."""
+    try:
+        return float(channel_noise(e.columns["time_s"], e.columns["motor_position_rad"]).resolution)
+    except InputError:
+        return 0.0

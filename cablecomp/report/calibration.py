@@ -72,7 +72,9 @@ def calibration_json(found: Calibration) -> dict[str, Any]:
 
 def calibrated_text(found: Calibration) -> str:
     """`joint.calibrated.toml`: the joint with what is known now; its head says what was fitted and what was not."""
-    lines = ["calibrated; tolerances of fitted values are what the fit leaves (1 sigma, relative, at least 0.3 %)"]
+    lines = [
+        "calibrated; tolerances of fitted values are what the fit leaves (1 sigma, relative, at least 0.3 %)"
+    ]
     lines += [f"{v.name}: {v.value:.5g} ± {v.sd:.2g}, was {cells(v)[0]}" for v in found.values]
     return joint_text(found.config, (*lines, *calibration_notes(found)))
 
@@ -83,6 +85,4 @@ def _kept(k: Kept) -> str:
         if k.advice is None
         else f"{k.advice.motion} would tell it to ± {100 * k.advice.sd:.2g} %"
     )
-    return (
-        f"{k.name} stays nominal, {k.nominal:.5g} ± {100 * min(k.tolerance, 9.99):.2g} %: {k.why}; {told}"
-    )
+    return f"{k.name} stays nominal, {k.nominal:.5g} ± {100 * min(k.tolerance, 9.99):.2g} %: {k.why}; {told}"
