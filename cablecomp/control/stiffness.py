@@ -3,7 +3,7 @@ the observer."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import control
 import numpy as np

@@ -24,7 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.mechanics.jit import kernel, leaf_kernel
-from cablecomp.mechanics.tables import GROOVED, PLAIN, STIFF, STIFFENING, between, groove, stiffening_strain, strain
+from cablecomp.mechanics.tables import (
+    GROOVED,
+    PLAIN,
+    STIFF,
+    STIFFENING,
+    between,
+    groove,
+    stiffening_strain,
+    strain,
+)
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
