@@ -37,7 +37,7 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
     weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
     left = model.left_out[rows].copy()
     fold, block = groups.fold[rows], groups.block[rows]
-    here = Groups(block, fold, groups.by)
+    here = Groups(block, fold, groups.by, np.zeros_like(block))
     found: list[Found] = []
     while True:
         best: Found | None = None

@@ -86,7 +86,7 @@ def diagnose(
         kept = final
     laws = empirical_laws(final, groups) if named else []
     repeated = repeatability(drive.fit.problem.evidence, seen)
-    structured = _structured(rest if named else location, after if named else before, repeated)
+    structured = _structured(rest if named else location, after if named else before, repeated, bool(named))
     verdict = _verdict(named, structured, drive)
     progress("counting errors on data left out", 0.95)
     by = groups.by
@@ -216,13 +216,14 @@ def _share_left(drive: Calibrated, final: Model) -> float:
     return float(np.clip(after / max(before, 1e-3 * noise), 0.0, 1.0))
 
 
-def _structured(found: Location, series: Series, repeated: float | None) -> bool:
-    """Whether what is left is more than noise and follows something."""
+def _structured(found: Location, series: Series, repeated: float | None, named: bool) -> bool:
+    """Whether what is left is more than noise and follows something; beside a name, far more than noise is enough."""
     yardstick = (
         float(np.mean(series.sigma)) if repeated is None else max(repeated, float(np.mean(series.sigma)))
     )
     ratio = float(np.mean(series.residual**2)) / yardstick**2
-    return ratio > LIMITS.structured and bool(found.significant(0.01))
+    follows = bool(found.significant(0.01))
+    return ratio > (LIMITS.structured if follows else LIMITS.beyond_noise if named else np.inf)
 
 
 def _verdict(named: Sequence[Weighed], structured: bool, drive: Calibrated) -> str:

@@ -40,15 +40,19 @@ class Thresholds:
     """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
     worth_rates: float = 1.08
     """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on every sample."""
-    hopeless: float = 4.0
+    tolerance: float = 1e-3
+    """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by far more."""
+    hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0
     """The second model is carried on where its loss on data left out is less than this many times the best one's."""
     quiet: float = 1.15
     """Mean square over the sensors' noise at which nothing further is asked: what is left is noise."""
+    z_first: float = 1.7
+    """Standard errors of the paired held-out difference that the first effect must show to enter the model; whether it is named
+    is its confidence's matter (what is missing first leaves few, long waves, whose scatter is large)."""
     z: float = 2.5
-    """Standard errors of the paired held-out difference that an effect must show to enter the model; whether it is named is
-    its confidence's matter (one in 160 by chance, about twenty asked)."""
+    """The same for every further effect: one in 160 by chance, about twenty asked."""
     gain: float = 0.06
     """Share of the held-out square of what is left that an effect must take off to be looked at as a name: below it, laws of
     another form and calibration trade places."""
@@ -70,6 +74,9 @@ class Thresholds:
     """Share of a recording that may be given up to an unknown history."""
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
+    beyond_noise: float = 4.0
+    """The same where it follows nothing that can be shown (a single recording of few cycles) and physics is named: twice the
+    noise is not noise."""
     recalibrate: float = 0.9
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     name: float = 0.5

@@ -14,6 +14,9 @@ from cablecomp.estimation.least_squares import Fit
 SIGMAS = 3.0
 """Standard deviations of its amount up to which an effect could have stayed unseen."""
 
+SHAPES = 6
+"""Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
+
 
 def could_be_unseen(fit: Fit, pool: Sequence[Hypothesis], named: Sequence[str]) -> list[dict[str, Any]]:
     """One row per effect: its amount is below `below` unless it hides in the least visible of its shapes; None = any size."""
@@ -22,7 +25,8 @@ def could_be_unseen(fit: Fit, pool: Sequence[Hypothesis], named: Sequence[str]) 
     for h in pool:
         if h.name in named:
             continue
-        sizes = [_bound(here, h, k) for k in range(len(h.starts))]
+        shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // SHAPES)
+        sizes = [_bound(here, h, k) for k in shapes]
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
         below = max(seen) if seen and len(seen) == len(sizes) else None

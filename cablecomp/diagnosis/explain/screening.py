@@ -14,6 +14,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import INSTANT, PHASE, Hypothesis, Start, at_instants
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Problem
@@ -81,7 +82,7 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
         t = float(best[1][INSTANT])
         times = sorted(float(s.values[INSTANT]) for s in h.starts)
         width = times[1] - times[0]
-        for _ in range(4):
+        for _ in range(2 if here.fit.problem.fine else 4):
             width *= 0.5
             closer = _best(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
             if closer is not None and closer[0] < best[0]:
@@ -98,7 +99,8 @@ def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], F
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)
     best = None
-    for start in h.starts:
+    # an event's instants are looked at coarsely where every run is dear
+    for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
         found = contribution(here, h, start)
         if found is None:
             continue
@@ -209,7 +211,7 @@ def rough(answers: Sequence[Answer], evaluations: int, cold: Mapping[str, float]
     for k, (problem, x) in enumerate(starts):
         wanted = 3 if problem.fine else evaluations if k < len(answers) else evaluations + 3
         try:
-            fits.append(solve(problem, x, wanted))
+            fits.append(solve(problem, x, wanted, LIMITS.tolerance))
         except InputError:
             continue
     return min(fits, key=lambda f: f.cost, default=None)

@@ -18,9 +18,10 @@ from cablecomp.diagnosis.explain.scores import (
     Groups,
     Lead,
     confidence_set,
-    huber,
+    block_losses,
     lead,
     left_out,
+    scales,
     selected_in,
 )
 from cablecomp.diagnosis.explain.screening import Anchor, Answer, anchor, ask_all, rough
@@ -119,16 +120,17 @@ def select(
             answers = answers or answered
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
-        good = [t for _, t in candidates if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
-        fresh = _distinct(sorted((t.model for t in good), key=lambda m: _loss(m, best, groups)))
+        good = [t for _, t in candidates if _demanded(t, number)]
+        fresh = _ranked([t.model for t in good], groups)
         if not fresh:
             break
-        most = LIMITS.close * _loss(fresh[0], fresh[0], groups)
-        kept = [m for m in fresh[: LIMITS.beam] if _loss(m, fresh[0], groups) < most]
+        size = _common([fresh[0]], groups)
+        most = LIMITS.close * _loss(fresh[0], size, groups)
+        kept = [m for m in fresh[: LIMITS.beam] if _loss(m, size, groups) < most]
         sharper = searching(fresh[0].fit)
-        carried = [reweighed(m, sharper, groups) for m in kept]
+        carried = _ranked([reweighed(m, sharper, groups) for m in kept], groups)
         rival = best if best.fit.problem.fine == carried[0].fit.problem.fine else None
-        if rival is None or _better(carried[0], reweighed(rival, sharper, groups), groups):
+        if rival is None or not number or _better(carried[0], reweighed(rival, sharper, groups), groups):
             best = carried[0]
         if quiet(best.fit):
             break
@@ -137,12 +139,20 @@ def select(
     return Selection(first, tuple(rounds), final, groups, answers)
 
 
-def _distinct(models: Sequence[Model]) -> list[Model]:
-    """Each set of terms once, the first of its kind."""
+def _ranked(models: Sequence[Model], groups: Groups) -> list[Model]:
+    """By loss on data left out, each set of terms once."""
     found: dict[frozenset[str], Model] = {}
-    for m in models:
+    if not models:
+        return []
+    size = _common(models, groups)
+    for m in sorted(models, key=lambda m: _loss(m, size, groups)):
         found.setdefault(frozenset(t.name for t in m.terms), m)
     return list(found.values())
+
+
+def _demanded(t: Tried, number: int) -> bool:
+    """Whether data left out demand what a round tried."""
+    return t.lead.z > (LIMITS.z if number else LIMITS.z_first) and t.lead.gain > LIMITS.gain
 
 
 def _better(model: Model, than: Model, groups: Groups) -> bool:
@@ -215,12 +225,13 @@ def _one_round(
     def finish(c: tuple[float, tuple[Term, ...], Problem, FloatArray]) -> Model | None:
         progress(f"fitting {c[1][0].name}", done)
         try:
-            fit = solve(c[2], c[3], 15)
+            fit = solve(c[2], c[3], 15, LIMITS.tolerance)
         except InputError:
             return None
         ratio = 1.0
         if fine is not None and fit.problem.fine:
-            ratio = _loss(model, model, groups) / max(_loss(fine, model, groups), 1e-300)
+            size = scales(model.left_out, groups)
+            ratio = _loss(model, size, groups) / max(_loss(fine, size, groups), 1e-300)
         return Model((*model.terms, *c[1]), fit, left_out(fit, groups), ratio)
 
     models = [m for m in side_by_side(finish, chosen) if m is not None]
@@ -234,7 +245,7 @@ def _one_round(
     first = len(model.terms)
     tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
-    good = [t for t in tried if t.lead.z > LIMITS.z and t.lead.gain > LIMITS.gain]
+    good = [t for t in tried if _demanded(t, number)]
     return Round(model, promised, tuple(tried), good[0] if good else None), tuple(
         x for a in answers for x in a
     )
@@ -347,11 +358,14 @@ def _placed(fit: Fit, problem: Problem) -> FloatArray:
     )
 
 
-def _loss(model: Model, reference: Model, groups: Groups) -> float:
-    """Loss on data left out, in units of the reference's remainder (so that models compare by one yardstick)."""
-    here = groups.block >= 0
-    scale = float(np.median(np.abs(reference.left_out[here]))) / 0.6745
-    return model.by_thinning * float(np.sum(huber(model.left_out[here], scale)))
+def _common(models: Sequence[Model], groups: Groups) -> FloatArray:
+    """One yardstick for several models: of each channel, what the best of them leaves."""
+    return np.asarray(np.min([scales(m.left_out, groups) for m in models], axis=0), dtype=np.float64)
+
+
+def _loss(model: Model, size: FloatArray, groups: Groups) -> float:
+    """Loss on data left out by a common yardstick."""
+    return model.by_thinning * float(np.sum(block_losses(model.left_out, size, groups)))
 
 
 def without(model: Model, term: Term, groups: Groups) -> Model | None:
@@ -360,7 +374,7 @@ def without(model: Model, term: Term, groups: Groups) -> Model | None:
     problem = _stripped(model.fit.problem, term)
     start = _placed(model.fit, problem)
     try:
-        fit = solve(problem, start, 10)
+        fit = solve(problem, start, 10, LIMITS.tolerance)
     except InputError:
         return None
     return Model(kept, fit, left_out(fit, groups))
@@ -416,7 +430,8 @@ def rivals(
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )
-    losses: dict[str, FloatArray] = {term.name: _block_losses(model, model, groups)}
+    size = scales(model.left_out, groups)
+    losses = {term.name: block_losses(model.left_out, size, groups)}
     leads: dict[str, Lead] = {}
     chosen = roughs[: LIMITS.promising // 2]
     fits = side_by_side(lambda p: _tried(p[0]), chosen)
@@ -425,23 +440,16 @@ def rivals(
             continue
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         leads[a.hypothesis.name] = lead(model.left_out, other.left_out, groups)
-        losses[a.hypothesis.name] = _block_losses(other, model, groups)
+        losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
     kept = confidence_set(losses, rng)
     return tuple(n for n in kept if n != term.name), leads
 
 
 def _tried(fit: Fit) -> Fit | None:
     try:
-        return solve(fit.problem, fit.x, 10)
+        return solve(fit.problem, fit.x, 10, LIMITS.tolerance)
     except InputError:
         return None
-
-
-def _block_losses(model: Model, reference: Model, groups: Groups) -> FloatArray:
-    here = groups.block >= 0
-    scale = float(np.median(np.abs(reference.left_out[here]))) / 0.6745
-    sums = np.bincount(groups.block[here], huber(model.left_out[here], scale), minlength=groups.blocks)
-    return np.asarray(sums, dtype=np.float64)
 
 
 __all__ = ["Anchor", "Model", "Round", "Selection", "Tried", "rivals", "select", "without"]
