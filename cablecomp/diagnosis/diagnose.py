@@ -27,7 +27,7 @@ from cablecomp.diagnosis.result import Diagnosis, Errors, Law, Named, Tested, Tr
 from cablecomp.diagnosis.series import Series, make_series
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.diagnosis.unknown import describe
-from cablecomp.diagnosis.unseen import could_be_unseen
+from cablecomp.diagnosis.unseen import Hidden, could_be_unseen
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve, weighed
@@ -95,7 +95,8 @@ def diagnose(
     if laws:
         augmented = _with_laws(augmented, laws)
     joint = augmented_joint(config, kept, [f.law for f in laws], body.names)
-    tied = _tied(weighed_terms)
+    unseen, hidden = could_be_unseen(kept.fit, pool, [w.term.name for w in named])
+    tied = (*_tied(weighed_terms), *(((h.effect,), h.why) for h in hidden))
     return Diagnosis(
         config=config,
         recordings=body.names,
@@ -120,8 +121,8 @@ def diagnose(
         candidates=_candidates(weighed_terms, selection, final),
         not_excluded=tied,
         empirical=tuple(Law(f.law.id, _of(f.law.of), f.lead.gain, f.lead.z) for f in laws),
-        next_experiment=_experiment(config, selection, weighed_terms, drive, seen, bool(tied)),
-        could_be_unseen=tuple(could_be_unseen(kept.fit, pool, [w.term.name for w in named])),
+        next_experiment=_experiment(selection, weighed_terms, kept, hidden, drive, seen),
+        could_be_unseen=tuple(unseen),
         remainder=_remainder(
             kept, rest if named else location, after if named else before, structured, drive, rng
         ),
@@ -361,16 +362,14 @@ def _tested(selection: Selection, named: Sequence[str]) -> tuple[Tested, ...]:
 
 
 def _experiment(
-    config: JointConfig,
     selection: Selection,
     found: Sequence[Weighed],
+    kept: Model,
+    hidden: Sequence[Hidden],
     drive: Calibrated,
     seen: Sequence[Covariates],
-    tied: bool,
 ) -> tuple[str, str] | None:
-    """Where effects are tied, what would set their predictions apart."""
-    if not tied:
-        return None
+    """Where effects are tied, or one hides behind the calibration, what would set the predictions apart."""
     first = drive.fit.problem.evidence[0]
     names = {n for w in found for n in w.rivals}
     models = [selection.final.fit.problem.joint(selection.final.fit.x, first)]
@@ -379,6 +378,8 @@ def _experiment(
             if t.term.name in names:
                 names.discard(t.term.name)
                 models.append(t.model.fit.problem.joint(t.model.fit.x, first))
+    if len(models) < 2:
+        models = [kept.fit.problem.joint(kept.fit.x, first), *(h.joint for h in hidden[:1])]
     if len(models) < 2:
         return None
     temperature = float(np.mean(first.columns.get("temperature_degC", np.array([20.0]))))

@@ -138,11 +138,6 @@ def test_a_missing_channel_is_one_line_and_leaves_nothing(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="since the diagnosis was rewritten: bearing friction is named at this small swing, and what EA can take up is "
-    "said in could_be_unseen alone, without an experiment",
-)
 def test_a_compliance_behind_the_stiffness_is_said_not_named(tmp_path: Path) -> None:
     """One small swing of the load, input locked: EA within its tolerance makes up for a soft mount."""
     time = np.arange(0.0, 40.0, 0.01)

@@ -17,8 +17,8 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import (
     Groups,
     Lead,
-    confidence_set,
     block_losses,
+    confidence_set,
     lead,
     left_out,
     scales,
