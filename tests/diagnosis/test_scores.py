@@ -124,3 +124,17 @@ def test_models_are_chosen_in_shares_that_add_up() -> None:
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares["good"] > 0.99
     assert selected_in({}, rng) == {}
+
+
+def test_a_channels_unit_decides_nothing() -> None:
+    """Each channel has its own yardstick: a torque in N mm leads as far as the same torque in N m."""
+    rng = np.random.default_rng(6)
+    block = np.tile(np.repeat(np.arange(BLOCKS), ROWS // 2), 2)
+    channel = np.repeat(np.arange(2), BLOCKS * ROWS // 2)
+    g = Groups(block, block, "block", channel)
+    better = rng.standard_normal(block.size)
+    worse = better + np.where(channel == 1, 1.0, 0.1) * rng.standard_normal(block.size)
+    unit = np.where(channel == 1, 1000.0, 1.0)
+    plain, scaled = lead(better, worse, g), lead(unit * better, unit * worse, g)
+    assert scaled.gain == pytest.approx(plain.gain, rel=1e-9)
+    assert scaled.z == pytest.approx(plain.z, rel=1e-9)
