@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cablecomp.config import Empirical
+from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import Groups, Lead, lead
-from cablecomp.diagnosis.explain.selection import Model
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.signal.smoothing import FloatArray, IntArray

@@ -118,8 +118,8 @@ def gather(
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
     # the drive goes from reading to reading: where an input has none, a bridged value would be an error of the prediction
     kept = np.ones(len(raw["time_s"]), dtype=np.bool_)
-    for key in ("motor_position_rad", load):
-        if key is not None and good[key].mean() > SPARSE:
+    for key in ("motor_position_rad", *([load] if load else [])):
+        if good[key].mean() > SPARSE:
             kept &= good[key]
     time = raw["time_s"]
     raw = {

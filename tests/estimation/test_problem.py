@@ -161,9 +161,7 @@ def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
 ) -> None:
     """The derivative by a session's own pretension is that of running every recording again."""
     free = tuple(
-        q
-        for p in of_drive(JOINT)
-        for q in (own_of(p, ("a", "b")) if p.name == "pretension_N" else (p,))
+        q for p in of_drive(JOINT) for q in (own_of(p, ("a", "b")) if p.name == "pretension_N" else (p,))
     )
     p = Problem(JOINT, free, three, Weighing({ANGLE: SIGMA}, {ANGLE: SPREAD}))
     x, J = p.start, p.jacobian(p.start)

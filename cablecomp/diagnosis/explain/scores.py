@@ -185,7 +185,7 @@ def scales(r: FloatArray, groups: Groups) -> FloatArray:
     found = [
         np.median(np.abs(r[here & (groups.channel == c)])) / 0.6745 for c in range(groups.channel.max() + 1)
     ]
-    return np.maximum(np.array(found), 1e-300)
+    return np.maximum(np.array(found, dtype=np.float64), 1e-300)
 
 
 def block_losses(r: FloatArray, scale: FloatArray, groups: Groups) -> FloatArray:

@@ -10,8 +10,9 @@ import numpy as np
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.model import Model, Selection, without
+from cablecomp.diagnosis.explain.rivals import rivals
 from cablecomp.diagnosis.explain.scores import Groups, Lead, halves, lead, scales
-from cablecomp.diagnosis.explain.selection import Model, Selection, rivals, without
 from cablecomp.diagnosis.locate import Location
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray
