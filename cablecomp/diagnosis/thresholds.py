@@ -23,7 +23,7 @@ class Thresholds:
     search_weight: float = 0.5
     """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
     the calibration do not stand in the way of a better law."""
-    rounds: int = 4
+    rounds: int = 5
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
     zero: float = 0.7
     """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row counts for."""
@@ -56,6 +56,12 @@ class Thresholds:
     gain: float = 0.06
     """Share of the held-out square of what is left that an effect must take off to be looked at as a name: below it, laws of
     another form and calibration trade places."""
+    z_sure: float = 5.0
+    """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
+    gain_sure: float = 0.03
+    """That share."""
+    part: float = 0.4
+    """Part of its amount with which an effect of the model begins beside one that was found without it."""
     tail: float = 3.0
     """Standard deviations of the remainder beyond which a misfit counts linearly (Huber): outliers decide nothing."""
     memory: float = 2.0

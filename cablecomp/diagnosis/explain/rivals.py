@@ -38,7 +38,7 @@ def rivals(
     asked = side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names])
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]
-    fitted = side_by_side(lambda a: rough(a, LIMITS.rough), answers)
+    fitted = [next(iter(f), None) for f in side_by_side(lambda a: rough(a, LIMITS.rough), answers)]
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )

@@ -13,7 +13,8 @@ import numpy as np
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, loss, placed
-from cablecomp.diagnosis.explain.scores import Groups, lead, left_out, scales, selected_in
+from cablecomp.diagnosis.explain.model import ranked as ranked_models
+from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out, scales, selected_in
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
 from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -36,7 +37,10 @@ def one_round(
     progress: Progress,
     number: int,
     cold: Mapping[str, float] | None,
+    known: Sequence[Model],
 ) -> tuple[Round, tuple[Answer, ...]]:
+    """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to begin from
+    where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well."""
     anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
     names = {t.name for t in model.terms}
     ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
@@ -67,15 +71,17 @@ def one_round(
         worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later]
     promising = max(LIMITS.promising - 2 * number, LIMITS.promising // 2)
 
-    def begin(a: list[Answer]) -> Fit | None:
+    def begin(a: list[Answer]) -> list[Fit]:
         progress(f"trying {a[0].hypothesis.name}", done)
-        return rough(a, LIMITS.rough, cold if a[0].hypothesis.trades else None)
+        further = _further(a[0].hypothesis, model, known, cold) if a[0].hypothesis.trades else []
+        return rough(a, LIMITS.rough, further)
 
     roughs = side_by_side(begin, worth)
     ranked: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
-    for f, a in zip(roughs, worth, strict=True):
-        if f is not None:
-            ranked.append((f.cost, (a[0].hypothesis,), f.problem, f.x))
+    second: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    for fits, a in zip(roughs, worth, strict=True):
+        for k, f in enumerate(fits[: 2 if trades and a[0].hypothesis.trades else 1]):
+            (second if k else ranked).append((f.cost, (a[0].hypothesis,), f.problem, f.x))
     for found in side_by_side(lambda c: _by_conditions(c), list(ranked)):
         ranked += found
     for d, cost, problem in dependences:
@@ -87,6 +93,10 @@ def one_round(
         for k, c in enumerate(ranked[:promising])
         if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
     ]
+
+    # what lies lower need not predict better: of two valleys both are fitted to the end
+    taken = {c[1] for c in chosen}
+    chosen += [c for c in second if c[1] in taken and c[0] < LIMITS.hopeless * top]
 
     def finish(c: tuple[float, tuple[Term, ...], Problem, FloatArray]) -> Model | None:
         progress(f"fitting {c[1][0].name}", done)
@@ -100,7 +110,7 @@ def one_round(
             ratio = loss(model, size, groups) / max(loss(fine, size, groups), 1e-300)
         return Model((*model.terms, *c[1]), fit, left_out(fit, groups), ratio)
 
-    models = [m for m in side_by_side(finish, chosen) if m is not None]
+    models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], groups)
     leads = {
         m.name: lead(
             m.left_out, fine.left_out if fine is not None and m.fit.problem.fine else model.left_out, groups
@@ -111,15 +121,27 @@ def one_round(
     first = len(model.terms)
     tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
     tried.sort(key=lambda t: -t.lead.gain)
-    good = [t for t in tried if demanded(t, number)]
+    good = [t for t in tried if demanded(t.lead, first=number == 0)]
     return Round(model, promised, tuple(tried), good[0] if good else None), tuple(
         x for a in answers for x in a
     )
 
 
-def demanded(t: Tried, number: int) -> bool:
-    """Whether data left out demand what a round tried."""
-    return t.lead.z > (LIMITS.z if number else LIMITS.z_first) and t.lead.gain > LIMITS.gain
+def _further(
+    h: Hypothesis, model: Model, known: Sequence[Model], cold: Mapping[str, float] | None
+) -> list[Mapping[str, float]]:
+    """Values to begin from beside where calibration stands: effects that trade places sit in a valley of their own, and an
+    earlier model that has this one may have found it; what that model lacks begins at a part of its amount."""
+    names = {t.name for t in model.terms}
+    having = [m for m in known if any(t.name == h.name for t in m.terms) and len(m.terms) <= len(names)]
+    if not having:
+        return [cold] if cold is not None and names else []
+    best = max(having, key=lambda m: len(names & {t.name for t in m.terms}))
+    values = dict(best.fit.values)
+    amounts = {f"effect.{t.effect.id}.{t.amount.name}" for t in model.terms if isinstance(t, Hypothesis)}
+    for name, value in model.fit.values.items():
+        values.setdefault(name, LIMITS.part * value if name in amounts else value)
+    return [values]
 
 
 def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:

@@ -257,6 +257,12 @@ def halves(problem: Problem, groups: Groups) -> list[IntArray]:
     return [np.concatenate(p) for p in parts]
 
 
+def demanded(step: Lead, first: bool = False) -> bool:
+    """Whether data left out demand what leads so; `first`: the first effect of all."""
+    usual = step.z > (LIMITS.z_first if first else LIMITS.z) and step.gain > LIMITS.gain
+    return usual or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
+
+
 def selected_in(differences: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:
     """Share of resampled bodies of blocks in which each model is the best."""
     if not differences:

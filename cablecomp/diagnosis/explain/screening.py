@@ -197,21 +197,22 @@ def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     return sorted((replace(a, place=k) for k, a in enumerate(asked) if a is not None), key=lambda a: a.cost)
 
 
-def rough(answers: Sequence[Answer], evaluations: int, cold: Mapping[str, float] | None = None) -> Fit | None:
-    """The best of short fits from where each anchor's answer begins; None if none can be followed.
+def rough(
+    answers: Sequence[Answer], evaluations: int, further: Sequence[Mapping[str, float]] = ()
+) -> list[Fit]:
+    """Short fits from where each anchor's answer begins, best first; none if none can be followed.
 
-    `cold`: values to begin from as well, the drive at its nominal ones: effects that were added one after the other may sit in
-    a valley of their own.
+    `further`: values to begin from as well (what they do not name, at its start).
     """
     fits = []
     starts = [(a.problem, a.x) for a in answers]
-    if cold is not None:
-        problem = answers[0].problem
-        starts.append((problem, np.array([p.x(cold.get(p.name, p.start)) for p in problem.parameters])))
+    problem = answers[0].problem
+    for values in further:
+        starts.append((problem, np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters])))
     for k, (problem, x) in enumerate(starts):
         wanted = 3 if problem.fine else evaluations if k < len(answers) else evaluations + 3
         try:
             fits.append(solve(problem, x, wanted, LIMITS.tolerance))
         except InputError:
             continue
-    return min(fits, key=lambda f: f.cost, default=None)
+    return sorted(fits, key=lambda f: f.cost)

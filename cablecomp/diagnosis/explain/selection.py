@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,8 +20,8 @@ from cablecomp.diagnosis.explain.model import (
     searching,
     without,
 )
-from cablecomp.diagnosis.explain.rounds import Progress, cold_starts, demanded, one_round
-from cablecomp.diagnosis.explain.scores import Groups, lead, left_out
+from cablecomp.diagnosis.explain.rounds import Progress, cold_starts, one_round
+from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
@@ -35,12 +34,11 @@ def select(
     groups: Groups,
     rng: np.random.Generator,
     progress: Progress,
-    budget_s: float = 150.0,
 ) -> Selection:
     """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is not missed.
 
     `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to the effect
-    begins there. `budget_s`: no round is begun after so much time.
+    begins there.
     """
     sharp = searching(baseline)
     first = reweighed(Model((), baseline, left_out(baseline, groups)), sharp, groups)
@@ -52,17 +50,15 @@ def select(
     answers: tuple[Answer, ...] = ()
     cold = cold_starts(pool, baseline)
     best = first
-    begin = time.monotonic()
     for number in range(0 if quiet(baseline) else LIMITS.rounds):
-        if number and time.monotonic() - begin > budget_s:
-            break
         candidates: list[tuple[Round, Tried]] = []
         for model, start in beam:
-            round_, answered = one_round(model, start, pool, groups, rng, progress, number, cold)
+            known = [t.model for r in rounds for t in r.tried]
+            round_, answered = one_round(model, start, pool, groups, rng, progress, number, cold, known)
             answers = answers or answered
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
-        good = [t for _, t in candidates if demanded(t, number)]
+        good = [t for _, t in candidates if demanded(t.lead, first=number == 0)]
         fresh = ranked([t.model for t in good], groups)
         if not fresh:
             break
@@ -83,8 +79,7 @@ def select(
 
 def _better(model: Model, than: Model, groups: Groups) -> bool:
     """Whether a model is worth its further terms."""
-    step = lead(model.left_out, than.left_out, groups)
-    return step.z > LIMITS.z and step.gain > LIMITS.gain
+    return demanded(lead(model.left_out, than.left_out, groups))
 
 
 def quiet(fit: Fit) -> bool:
@@ -108,7 +103,7 @@ def _pruned(model: Model, groups: Groups) -> Model:
             if smaller is None:
                 continue
             step = lead(model.left_out, smaller.left_out, groups)
-            if (step.z < LIMITS.z or step.gain < LIMITS.gain) and (weakest is None or step.gain < weakest[0]):
+            if not demanded(step) and (weakest is None or step.gain < weakest[0]):
                 weakest = (step.gain, smaller)
         if weakest is None:
             return model
