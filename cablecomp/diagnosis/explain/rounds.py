@@ -95,8 +95,8 @@ def one_round(
     ]
 
     # what lies lower need not predict better: of two valleys both are fitted to the end
-    taken = {c[1] for c in chosen}
-    chosen += [c for c in second if c[1] in taken and c[0] < LIMITS.hopeless * top]
+    taken = [c[1][0].name for c in chosen]
+    chosen += [c for c in second if c[1][0].name in taken and c[0] < LIMITS.hopeless * top]
 
     def finish(c: tuple[float, tuple[Term, ...], Problem, FloatArray]) -> Model | None:
         progress(f"fitting {c[1][0].name}", done)
