@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.beliefs import believe
+from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
 from cablecomp.cli.shared import (
     Config,
     EffectsOption,
@@ -61,8 +62,18 @@ def diagnose_recordings(
     link: LinkOption = None,
     dbc: DbcOption = None,
     which: JointOption = None,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
 ) -> None:
-    """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
+    """Find the physics that the configuration lacks: locate, name, model, show on held-out data.
+
+    Recordings are one body of evidence. With --workers or --scheduler they are folders of a fleet, JOINT/NIGHT, and every
+    night is diagnosed by itself.
+    """
+    fleet = asked_for(workers, scheduler)
+    if fleet is not None:
+        work_fleet("diagnose", recordings, config, out, fleet)
+        return
     joint = read_joint(config, effects)
     reading = sources(words, link, dbc, which, joint)
     data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}

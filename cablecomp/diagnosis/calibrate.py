@@ -16,7 +16,7 @@ from cablecomp.diagnosis.augmented import augmented_joint
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
 from cablecomp.diagnosis.every_sample import on_every_sample
-from cablecomp.diagnosis.explain.selection import Model
+from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.motion import Advice, what_would_tell
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.values import drive_values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer import stepper as st
 from cablecomp.observer.refusal import REASONS, Refusal
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _PLACES: Final[Mapping[str, int]] = {
     JOINT: st.OUT_JOINT,
@@ -43,13 +43,14 @@ class Simulator:
         `history` (k x 2): motor angle [rad] and load [N m] that went before the first row. Raises InputError where the drive
         cannot follow (slack in an open circuit, a drum run out of cable).
         """
-        outs = self.run(recording, None if self.fine else recording.rows, history)
+        kept = recording.rated if self.fine else recording.rows
+        outs = self.run(recording, kept, history)
         if self.fine:
-            outs = outs[recording.rows]
+            outs = outs[np.searchsorted(kept, recording.rows)]
         return {name: outs[:, place] for name, place in _PLACES.items()}
 
-    def run(self, recording: Evidence, kept: Any = None, history: FloatArray | None = None) -> FloatArray:
-        """The kernel's outputs on all fine rows, or on those `kept`."""
+    def run(self, recording: Evidence, kept: IntArray, history: FloatArray | None = None) -> FloatArray:
+        """The kernel's outputs on the fine rows `kept`."""
         rows = self._rows(recording, kept)
         before = 0 if history is None else len(history)
         if history is not None:
@@ -67,7 +68,7 @@ class Simulator:
             raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")
         return outs[before:]
 
-    def _rows(self, recording: Evidence, kept: Any) -> FloatArray:
+    def _rows(self, recording: Evidence, kept: IntArray) -> FloatArray:
         columns = recording.columns
         time = columns["time_s"]
         rows = np.full((len(time), st.IN_OTHER + len(self.others)), np.nan)
@@ -82,7 +83,7 @@ class Simulator:
                     f"{recording.name}: channel `{name}` is missing, which an effect reads; record it"
                 )
             rows[:, st.IN_OTHER + k] = columns[name]
-        return rows if kept is None else np.ascontiguousarray(rows[kept])
+        return np.ascontiguousarray(rows[kept])
 
 
 def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray | float:

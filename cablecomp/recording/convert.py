@@ -31,7 +31,9 @@ def convert(
     """Write the rows of `source` with times within `between_s` to `to`, by its ending; returns how many.
 
     `late_s`: channels whose values come so much later than the others', set right by interpolation; rows at the ends that
-    have no value then are left out, and all of the recording is held in memory. The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
+    have no value then are left out, and all of the recording is held in memory.
+
+    The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
     reading does.
     """
     ending = next((e for e in _ENDINGS if to.name.endswith(e)), None)
