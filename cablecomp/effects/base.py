@@ -3,8 +3,8 @@
 An effect says in plain words what it is, names its parameters, and gives a `Change` to the drive. Most are a
 compiled *term*, a small function of three records, all by name: it reads the context of the solve (angles, load,
 tensions, time, temperature, other channels) and adds to it (moment taken from the load path, cable length,
-pretension and stiffness factors, encoder reading), with parameters and a state of its own. A few change the law of friction or the cable path itself. The kernel
-only sums them.
+pretension and stiffness factors, encoder reading), with parameters and a state of its own. A few change the
+law of friction or the cable path itself. The kernel only sums them.
 """
 
 from __future__ import annotations
