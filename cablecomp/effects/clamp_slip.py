@@ -7,18 +7,17 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, term, wrap_deflection
-from cablecomp.mechanics.layout import X_LENGTH_H, X_TIME
 
 
-@term(parameters=2)
+@term(parameters=("slip", "instant"))
 def _slip(c: Any, p: Any, s: Any) -> None:
     """p: length let go [m], instant [s]."""
-    if c[X_TIME] >= p[1]:
-        c[X_LENGTH_H] -= p[0]
+    if c.time >= p.instant:
+        c.length_h -= p.slip
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_slip(values["slip_m"], values["time_s"]))
+    return Change(terms=_slip(slip=values["slip_m"], instant=values["time_s"]))
 
 
 def _loop_arc(config: JointConfig) -> float:

@@ -7,18 +7,17 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.mechanics.layout import X_STIFFNESS_H, X_TIME
 
 
-@term(parameters=2)
+@term(parameters=("fraction", "instant"))
 def _break(c: Any, p: Any, s: Any) -> None:
     """p: share of EA lost, instant [s]."""
-    if c[X_TIME] >= p[1]:
-        c[X_STIFFNESS_H] *= 1.0 - p[0]
+    if c.time >= p.instant:
+        c.stiffness_h *= 1.0 - p.fraction
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_break(values["fraction"], values["time_s"]))
+    return Change(terms=_break(fraction=values["fraction"], instant=values["time_s"]))
 
 
 EFFECT = Effect(
