@@ -6,7 +6,6 @@ import json
 import re
 import sys
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, get_args, get_origin
 
@@ -88,7 +87,7 @@ def _answer(word: str) -> tuple[str, Any]:
         return key.strip(), text.strip()
 
 
-def _asked() -> Mapping[str, Any]:
+def _asked() -> dict[str, Any]:
     """Ask for every key; an empty answer takes the default, or leaves it out."""
     told: dict[str, Any] = {}
     for key, field in Draft.model_fields.items():

@@ -21,8 +21,8 @@ def calibration_summary(found: Calibration) -> RenderableType:
         table.add_column(head, justify="right" if k else "left", overflow="fold")
     for v in found.values:
         table.add_row(v.name, *cells(v))
-    for k in found.kept:
-        table.add_row(k.name, f"{k.nominal:.5g}", "not told", "", "")
+    for kept in found.kept:
+        table.add_row(kept.name, f"{kept.nominal:.5g}", "not told", "", "")
     head = (
         f"The joint's angle is left with {1e3 * found.rmse_rad:.4g} mrad RMS ({1e3 * found.nominal_rmse_rad:.4g} with the "
         f"nominal values; the encoder's own noise is {1e3 * found.noise_rad:.4g})."
