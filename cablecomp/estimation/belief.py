@@ -181,7 +181,7 @@ class _View:
         step = float(np.median(np.diff(self.time)))
         for name in wanted:
             late, before, after = self._best_shift(name)
-            if abs(late) >= 2.0 * step and after < LATE_GAIN * before:
+            if abs(late) >= 1.5 * step and after < LATE_GAIN * before:
                 how = "late" if late > 0.0 else "early"
                 words = (
                     f"{name} seems to come {1e3 * abs(late):.3g} ms {how}: the nominal drive leaves {_mrad(before)} RMS, "
