@@ -18,7 +18,7 @@ class Thresholds:
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
     rows_each: int = 120
     """Judged rows that a recording has at least, however many recordings there are: six strokes of twenty."""
-    searched: int = 12
+    searched: int = 9
     """Recordings among which hypotheses are compared, spread over sessions and order; the final model is fitted to all."""
     search_weight: float = 0.5
     """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
