@@ -13,9 +13,9 @@ from cablecomp.effects import catalogue, extend
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.start import joint_start
+from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import stepper as st
 from cablecomp.observer.refusal import REASONS, Refusal
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -63,7 +63,7 @@ class Simulator:
         joint_start(model.P, model.I, S, J, model.L, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
         outs = np.empty((len(rows), st.OUT_WIDTH))
         done, status = st.run_block(model.P, model.I, S, J, model.L, rows, outs)
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             at = rows[min(done, len(rows) - 1), st.IN_TIME]
             raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")
         return outs[before:]

@@ -88,6 +88,11 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
             if closer is not None and closer[0] < best[0]:
                 best = closer
                 t = float(best[1][INSTANT])
+        if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
+            mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
+            other = _best(here, mirrored)
+            if other is not None and other[0] < best[0]:
+                best = other
     if best is None:
         return None
     cost, values, d, size = best
@@ -117,6 +122,12 @@ def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], F
         if best is None or cost < best[0]:
             best = (cost, values, d, size)
     return best
+
+
+def _turned(h: Hypothesis, t: float) -> Start:
+    """The event at t with the other sign."""
+    base = h.starts[0].values
+    return Start({**base, INSTANT: t, h.amount.name: -float(base[h.amount.name])})
 
 
 def contribution(here: Anchor, h: Hypothesis, start: Start) -> tuple[FloatArray, float] | None:
