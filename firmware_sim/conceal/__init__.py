@@ -1,0 +1,6 @@
+"""Physics concealed in recordings that somebody else made: channels transformed, no model of the drive in between.
+
+What the true drive felt is what was measured. A concealed weight, inertia, friction or neighbour is therefore taken out of
+the torque channel, so that the sensor seems not to have seen it, and is exact whatever the drive is; what acts on the
+joint's reading (a late clock, a slip, play, a drift) is put on the reading.
+"""
