@@ -44,7 +44,8 @@ def spread(
     """Call `work(*job)` for every job; outcomes in the order in which they come.
 
     A job that raises, or whose process dies, is an outcome like others: it stops no other job. `work` is a function of
-    a module, what it takes and returns can be pickled. Once it is closed, nothing more is begun. Raises InputError where the scheduler does not answer.
+    a module, what it takes and returns can be pickled. Once closed, it begins nothing more. Raises InputError where the
+    scheduler does not answer.
     """
     if workers.scheduler is not None:
         yield from _on_cluster(work, jobs, workers.scheduler)

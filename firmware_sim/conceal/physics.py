@@ -63,12 +63,13 @@ def _has(tables: Sequence[Table], channel: str) -> bool:
 
 def _late(rng: Rng, tables: Sequence[Table], delay_s: float) -> Change | None:
     """The joint's clock is late by whole samples where it can be, so that noise stays as it is."""
-    added = []
+    added, lags = [], []
     for t in tables:
         step = float(np.median(np.diff(t[TIME])))
         lag = round(delay_s / step) * step if delay_s >= step else delay_s
+        lags.append(lag)
         added.append(np.interp(t[TIME] - lag, t[TIME], t[JOINT]) - t[JOINT])
-    return Change(JOINT, tuple(added), {"size": delay_s})
+    return Change(JOINT, tuple(added), {"size": float(np.mean(lags))})
 
 
 def _slip(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:

@@ -126,4 +126,4 @@ def _swing(rng: np.random.Generator, time: Floats) -> Floats:
 
 def usable(piece: Sequence[Mapping[str, Floats]]) -> bool:
     """Whether a joint's angle can be changed in every recording of a piece."""
-    return all(JOINT in t and np.count_nonzero(np.isfinite(t[JOINT])) > 10 for t in piece)
+    return bool(piece) and all(JOINT in t and np.count_nonzero(np.isfinite(t[JOINT])) > 10 for t in piece)
