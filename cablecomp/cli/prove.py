@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.concealing import conceal_in, conceal_joints, experiment, trial_bar
+from cablecomp.cli.concealing import Told, conceal_in, conceal_joints, experiment, trial_bar
 from cablecomp.cli.shared import announce_compilation, console, read_joint
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.cluster import Workers
@@ -52,41 +52,45 @@ def prove_blindly(
     which: JointOption = None,
 ) -> None:  # fmt: skip
     """Blind trials: conceal physics in simulated joints or in your own recordings, diagnose, open the truth, keep the score."""
-    place, by = out.absolute(), Workers(workers, scheduler)
-
-    def announce(sha256: str) -> None:
-        console.print(f"sealed truth, SHA-256 {sha256}", soft_wrap=True)
-
+    by = Workers(workers, scheduler)
     announce_compilation()
-    if not recordings:
+    if recordings is None:
         if config is not None:
             raise InputError(
-                "--config goes with --in: give the recordings too, or leave it out for simulated joints"
+                "--config goes with --in: give recordings too, or leave it out for simulated joints"
             )
-        wish = Wish(trials, seed, kinds, laws, imperfections)
-        with trial_bar() as tell:
-            board = prove(
-                Blind(place, lambda o, w, t: conceal_joints(o, w, workers, t), experiment, by),
-                wish,
-                tell,
-                announce,
-            )
-        write_scoreboard_page(board, out / "scoreboard.html")
-        console.print(scoreboard_table(board))
-        console.print(f"report: {out / 'scoreboard.html'}")
+        _on_joints(Wish(trials, seed, kinds, laws, imperfections), out, by)
         return
     if config is None:
         raise InputError("--in needs --config: the joint's configuration, as `cablecomp diagnose` takes it")
     joint = read_joint(resolve(config, "joints"))
     reading = sources(words, link, dbc, which, joint)
     data = {path_text(p): reading.read(p, gaps=True).columns for p in find_recordings(recordings)}
-    own = Own(place, data, joint_text(joint), conceal_in, by)
+    own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
+    _in_recordings(own, OwnWish(seed, rounds, seconds, minutes), out)
+
+
+def _on_joints(wish: Wish, out: Path, by: Workers) -> None:
+    def conceal(where: Path, wanted: Wish, told: Told) -> str:
+        return conceal_joints(where, wanted, by.processes, told)
+
     with trial_bar() as tell:
-        found = prove_in(own, OwnWish(seed, rounds, seconds, minutes), tell, announce)
-    write_concealed_page(found.as_json(), out / "concealed.html")
-    console.print(concealed_table(found.as_json()))
+        board = prove(Blind(out.absolute(), conceal, experiment, by), wish, tell, _announce)
+    write_scoreboard_page(board, out / "scoreboard.html")
+    console.print(scoreboard_table(board))
+    console.print(f"report: {out / 'scoreboard.html'}")
+
+
+def _in_recordings(own: Own, wish: OwnWish, out: Path) -> None:
+    with trial_bar() as tell:
+        found = prove_in(own, wish, tell, _announce)
+    answer = found.as_json()
+    write_concealed_page(answer, out / "concealed.html")
+    console.print(concealed_table(answer))
     if found.done < found.of:
-        console.print(
-            f"{found.done} of {found.of} trials are done: the same command with more --minutes goes on"
-        )
+        console.print(f"{found.done} of {found.of} trials are done; the same with more --minutes goes on")
     console.print(f"report: {out / 'concealed.html'}")
+
+
+def _announce(sha256: str) -> None:
+    console.print(f"sealed truth, SHA-256 {sha256}", soft_wrap=True)

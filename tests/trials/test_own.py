@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from blind_joint import JOINT, recording
 
+from cablecomp.cli import main
 from cablecomp.cluster import Workers
 from cablecomp.config_text import joint_text
 from cablecomp.errors import InputError
@@ -156,3 +157,15 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
     with pytest.raises(InputError, match="is no answer"):
         concealed_beside(tmp_path)
     assert concealed_beside(tmp_path / "trials") is None
+
+
+@pytest.mark.parametrize(
+    ("options", "words"), [(["--in", "a.csv"], "--in needs --config"), (["--config", "x"], "goes with --in")]
+)
+def test_recordings_and_their_configuration_go_together(
+    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["prove", *options]) == 2
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.count("\n") == 1
