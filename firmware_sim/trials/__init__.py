@@ -1,4 +1,8 @@
-"""Blind trials: joints drawn with physics hidden in them, recordings in the open, each truth under a seal."""
+"""Blind trials: joints drawn with physics hidden in them, recordings in the open, each truth under a seal.
+
+Imports the plant. Start reading at `generate.py`, then `world.py`; `python -m firmware_sim.trials.make` makes the same
+trials with their truth beside them.
+"""
 
 from firmware_sim.trials.experiment import run_experiment
 from firmware_sim.trials.generate import generate
