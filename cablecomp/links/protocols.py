@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from cablecomp.errors import InputError
 from cablecomp.links import (
     device_cansimple,
+    device_cia402,
     device_cubemars,
     device_dbc,
     device_mit,
@@ -14,6 +15,7 @@ from cablecomp.links import (
     device_robstride,
 )
 from cablecomp.links.device_cansimple import CanSimpleDrive
+from cablecomp.links.device_cia402 import Cia402Drive
 from cablecomp.links.device_cubemars import CubeMarsDrive
 from cablecomp.links.device_damiao import DamiaoDrive
 from cablecomp.links.device_dbc import DbcDrive, build_sources
@@ -22,9 +24,11 @@ from cablecomp.links.device_moteus import MoteusDrive
 from cablecomp.links.device_robstride import RobStrideDrive
 from cablecomp.links.devices import Claim, Drive, Receiver
 from cablecomp.links.readings import JointReadings
+from cablecomp.links.rounds import Round
 from cablecomp.links.schema import JointEnds, LinkConfig, MotorEnd, SensorEnd
 from cablecomp.links.schema_devices import (
     CanSimpleDevice,
+    Cia402Device,
     CubeMarsDevice,
     DbcDevice,
     Device,
@@ -51,6 +55,8 @@ def _extra(device: Device) -> tuple[str, ...]:
         return device_moteus.EXTRAS
     if isinstance(device, CanSimpleDevice):
         return device_cansimple.extra_channels(device)
+    if isinstance(device, Cia402Device):
+        return ()
     return device_dbc.extra_channels(device)
 
 
@@ -68,18 +74,20 @@ def second_encoder(config: LinkConfig, ends: JointEnds) -> SensorEnd | None:
     return end
 
 
-def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> Drive | None:
-    """The drive of a joint, None where it has none on this link."""
+def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings, round_: Round) -> Drive | None:
+    """The drive of a joint, None where it has none on this link; `round_` is all drives' of the link."""
     end = ends.motor
     if end is None:
         return None
     device, second = config.device_of(end), second_encoder(config, ends)
     if isinstance(device, MoteusDevice):
         return MoteusDrive(device, end, joint, second)
+    if isinstance(device, Cia402Device):
+        return Cia402Drive(device, end, joint, round_, config.rate_Hz, second)
     if second is not None:
         raise InputError(
             f"joint `{ends.name}`: device `{device.id}` speaks `{device.protocol}`, which tells of no second "
-            "encoder; a `dbc` device or a `moteus` drive is accepted as the joint's sensor"
+            "encoder; a `dbc` device, a `moteus` or a `cia402` drive is accepted as the joint's sensor"
         )
     if isinstance(device, MitDevice):
         damiao = device_mit.family_of(device) == "damiao"
@@ -127,4 +135,6 @@ def _claims(config: LinkConfig, end: MotorEnd | SensorEnd) -> tuple[Claim, ...]:
         return device_robstride.claims(device, end)
     if isinstance(device, MoteusDevice):
         return device_moteus.claims(device, end)
+    if isinstance(device, Cia402Device):
+        return device_cia402.claims(device, end)
     return device_cansimple.claims(end)
