@@ -3,7 +3,7 @@ the observer."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import control
 import numpy as np
@@ -119,7 +119,7 @@ class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc] 
             self._live = self._started()
         self._time += 1e3
         sample = Sample(self._time, 0.0, 0.0, float(deflection_rad), 0.0, 20.0)
-        return self._live.step_inverse(_full(sample, self._live)).joint_torque_Nm
+        return self._live.step_inverse(full(sample, self._live)).joint_torque_Nm
 
     def reset(self) -> None:
         """Forget the history of calls."""
@@ -138,7 +138,7 @@ class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc] 
     def _started(self) -> Observer:
         observer = Observer(self._config)
         self._time = 1.0
-        found = observer.step(_full(Sample(0.0, 0.0, self._bias_Nm, 0.0, 0.0, 20.0), observer))
+        found = observer.step(full(Sample(0.0, 0.0, self._bias_Nm, 0.0, 0.0, 20.0), observer))
         self._middle = found.deflection_rad
         return observer
 
@@ -149,7 +149,7 @@ class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc] 
         loads = []
         for k, angle in enumerate(self._middle + amplitude * np.sin(phase)):
             sample = Sample(1e3 * (k + 1), 0.0, 0.0, float(angle), 0.0, 20.0)
-            loads.append(observer.step_inverse(_full(sample, observer)).joint_torque_Nm)
+            loads.append(observer.step_inverse(full(sample, observer)).joint_torque_Nm)
         last, at = np.array(loads[-n:]), phase[-n:]
         last = last - last.mean()
         in_phase = 2.0 * float(np.mean(last * np.sin(at)))
@@ -157,43 +157,6 @@ class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc] 
         return complex(in_phase, quadrature) / amplitude
 
 
-def to_nlsys(config: JointConfig, period_s: float = 1e-3, name: str = "drive") -> Any:
-    """The drive as a python-control nonlinear I/O system, discrete in time, its whole history in the state
-    vector.
-
-    Inputs: motor_position_rad, joint_torque_Nm. Outputs: joint_position_rad, deflection_rad, tension_h_N,
-    tension_l_N. The start is uniform pretension at the first motor angle; `system.params["start"]` is that
-    state vector.
-    """
-    model = Observer(plain(config))
-    model.step(_full(Sample(0.0, 0.0, 0.0, 0.0, 0.0, 20.0), model))
-    start = model.vector()
-
-    def sample(t: float, u: Floats) -> Sample:
-        return _full(Sample(t + period_s, float(u[0]), float(u[1]), 0.0, 0.0, 20.0), model)
-
-    def update(t: float, x: Floats, u: Floats, params: Any) -> Floats:
-        model.set_vector(x)
-        model.step(sample(t, u))
-        return model.vector()
-
-    def output(t: float, x: Floats, u: Floats, params: Any) -> Floats:
-        model.set_vector(x)
-        e = model.peek(sample(t, u))
-        low = e.tension_l_N if e.tension_l_N == e.tension_l_N else 0.0
-        return np.array([e.joint_position_rad, e.deflection_rad, e.tension_h_N, low])
-
-    return control.nlsys(
-        update,
-        output,
-        name=name,
-        inputs=["motor_position_rad", "joint_torque_Nm"],
-        outputs=["joint_position_rad", "deflection_rad", "tension_h_N", "tension_l_N"],
-        states=len(start),
-        dt=period_s,
-        params={"start": start},
-    )
-
-
-def _full(sample: Sample, observer: Observer) -> Sample:
+def full(sample: Sample, observer: Observer) -> Sample:
+    """The sample with a zero on every further channel that the observer's effects read."""
     return sample._replace(other=(0.0,) * len(observer.channels))

@@ -1,6 +1,7 @@
 """Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
 
-`L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count].
+`L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count, stiffening,
+1 if friction depends on the place].
 Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `L` is None for the plain drive without any
 extension: the compiler then leaves out all code that a plain drive does not need. Mode 2 is the plain friction of mode 0
 with the stiffening law of the head. In mode 1 row 1 holds u = ln tau
@@ -27,6 +28,7 @@ SIZE = 4096
 U_LOW, U_HIGH = -7.0, 2.5
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
 STIFFENING = 10  # place in the head of b in EA(T) = EA (1 + b (tau - 1))
+GROOVED = 11  # place in the head: 0 = g(y) is y itself
 
 
 def plain_law() -> Floats:
@@ -57,9 +59,11 @@ def law_table(
     table[1] = CubicHermiteSpline(v, u, tension_factor(np.exp(u)))(v_grid)
     table[3] = v
     y = np.linspace(0.0, wrap_max_rad, SIZE)
-    table[2] = _integral(y, groove_factor(y))
-    table[0, :11] = [
-        1.0, v[0], v_grid[1] - v_grid[0], SIZE, 0.0, y[1] - y[0], SIZE, U_LOW, u[1] - u[0], SIZE, stiffening
+    by_place = groove_factor(y)
+    table[2] = _integral(y, by_place)
+    table[0, :12] = [
+        1.0, v[0], v_grid[1] - v_grid[0], SIZE, 0.0, y[1] - y[0], SIZE, U_LOW, u[1] - u[0], SIZE, stiffening,
+        float(np.any(by_place != 1.0)),
     ]  # fmt: skip
     return table
 
@@ -95,12 +99,31 @@ def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) ->
     )
 
 
+@kernel
+def look_up_slope(L: Floats, law: int, row: int, low: float, step: float, x: float) -> tuple[float, float]:
+    """As `look_up`, with its derivative by x."""
+    p = (x - low) / step
+    k = min(max(int(p), 1), SIZE - 3)
+    t = p - k
+    if t < -1.0 or t > 2.0:
+        edge = 0 if t < 0.0 else SIZE - 2
+        rise = L[law, row, edge + 1] - L[law, row, edge]
+        return L[law, row, edge] + (p - edge) * rise, rise / step
+    a, b, c, d = L[law, row, k - 1], L[law, row, k], L[law, row, k + 1], L[law, row, k + 2]
+    # the same cubic in powers of t
+    first = -a / 3.0 - b / 2.0 + c - d / 6.0
+    second = a / 2.0 - b + c / 2.0
+    third = (d - a) / 6.0 + (b - c) / 2.0
+    value = b + t * (first + t * (second + t * third))
+    return value, (first + t * (2.0 * second + t * 3.0 * third)) / step
+
+
 @leaf_kernel
 def groove(L: Floats, law: int, y: float) -> float:
     """Friction-weighted angle g(y); y itself for the plain law."""
     if L is None:
         return y
-    if L[0, 0, 0] != TABLED:
+    if L[law, 0, GROOVED] == 0.0:
         return y
     return look_up(L, law, 2, L[law, 0, 4], L[law, 0, 5], y)
 
@@ -110,7 +133,7 @@ def between(L: Floats, law: int, y_low: float, y_high: float, share: float) -> f
     """The angle whose groove coordinate lies by `share` between those of y_low and y_high."""
     if L is None:
         return y_low + share * (y_high - y_low)
-    if L[0, 0, 0] != TABLED:
+    if L[law, 0, GROOVED] == 0.0:
         return y_low + share * (y_high - y_low)
     low = groove(L, law, y_low)
     return groove_inverse(L, law, low + share * (groove(L, law, y_high) - low), y_low, y_high)
@@ -165,12 +188,7 @@ def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
 
 @kernel
 def _slope_table(L: Floats, law: int, tau: float, v: float) -> float:
-    step = L[law, 0, 2]
-    du = (
-        look_up(L, law, 1, L[law, 0, 1], step, v + 0.01 * step)
-        - look_up(L, law, 1, L[law, 0, 1], step, v - 0.01 * step)
-    ) / (0.02 * step)
-    return 1.0 / (tau * du)
+    return 1.0 / (tau * look_up_slope(L, law, 1, L[law, 0, 1], L[law, 0, 2], v)[1])
 
 
 @leaf_kernel
@@ -208,6 +226,7 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
 @kernel
 def strain(L: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
-    tau = tau_of_v(L, law, v)
-    e, de = strain_of_tau(L, law, tau)
-    return e, de / dv_dtau(L, law, tau, v)
+    u, du = look_up_slope(L, law, 1, L[law, 0, 1], L[law, 0, 2], v)
+    tau = math.exp(u)
+    e, de = stiffening_strain(L[law, 0, STIFFENING], tau)
+    return e, de * tau * du

@@ -23,6 +23,7 @@ from cablecomp.runtime.clock import Clock, MonotonicClock, SteppedClock, Tick
 from cablecomp.runtime.folder import SNAPSHOT, START, RunFolder
 from cablecomp.runtime.joint_loop import JointSetup
 from cablecomp.runtime.loop import Loop, LoopOptions, Stage
+from cablecomp.runtime.pace import Pace, check_pace
 from cablecomp.runtime.priority import QUIET, Policy
 from cablecomp.runtime.results import RunReport, TruthTally, result_of
 from cablecomp.runtime.setup import (
@@ -121,6 +122,8 @@ def run_joints(
         )
         for c in contestants
     )
+    if not options.stepped:
+        check_pace([_pace(setup, options) for setup in setups], period)
     duration = protocol.duration_s if options.duration_s is None else options.duration_s
     policy = options.policy if options.policy is not None else (QUIET if options.stepped else Policy())
     clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
@@ -154,6 +157,11 @@ def run_joints(
             tuple(loop.failures),
         )
         return found if options.out is None else _reported(found, options.out)
+
+
+def _pace(setup: JointSetup, options: RunOptions) -> Pace:
+    compensator = setup.compensator
+    return Pace(setup.name, setup.config, compensator.options, compensator.gains, options.bounds)
 
 
 def _reported(report: RunReport, out: Path) -> RunReport:

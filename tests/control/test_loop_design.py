@@ -24,10 +24,8 @@ from cablecomp.control.plant_model import (
     stable_when_closed,
 )
 from cablecomp.control.shaping import Ahead, Slope
-from cablecomp.control.stiffness import Hysteresis, stiffness_range, to_nlsys
+from cablecomp.control.stiffness import Hysteresis, stiffness_range
 from cablecomp.errors import InputError
-from cablecomp.observer import Observer
-from cablecomp.signals import Sample
 from cablecomp.thesis.design import design_sheet
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -162,19 +160,6 @@ def test_no_limit_cycle_where_the_feed_forward_damps(design: LoopDesign) -> None
     assert limit.margin > 0.0
     assert all(loss > 0.0 for loss in limit.loss_factor)
     assert limit.loss_factor[-1] > limit.loss_factor[0]  # the hysteresis takes more out of larger swings
-
-
-def test_the_drive_in_python_control_is_the_observer() -> None:
-    system = to_nlsys(JOINT, T)
-    times = np.arange(150) * T
-    motor, load = 0.5 * np.sin(9.0 * times), 1.1 * np.sin(31.0 * times)
-    found = control.input_output_response(system, times, np.vstack([motor, load]), system.params["start"])
-    observer = Observer(JOINT)
-    observer.step(Sample(0.0, 0.0, 0.0, 0.0, 0.0, 20.0))
-    for k in range(150):
-        expected = observer.step(Sample(float(times[k]) + T, float(motor[k]), float(load[k]), 0.0, 0.0, 20.0))
-        assert found.outputs[0, k] == pytest.approx(expected.joint_position_rad, abs=1e-14)
-        assert found.outputs[2, k] == pytest.approx(expected.tension_h_N, abs=1e-10)
 
 
 def test_a_drive_that_cannot_be_stable_is_refused() -> None:

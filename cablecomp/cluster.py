@@ -1,0 +1,117 @@
+"""Independent jobs side by side: in processes of this machine, or on a Dask cluster (extra `[cluster]`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Any, Final, Generic, TypeVar
+
+from cablecomp.errors import CablecompError, InputError
+
+R = TypeVar("R")
+
+CONNECT_S: Final = 10.0
+"""How long a scheduler is waited for; one that is there answers in milliseconds."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where jobs are done: `processes` of this machine (0: here and now), or the cluster of a Dask `scheduler`.
+
+    A cluster's workers need this package in the same version, and every path that a job names.
+    """
+
+    processes: int = 2
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True)
+class Done(Generic[R]):
+    """What came of job number `job`: its `result`, or in `failed` one line that says why there is none."""
+
+    job: int
+    result: R | None
+    failed: str = ""
+
+
+def spread(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], workers: Workers) -> Iterator[Done[R]]:
+    """Call `work(*job)` for every job; outcomes in the order in which they come.
+
+    A job that raises, or whose process dies, is an outcome like others: it stops no other job. `work` is a function of
+    a module, what it takes and returns can be pickled. Raises InputError where the scheduler does not answer.
+    """
+    if workers.scheduler is not None:
+        yield from _on_cluster(work, jobs, workers.scheduler)
+    elif workers.processes == 0:
+        yield from (Done(k, *_told(work, job)) for k, job in enumerate(jobs))
+    else:
+        yield from _in_processes(work, jobs, workers.processes)
+
+
+def _told(work: Callable[..., R], job: tuple[Any, ...]) -> tuple[R | None, str]:
+    """Result, or what went wrong: an exception need not survive the way back to the caller."""
+    try:
+        return work(*job), ""
+    except CablecompError as error:
+        return None, str(error)
+    except Exception as error:  # whatever it is, it is this job's own failure
+        return None, f"{type(error).__name__}: {error}"
+
+
+def _in_processes(
+    work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], processes: int
+) -> Iterator[Done[R]]:
+    """A process that dies takes its pool along: what is left is then done one by one, to find whose fault it was."""
+    left = dict(enumerate(jobs))
+    while left:
+        with _pool(min(processes, len(left))) as pool:
+            running: dict[Future[tuple[R | None, str]], int] = {
+                pool.submit(_told, work, job): k for k, job in left.items()
+            }
+            for finished in as_completed(running):
+                try:
+                    result, failed = finished.result()
+                except BrokenProcessPool:
+                    break
+                del left[running[finished]]
+                yield Done(running[finished], result, failed)
+        if left and processes == 1:  # one process takes jobs in their order: the first that is left killed it
+            guilty = min(left)
+            del left[guilty]
+            yield Done(guilty, None, "its process died (out of memory?)")
+        processes = 1
+
+
+@contextmanager
+def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool that starts nothing more once its user has gone."""
+    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address: str) -> Iterator[Done[R]]:
+    try:
+        from distributed import Client
+        from distributed import as_completed as completed
+    except ImportError:
+        raise InputError("--scheduler needs Dask: pip install 'cablecomp[cluster]'") from None
+    try:
+        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        words = str(error).partition("\n")[0]
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers there ({words})") from None
+    with client, client.as_current():
+        running = {client.submit(_told, work, job, pure=False): k for k, job in enumerate(jobs)}
+        for finished in completed(running):
+            try:
+                result, failed = finished.result()
+            except Exception as error:  # the worker died or was taken away: said by the scheduler
+                result, failed = None, f"{type(error).__name__}: {error}"
+            yield Done(running[finished], result, failed)

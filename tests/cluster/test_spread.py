@@ -1,0 +1,73 @@
+"""Jobs side by side: all are done, none stops another, wherever they are done."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from cablecomp.cluster import Done, Workers, spread
+from cablecomp.errors import InputError
+
+
+def square(x: int) -> int:
+    """x²; raises, dies or says what is wrong with its input where it is asked to."""
+    if x == 3:
+        raise ZeroDivisionError("three")
+    if x == 4:
+        raise InputError("four.csv: is empty")
+    if x == 5:
+        os._exit(1)
+    return x * x
+
+
+def outcomes(numbers: tuple[int, ...], workers: Workers) -> dict[int, Done[int]]:
+    """Each number's outcome; none is told twice."""
+    done = list(spread(square, [(x,) for x in numbers], workers))
+    assert sorted(d.job for d in done) == list(range(len(numbers)))
+    return {numbers[d.job]: d for d in done}
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """Address of a Dask cluster in threads of this process."""
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=2,
+        processes=False,
+        dashboard_address="127.0.0.1:0",
+        host="127.0.0.1",
+        protocol="tcp://",
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_one_failure_stops_nothing() -> None:
+    done = outcomes((1, 2, 3, 4, 6), Workers(0))
+    assert {x: d.result for x, d in done.items() if not d.failed} == {1: 1, 2: 4, 6: 36}
+    assert done[3].failed == "ZeroDivisionError: three"
+    assert done[4].failed == "four.csv: is empty"
+
+
+def test_a_process_that_dies_fails_alone() -> None:
+    done = outcomes((1, 5, 2, 3, 6), Workers(2))
+    assert {x: d.result for x, d in done.items() if not d.failed} == {1: 1, 2: 4, 6: 36}
+    assert "died" in done[5].failed
+    assert done[3].failed == "ZeroDivisionError: three"
+
+
+def test_a_cluster_does_the_same(scheduler: str) -> None:
+    done = outcomes((1, 2, 3, 4, 6), Workers(scheduler=scheduler))
+    assert {x: (d.result, d.failed) for x, d in done.items()} == {
+        x: (d.result, d.failed) for x, d in outcomes((1, 2, 3, 4, 6), Workers(0)).items()
+    }
+
+
+@pytest.mark.parametrize("address", ["nowhere", "carrier-pigeon://127.0.0.1:1"])
+def test_no_scheduler_there_is_one_line(address: str) -> None:
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    with pytest.raises(InputError, match=r"no Dask scheduler answers there") as caught:
+        list(spread(square, [(1,)], Workers(scheduler=address)))
+    assert "\n" not in str(caught.value)
