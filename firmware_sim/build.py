@@ -18,13 +18,14 @@ from firmware_sim.wire.cia402 import Cia402Wire, Units
 from firmware_sim.wire.cubemars import CubeMarsWire
 from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.dbc import DbcWire, load_map
+from firmware_sim.wire.dynamixel import DynamixelWire
 from firmware_sim.wire.mit import MitWire, model_of
 from firmware_sim.wire.moteus import MoteusWire
 from firmware_sim.wire.odrive import FirmwareName, OdriveRates, OdriveWire
 from firmware_sim.wire.robstride import RobStrideWire
 from firmware_sim.wire.tables import MOST_JOINTS
 
-PROTOCOLS = ("mit", "cubemars", "robstride", "moteus", "cia402", "odrive", "dbc")
+PROTOCOLS = ("mit", "cubemars", "robstride", "moteus", "cia402", "dynamixel", "odrive", "dbc")
 FD_PROTOCOLS = ("moteus",)
 MakePlant = Callable[[int], PlantLike]
 
@@ -69,6 +70,8 @@ def make_wire(config: BenchConfig, number: int) -> DriveWire:
         return MoteusWire(number, *config.gains_per_turn)
     if config.protocol == "cia402":
         return Cia402Wire(number, config.units)
+    if config.protocol == "dynamixel":
+        return DynamixelWire(number, config.torque_constant)
     if config.protocol == "odrive":
         return OdriveWire(number, config.rates, config.torque_constant, config.firmware)
     mapped = None if config.map_path is None else load_map(config.map_path)
@@ -76,11 +79,11 @@ def make_wire(config: BenchConfig, number: int) -> DriveWire:
 
 
 def _drive_of(config: BenchConfig) -> DriveConfig:
-    """The drive as its protocol knows it: ODrive and CiA 402 start in position control and have no impedance
+    """The drive as its protocol knows it: ODrive, CiA 402 and Dynamixel start in position control and have no impedance
     mode; MIT drives but Damiao's and RobStride's report no error when the host falls silent."""
     if config.protocol == "odrive":
         return replace(config.drive, mode=Mode.POSITION)
-    if config.protocol == "cia402":  # it watches nobody until it is told to
+    if config.protocol in ("cia402", "dynamixel"):  # they watch nobody until they are told to
         return replace(config.drive, mode=Mode.POSITION, command_timeout_s=0.0)
     silent = config.protocol == "cubemars" or (
         config.protocol == "mit" and model_of(config.model).maker in ("cubemars", "katz")

@@ -16,6 +16,7 @@ from cablecomp.links.schema_devices import (
     Cia402Device,
     CubeMarsDevice,
     Device,
+    DynamixelDevice,
     MitDevice,
     MoteusDevice,
     RobStrideDevice,
@@ -114,13 +115,16 @@ def _bench_of(device: Device, end: MotorEnd) -> BenchConfig:
         second = device.joint_encoder_counts_per_turn or turn
         units = Units(turn, device.velocity_counts_per_turn_s or turn, second, device.rated_torque_Nm)
         return BenchConfig(protocol="cia402", units=units)
+    if isinstance(device, DynamixelDevice):
+        return BenchConfig(protocol="dynamixel", torque_constant=device.torque_constant_Nm_per_A)
     return BenchConfig(protocol="dbc")
 
 
 def _bus(link: LinkConfig) -> str:
     bus = link.bus
     if isinstance(bus, SerialBus):
-        return "serial"
+        packets = any(isinstance(device, DynamixelDevice) for device in link.device)
+        return "dynamixel" if packets else "serial"
     if bus.interface == "slcan":
         return "slcan"
     if bus.interface == "virtual":

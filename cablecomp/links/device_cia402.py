@@ -82,7 +82,7 @@ class Cia402Drive:
         device: Cia402Device,
         end: MotorEnd,
         readings: JointReadings,
-        round_: Round,
+        round_: Round[None],
         rate_Hz: float,
         joint: SensorEnd | None = None,
     ) -> None:
@@ -265,7 +265,7 @@ class Cia402Drive:
         if self._watch_s and self._now_s - self._told_s >= 0.25 * self._watch_s:
             self._told_s = self._now_s
             frames.append(canopen.alive(self._host))
-        if self._round.closes(self._node):
+        if self._round.gather(self._node, None) is not None:
             frames.append(canopen.sync())
         return Outgoing(tuple(frames), clipped)
 
@@ -309,7 +309,7 @@ class Cia402Drive:
 
     def _report(self) -> tuple[Frame, ...]:
         if self._dialogue.done:
-            return (canopen.sync(),) if self._round.closes(self._node) else ()
+            return () if self._round.gather(self._node, None) is None else (canopen.sync(),)
         frames = self._dialogue.next()
         if self._dialogue.done:
             self._health.set_up()

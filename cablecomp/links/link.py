@@ -10,11 +10,11 @@ from cablecomp.links.devices import Drive, Receiver, Take
 from cablecomp.links.port_can import can_port, fd_options
 from cablecomp.links.port_line import serial_port
 from cablecomp.links.ports import Port
-from cablecomp.links.protocols import extra_channels, make_drive, sensor_receivers
+from cablecomp.links.protocols import Shared, extra_channels, make_drive, sensor_receivers
 from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import NOT_TAKEN, BusState, Mode, MotorCommand, Request
-from cablecomp.links.rounds import Round
 from cablecomp.links.schema import CanBus, LinkConfig
+from cablecomp.links.schema_devices import DynamixelDevice
 from cablecomp.signals import Wire
 
 
@@ -112,10 +112,10 @@ class BusLink:
         readings: list[JointReadings] = []
         drives: list[Drive | None] = []
         receivers: list[Receiver] = []
-        round_ = Round()
+        shared = Shared()
         for ends in config.joint:
             joint = JointReadings(ends.name, extra_channels(config, ends))
-            drive = make_drive(config, ends, joint, round_)
+            drive = make_drive(config, ends, joint, shared)
             readings.append(joint)
             drives.append(drive)
             receivers += drive.receivers() if drive is not None else ()
@@ -252,7 +252,8 @@ def make_port(config: LinkConfig) -> Port:
     if isinstance(bus, CanBus):
         options = {**fd_options(bus.interface, bus.fd, bus.bitrate, bus.data_bitrate), **bus.options}
         return can_port(bus.interface, bus.channel, bus.bitrate, options)
-    return serial_port(bus.port, bus.baud)
+    packets = any(isinstance(device, DynamixelDevice) for device in config.device)
+    return serial_port(bus.port, bus.baud, dynamixel=packets)
 
 
 class Strangers:

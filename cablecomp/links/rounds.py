@@ -1,26 +1,28 @@
-"""Drives that share frames: what is common to all of them goes out once a cycle, when the last of them has been
-commanded."""
+"""Drives that share frames: what is common to them goes out once a cycle, when the last of them was commanded."""
 
 from __future__ import annotations
 
+from typing import Generic, TypeVar
 
-class Round:
+Part = TypeVar("Part")
+
+
+class Round(Generic[Part]):
     """Learns which drives are commanded in a cycle, since a run may leave some of a bus's joints alone.
 
     A drive that comes up again begins a new cycle; its drives are those of the cycle before. In the first one
     everybody is taken for the last.
     """
 
-    __slots__ = ("_before", "_seen")
+    __slots__ = ("_before", "_parts")
 
     def __init__(self) -> None:
         self._before: set[int] = set()
-        self._seen: set[int] = set()
+        self._parts: dict[int, Part] = {}
 
-    def closes(self, node: int) -> bool:
-        """Note that `node` has been commanded; True = nobody else is to come in this cycle."""
-        if node in self._seen:
-            self._before, self._seen = self._seen, {node}
-        else:
-            self._seen.add(node)
-        return self._seen >= self._before
+    def gather(self, node: int, part: Part) -> dict[int, Part] | None:
+        """Note what `node` has to say in this cycle; everybody's part if nobody else is to come, else None."""
+        if node in self._parts:
+            self._before, self._parts = set(self._parts), {}
+        self._parts[node] = part
+        return self._parts if self._parts.keys() >= self._before else None

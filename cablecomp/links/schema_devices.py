@@ -118,6 +118,19 @@ class Cia402Device(Frozen):
     joint_encoder_counts_per_turn: Positive | None = None
 
 
+class DynamixelDevice(Frozen):
+    """A Dynamixel of the X series, protocol 2.0, on a serial line that carries nothing else.
+
+    `current_unit_A`: current of one count, as in the model's control table; `torque_constant_Nm_per_A`: at the
+    output shaft.
+    """
+
+    protocol: Literal["dynamixel"]
+    id: Name
+    torque_constant_Nm_per_A: Positive
+    current_unit_A: Positive = 2.69e-3
+
+
 class CanSimpleDevice(Frozen):
     """An ODrive: `cyclic` names what it sends by itself, `polled` what is asked for with every command
     (firmware 0.6: all)."""
@@ -242,6 +255,13 @@ class DbcDevice(Frozen):
 
 
 Device = Annotated[
-    MitDevice | CubeMarsDevice | RobStrideDevice | MoteusDevice | Cia402Device | CanSimpleDevice | DbcDevice,
+    MitDevice
+    | CubeMarsDevice
+    | RobStrideDevice
+    | MoteusDevice
+    | Cia402Device
+    | DynamixelDevice
+    | CanSimpleDevice
+    | DbcDevice,
     Field(discriminator="protocol"),
 ]

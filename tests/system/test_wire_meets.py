@@ -37,6 +37,7 @@ PROTOCOLS = {
     "moteus-dual": ("moteus-dual-encoder.toml", {"protocol": "moteus", "gains_per_turn": (1000.0, 10.0)}),
     "cia402": ("cia402-socketcan.toml", {"protocol": "cia402"}),
     "cia402-dual": ("cia402-dual-encoder.toml", {"protocol": "cia402"}),
+    "dynamixel": ("dynamixel-serial.toml", {"protocol": "dynamixel", "torque_constant": 1.78}),
     "dbc": ("dbc-virtual.toml", {"protocol": "dbc"}),
 }
 # Half a count of what each wire carries: motor position in rad, motor velocity in rad/s, motor torque in Nm
@@ -183,7 +184,7 @@ def meet() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("wire", WIRES)
-@pytest.mark.parametrize("protocol", [p for p in PROTOCOLS if not p.endswith("-dual")])
+@pytest.mark.parametrize("protocol", [p for p in PROTOCOLS if not p.endswith(("-dual", "dynamixel"))])
 def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting = meet(protocol, wire)
     link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
@@ -250,6 +251,30 @@ def test_the_joints_encoder_on_the_drives_second_input(meet: Any, protocol: str)
         assert joint.values[JOINT_POSITION] == pytest.approx(device.truth.joint_position_rad, abs=4e-6)
     assert joint.values[JOINT_POSITION] < first - 5e-3
     assert joint.updates[JOINT_TORQUE] == 0
+
+
+def test_a_dynamixel_on_a_line_of_its_own(meet: Any) -> None:
+    meeting = meet("dynamixel", "dynamixel")
+    link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
+    meeting.climb()
+    for _ in range(40):
+        steps = meeting.bench.steps
+        updates = joint.updates[MOTOR_POSITION]
+        link.send(0, MotorCommand(0.4))
+        meeting.until(
+            lambda steps=steps, updates=updates: (
+                meeting.bench.steps > steps and joint.updates[MOTOR_POSITION] > updates
+            )
+        )
+        truth = device.truth
+        assert joint.values[MOTOR_POSITION] == pytest.approx(truth.motor_position_rad, abs=8e-4)
+        assert joint.values[MOTOR_VELOCITY] == pytest.approx(truth.motor_velocity_rad_s, abs=0.0121)
+        assert joint.values[MOTOR_TORQUE] == pytest.approx(truth.motor_torque_Nm, abs=2.5e-3)
+    assert device.drive.setpoint.position_rad == pytest.approx(0.4, abs=8e-4)
+    assert joint.updates[JOINT_POSITION] == 0
+    assert link.status().invalid == 0
+    assert link.stop()
+    meeting.until(lambda: device.drive.state.name == "DISABLED")
 
 
 def test_eight_joints_on_one_bus(meet: Any) -> None:
