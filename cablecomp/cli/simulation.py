@@ -26,8 +26,8 @@ from firmware_sim.build import BenchConfig
 from firmware_sim.errors import SimError
 from firmware_sim.faults import parse_fault
 from firmware_sim.firmware import DriveConfig
-from firmware_sim.hosted import HostedJoints, HostedSpec
-from firmware_sim.plant import LinkSpec, MotorSpec
+from firmware_sim.hosted import OFF_NOMINAL, HostedJoints, HostedSpec, off_nominal
+from firmware_sim.plant import LinkSpec, MotorSpec, PlantConfig
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.wire.cia402 import Units
 
@@ -56,6 +56,13 @@ def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
         return _Joints(spec)
     except (SimError, PlantError) as error:
         raise InputError(f"simulated joint: {error}") from None
+
+
+def true_values(joint: Path, seed: int) -> dict[str, float]:
+    """What a simulated joint off its nominal values is given, by parameter (first stage)."""
+    data = read_toml(joint)
+    stage = off_nominal(PlantConfig.from_dict(data, str(joint)), data.get("tolerance", {}), seed).stages[0]
+    return {key: float(getattr(stage, key)) for key in OFF_NOMINAL}
 
 
 class _Joints(HostedJoints):
