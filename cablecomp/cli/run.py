@@ -127,6 +127,9 @@ def _finish(report: RunReport, joint: JointConfig, config: Path, beside: LiveRun
     except OSError as error:
         page = "no report.html was written"
         failures.append(f"{report.folder}/report.html: cannot be written ({error.strerror}); free some space")
+    except InputError as error:  # of a recording that holds no row
+        page = "no report.html was written"
+        failures.append(str(error))
     with suppress(OSError):
         _show(report)
         for path in () if beside is None else beside.kept:
