@@ -244,7 +244,13 @@ def test_recovery_ends_where_the_whole_feed_forward_is_back() -> None:
 
 def test_phases_are_numbers_in_files() -> None:
     """`cycles.csv` holds them."""
-    assert [phase.name for phase in map(Phase, range(5))] == "NORMAL HELD FADING RECOVERING STOPPED".split()
+    assert [phase.name for phase in map(Phase, range(5))] == [
+        "NORMAL",
+        "HELD",
+        "FADING",
+        "RECOVERING",
+        "STOPPED",
+    ]
     assert len(Phase) == 5
 
 

@@ -24,12 +24,17 @@ def twice(x):
 def test_a_cache_that_was_cut_short_breaks_nothing(kind: str, size: int, tmp_path: Path) -> None:
     """A process that finds it compiles anew; `size` = bytes left."""
     (tmp_path / "program.py").write_text(MODULE)
-    base = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    base = {
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path]),
+    }
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | base
 
     def run() -> str:
         command = [sys.executable, "-c", "import program; print(program.twice(4.0))"]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=120, check=False
+        )
         assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 

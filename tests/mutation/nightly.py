@@ -27,7 +27,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 EXPLAINED = Path(__file__).with_name("survivors.txt")
 TESTS = {
-    "cablecomp.control.gate": ["tests/control/test_gate_and_descent.py"],
+    "cablecomp.control.gate": ["tests/control/test_gate_in_numbers.py", "tests/control/test_gate_and_descent.py"],
     "cablecomp.control.degrade": ["tests/control/test_gate_and_descent.py"],
     "cablecomp.runtime.health": ["tests/runtime/test_health_watch.py"],
     "cablecomp.runtime.channel": ["tests/runtime/test_health_watch.py"],
@@ -84,7 +84,9 @@ def meaning(text: str) -> str:
 def difference(before: str, after: str) -> str:
     """The lines that differ, as they were and as they are."""
     old, new = before.splitlines(), after.splitlines()
-    k = next((k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), min(len(old), len(new)) - 1)
+    k = next(
+        (k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), min(len(old), len(new)) - 1
+    )
     return f"{old[k].strip()}  ->  {new[k].strip()}"
 
 
@@ -147,7 +149,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     known = [module.rpartition(".")[2] for module in TESTS]
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--module", action="append", choices=known)
-    parser.add_argument("--most", type=int, default=10**6, help="so many mutants of a module, drawn at random")
+    parser.add_argument(
+        "--most", type=int, default=10**6, help="so many mutants of a module, drawn at random"
+    )
     asked = parser.parse_args(arguments)
     os.chdir(ROOT)
     accounted, fine = explained(), True

@@ -92,7 +92,9 @@ def one_minute(number: int, folder: Path, resume: Path | None, rng: random.Rando
     finally:
         simulation.close()
     stop = report.stop_reason
-    assert any(reason in stop for reason in reasons), f"{faults}: stopped by `{stop}`, not by one of {reasons}"
+    assert any(reason in stop for reason in reasons), (
+        f"{faults}: stopped by `{stop}`, not by one of {reasons}"
+    )
     assert not report.failures, report.failures
     check_files(folder)
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
