@@ -27,10 +27,19 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 EXPLAINED = Path(__file__).with_name("survivors.txt")
 TESTS = {
-    "cablecomp.control.gate": ["tests/control/test_gate_in_numbers.py", "tests/control/test_gate_and_descent.py"],
+    "cablecomp.control.gate": [
+        "tests/control/test_gate_in_numbers.py",
+        "tests/control/test_gate_and_descent.py",
+    ],
     "cablecomp.control.degrade": ["tests/control/test_gate_and_descent.py"],
-    "cablecomp.runtime.health": ["tests/runtime/test_health_watch.py"],
-    "cablecomp.runtime.channel": ["tests/runtime/test_health_watch.py"],
+    "cablecomp.runtime.health": [
+        "tests/runtime/test_health_in_numbers.py",
+        "tests/runtime/test_health_watch.py",
+    ],
+    "cablecomp.runtime.channel": [
+        "tests/runtime/test_health_in_numbers.py",
+        "tests/runtime/test_health_watch.py",
+    ],
 }
 LOADED_BEFORE = ("pytest", "hypothesis", "control", "cablecomp.observer", "cablecomp.links.link")
 """What the tests import that imports none of the modules that are changed."""
