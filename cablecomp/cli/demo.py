@@ -18,7 +18,7 @@ from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.examples import example
 from cablecomp.links.load import load_link
 from cablecomp.links.schema import LinkConfig
-from cablecomp.report.compare_page import HEADERS, summary_rows, write_comparison
+from cablecomp.report.compare_page import HEADERS, feedback_words, summary_rows, write_comparison
 from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.view import LiveView
@@ -82,6 +82,7 @@ def _summary(found: Comparison) -> None:
     for row in summary_rows(found):
         table.add_row(*row)
     console.print(table)
+    console.print(feedback_words(found))
     joint = found.force.joints[0]
     console.print(
         f"force without torque sensor: RMS error {joint.true_torque_Nm:.4f} Nm, "

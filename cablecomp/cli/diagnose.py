@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
 from cablecomp.cli.shared import Config, announce_compilation, console, read_joint, share_bar
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config_text import joint_text
@@ -56,8 +57,18 @@ def diagnose_recordings(
     link: LinkOption = None,
     dbc: DbcOption = None,
     which: JointOption = None,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
 ) -> None:
-    """Find the physics that the configuration lacks: locate, name, model, show on held-out data."""
+    """Find the physics that the configuration lacks: locate, name, model, show on held-out data.
+
+    Recordings are one body of evidence. With --workers or --scheduler they are folders of a fleet, JOINT/NIGHT, and every
+    night is diagnosed by itself.
+    """
+    fleet = asked_for(workers, scheduler)
+    if fleet is not None:
+        work_fleet("diagnose", recordings, config, out, fleet)
+        return
     for path in effects or ():
         load_effects(path)
     joint = read_joint(config)

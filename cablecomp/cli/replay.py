@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
 from cablecomp.cli.shared import Config, announce_compilation, console, read_joint
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config import in_session, session_of
@@ -35,8 +36,17 @@ def replay(
     link: LinkOption = None,
     dbc: DbcOption = None,
     which: JointOption = None,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
 ) -> None:
-    """Stream a recording through the observer that the controller runs; compare with what was measured."""
+    """Stream a recording through the observer that the controller runs; compare with what was measured.
+
+    With --workers or --scheduler RECORDING is a folder of a fleet, JOINT/NIGHT: one row for each, and which joints change.
+    """
+    fleet = asked_for(workers, scheduler)
+    if fleet is not None:
+        work_fleet("replay", [recording], config, out, fleet)
+        return
     joint = read_joint(config)
     source = sources(words, link, dbc, which, joint).open(recording)
     found = session_of(joint, recording, session)

@@ -1,0 +1,5 @@
+"""What a joint's model lacks: where its residual lies, which physics explains it, and what no recording has shown yet.
+
+Imports estimation and everything below, not the runtime. Start reading at `diagnose.py`, the story from top to bottom;
+`result.py` is what comes out, `thresholds.py` every number that decides.
+"""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from cablecomp.config import Empirical, JointConfig, Session
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.selection import Model
+from cablecomp.diagnosis.explain.model import Model
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.standing import standing, value_of

@@ -11,7 +11,7 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.augmented import augmented_joint
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration import calibrate_drive
-from cablecomp.diagnosis.explain.selection import Model
+from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.values import drive_values
 from cablecomp.estimation.evidence import Evidence

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cablecomp.config import Empirical
+from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import Groups, Lead, lead
-from cablecomp.diagnosis.explain.selection import Model
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -37,7 +37,7 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
     weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
     left = model.left_out[rows].copy()
     fold, block = groups.fold[rows], groups.block[rows]
-    here = Groups(block, fold, groups.by)
+    here = Groups(block, fold, groups.by, np.zeros_like(block))
     found: list[Found] = []
     while True:
         best: Found | None = None

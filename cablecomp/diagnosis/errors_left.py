@@ -25,7 +25,7 @@ def errors_of(fit: Fit, final: Sequence[Evidence], by: str) -> Errors:
 
     def left_out(k: int) -> list[FloatArray]:
         train, test = folds[k]
-        return _left(solve(fit.problem.with_evidence(train), fit.x, 5), test)
+        return _left(solve(fit.problem.with_evidence(train), fit.x, 3), test)
 
     parts = [p for found in side_by_side(left_out, range(len(folds))) for p in found]
     return Errors(inside, _rms(parts), _rms(_left(fit, final)))

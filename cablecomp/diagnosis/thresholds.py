@@ -23,7 +23,7 @@ class Thresholds:
     search_weight: float = 0.5
     """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
     the calibration do not stand in the way of a better law."""
-    rounds: int = 4
+    rounds: int = 5
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
     zero: float = 0.7
     """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row counts for."""
@@ -40,18 +40,28 @@ class Thresholds:
     """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
     worth_rates: float = 1.08
     """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on every sample."""
-    hopeless: float = 4.0
+    tolerance: float = 1e-3
+    """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by far more."""
+    hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0
     """The second model is carried on where its loss on data left out is less than this many times the best one's."""
     quiet: float = 1.15
     """Mean square over the sensors' noise at which nothing further is asked: what is left is noise."""
+    z_first: float = 1.7
+    """Standard errors of the paired held-out difference that the first effect must show to enter the model; whether it is named
+    is its confidence's matter (what is missing first leaves few, long waves, whose scatter is large)."""
     z: float = 2.5
-    """Standard errors of the paired held-out difference that an effect must show to enter the model; whether it is named is
-    its confidence's matter (one in 160 by chance, about twenty asked)."""
+    """The same for every further effect: one in 160 by chance, about twenty asked."""
     gain: float = 0.06
     """Share of the held-out square of what is left that an effect must take off to be looked at as a name: below it, laws of
     another form and calibration trade places."""
+    z_sure: float = 5.0
+    """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
+    gain_sure: float = 0.03
+    """That share."""
+    part: float = 0.4
+    """Part of its amount with which an effect of the model begins beside one that was found without it."""
     tail: float = 3.0
     """Standard deviations of the remainder beyond which a misfit counts linearly (Huber): outliers decide nothing."""
     memory: float = 2.0
@@ -70,6 +80,9 @@ class Thresholds:
     """Share of a recording that may be given up to an unknown history."""
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
+    beyond_noise: float = 4.0
+    """The same where it follows nothing that can be shown (a single recording of few cycles) and physics is named: twice the
+    noise is not noise."""
     recalibrate: float = 0.9
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     name: float = 0.5

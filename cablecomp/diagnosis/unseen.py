@@ -3,26 +3,62 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.screening import Anchor, anchor, contribution
+from cablecomp.diagnosis.explain.screening import Anchor, anchor, contribution, with_entry
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.signal.smoothing import FloatArray
 
 SIGMAS = 3.0
 """Standard deviations of its amount up to which an effect could have stayed unseen."""
+SHAPES = 6
+"""Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
+ALIKE = 0.1
+"""Share of what an effect does that calibration cannot imitate, below which it hides behind calibration."""
+WITHIN = 2.0
+"""Standard deviations of its tolerance by which a parameter may be off to make up for an effect."""
+MOST = 3
+"""Hidden effects that are told, the largest first."""
 
 
-def could_be_unseen(fit: Fit, pool: Sequence[Hypothesis], named: Sequence[str]) -> list[dict[str, Any]]:
-    """One row per effect: its amount is below `below` unless it hides in the least visible of its shapes; None = any size."""
+@dataclass(frozen=True)
+class Hidden:
+    """An effect that a parameter within its tolerance makes up for, up to `amount`; the joint with as much of it."""
+
+    effect: str
+    parameter: str
+    amount: float
+    unit: str
+    visible: float
+    joint: JointConfig
+
+    @property
+    def why(self) -> str:
+        """For readers."""
+        return (
+            f"`{self.parameter}` within its tolerance makes up for it: up to {self.amount:.3g} {self.unit} of it "
+            "leave no trace in these data"
+        ).replace("  ", " ")
+
+
+def could_be_unseen(
+    fit: Fit, pool: Sequence[Hypothesis], named: Sequence[str]
+) -> tuple[list[dict[str, Any]], list[Hidden]]:
+    """One row per effect: its amount is below `below` unless it hides in the least visible of its shapes; None = any size.
+    Beside them the effects that calibration within its tolerances conceals."""
     here = anchor(fit)
-    found = []
+    found, hidden = [], []
     for h in pool:
         if h.name in named:
             continue
-        sizes = [_bound(here, h, k) for k in range(len(h.starts))]
+        shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // SHAPES)
+        made = [contribution(here, h, h.starts[k]) for k in shapes]
+        sizes = [None if m is None else _bound(here, *m) for m in made]
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
         below = max(seen) if seen and len(seen) == len(sizes) else None
@@ -36,13 +72,44 @@ def could_be_unseen(fit: Fit, pool: Sequence[Hypothesis], named: Sequence[str]) 
                 "why": "these data say nothing of it: it could be any size" if any_size else "",
             }
         )
-    return found
+        if not (h.has_instant or h.has_phase):
+            behind = [_hidden(here, h, k, *m) for k, m in zip(shapes, made, strict=True) if m is not None]
+            hidden += sorted((b for b in behind if b is not None), key=lambda b: -b.visible)[:1]
+    return found, sorted(hidden, key=lambda b: -b.visible)[:MOST]
 
 
-def _bound(here: Anchor, h: Hypothesis, k: int) -> float | None:
-    made = contribution(here, h, h.starts[k])
-    if made is None:
-        return None
-    d, size = made
+def _bound(here: Anchor, d: FloatArray, size: float) -> float | None:
     length = float(np.linalg.norm(here.beyond(d)))
     return SIGMAS * abs(size) / length if length > 1e-9 else None
+
+
+def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float) -> Hidden | None:
+    """Whether steps of the calibration inside the tolerances do what `size` of the effect does: J s = d, |s_j| <= WITHIN."""
+    problem = here.fit.problem
+    count = len(problem.parameters)
+    J, d = here.fit.J[: len(d) - count], d[: len(d) - count]
+    length = float(np.linalg.norm(d))
+    finite = np.array([np.isfinite(p.sd) for p in problem.parameters], dtype=np.bool_)
+    if not finite.any() or length <= 0.0:
+        return None
+    scale = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+    s = np.linalg.lstsq(J / scale, d, rcond=1e-6)[0] / scale
+    if float(np.linalg.norm(d - J @ s)) > ALIKE * length:
+        return None
+    sds = np.array([p.sd for p in problem.parameters])
+    most = float(np.max(np.abs(s[finite]) / sds[finite]))
+    factor = WITHIN / max(most, 1e-300)
+    amount = min(abs(size) * factor, max(abs(b) for b in h.amount.bounds(problem.config)))
+    visible = length * amount / abs(size)
+    if visible < SIGMAS:
+        return None
+    j = int(np.argmax(np.abs(s) * scale))
+    p = problem.parameters[j]
+    made = with_entry(problem, h, h.entry({**h.starts[shape].values, h.amount.name: amount}))
+    x = here.fit.x - s * amount / size
+    low, high = problem.bounds()
+    moved = np.concatenate([np.clip(x, low, high), [q.x(q.start) for q in made.parameters[count:]]])
+    return Hidden(h.name, p.name, amount, h.amount.unit, visible, made.joint(moved, problem.evidence[0]))
+
+
+__all__ = ["Hidden", "could_be_unseen"]

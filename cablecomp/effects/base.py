@@ -1,16 +1,16 @@
 """The contract of an effect: one file, one physics, one neutral value that switches it off.
 
 An effect says in plain words what it is, names its parameters, and gives a `Change` to the drive. Most are a
-compiled *term*, a small function that reads the context of the solve (angles, load, tensions, time,
-temperature, other channels) and adds to it (moment taken from the load path, cable length, pretension and
-stiffness factors, encoder reading). A few change the law of friction or the cable path itself. The kernel
-only sums them.
+compiled *term*, a small function of three records, all by name: it reads the context of the solve (angles, load,
+tensions, time, temperature, other channels) and adds to it (moment taken from the load path, cable length,
+pretension and stiffness factors, encoder reading), with parameters and a state of its own. A few change the
+law of friction or the cable path itself. The kernel only sums them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,13 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
-from cablecomp.mechanics import layout
+from cablecomp.errors import InputError
 from cablecomp.mechanics.assemble import Term
 from cablecomp.mechanics.jit import cached, njit
 from cablecomp.mechanics.pointer import TERM_SIGNATURE
+from cablecomp.mechanics.records import CONTEXT
 
 Floats = NDArray[np.float64]
 TermFunction = Callable[[Any, Any, Any], None]
+Names = Sequence[str | tuple[str, int]]
+"""Names of numbers; a name with a length is an array."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +92,9 @@ def wrap_deflection(config: JointConfig) -> float:
     """T0/(EA mu_eff) over stages, at the output [rad]: the thesis's unit of deflection, (3-17), (4-18)."""
     total, ratio = 0.0, 1.0
     for stage in reversed(config.drive.stage):
-        r_over_R = stage.input_radius_m / stage.output_radius_m
-        total += ratio * stage.pretension_N / stage.EA_N * (1.0 / stage.mu_output + r_over_R / stage.mu_input)
-        ratio *= r_over_R
+        per_mu = 1.0 / stage.mu_output + stage.ratio / stage.mu_input
+        total += ratio * stage.pretension_N / stage.EA_N * per_mu
+        ratio *= stage.ratio
     return total
 
 
@@ -160,10 +163,11 @@ class Effect:
 class CompiledTerm:
     """A term function compiled to machine code when it is first used."""
 
-    def __init__(self, function: TermFunction, parameters: int, state: int) -> None:
+    def __init__(self, function: TermFunction, parameters: Names, state: Names) -> None:
         self._function = function
-        self._parameters = parameters
-        self._state = state
+        self._parameters = _record(parameters)
+        self._state = _record(state)
+        self._state_size = self._state.itemsize // 8 if state else 0
         self._address: int | None = None
         self._entry: Any = None
 
@@ -172,13 +176,13 @@ class CompiledTerm:
         """Address of the machine code (compiled or read from the cache on first use)."""
         if self._address is None:
             inner = njit(self._function)
-            n_parameters, n_state = max(self._parameters, 1), max(self._state, 1)
+            of_parameters, of_state = self._parameters, self._state
 
             def entry(context: Any, parameters: Any, state: Any) -> None:
                 inner(
-                    numba.carray(context, layout.CONTEXT),
-                    numba.carray(parameters, n_parameters),
-                    numba.carray(state, n_state),
+                    numba.carray(context, 1, CONTEXT)[0],
+                    numba.carray(parameters, 1, of_parameters)[0],
+                    numba.carray(state, 1, of_state)[0],
                 )
 
             compile_ = numba.cfunc(TERM_SIGNATURE)
@@ -186,15 +190,31 @@ class CompiledTerm:
             self._address = int(self._entry.address)
         return self._address
 
-    def __call__(self, *parameters: float) -> tuple[Term, ...]:
-        """The term with these parameter values, as the `terms` of a `Change`."""
-        return (Term(self.address, tuple(float(p) for p in parameters), self._state),)
+    def __call__(self, **values: float | Sequence[float]) -> tuple[Term, ...]:
+        """The term with these values of its parameters, as the `terms` of a `Change`; raises InputError for other names."""
+        names = [name for name in self._parameters.names or () if name != NOTHING]
+        if set(values) != set(names):
+            raise InputError(
+                f"term `{self._function.__name__}` takes {', '.join(names)}, not {', '.join(values)}"
+            )
+        record = np.zeros(1, self._parameters)
+        for name, value in values.items():
+            record[name] = value
+        return (Term(self.address, tuple(record.view(np.float64).tolist()), self._state_size),)
 
 
-def term(parameters: int, state: int = 0) -> Callable[[TermFunction], CompiledTerm]:
-    """Make a function f(c, p, s) a term: c context (places X_* of `mechanics.layout`), p parameters, s state.
+NOTHING = "nothing"  # the field of a record without any: a record cannot be empty
 
-    It must add to the context only, and change `s` only when c[X_COMMIT] is set: the solver calls it several
-    times a step.
+
+def _record(names: Names) -> np.dtype[Any]:
+    fields = [(name, "f8") if isinstance(name, str) else (name[0], "f8", (name[1],)) for name in names]
+    return np.dtype(fields or [(NOTHING, "f8")])
+
+
+def term(parameters: Names, state: Names = ()) -> Callable[[TermFunction], CompiledTerm]:
+    """Make a function f(c, p, s) a term: c context (`mechanics.records.CONTEXT`), p its parameters, s its own state, by name.
+
+    A name with a length, `("readings", 256)`, is an array. The function must add to the context only, and change `s` only
+    when `c.commit` is set: the solver calls it several times a step. State starts at zero.
     """
     return lambda function: CompiledTerm(function, parameters, state)

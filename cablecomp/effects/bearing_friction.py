@@ -8,51 +8,41 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment, term
-from cablecomp.mechanics.layout import (
-    X_COMMIT,
-    X_FIRST,
-    X_JOINT,
-    X_JOINT_OLD,
-    X_MOMENT,
-    X_MOMENT_SLOPE,
-    X_TENSION_H,
-    X_TENSION_L,
-)
 
 
-@term(parameters=5, state=1)
+@term(parameters=("torque", "load_coefficient", "presliding", "radius", "radial_at_rest"), state=("z",))
 def _hold_back(c: Any, p: Any, s: Any) -> None:
-    """p: torque [N m], load coefficient, presliding [rad], R [m], R (T_h + T_l) at rest [N m]; s: z.
+    """p: torque [N m], load coefficient, presliding [rad], R [m], R (T_h + T_l) at rest [N m].
 
     The first sample counts from the angle at uniform pretension, as the profiles do: z = 0 there.
     """
-    radial = p[4]
-    if not math.isnan(c[X_TENSION_H]):
-        radial = p[3] * c[X_TENSION_H]
-        if not math.isnan(c[X_TENSION_L]):
-            radial += p[3] * c[X_TENSION_L]
-    limit = p[0] + p[1] * radial
-    before = 0.0 if c[X_FIRST] != 0.0 else s[0]
-    z = before + (c[X_JOINT] - c[X_JOINT_OLD]) / p[2]
+    radial = p.radial_at_rest
+    if not math.isnan(c.tension_h):
+        radial = p.radius * c.tension_h
+        if not math.isnan(c.tension_l):
+            radial += p.radius * c.tension_l
+    limit = p.torque + p.load_coefficient * radial
+    before = 0.0 if c.first else s.z
+    z = before + (c.joint - c.joint_old) / p.presliding
     if z > 1.0:
         z = 1.0
     elif z < -1.0:
         z = -1.0
     else:
-        c[X_MOMENT_SLOPE] += limit / p[2]
-    c[X_MOMENT] += limit * z
-    if c[X_COMMIT] != 0.0:
-        s[0] = z
+        c.moment_slope += limit / p.presliding
+    c.moment += limit * z
+    if c.commit:
+        s.z = z
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     cables = 2.0 if config.drive.circuit == "closed" else 1.0
     terms = _hold_back(
-        values["torque_Nm"],
-        values["load_coefficient"],
-        values["presliding_rad"],
-        drum_radius(config),
-        cables * pretension_moment(config),
+        torque=values["torque_Nm"],
+        load_coefficient=values["load_coefficient"],
+        presliding=values["presliding_rad"],
+        radius=drum_radius(config),
+        radial_at_rest=cables * pretension_moment(config),
     )
     return Change(terms=terms)
 

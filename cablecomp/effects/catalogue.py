@@ -20,7 +20,7 @@ from cablecomp.effects.base import Change, Effect, Floats, Parameter
 from cablecomp.effects.empirical import empirical_term
 from cablecomp.errors import InputError
 from cablecomp.mechanics.assemble import Extension, Term
-from cablecomp.mechanics.layout import OTHERS
+from cablecomp.mechanics.records import OTHERS
 from cablecomp.mechanics.tables import law_table, plain_law, stiffening_law
 
 _registered: dict[str, Effect] = {}

@@ -1,4 +1,4 @@
-"""Clamp slip: a termination or clamp of cable h gives way once."""
+"""Clamp slip: a termination or clamp of one cable gives way once."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, term, wrap_deflection
-from cablecomp.mechanics.layout import X_LENGTH_H, X_TIME
 
 
-@term(parameters=2)
+@term(parameters=("slip", "instant"))
 def _slip(c: Any, p: Any, s: Any) -> None:
-    """p: length let go [m], instant [s]."""
-    if c[X_TIME] >= p[1]:
-        c[X_LENGTH_H] -= p[0]
+    """p: length let go [m] (below 0: by cable l), instant [s]."""
+    if c.time >= p.instant:
+        if p.slip > 0.0:
+            c.length_h -= p.slip
+        else:
+            c.length_l += p.slip
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_slip(values["slip_m"], values["time_s"]))
+    return Change(terms=_slip(slip=values["slip_m"], instant=values["time_s"]))
 
 
 def _loop_arc(config: JointConfig) -> float:
@@ -28,21 +30,20 @@ def _loop_arc(config: JointConfig) -> float:
 
 EFFECT = Effect(
     id="clamp_slip",
-    statement="A clamp or termination of cable h slipped once: the joint stands off from then on, and the "
-    "pretension is lower.",
-    equation="length of cable h + s for t >= t*",
+    statement="A clamp or termination slipped once (of cable h where the length is positive, of l where it is negative): the "
+    "joint stands off from then on, and the pretension is lower.",
+    equation="length of cable h + s, s > 0; of cable l + |s|, s < 0; for t >= t*",
     source="kinematics; in a closed circuit the joint moves by about s/(2R), and both tensions fall",
     parameters=(
         Parameter(
             "slip_m",
             "m",
             0.0,
-            1e-4,
+            -1.0,
             1.0,
-            "s, length let go",
-            log=True,
+            "s, length let go: by cable h, below 0 by cable l",
             scale=_loop_arc,
-            minimum=0.0,
+            minimum=-0.1,
             maximum=0.1,
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", shape=True),

@@ -8,19 +8,18 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.mechanics.layout import X_MOMENT, X_OTHER
 
 
-@term(parameters=2)
+@term(parameters=("load_coefficient", "channel"))
 def _leak(c: Any, p: Any, s: Any) -> None:
     """p: load coefficient [N m per unit of the channel], place of the channel among the others."""
-    other = c[X_OTHER + int(p[1])]
+    other = c.other[int(p.channel)]
     if not math.isnan(other):
-        c[X_MOMENT] -= p[0] * other
+        c.moment -= p.load_coefficient * other
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_leak(values["load_coefficient"], values["channel"]))
+    return Change(terms=_leak(load_coefficient=values["load_coefficient"], channel=values["channel"]))
 
 
 EFFECT = Effect(

@@ -9,53 +9,58 @@ from cablecomp.config import Empirical, JointConfig
 from cablecomp.effects.base import term
 from cablecomp.errors import InputError
 from cablecomp.mechanics.assemble import Term
-from cablecomp.mechanics.layout import (
-    OTHERS,
-    X_JOINT,
-    X_LOAD,
-    X_MOTOR,
-    X_OTHER,
-    X_READING,
-    X_TEMPERATURE,
-    X_TIME,
-)
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.records import OTHERS
 
 FORMS: Final = ("chebyshev", "fourier")
+CHANNELS: Final = (
+    "time_s",
+    "motor_position_rad",
+    "joint_position_rad",
+    "joint_torque_Nm",
+    "temperature_degC",
+)
+"""What a law may depend on, in the order of `_channel`; the channels other_<name> follow."""
 _MOST: Final = 24
-_PLACES: Final = {
-    "time_s": X_TIME,
-    "motor_position_rad": X_MOTOR,
-    "joint_position_rad": X_JOINT,
-    "joint_torque_Nm": X_LOAD,
-    "temperature_degC": X_TEMPERATURE,
-}
 
 
-@term(parameters=5 + _MOST)
+@njit
+def _channel(c: Any, place: int) -> Any:
+    if place == 0:
+        return c.time
+    if place == 1:
+        return c.motor
+    if place == 2:
+        return c.joint
+    if place == 3:
+        return c.load
+    if place == 4:
+        return c.temperature
+    return c.other[place - 5]
+
+
+@term(parameters=("form", "channel", "centre", "half_width", "count", ("coefficients", _MOST)))
 def _curve(c: Any, p: Any, s: Any) -> None:
-    """p: form, place in the context, centre, half width, number of coefficients, coefficients [rad].
+    """p: place in `FORMS`, in `CHANNELS`, centre and half width of the channel, number of coefficients [rad] in use.
 
     Chebyshev: T_k(x) of x held within -1..1. Fourier: 1, sin πx, cos πx, sin 2πx, cos 2πx, ...
     """
-    x = (c[int(p[1])] - p[2]) / p[3]
+    x = (_channel(c, int(p.channel)) - p.centre) / p.half_width
     if math.isnan(x):
         return
-    count = int(p[4])
-    if p[0] == 0.0:
+    coefficients = p.coefficients
+    total = coefficients[0]
+    if p.form == 0.0:
         x = min(max(x, -1.0), 1.0)
         before, now = 1.0, x
-        total = p[5]
-        for k in range(1, count):
-            total += p[5 + k] * now
+        for k in range(1, int(p.count)):
+            total += coefficients[k] * now
             before, now = now, 2.0 * x * now - before
     else:
-        total = p[5]
-        for k in range(1, count):
-            order = (k + 1) // 2
-            total += p[5 + k] * (
-                math.sin(math.pi * order * x) if k % 2 == 1 else math.cos(math.pi * order * x)
-            )
-    c[X_READING] += total
+        for k in range(1, int(p.count)):
+            angle = math.pi * ((k + 1) // 2) * x
+            total += coefficients[k] * (math.sin(angle) if k % 2 == 1 else math.cos(angle))
+    c.reading += total
 
 
 def empirical_term(law: Empirical, config: JointConfig, others: list[str]) -> tuple[Term, ...]:
@@ -65,11 +70,17 @@ def empirical_term(law: Empirical, config: JointConfig, others: list[str]) -> tu
         raise InputError(f"{where}: law '{law.law}' is unknown; {', '.join(FORMS)} are accepted")
     if len(law.coefficients_rad) > _MOST:
         raise InputError(f"{where}: {len(law.coefficients_rad)} coefficients; up to {_MOST} are accepted")
-    place = X_OTHER + others.index(law.of) if law.of in others else _PLACES.get(law.of)
-    if place is None or place >= X_OTHER + OTHERS:
+    known = (*CHANNELS, *others[:OTHERS])
+    if law.of not in known:
         raise InputError(
-            f"{where}: of '{law.of}'; {', '.join(_PLACES)} or one of {OTHERS} channels other_<name> are accepted"
+            f"{where}: of '{law.of}'; {', '.join(CHANNELS)} or one of {OTHERS} channels other_<name> are accepted"
         )
-    padded = (*law.coefficients_rad, *([0.0] * (_MOST - len(law.coefficients_rad))))
-    head = (float(FORMS.index(law.law)), float(place), law.centre, law.half_width)
-    return _curve(*head, float(len(law.coefficients_rad)), *padded)
+    count = len(law.coefficients_rad)
+    return _curve(
+        form=FORMS.index(law.law),
+        channel=known.index(law.of),
+        centre=law.centre,
+        half_width=law.half_width,
+        count=count,
+        coefficients=(*law.coefficients_rad, *([0.0] * (_MOST - count))),
+    )

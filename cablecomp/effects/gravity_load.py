@@ -8,19 +8,18 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
-from cablecomp.mechanics.layout import X_JOINT, X_MOMENT, X_MOMENT_SLOPE
 
 
-@term(parameters=2)
+@term(parameters=("moment", "phase"))
 def _weigh(c: Any, p: Any, s: Any) -> None:
     """p: greatest moment [N m], phase [rad]."""
-    angle = c[X_JOINT] + p[1]
-    c[X_MOMENT] += p[0] * math.sin(angle)
-    c[X_MOMENT_SLOPE] += p[0] * math.cos(angle)
+    angle = c.joint + p.phase
+    c.moment += p.moment * math.sin(angle)
+    c.moment_slope += p.moment * math.cos(angle)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_weigh(values["moment_Nm"], values["phase_rad"]))
+    return Change(terms=_weigh(moment=values["moment_Nm"], phase=values["phase_rad"]))
 
 
 EFFECT = Effect(

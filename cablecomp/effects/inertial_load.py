@@ -7,12 +7,9 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
-from cablecomp.mechanics.layout import X_COMMIT, X_DT, X_JOINT, X_MOMENT, X_MOMENT_SLOPE
-
-SEEN, ANGLE, ANGLE_OLD, SPEED, SPEED_OLD, STEP, PULL, STATE = range(8)
 
 
-@term(parameters=1, state=STATE)
+@term(parameters=("inertia",), state=("seen", "angle", "angle_old", "speed", "speed_old", "step", "pull"))
 def _accelerate(c: Any, p: Any, s: Any) -> None:
     """p: inertia [kg m2]; s: samples seen (up to 2), angles, speeds, last step [s], last acceleration.
 
@@ -20,38 +17,38 @@ def _accelerate(c: Any, p: Any, s: Any) -> None:
     inertia swings on the drive's own stiffness, and noise of the inputs moves the load no more than a real
     one would.
     """
-    x, h = c[X_JOINT], c[X_DT]
-    if s[SEEN] == 0.0:  # nothing is known yet: at rest or in even motion
-        if c[X_COMMIT] != 0.0:
-            s[SEEN], s[ANGLE] = 1.0, x
+    x, h = c.joint, c.dt
+    if s.seen == 0.0:  # nothing is known yet: at rest or in even motion
+        if c.commit:
+            s.seen, s.angle = 1.0, x
         return
     if h <= 0.0:  # a second sample at the same instant: what pulled goes on pulling
-        c[X_MOMENT] += p[0] * s[PULL]
-        if c[X_COMMIT] != 0.0:
-            s[ANGLE] = x
+        c.moment += p.inertia * s.pull
+        if c.commit:
+            s.angle = x
         return
-    if s[SEEN] == 1.0:
-        if c[X_COMMIT] != 0.0:
-            speed = (x - s[ANGLE]) / h
-            s[SEEN], s[ANGLE], s[ANGLE_OLD] = 2.0, x, s[ANGLE]
-            s[SPEED], s[SPEED_OLD], s[STEP] = speed, speed, h
+    if s.seen == 1.0:
+        if c.commit:
+            speed = (x - s.angle) / h
+            s.seen, s.angle, s.angle_old = 2.0, x, s.angle
+            s.speed, s.speed_old, s.step = speed, speed, h
         return
     b0, b1, b2 = 1.0, -1.0, 0.0
-    if h <= 5.0 * s[STEP]:  # after a longer gap, two-step differences would carry the old motion too far
-        w = h / s[STEP]
+    if h <= 5.0 * s.step:  # after a longer gap, two-step differences would carry the old motion too far
+        w = h / s.step
         b0, b1, b2 = (1.0 + 2.0 * w) / (1.0 + w), -(1.0 + w), w * w / (1.0 + w)
-    speed = (b0 * x + b1 * s[ANGLE] + b2 * s[ANGLE_OLD]) / h
-    pull = (b0 * speed + b1 * s[SPEED] + b2 * s[SPEED_OLD]) / h
-    c[X_MOMENT] += p[0] * pull
-    c[X_MOMENT_SLOPE] += p[0] * (b0 / h) ** 2
-    if c[X_COMMIT] != 0.0:
-        s[ANGLE_OLD], s[ANGLE] = s[ANGLE], x
-        s[SPEED_OLD], s[SPEED] = s[SPEED], speed
-        s[STEP], s[PULL] = h, pull
+    speed = (b0 * x + b1 * s.angle + b2 * s.angle_old) / h
+    pull = (b0 * speed + b1 * s.speed + b2 * s.speed_old) / h
+    c.moment += p.inertia * pull
+    c.moment_slope += p.inertia * (b0 / h) ** 2
+    if c.commit:
+        s.angle_old, s.angle = s.angle, x
+        s.speed_old, s.speed = s.speed, speed
+        s.step, s.pull = h, pull
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_accelerate(values["inertia_kgm2"]))
+    return Change(terms=_accelerate(inertia=values["inertia_kgm2"]))
 
 
 EFFECT = Effect(

@@ -7,21 +7,20 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, input_moment, term
-from cablecomp.mechanics.layout import X_COMMIT, X_FIRST, X_MOTOR, X_MOTOR_MOMENT, X_MOTOR_OLD
 
 
-@term(parameters=2, state=1)
+@term(parameters=("torque", "presliding"), state=("z",))
 def _take(c: Any, p: Any, s: Any) -> None:
     """p: torque [N m], presliding [rad]; s: z, the elasto-plastic direction of the motor's motion."""
-    z = 0.0 if c[X_FIRST] != 0.0 else s[0]
-    z = min(max(z + (c[X_MOTOR] - c[X_MOTOR_OLD]) / p[1], -1.0), 1.0)
-    c[X_MOTOR_MOMENT] += p[0] * z
-    if c[X_COMMIT] != 0.0:
-        s[0] = z
+    z = 0.0 if c.first else s.z
+    z = min(max(z + (c.motor - c.motor_old) / p.presliding, -1.0), 1.0)
+    c.motor_moment += p.torque * z
+    if c.commit:
+        s.z = z
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_take(values["torque_Nm"], values["presliding_rad"]))
+    return Change(terms=_take(torque=values["torque_Nm"], presliding=values["presliding_rad"]))
 
 
 EFFECT = Effect(

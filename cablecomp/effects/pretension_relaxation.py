@@ -8,36 +8,28 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
-from cablecomp.mechanics.layout import (
-    X_COMMIT,
-    X_FIRST,
-    X_MOMENT,
-    X_PRETENSION_H,
-    X_PRETENSION_L,
-    X_TIME,
-)
 
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
-@term(parameters=3, state=1)
+@term(parameters=("fraction", "time_constant", "hanging"), state=("start",))
 def _relax(c: Any, p: Any, s: Any) -> None:
     """p: fraction, time constant [s], hanging moment R T0 [N m] (closed: 0); s: the first sample's time."""
-    start = c[X_TIME] if c[X_FIRST] != 0.0 else s[0]
-    factor = max(1.0 - p[0] * math.log1p((c[X_TIME] - start) / p[1]), LEAST)
-    if p[2] > 0.0:
-        c[X_MOMENT] += p[2] * (1.0 - factor)
+    start = c.time if c.first else s.start
+    factor = max(1.0 - p.fraction * math.log1p((c.time - start) / p.time_constant), LEAST)
+    if p.hanging > 0.0:
+        c.moment += p.hanging * (1.0 - factor)
     else:
-        c[X_PRETENSION_H] *= factor
-        c[X_PRETENSION_L] *= factor
-    if c[X_COMMIT] != 0.0:
-        s[0] = start
+        c.pretension_h *= factor
+        c.pretension_l *= factor
+    if c.commit:
+        s.start = start
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     closed = config.drive.circuit == "closed"
     hanging = 0.0 if closed else pretension_moment(config)
-    terms = _relax(values["fraction"], values["time_constant_s"], hanging)
+    terms = _relax(fraction=values["fraction"], time_constant=values["time_constant_s"], hanging=hanging)
     return Change(terms=terms, moves_pretension=closed)
 
 

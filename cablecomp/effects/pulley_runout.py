@@ -8,35 +8,33 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment, term
-from cablecomp.mechanics.layout import (
-    X_JOINT,
-    X_LENGTH_H,
-    X_LENGTH_L,
-    X_LOAD,
-    X_MOMENT,
-    X_MOMENT_SLOPE,
-)
 
 
-@term(parameters=4)
+@term(parameters=("eccentricity", "phase", "radius", "hanging"))
 def _wind(c: Any, p: Any, s: Any) -> None:
     """p: eccentricity [m], phase [rad], R [m], moment that holds the pretension [N m] (open circuit: R T0).
 
     Lever arm and wound length belong together (virtual work): the cables feel M R/(R + e cos(x + φ)).
     """
-    angle = c[X_JOINT] + p[1]
-    wound = p[0] * (math.sin(angle) - math.sin(p[1]))
-    c[X_LENGTH_H] += wound
-    c[X_LENGTH_L] -= wound
-    arm = p[0] * math.cos(angle)
-    whole = c[X_LOAD] - c[X_MOMENT] + p[3]
-    c[X_MOMENT] += whole * arm / (p[2] + arm)
-    c[X_MOMENT_SLOPE] -= whole * p[0] * math.sin(angle) * p[2] / (p[2] + arm) ** 2
+    angle = c.joint + p.phase
+    wound = p.eccentricity * (math.sin(angle) - math.sin(p.phase))
+    c.length_h += wound
+    c.length_l -= wound
+    arm = p.eccentricity * math.cos(angle)
+    whole = c.load - c.moment + p.hanging
+    c.moment += whole * arm / (p.radius + arm)
+    c.moment_slope -= whole * p.eccentricity * math.sin(angle) * p.radius / (p.radius + arm) ** 2
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     hanging = pretension_moment(config) if config.drive.circuit == "open" else 0.0
-    return Change(terms=_wind(values["eccentricity_m"], values["phase_rad"], drum_radius(config), hanging))
+    terms = _wind(
+        eccentricity=values["eccentricity_m"],
+        phase=values["phase_rad"],
+        radius=drum_radius(config),
+        hanging=hanging,
+    )
+    return Change(terms=terms)
 
 
 EFFECT = Effect(

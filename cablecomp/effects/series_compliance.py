@@ -7,16 +7,15 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term, wrap_compliance
-from cablecomp.mechanics.layout import X_LOAD, X_MOMENT, X_READING
 
 
-@term(parameters=1)
-def _compliance(c: Any, p: Any, s: Any) -> None:
-    c[X_READING] += p[0] * (c[X_LOAD] - c[X_MOMENT])
+@term(parameters=("compliance",))
+def _give_way(c: Any, p: Any, s: Any) -> None:
+    c.reading += p.compliance * (c.load - c.moment)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_compliance(values["compliance_rad_per_Nm"]))
+    return Change(terms=_give_way(compliance=values["compliance_rad_per_Nm"]))
 
 
 EFFECT = Effect(

@@ -1,4 +1,4 @@
-"""Strand break: wires of cable h break at an instant, and it is softer from then on."""
+"""Strand break: wires of one cable break at an instant, and it is softer from then on."""
 
 from __future__ import annotations
 
@@ -7,25 +7,27 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.mechanics.layout import X_STIFFNESS_H, X_TIME
 
 
-@term(parameters=2)
+@term(parameters=("fraction", "instant"))
 def _break(c: Any, p: Any, s: Any) -> None:
-    """p: share of EA lost, instant [s]."""
-    if c[X_TIME] >= p[1]:
-        c[X_STIFFNESS_H] *= 1.0 - p[0]
+    """p: share of EA lost (below 0: by cable l), instant [s]."""
+    if c.time >= p.instant:
+        if p.fraction > 0.0:
+            c.stiffness_h *= 1.0 - p.fraction
+        else:
+            c.stiffness_l *= 1.0 + p.fraction
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_break(values["fraction"], values["time_s"]))
+    return Change(terms=_break(fraction=values["fraction"], instant=values["time_s"]))
 
 
 EFFECT = Effect(
     id="strand_break",
-    statement="Wires of cable h broke: from one instant on it is softer, and at the same stretch it pulls "
-    "less.",
-    equation="EA_h -> EA_h (1 - f) for t >= t*, stretch unchanged",
+    statement="Wires of one cable broke (of h where the share is positive, of l where it is negative): from one instant "
+    "on it is softer, and at the same stretch it pulls less.",
+    equation="EA_h -> EA_h (1 - f), f > 0; EA_l -> EA_l (1 - |f|), f < 0; for t >= t*, stretch unchanged",
     source="EA is modulus times metallic area; a broken wire carries nothing (G. A. Costello, Theory of "
     "Wire Rope, 1990)",
     parameters=(
@@ -33,11 +35,10 @@ EFFECT = Effect(
             "fraction",
             "-",
             0.0,
-            1e-4,
+            -0.9,
             0.9,
-            "f, share of the cross-section lost",
-            log=True,
-            minimum=0.0,
+            "f, share of the cross-section lost: of cable h, below 0 of cable l",
+            minimum=-0.95,
             maximum=0.95,
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", shape=True),

@@ -26,11 +26,11 @@ EFFECT = Effect(
             "-",
             0.0,
             1e-3,
-            10.0,
+            1.0,
             "s, stretch behind the play over the elastic one",
             log=True,
             minimum=0.0,
-            maximum=100.0,
+            maximum=10.0,
         ),
         Parameter(
             "yield_N",

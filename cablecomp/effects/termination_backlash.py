@@ -8,20 +8,19 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_deflection
-from cablecomp.mechanics.layout import X_LOAD, X_MOMENT, X_READING
 
 # Moment, as a share of R T0, within which the clearance is crossed: a step that is smooth can be fitted.
 TRANSITION = 0.0005
 
 
-@term(parameters=2)
+@term(parameters=("gap", "width"))
 def _cross(c: Any, p: Any, s: Any) -> None:
     """p: gap [rad], width of the transition [N m]."""
-    c[X_READING] += 0.5 * p[0] * math.tanh((c[X_LOAD] - c[X_MOMENT]) / p[1])
+    c.reading += 0.5 * p.gap * math.tanh((c.load - c.moment) / p.width)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_cross(values["gap_rad"], TRANSITION * pretension_moment(config)))
+    return Change(terms=_cross(gap=values["gap_rad"], width=TRANSITION * pretension_moment(config)))
 
 
 EFFECT = Effect(

@@ -8,31 +8,32 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, cable_strain, pretension_moment, term
-from cablecomp.mechanics.layout import X_MOMENT, X_PRETENSION_H, X_PRETENSION_L, X_TEMPERATURE
 
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
-@term(parameters=3)
+@term(parameters=("coefficient", "reference", "hanging"))
 def _expand(c: Any, p: Any, s: Any) -> None:
     """p: coefficient [1/K], reference [degC], moment R T0 that hangs [N m] (closed circuit: 0).
 
     Without a temperature nothing is changed.
     """
-    warm = c[X_TEMPERATURE]
+    warm = c.temperature
     if not math.isnan(warm):
-        factor = max(1.0 + p[0] * (warm - p[1]), LEAST)
-        if p[2] > 0.0:
-            c[X_MOMENT] += p[2] * (1.0 - factor)
+        factor = max(1.0 + p.coefficient * (warm - p.reference), LEAST)
+        if p.hanging > 0.0:
+            c.moment += p.hanging * (1.0 - factor)
         else:
-            c[X_PRETENSION_H] *= factor
-            c[X_PRETENSION_L] *= factor
+            c.pretension_h *= factor
+            c.pretension_l *= factor
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     closed = config.drive.circuit == "closed"
     hanging = 0.0 if closed else pretension_moment(config)
-    terms = _expand(values["coefficient_per_K"], values["reference_degC"], hanging)
+    terms = _expand(
+        coefficient=values["coefficient_per_K"], reference=values["reference_degC"], hanging=hanging
+    )
     return Change(terms=terms, moves_pretension=closed)
 
 

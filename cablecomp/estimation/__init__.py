@@ -1,4 +1,4 @@
 """Fitting a drive's model to recordings: parameters, the fitting problem, least squares, intervals.
 
-May import recording, observer and what lies below. Start reading at `problem.py`.
+Imports recording, observer and what lies below. Start reading at `problem.py`.
 """

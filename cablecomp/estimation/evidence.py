@@ -28,9 +28,13 @@ OUTPUTS: Final = (JOINT, MOTOR, "tension_h_N", "tension_l_N")
 
 NEEDED: Final = ("time_s", "motor_position_rad", JOINT)
 FINE_ROWS: Final = 6_000
-"""Rows of all recordings together at which a law with rates is run."""
+"""Rows of all recordings together that are kept after cleaning."""
+RATED: Final = 2
+"""Every so many of them a law with rates is run at, beside the judged ones."""
 LEAST_FINE: Final = 1_000
 """Rows that a recording keeps of these, however many there are."""
+SPARSE: Final = 0.6
+"""Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
 SPIKE: Final = 8.0
 """Deviations (scaled median) from the neighbours beyond which a reading is an outlier."""
 
@@ -61,6 +65,11 @@ class Evidence:
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""
         return self.columns[name][self.rows]
+
+    @property
+    def rated(self) -> IntArray:
+        """The fine rows at which a law with rates is run."""
+        return np.union1d(self.rows, np.arange(0, len(self.columns["time_s"]), RATED))
 
     def counting_from(self, first: int) -> Evidence:
         """The same with judged rows before `first` not counted."""
@@ -95,26 +104,33 @@ def gather(
     raw = _in_order(name, raw)
     load = load_channel(config, raw)
     inputs = [k for k in raw if k not in OUTPUTS or k == load]
+    good = {k: np.isfinite(v) for k, v in raw.items() if k != "time_s"}
     outliers = 0
-    finite = {k: np.isfinite(raw[k]) for k in OUTPUTS if k in raw}
-    noise: dict[str, float] = {}
     for key, values in raw.items():
         if key == "time_s":
             continue
-        good = np.isfinite(values)
-        if good.sum() < 40:
-            raise InputError(f"{name}: channel `{key}` has {int(good.sum())} finite readings; 40 are needed")
-        spikes = _spikes(values, good)
+        if good[key].sum() < 40:
+            count = int(good[key].sum())
+            raise InputError(f"{name}: channel `{key}` has {count} finite readings; 40 are needed")
+        spikes = _spikes(values, good[key])
         outliers += int(spikes.sum())
-        good &= ~spikes
-        if key in finite:
-            finite[key] &= ~spikes
-        raw[key] = np.interp(raw["time_s"], raw["time_s"][good], values[good])
-        noise[key] = _noise(raw["time_s"][good], values[good])
+        good[key] &= ~spikes
+    noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
+    # the drive goes from reading to reading: where an input has none, a bridged value would be an error of the prediction
+    kept = np.ones(len(raw["time_s"]), dtype=np.bool_)
+    for key in ("motor_position_rad", *([load] if load else [])):
+        if good[key].mean() > SPARSE:
+            kept &= good[key]
+    time = raw["time_s"]
+    raw = {
+        k: v[kept] if k == "time_s" else np.interp(time[kept], time[good[k]], v[good[k]])
+        for k, v in raw.items()
+    }
+    finite = {k: good[k][kept] for k in OUTPUTS if k in raw}
     group = max(1, -(-len(raw["time_s"]) // fine_rows))
     whole = len(raw["time_s"]) // group * group
     means = {k: group_means(v[:whole], group) for k, v in raw.items()}
-    good_rows = {k: group_means(v[:whole].astype(np.float64), group) > 0.5 for k, v in finite.items()}
+    good_rows = {k: group_means(v[:whole].astype(np.float64), group) > 0.99 for k, v in finite.items()}
     for key in inputs:
         if key != "time_s" and np.ptp(means[key]) > 0.0:
             means[key] = keep_corners(means["time_s"], means[key], noise[key] / np.sqrt(group))

@@ -44,8 +44,11 @@ class Fit:
         return tuple(found)
 
 
-def solve(problem: Problem, x: FloatArray | None = None, evaluations: int = 20) -> Fit:
-    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept.
+def solve(
+    problem: Problem, x: FloatArray | None = None, evaluations: int = 20, tolerance: float = 1e-4
+) -> Fit:
+    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a step lowers the cost
+    by less than `tolerance` of it.
 
     Raises InputError if the drive cannot follow the recordings where the fit begins and ends.
     """
@@ -71,7 +74,7 @@ def solve(problem: Problem, x: FloatArray | None = None, evaluations: int = 20) 
         jac=lambda x: problem.jacobian(x, residual(x)),
         bounds=(low, high),
         x_scale="jac",
-        ftol=1e-4,
+        ftol=tolerance,
         xtol=1e-4,
         gtol=1e-6,
         max_nfev=evaluations,
@@ -89,18 +92,21 @@ def best_of(problem: Problem, starts: Sequence[FloatArray], rough: int, evaluati
 
 
 def weighed(fit: Fit, floor: Weighing) -> Weighing:
-    """What a misfit counts for, out of what this fit leaves: RMS by channel times the root of its memory, never below
-    `floor`; the recordings' zeros by how they scatter (one step of expectation-maximisation)."""
+    """What a misfit counts for, out of what this fit leaves: RMS by channel times the root of the longest memory, never
+    below `floor`; the recordings' zeros by how they scatter (one step of expectation-maximisation)."""
     problem = fit.problem
-    sigma, zero_sd = {}, {}
+    sigma, zero_sd, size, memory = {}, {}, {}, 1.0
     for c in problem.channels:
         parts = []
         for r, m in zip(problem.evidence, problem.left(fit.x, c), strict=True):
             if c in r.counted and r.counted[c].sum() > 8:
                 parts.append((r.weight * m)[r.counted[c]])
         whole = np.concatenate(parts)
-        size = float(np.sqrt(np.mean(np.minimum(whole**2, 16.0 * np.median(whole**2) / 0.455))))
-        sigma[c] = max(size * float(np.sqrt(integrated_time_of_parts(parts))), floor.sigma[c])
+        size[c] = float(np.sqrt(np.mean(np.minimum(whole**2, 16.0 * np.median(whole**2) / 0.455))))
+        memory = max(memory, integrated_time_of_parts(parts))
+    for c in problem.channels:
+        # one memory for all: a channel whose misfit wanders may not be given up for the sake of another
+        sigma[c] = max(size[c] * float(np.sqrt(memory)), floor.sigma[c])
         zeros = problem.zeros(fit.x)[c]
         spread = [
             float(zeros[r.name][0] - zeros[r.session][0])
@@ -108,7 +114,7 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
             if sum(q.session == r.session for q in problem.evidence) > 1
         ]
         if spread:
-            seen = min(float(np.sqrt(np.mean(np.square(spread)))), ZERO * size)
+            seen = min(float(np.sqrt(np.mean(np.square(spread)))), ZERO * size[c])
             zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
     return Weighing(sigma, zero_sd)
 

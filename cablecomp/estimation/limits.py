@@ -12,7 +12,7 @@ STEP: Final = 1e-3
 """Step of the difference quotients in x: large against round-off and the kinks of friction, small against what matters."""
 INSTANT_STEP_S: Final = 0.05
 """Step of the difference quotient by an event's instant: it has to move over rows that are thinned by travel."""
-INSTANT_REACH_S: Final = 20.0
+INSTANT_REACH_S: Final = 3.0
 """How far an event's instant may move from where it was found by asking."""
 ZERO: Final = 0.5
 """How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up what compliances do."""

@@ -131,7 +131,8 @@ def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig)
         return Parameter(name, value, max(low, p.minimum), min(high, p.maximum), False, max(span, 1e-12))
     one_sided = p.log or low >= 0.0
     least = max(0.0 if one_sided else low * 3.0, p.minimum)
-    most = min(high * 10.0, p.maximum)
+    # a share needs no room for a scale that is known roughly
+    most = min(high * (1.0 if p.unit == "-" else 10.0), p.maximum)
     scale = abs(value) if value else 0.05 * span
     return Parameter(name, value, least, most, False, max(scale, 1e-300))
 

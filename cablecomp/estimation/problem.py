@@ -112,13 +112,22 @@ class Problem:
         """The joint at x as it stood in this recording."""
         return standing(self.config, self.values(x), recording)
 
-    def misfits(self, x: FloatArray) -> dict[str, list[FloatArray]]:
+    def misfits(
+        self, x: FloatArray, beside: Mapping[str, list[FloatArray]] | None = None, session: str | None = None
+    ) -> dict[str, list[FloatArray]]:
         """Measured less predicted, zeros still in it, on all judged rows, by channel and recording; NaN where the recording
-        lacks the channel. Raises InputError where the drive cannot follow."""
+        lacks the channel. Raises InputError where the drive cannot follow.
+
+        `beside`, `session`: misfits known already, of which only that session's recordings are run again.
+        """
         values = self.values(x)
         found: dict[str, list[FloatArray]] = {c: [] for c in self.channels}
         cache: dict[Any, Simulator] = {}
-        for r in self.evidence:
+        for k, r in enumerate(self.evidence):
+            if beside is not None and r.session != session:
+                for c in self.channels:
+                    found[c].append(beside[c][k])
+                continue
             key = self._stand_key(r)
             if key not in cache:
                 cache[key] = simulator(standing(self.config, values, r), self.fine)
@@ -145,9 +154,11 @@ class Problem:
     def followed(self, x: FloatArray) -> FloatArray | None:
         """As `residual`; None where the drive cannot follow."""
         try:
-            misfits = self.misfits(x)
+            return self._projected(x, self.misfits(x))
         except InputError:
             return None
+
+    def _projected(self, x: FloatArray, misfits: Mapping[str, list[FloatArray]]) -> FloatArray:
         parts = [self.bases[c].project(self._rows(c, misfits[c])) for c in self.channels]
         return np.concatenate([*parts, self.prior(x)])
 
@@ -163,12 +174,33 @@ class Problem:
         here = self.residual(x) if base is None else base
         high = self.bounds()[1]
         columns = np.empty((len(here), len(x)))
-        for k in range(len(x)):
+        known = self._known(x)
+        for k, p in enumerate(self.parameters):
             step = STEP if x[k] + STEP <= high[k] else -STEP
             moved = x.copy()
             moved[k] += step
-            columns[:, k] = (self.residual(moved) - here) / step
+            there = self._beside(moved, known, p.session)
+            columns[:, k] = (there - here) / step
         return columns
+
+    def _known(self, x: FloatArray) -> dict[str, list[FloatArray]] | None:
+        """Misfits at x where some parameter is one session's own, so that others need not be run for it."""
+        if not any(p.session for p in self.parameters):
+            return None
+        try:
+            return self.misfits(x)
+        except InputError:
+            return None
+
+    def _beside(
+        self, x: FloatArray, known: Mapping[str, list[FloatArray]] | None, session: str | None
+    ) -> FloatArray:
+        if known is None or session is None:
+            return self.residual(x)
+        try:
+            return self._projected(x, self.misfits(x, known, session))
+        except InputError:
+            return self.residual(x)
 
     def zeros(self, x: FloatArray) -> dict[str, dict[str, FloatArray]]:
         """By channel: the zero (and slope, for the motor torque) of each session, and of each recording, in the channel's

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from cablecomp.effects import catalogue, extend
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.start import joint_start
+from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import stepper as st
 from cablecomp.observer.refusal import REASONS, Refusal
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _PLACES: Final[Mapping[str, int]] = {
     JOINT: st.OUT_JOINT,
@@ -43,13 +43,14 @@ class Simulator:
         `history` (k x 2): motor angle [rad] and load [N m] that went before the first row. Raises InputError where the drive
         cannot follow (slack in an open circuit, a drum run out of cable).
         """
-        outs = self.run(recording, None if self.fine else recording.rows, history)
+        kept = recording.rated if self.fine else recording.rows
+        outs = self.run(recording, kept, history)
         if self.fine:
-            outs = outs[recording.rows]
+            outs = outs[np.searchsorted(kept, recording.rows)]
         return {name: outs[:, place] for name, place in _PLACES.items()}
 
-    def run(self, recording: Evidence, kept: Any = None, history: FloatArray | None = None) -> FloatArray:
-        """The kernel's outputs on all fine rows, or on those `kept`."""
+    def run(self, recording: Evidence, kept: IntArray, history: FloatArray | None = None) -> FloatArray:
+        """The kernel's outputs on the fine rows `kept`."""
         rows = self._rows(recording, kept)
         before = 0 if history is None else len(history)
         if history is not None:
@@ -62,12 +63,12 @@ class Simulator:
         joint_start(model.P, model.I, S, J, model.L, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
         outs = np.empty((len(rows), st.OUT_WIDTH))
         done, status = st.run_block(model.P, model.I, S, J, model.L, rows, outs)
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             at = rows[min(done, len(rows) - 1), st.IN_TIME]
             raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")
         return outs[before:]
 
-    def _rows(self, recording: Evidence, kept: Any) -> FloatArray:
+    def _rows(self, recording: Evidence, kept: IntArray) -> FloatArray:
         columns = recording.columns
         time = columns["time_s"]
         rows = np.full((len(time), st.IN_OTHER + len(self.others)), np.nan)
@@ -82,7 +83,7 @@ class Simulator:
                     f"{recording.name}: channel `{name}` is missing, which an effect reads; record it"
                 )
             rows[:, st.IN_OTHER + k] = columns[name]
-        return rows if kept is None else np.ascontiguousarray(rows[kept])
+        return np.ascontiguousarray(rows[kept])
 
 
 def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray | float:

@@ -1,4 +1,4 @@
-"""An arc with two free ends: belt pulley, idler, fixed guide or a stretch of sheath (sheet, section 1.1, "ends").
+"""An arc with two free ends: belt pulley, idler, fixed guide or a stretch of sheath.
 
 The same profile law as a drum's wrap, clamped by a friction cone from either end: v(y) on 0 <= y <= width, y = 0 the
 near end. When the cones exclude each other the whole arc slides, and |v_1 - v_2| = mu width.
@@ -10,7 +10,7 @@ import math
 from typing import TypeAlias
 
 from cablecomp.mechanics.jit import kernel
-from cablecomp.mechanics.profile import B, C, D, E, Floats, V, Y, _piece_plain
+from cablecomp.mechanics.profile import B, C, D, E, Floats, V, Y, piece_plain
 
 ArcMeet: TypeAlias = tuple[float, float, float, float, float, float, float]
 
@@ -18,7 +18,7 @@ ArcMeet: TypeAlias = tuple[float, float, float, float, float, float, float]
 @kernel
 def line(y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
     """Integral of exp(v) - 1, and of exp(v), over a straight piece."""
-    return _piece_plain(y2 - y1, v2 - v1, math.exp(v1), math.exp(v2))
+    return piece_plain(y2 - y1, v2 - v1, math.exp(v1), math.exp(v2))
 
 
 @kernel
@@ -138,40 +138,6 @@ def arc_commit(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> in
 
 
 @kernel
-def arc_turn(G: Floats, i: int, n: int, turn: float, v_arriving: float) -> int:
-    """Let a pulley turn: cable arrives at the near end (turn > 0) at v_arriving and as much leaves at the far end; turn < 0
-    the other way round. The width stays."""
-    if turn == 0.0:
-        return n
-    width = G[i, Y, n - 1]
-    if turn < 0.0:
-        _mirror(G, i, n)
-        n = arc_turn_on(G, i, n, width, -turn, v_arriving)
-        _mirror(G, i, n)
-        return _tidy(G, i, n)
-    return _tidy(G, i, arc_turn_on(G, i, n, width, turn, v_arriving))
-
-
-@kernel
-def arc_turn_on(G: Floats, i: int, n: int, width: float, turn: float, v_arriving: float) -> int:
-    """Shift the profile inward by `turn`, put arriving cable before it, cut what left the arc."""
-    if turn >= width:
-        _put(G, i, 0, 0.0, v_arriving)
-        _put(G, i, 1, width, v_arriving)
-        return 2
-    cut = width - turn
-    while n > 1 and G[i, Y, n - 2] >= cut:
-        n -= 1
-    share = (cut - G[i, Y, n - 2]) / (G[i, Y, n - 1] - G[i, Y, n - 2])
-    end = G[i, V, n - 2] + share * (G[i, V, n - 1] - G[i, V, n - 2])
-    for k in range(n - 1, -1, -1):
-        _put(G, i, k + 1, G[i, Y, k] + turn, G[i, V, k])
-    _put(G, i, n, width, end)
-    _put(G, i, 0, 0.0, v_arriving)
-    return n + 1
-
-
-@kernel
 def arc_fill(G: Floats, i: int, width: float, v: float) -> int:
     """Start an arc at uniform tension."""
     G[i, :, :] = 0.0
@@ -190,17 +156,6 @@ def _put(G: Floats, i: int, k: int, y: float, v: float) -> None:
 def _copy(G: Floats, i: int, source: int, target: int) -> None:
     G[i, Y, target] = G[i, Y, source]
     G[i, V, target] = G[i, V, source]
-
-
-@kernel
-def _mirror(G: Floats, i: int, n: int) -> None:
-    width = G[i, Y, n - 1]
-    for k in range(n // 2):
-        y, v = G[i, Y, k], G[i, V, k]
-        _put(G, i, k, width - G[i, Y, n - 1 - k], G[i, V, n - 1 - k])
-        _put(G, i, n - 1 - k, width - y, v)
-    if n % 2 == 1:
-        G[i, Y, n // 2] = width - G[i, Y, n // 2]
 
 
 @kernel
@@ -225,7 +180,7 @@ def _tidy(G: Floats, i: int, n: int) -> int:
     G[i, E, 0] = math.exp(G[i, V, 0])
     for k in range(1, n):
         G[i, E, k] = math.exp(G[i, V, k])
-        part, _ = _piece_plain(
+        part, _ = piece_plain(
             G[i, Y, k] - G[i, Y, k - 1], G[i, V, k] - G[i, V, k - 1], G[i, E, k - 1], G[i, E, k]
         )
         G[i, C, k] = G[i, C, k - 1] + part

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +12,23 @@ from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig, Stage
 from cablecomp.errors import InputError
-from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.drive import Drive, named
 from cablecomp.mechanics.profile import ROWS, Floats, Ints
-from cablecomp.mechanics.viscous import W_HEAD
+from cablecomp.mechanics.records import (
+    CABLE,
+    CIRCUIT,
+    CONTEXT,
+    FILTER,
+    GRID,
+    SENSOR,
+    SIZES,
+    STATE,
+    STEP,
+    TERM,
+    floats,
+)
 
-WET_NODES = 96  # grid nodes of a drum with viscous slip
+HEAD = 8  # numbers of a grid before its nodes
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
 
 
@@ -44,13 +57,18 @@ class Extension:
 
 @dataclass(frozen=True)
 class Model:
-    """The kernel's arrays for one joint: P and I never change, S and J are the initial state, L the law tables (None = plain)."""
+    """The kernel's arrays for one joint: parameters P and sizes I never change; S (all numbers) and J (points in use of every
+    profile) are the initial state; L the law tables (None = plain). `named` says what lies in them."""
 
     P: Floats
     I: Ints
     S: Floats
     J: Ints
     L: Any  # law tables, or None for the plain drive: the compiler tells the two apart
+
+    def named(self, S: Floats, J: Ints) -> Drive:
+        """The records of this joint in the state S, J; what is written to them is written there."""
+        return named(self.P, self.I, S, J)
 
 
 def stage_ratios(stages: Sequence[Stage]) -> list[float]:
@@ -71,78 +89,80 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
     ratios = stage_ratios(stages)
     if chained:
         _check_pretensions(config, ratios)
-    n_circuits, n_cables = len(groups), len(stages) * (1 + closed)
-    joints: list[float] = []
-    cables: list[list[float]] = []
-    structure: list[int] = []
-    for ic, group in enumerate(groups):
-        last = group[-1]
-        rigid = float(np.prod([s.input_radius_m / s.output_radius_m for s in group]))
-        joints += [rigid, ratios[ic] if not chained else 1.0, last.output_radius_m, SLACK * last.pretension_N]
-        inner = stage_ratios(group)
-        first_h = len(cables)
-        for sign in (1.0, -1.0)[: 1 + closed]:
-            for n_i, stage in zip(inner, group, strict=True):
-                cables.append(_cable(stage, n_i, last, sign, config, extra))
-        structure += [first_h, len(group), closed, first_h + len(group) * closed]
-    s_cable = 0
-    s_context = o.CABLE_STATE * n_cables
-    s_filter = s_context + o.CONTEXT
-    s_term = s_filter + o.FILTER
-    s_wet = s_term + sum(t.state_size for t in extra.terms)
-    nodes = WET_NODES if extra.viscous_Ns_per_m_rad > 0.0 else 0
-    s_meet = s_wet + (W_HEAD + 4 * nodes) * 2 * n_cables
-    s_profile = s_meet + o.MEET * 2 * n_cables
-    capacity = config.observer.max_pieces
-    n_stacks = (3 if extra.guide_angle > 0.0 else 2) * n_cables
-    s_spare = s_profile + n_stacks * ROWS * capacity
-    S = np.zeros(s_spare + s_meet)
-    p_terms = len(joints) + o.CABLE * n_cables
-    p_sensor = p_terms + sum(len(t.parameters) for t in extra.terms)
-    header = [
-        n_circuits, n_cables, capacity, len(extra.terms), n_stacks, s_profile, s_cable, s_context, s_term, s_wet, nodes,
-        s_filter, s_meet, s_spare, p_sensor,
-    ]  # fmt: skip
-    parameters: list[float] = []
-    for term in extra.terms:
-        structure += [term.address, p_terms + len(parameters), s_term]
-        parameters += term.parameters
-        s_term += term.state_size
-    sensors = [
-        config.sensors.joint_torque_gain,
-        config.sensors.joint_torque_offset_Nm,
-        2.0 * np.pi * config.observer.input_filter_Hz,
-    ]
-    P = np.array([*joints, *np.ravel(cables), *parameters, *sensors])
-    I = np.array(header + structure, dtype=np.int64)
-    S[s_context + o.X_RADIUS] = stages[-1].output_radius_m
-    return Model(P, I, S, np.zeros(n_stacks, dtype=np.int64), extra.law)
-
-
-def _cable(
-    stage: Stage, n_i: float, last: Stage, sign: float, config: JointConfig, extra: Extension
-) -> list[float]:
-    """Parameters of one cable, in the order of the layout."""
-    row = [0.0] * o.CABLE
-    row[o.R_OUT], row[o.R_IN] = stage.output_radius_m, stage.input_radius_m
-    row[o.LENGTH], row[o.EA], row[o.T0] = (
-        stage.free_length_m + extra.extra_length_m,
-        stage.EA_N,
-        stage.pretension_N,
+    circuits = np.zeros(len(groups), CIRCUIT)
+    chains: list[tuple[float, list[Stage]]] = []  # of cables, each with its sign
+    first = 0
+    for circuit, group, ratio in zip(circuits, groups, ratios, strict=False):
+        circuit.first = first, first + closed * len(group)
+        circuit.count, circuit.chains = len(group), 1 + closed
+        circuit.ratio = math.prod(stage.ratio for stage in group)
+        circuit.share = 1.0 if chained else ratio
+        circuit.radius = group[-1].output_radius_m
+        circuit.slack = SLACK * group[-1].pretension_N
+        chains += [(1.0, group), (-1.0, group)][: 1 + closed]
+        first += len(group) * (1 + closed)
+    cables = np.concatenate([_chain(group, sign, config, extra) for sign, group in chains])
+    sensor = np.zeros(1, SENSOR)
+    sensor["gain"] = config.sensors.joint_torque_gain
+    sensor["offset"] = config.sensors.joint_torque_offset_Nm
+    sensor["cutoff"] = 2.0 * np.pi * config.observer.input_filter_Hz
+    size = np.zeros(1, SIZES)[0]
+    size.circuits, size.cables, size.terms = len(circuits), len(cables), len(extra.terms)
+    size.stacks = (3 if extra.guide_angle > 0.0 else 2) * len(cables)
+    size.capacity = config.observer.max_pieces
+    size.grids = 2 * len(cables) if extra.viscous_Ns_per_m_rad > 0.0 else 0
+    size.cables_at = len(circuits) * floats(CIRCUIT)
+    size.sensor_at = (
+        size.cables_at + len(cables) * floats(CABLE) + sum(len(t.parameters) for t in extra.terms)
     )
-    row[o.MU_OUT], row[o.MU_IN] = stage.mu_output, stage.mu_input
-    row[o.W_OUT], row[o.W_IN] = stage.wrap_output_rad, stage.wrap_input_rad
-    row[o.SCALE] = n_i * last.output_radius_m / stage.output_radius_m
-    row[o.WEIGHT] = n_i / stage.output_radius_m
-    row[o.SIGN] = sign
-    row[o.RATIO] = stage.input_radius_m / stage.output_radius_m
-    row[o.GUIDE], row[o.GUIDE_LENGTH] = extra.guide_angle, extra.guide_length_m
-    row[o.PLAY_SHARE], row[o.PLAY_YIELD] = extra.play_share, extra.play_yield_N
-    row[o.VISCOUS] = extra.viscous_Ns_per_m_rad
-    row[o.JOINT_DRUM] = float(stage is config.drive.stage[-1])
-    row[o.MERGE] = config.observer.merge_tolerance
-    row[o.PER_BREAKING] = 0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N
-    return row
+    size.context_at = len(cables) * floats(STATE)
+    size.filter_at = size.context_at + floats(CONTEXT)
+    size.grids_at = size.filter_at + floats(FILTER) + sum(t.state_size for t in extra.terms)
+    # without grids the room of their heads is left, as snapshots have it
+    size.steps_at = size.grids_at + (size.grids * floats(GRID) if size.grids else 2 * len(cables) * HEAD)
+    size.profiles_at = size.steps_at + 2 * len(cables) * floats(STEP)
+    size.spare_at = size.profiles_at + size.stacks * ROWS * size.capacity
+    terms = np.zeros(len(extra.terms), TERM)
+    parameters: list[float] = []
+    state_at = size.filter_at + floats(FILTER)
+    for call, term in zip(terms, extra.terms, strict=True):
+        call.address = term.address
+        call.parameters_at = size.cables_at + len(cables) * floats(CABLE) + len(parameters)
+        call.state_at = state_at
+        parameters += term.parameters
+        state_at += term.state_size
+    P = np.concatenate([circuits.view("f8"), cables.view("f8"), parameters, sensor.view("f8")])
+    I = np.concatenate([size.reshape(1).view("i8"), terms.view("i8")])
+    model = Model(
+        P, I, np.zeros(size.spare_at + size.steps_at), np.zeros(size.stacks, dtype=np.int64), extra.law
+    )
+    model.named(model.S, model.J).context.radius = stages[-1].output_radius_m
+    return model
+
+
+def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Extension) -> NDArray[Any]:
+    """Records of the cables of one chain, input side first."""
+    cables = np.zeros(len(group), CABLE)
+    last = group[-1]
+    for cable, stage, n_i in zip(cables, group, stage_ratios(group), strict=True):
+        cable.radius = stage.output_radius_m, stage.input_radius_m
+        cable.mu = stage.mu_output, stage.mu_input
+        cable.wrap = stage.wrap_output_rad, stage.wrap_input_rad
+        cable.law = 2, 2
+        if stage is config.drive.stage[-1]:
+            cable.law = (0 if sign > 0.0 else 1), 2
+        cable.length = stage.free_length_m + extra.extra_length_m
+        cable.EA, cable.T0 = stage.EA_N, stage.pretension_N
+        cable.scale = n_i * last.output_radius_m / stage.output_radius_m
+        cable.weight = n_i / stage.output_radius_m
+        cable.sign = sign
+        cable.ratio = stage.ratio
+        cable.guide, cable.guide_length = extra.guide_angle, extra.guide_length_m
+        cable.play_share, cable.play_yield = extra.play_share, extra.play_yield_N
+        cable.viscous = extra.viscous_Ns_per_m_rad
+        cable.merge = config.observer.merge_tolerance
+        cable.per_breaking = 0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N
+    return cables
 
 
 def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:

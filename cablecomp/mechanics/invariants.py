@@ -10,11 +10,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model
-from cablecomp.mechanics.profile import LEAST_WRAP, ROWS, B, C, D, E, Floats, Ints, V, Y, _piece_table
+from cablecomp.mechanics.drive import Drive
+from cablecomp.mechanics.profile import LEAST_WRAP, B, C, D, E, Floats, Ints, V, Y, piece_table
+from cablecomp.mechanics.records import IN, OUT, WET_NODES
 from cablecomp.mechanics.tables import groove
-from cablecomp.mechanics.viscous import W_COUNT, W_END, W_HEAD
 
 ROOM = 4  # points that a step may need beyond those it leaves behind
 STEEP = 1e-9  # of v, by which rounding may pass the friction cone
@@ -24,7 +24,7 @@ AGREE_RAD = 1e-6  # between wrap angles and shafts
 
 def heights_fit(model: Model, heights: NDArray[np.float64] | Ints) -> bool:
     """True if every profile has at least its two ends and fits its array with room for a step."""
-    most = int(model.I[o.CAPACITY]) - ROOM
+    most = int(model.named(model.S, model.J).size.capacity) - ROOM
     return bool(np.all((heights >= 2) & (heights <= most) & (heights == np.floor(heights))))
 
 
@@ -36,7 +36,8 @@ def violations(model: Model, S: Floats, J: Ints) -> list[str]:
     found = profile_violations(model, S, J)
     if not heights_fit(model, J):
         return found
-    return found + _scalar_violations(model, S) + _angle_violations(model, S, J)
+    d = model.named(S, J)
+    return found + _scalar_violations(d, S) + _angle_violations(d)
 
 
 def profile_violations(model: Model, S: Floats, J: Ints) -> list[str]:
@@ -45,21 +46,20 @@ def profile_violations(model: Model, S: Floats, J: Ints) -> list[str]:
     Count between 2 and capacity - 4; angles from 0 on, rising; |dv| <= mu dsigma between neighbours (thesis 2-11); finite
     tensions; running integrals C = int e dy and B that belong to the points; error bounds D >= 0.
     """
+    d = model.named(S, J)
     if not heights_fit(model, J):
-        return [f"profile lengths {J.tolist()} in room for {int(model.I[o.CAPACITY])}"]
-    stacks = int(model.I[o.N_STACKS])
-    first = int(model.I[o.S_PROFILE])
-    G = S[first : int(model.I[o.S_SPARE])].reshape(stacks, ROWS, -1)
+        return [f"profile lengths {J.tolist()} in room for {d.size.capacity}"]
     found = []
-    for stack in range(stacks):
-        found += [f"profile {stack}: {words}" for words in _profile(model, S, G[stack, :, : J[stack]], stack)]
+    for stack in range(d.size.stacks):
+        found += [f"profile {stack}: {words}" for words in _profile(model, d, stack)]
     return found
 
 
-def _profile(model: Model, S: Floats, rows: Floats, stack: int) -> list[str]:
-    wraps = 2 * int(model.I[o.N_CABLES])
-    p = int(model.I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * (stack // 2 if stack < wraps else stack - wraps)
+def _profile(model: Model, d: Drive, stack: int) -> list[str]:
+    rows = d.profiles[stack, :, : d.heights[stack]]
+    wraps = 2 * int(d.size.cables)
     guide = stack >= wraps
+    cable, end = d.cables[stack - wraps if guide else stack // 2], stack % 2
     if not np.all(np.isfinite(rows)):
         return ["a number is not finite"]
     y, v = rows[Y], rows[V]
@@ -67,10 +67,10 @@ def _profile(model: Model, S: Floats, rows: Floats, stack: int) -> list[str]:
         return [f"angles do not rise from 0: {y.tolist()}"]
     if np.any(rows[D] < 0.0) or (model.L is None and np.any(np.diff(rows[B]) < 0.0)):
         return ["a bound on the error of merging is negative"]
-    if guide and abs(y[-1] - model.P[p + o.GUIDE]) > AGREE_RAD:
-        return [f"its guide is {y[-1]} wide instead of {model.P[p + o.GUIDE]}"]
-    law = 2 if guide else _law(model, p, stack % 2)
-    mu = 1.0 if guide else float(model.P[p + o.MU_OUT + stack % 2])
+    if guide and abs(y[-1] - cable.guide) > AGREE_RAD:
+        return [f"its guide is {y[-1]} wide instead of {cable.guide}"]
+    law = 2 if guide else int(cable.law[end])
+    mu = 1.0 if guide else float(cable.mu[end])
     over = float(np.max(np.abs(np.diff(v)) - mu * np.diff(_sigma(model, law, y))))
     found = [f"is steeper than friction holds, by {over:g}"] if over > STEEP else []
     parts = _integrals(model, law, y, v)
@@ -91,7 +91,7 @@ def _integrals(model: Model, law: int, y: Floats, v: Floats) -> Floats:
         mean = np.where(small, 1.0 - 0.5 * d, -np.expm1(-d) / np.where(small, 1.0, d))
         return np.asarray(dy * (np.exp(v[1:]) * mean - 1.0))
     ends = zip(y[:-1].tolist(), v[:-1].tolist(), y[1:].tolist(), v[1:].tolist(), strict=True)
-    return np.array([_piece_table(model.L, law, *piece)[0] for piece in ends])
+    return np.array([piece_table(model.L, law, *piece)[0] for piece in ends])
 
 
 def _sigma(model: Model, law: int, y: Floats) -> Floats:
@@ -99,76 +99,65 @@ def _sigma(model: Model, law: int, y: Floats) -> Floats:
     return np.array([groove(model.L, law, float(a)) for a in y])
 
 
-def _law(model: Model, p: int, end: int) -> int:
-    if end == 1 or model.P[p + o.JOINT_DRUM] == 0.0:
-        return 2
-    return 0 if model.P[p + o.SIGN] > 0.0 else 1
-
-
-def _scalar_violations(model: Model, S: Floats) -> list[str]:
-    I = model.I
+def _scalar_violations(d: Drive, S: Floats) -> list[str]:
     found: list[str] = []
-    for c in range(int(I[o.N_CABLES])):
-        q = int(I[o.S_CABLE]) + o.CABLE_STATE * c
-        if not np.all(np.isfinite(S[q : q + o.CABLE_STATE])):
+    for c, state in enumerate(d.states):
+        if not np.all(np.isfinite(state.tolist())):
             found.append(f"cable {c}: a number is not finite")
-        for place, what in (
-            (o.Q_TENSION, "tension"),
-            (o.Q_TENSION_IN, "tension at the input drum"),
-            (o.Q_T0, "pretension factor"),
-            (o.Q_EA, "stiffness factor"),
+        for value, what in (
+            (state.tension, "tension"),
+            (state.tension_in, "tension at the input drum"),
+            (state.pretension, "pretension factor"),
+            (state.stiffness, "stiffness factor"),
         ):
-            if not S[q + place] > 0.0:
-                found.append(f"cable {c}: {what} {S[q + place]:g}")
-    x = int(I[o.S_CONTEXT])
+            if not value > 0.0:
+                found.append(f"cable {c}: {what} {value:g}")
+    x = d.context
+    # not what a recording may lack (tensions before the first solution, temperature, further channels)
     needed = [
-        o.X_TIME,
-        o.X_MOTOR,
-        o.X_MOTOR_OLD,
-        o.X_JOINT,
-        o.X_JOINT_OLD,
-        o.X_LOAD,
-        *range(o.X_MOMENT, o.CONTEXT),
+        x.time,
+        x.motor,
+        x.motor_old,
+        x.joint,
+        x.joint_old,
+        x.load,
+        x.moment,
+        x.moment_slope,
+        x.length_h,
+        x.length_l,
     ]
-    if not np.all(np.isfinite(S[[x + place for place in needed]])):
+    needed += [x.pretension_h, x.pretension_l, x.stiffness_h, x.stiffness_l, x.reading, x.compliance, x.rigid]
+    if not np.all(np.isfinite([*needed, x.motor_moment])):
         found.append("the context holds a number that is not finite")
-    if not np.all(np.isfinite(S[int(I[o.S_FILTER]) : int(I[o.S_MEET])])):
+    if not np.all(np.isfinite(S[d.size.filter_at : d.size.steps_at])):
         found.append("the filter's, a term's or a grid's state is not finite")
-    nodes = int(I[o.NODES])
-    wraps = 2 * int(I[o.N_CABLES])
     # behind a guide the input drum has no use for its grid
-    for wrap in range(0, wraps if nodes else 0, 1 if int(I[o.N_STACKS]) == wraps else 2):
-        b = int(I[o.S_WET]) + wrap * (W_HEAD + 4 * nodes)
-        if not (1.0 <= S[b + W_COUNT] <= nodes and S[b + W_END] > 0.0):
-            found.append(f"grid {wrap}: {S[b + W_COUNT]:g} nodes, end tension {S[b + W_END]:g}")
-        elif not np.all(S[b + W_HEAD : b + W_HEAD + int(S[b + W_COUNT])] > 0.0):
+    guided = d.size.stacks > 2 * d.size.cables
+    for wrap, grid in list(enumerate(d.grids))[:: 2 if guided else 1]:
+        if not (1.0 <= grid.count <= WET_NODES and grid.end > 0.0):
+            found.append(f"grid {wrap}: {grid.count:g} nodes, end tension {grid.end:g}")
+        elif not np.all(grid.tau[: int(grid.count)] > 0.0):
             found.append(f"grid {wrap}: a tension is not positive")
     return found
 
 
-def _angle_violations(model: Model, S: Floats, J: Ints) -> list[str]:
+def _angle_violations(d: Drive) -> list[str]:
     """Wraps that do not end where their shafts stand."""
-    I, P = model.I, model.P
     found: list[str] = []
-    x = int(I[o.S_CONTEXT])
-    if S[x + o.X_FIRST] != 0.0 or I[o.NODES] > 0:
+    if d.context.first or d.size.grids > 0:
         return found
-    first = int(I[o.S_PROFILE])
-    G = S[first : int(I[o.S_SPARE])].reshape(int(I[o.N_STACKS]), ROWS, -1)
-    last = int(I[o.N_CIRCUITS]) - 1
-    h = o.HEADER + o.CIRCUIT * last
-    for chain in range(1 + int(I[h + o.C_CLOSED])):
-        c = int(I[h] if chain == 0 else I[h + o.C_FIRST_L]) + int(I[h + o.C_COUNT]) - 1
-        p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * c
-        expected = P[p + o.W_OUT] + P[p + o.SIGN] * S[x + o.X_JOINT]
-        _agree(found, 2 * c, float(G[2 * c, Y, J[2 * c] - 1]), float(expected))
-        c = int(I[o.HEADER] if chain == 0 else I[o.HEADER + o.C_FIRST_L])
-        p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * c
-        expected = P[p + o.W_IN] - P[p + o.SIGN] * S[x + o.X_MOTOR]
-        _agree(found, 2 * c + 1, float(G[2 * c + 1, Y, J[2 * c + 1] - 1]), float(expected))
+    begin, last = d.circuits[0], d.circuits[-1]
+    for chain in range(last.chains):
+        c = last.first[chain] + last.count - 1
+        cable = d.cables[c]
+        _agree(found, d, 2 * c + OUT, cable.wrap[OUT] + cable.sign * d.context.joint)
+        c = begin.first[chain]
+        cable = d.cables[c]
+        _agree(found, d, 2 * c + IN, cable.wrap[IN] - cable.sign * d.context.motor)
     return found
 
 
-def _agree(found: list[str], stack: int, wrap: float, expected: float) -> None:
+def _agree(found: list[str], d: Drive, stack: int, expected: float) -> None:
+    wrap = float(d.profiles[stack, Y, d.heights[stack] - 1])
     if not wrap > LEAST_WRAP or not math.isclose(wrap, expected, rel_tol=0.0, abs_tol=AGREE_RAD):
         found.append(f"profile {stack}: ends at {wrap} rad, its shafts say {expected}")

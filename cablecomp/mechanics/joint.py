@@ -4,212 +4,199 @@ from __future__ import annotations
 
 import math
 
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
+from cablecomp.mechanics.drive import Drive, Terms
 from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
 from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
-from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints
+from cablecomp.mechanics.profile import LEAST_WRAP, Floats
+from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
 
 
 @kernel
-def run_terms(P: Floats, I: Ints, S: Floats) -> None:
+def run_terms(d: Drive, terms: Terms) -> None:
     """Let every term add its part to the context."""
-    x = I[o.S_CONTEXT]
-    S[x + o.X_MOMENT : x + o.X_LENGTH_L + 1] = 0.0
-    S[x + o.X_PRETENSION_H : x + o.X_STIFFNESS_L + 1] = 1.0
-    S[x + o.X_READING] = 0.0
-    S[x + o.X_MOTOR_MOMENT] = 0.0
-    context = S[x : x + o.CONTEXT]
-    for k in range(I[o.N_TERMS]):
-        t = o.HEADER + o.CIRCUIT * I[o.N_CIRCUITS] + o.TERM * k
-        call_term(I[t], context, P[I[t + o.T_PARAMETER] :], S[I[t + o.T_STATE] :])
+    x = d.context
+    x.moment = x.moment_slope = x.length_h = x.length_l = 0.0
+    x.pretension_h = x.pretension_l = x.stiffness_h = x.stiffness_l = 1.0
+    x.reading = x.motor_moment = 0.0
+    context = terms.memory[d.size.context_at :]
+    for k in range(d.size.terms):
+        call = terms.calls[k]
+        call_term(
+            call.address, context, terms.parameters[call.parameters_at :], terms.memory[call.state_at :]
+        )
 
 
 @kernel
-def _distribute(I: Ints, S: Floats) -> None:
+def _distribute(d: Drive) -> None:
     """Hand the terms' lengths and stiffness factors to the cables at the joint (pretension factors: at commits)."""
-    x = I[o.S_CONTEXT]
-    last = I[o.N_CIRCUITS] - 1
+    x = d.context
+    last = d.size.circuits - 1
     for ic in range(last + 1):
-        h = o.HEADER + o.CIRCUIT * ic
-        count = I[h + o.C_COUNT]
-        for chain in range(1 + I[h + o.C_CLOSED]):
-            first = I[h] if chain == 0 else I[h + o.C_FIRST_L]
-            for j in range(count):
-                q = I[o.S_CABLE] + o.CABLE_STATE * (first + j)
-                if S[x + o.X_FIRST] != 0.0:
-                    S[q + o.Q_T0] = S[x + o.X_PRETENSION_H + chain]
-                if ic == last and j == count - 1:
-                    S[q + o.Q_EA] = S[x + o.X_STIFFNESS_H + chain]
-                    S[q + o.Q_OFFSET] = S[x + o.X_LENGTH_H + chain]
+        circuit = d.circuits[ic]
+        for chain in range(circuit.chains):
+            for j in range(circuit.count):
+                state = d.states[circuit.first[chain] + j]
+                if x.first:
+                    state.pretension = x.pretension_h if chain == 0 else x.pretension_l
+                if ic == last and j == circuit.count - 1:
+                    state.stiffness = x.stiffness_h if chain == 0 else x.stiffness_l
+                    state.offset = x.length_h if chain == 0 else x.length_l
 
 
 @inlined_kernel
-def _solve_all(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, moment: float
-) -> tuple[float, float, int]:
+def _solve_all(d: Drive, L: Floats, moment: float) -> tuple[float, float, int]:
     """Joint angle and compliance with `moment` on the output pulley, through all circuits from the motor outward."""
-    x_context = I[o.S_CONTEXT]
-    x = S[x_context + o.X_MOTOR]
+    angle = d.context.motor
     total = 0.0
-    for ic in range(I[o.N_CIRCUITS]):
-        j = o.JOINT * ic
-        h = o.HEADER + o.CIRCUIT * ic
-        q = I[o.S_CABLE] + o.CABLE_STATE * (I[h] + I[h + o.C_COUNT] - 1)
-        guess = S[q + o.Q_SHAFT] if ic < I[o.N_CIRCUITS] - 1 else S[x_context + o.X_JOINT]
-        n = P[j + o.J_MOMENT]
-        x_out, compliance, status = circuit_solve(P, I, S, J, L, G, ic, moment * n, x, guess)
-        if status != o.STATUS_OK:
-            return x_out, total, status
-        total = total * P[j + o.J_RATIO] * P[j + o.J_RATIO] + compliance
-        x = x_out
-    return x, total, o.STATUS_OK
+    for ic in range(d.size.circuits):
+        circuit = d.circuits[ic]
+        last = d.states[circuit.first[0] + circuit.count - 1]
+        guess = last.shaft if ic < d.size.circuits - 1 else d.context.joint
+        after, compliance, status = circuit_solve(d, L, ic, moment * circuit.share, angle, guess)
+        if status != STATUS_OK:
+            return after, total, status
+        total = total * circuit.ratio * circuit.ratio + compliance
+        angle = after
+    return angle, total, STATUS_OK
 
 
 @inlined_kernel
-def joint_solve(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> int:
+def _show_tensions(d: Drive) -> None:
+    """Write the tensions at the output pulley into the context."""
+    circuit = d.circuits[d.size.circuits - 1]
+    d.context.tension_h = d.states[circuit.first[0] + circuit.count - 1].tension
+    d.context.tension_l = math.nan
+    if circuit.chains == 2:
+        d.context.tension_l = d.states[circuit.first[1] + circuit.count - 1].tension
+
+
+@inlined_kernel
+def joint_solve(d: Drive, terms: Terms, L: Floats) -> int:
     """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved together."""
-    x = I[o.S_CONTEXT]
-    load = S[x + o.X_LOAD]
-    h = o.HEADER + o.CIRCUIT * (I[o.N_CIRCUITS] - 1)
-    qh = I[o.S_CABLE] + o.CABLE_STATE * (I[h] + I[h + o.C_COUNT] - 1)
-    ql = I[o.S_CABLE] + o.CABLE_STATE * (I[h + o.C_FIRST_L] + I[h + o.C_COUNT] - 1)
-    if I[o.N_TERMS] == 0:
-        joint, compliance, status = _solve_all(P, I, S, J, L, G, load)
+    x = d.context
+    load = x.load
+    if d.size.terms == 0:
+        joint, compliance, status = _solve_all(d, L, load)
     else:
-        moment = load
-        joint = S[x + o.X_JOINT]
+        joint = x.joint
         compliance = 0.0
-        status = o.STATUS_DIVERGED
+        status = STATUS_DIVERGED
         low, high = -1e300, 1e300
-        run_terms(P, I, S)
-        moment = load - S[x + o.X_MOMENT]
+        run_terms(d, terms)
+        moment = load - x.moment
         for _ in range(60):
-            _distribute(I, S)
-            before_slope, before_h, before_l = (
-                S[x + o.X_MOMENT_SLOPE], S[x + o.X_LENGTH_H], S[x + o.X_LENGTH_L]
-            )  # fmt: skip
-            joint, compliance, status = _solve_all(P, I, S, J, L, G, moment)
-            if status == o.STATUS_SLACK and load > moment:
+            _distribute(d)
+            before_slope, before_h, before_l = x.moment_slope, x.length_h, x.length_l
+            joint, compliance, status = _solve_all(d, L, moment)
+            if status == STATUS_SLACK and load > moment:
                 # a trial moment that no open circuit can take (a first guess of the acceleration): nearer to the load
                 low = max(low, moment)
                 moment = 0.5 * (moment + load)
                 continue
-            if status != o.STATUS_OK:
+            if status != STATUS_OK:
                 break
-            moved = abs(joint - S[x + o.X_JOINT])
-            S[x + o.X_JOINT] = joint
-            S[x + o.X_TENSION_H] = S[qh + o.Q_TENSION]
-            S[x + o.X_TENSION_L] = S[ql + o.Q_TENSION] if I[h + o.C_CLOSED] == 1 else math.nan
-            run_terms(P, I, S)
-            excess = moment - (load - S[x + o.X_MOMENT])
+            moved = abs(joint - x.joint)
+            x.joint = joint
+            _show_tensions(d)
+            run_terms(d, terms)
+            excess = moment - (load - x.moment)
             scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15
             # settled, or nothing that the solve depends on has followed the angle
-            same = S[x + o.X_LENGTH_H] == before_h and S[x + o.X_LENGTH_L] == before_l
+            same = x.length_h == before_h and x.length_l == before_l
             if abs(excess) <= scale and (moved <= 1e-12 or (same and before_slope == 0.0)):
                 break
             if excess > 0.0:
                 high = min(high, moment)
             else:
                 low = max(low, moment)
-            moment -= excess / (1.0 + S[x + o.X_MOMENT_SLOPE] * compliance)
+            moment -= excess / (1.0 + x.moment_slope * compliance)
             if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
                 moment = 0.5 * (low + high)
-    S[x + o.X_JOINT] = joint
-    S[x + o.X_COMPLIANCE] = compliance
-    S[x + o.X_TENSION_H] = S[qh + o.Q_TENSION]
-    S[x + o.X_TENSION_L] = S[ql + o.Q_TENSION] if I[h + o.C_CLOSED] == 1 else math.nan
+    x.joint = joint
+    x.compliance = compliance
+    _show_tensions(d)
     return status
 
 
 @kernel
-def advance(
-    P: Floats, I: Ints, S: Floats, time: float, motor: float, load: float, temperature: float
-) -> None:
+def advance(d: Drive, time: float, motor: float, load: float, temperature: float) -> None:
     """Write one sample's readings into the context."""
-    x = I[o.S_CONTEXT]
+    x = d.context
     # first guess of the angle: along the last compliance
-    S[x + o.X_JOINT] += S[x + o.X_COMPLIANCE] * (load - S[x + o.X_LOAD]) + S[x + o.X_RIGID] * (
-        motor - S[x + o.X_MOTOR]
-    )
-    S[x + o.X_DT] = time - S[x + o.X_TIME]
-    S[x + o.X_TIME] = time
-    S[x + o.X_MOTOR] = motor
-    S[x + o.X_LOAD] = load
-    S[x + o.X_TEMPERATURE] = temperature
-    S[x + o.X_COMMIT] = 0.0
+    x.joint += x.compliance * (load - x.load) + x.rigid * (motor - x.motor)
+    x.dt = time - x.time
+    x.time = time
+    x.motor = motor
+    x.load = load
+    x.temperature = temperature
+    x.commit = 0.0
 
 
 @kernel
-def _follow_pretension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> None:
+def _follow_pretension(d: Drive, L: Floats) -> None:
     """Let the pretension of all cables follow the terms' factors; the next sample finds it."""
-    x = I[o.S_CONTEXT]
-    for ic in range(I[o.N_CIRCUITS]):
-        h = o.HEADER + o.CIRCUIT * ic
-        for chain in range(1 + I[h + o.C_CLOSED]):
-            first = I[h] if chain == 0 else I[h + o.C_FIRST_L]
-            for j in range(I[h + o.C_COUNT]):
-                retension(P, I, S, J, L, G, first + j, S[x + o.X_PRETENSION_H + chain])
+    x = d.context
+    for ic in range(d.size.circuits):
+        circuit = d.circuits[ic]
+        for chain in range(circuit.chains):
+            for j in range(circuit.count):
+                retension(d, L, circuit.first[chain] + j, x.pretension_h if chain == 0 else x.pretension_l)
 
 
 @kernel
-def terms_sane(I: Ints, S: Floats) -> bool:
+def terms_sane(d: Drive) -> bool:
     """True if the terms' answers are finite and all factors positive."""
-    x = I[o.S_CONTEXT]
-    total = S[x + o.X_MOMENT] + S[x + o.X_LENGTH_H] + S[x + o.X_LENGTH_L] + S[x + o.X_READING]
-    total += S[x + o.X_MOTOR_MOMENT]
-    for k in range(x + o.X_PRETENSION_H, x + o.X_STIFFNESS_L + 1):
-        total += S[k]
-        if not S[k] > 0.0:
-            return False
-    return math.isfinite(total)
+    x = d.context
+    sums = x.moment + x.length_h + x.length_l + x.reading + x.motor_moment
+    factors = x.pretension_h + x.pretension_l + x.stiffness_h + x.stiffness_l
+    positive = x.pretension_h > 0.0 and x.pretension_l > 0.0 and x.stiffness_h > 0.0 and x.stiffness_l > 0.0
+    return positive and math.isfinite(sums) and math.isfinite(factors)
 
 
 @leaf_kernel
-def joint_ready(I: Ints, S: Floats) -> int:
+def joint_ready(d: Drive) -> int:
     """Whether the pending solution may become the state: cable left on every drum, every number finite, tensions positive.
 
     What commits write through (places along the profiles) is bounded by just these.
     """
-    m = I[o.S_MEET]
-    for _ in range(2 * I[o.N_CABLES]):
-        if not S[m + o.M_W] > LEAST_WRAP:
-            return o.STATUS_UNWOUND
-        if not (0.0 < S[m + o.M_TAU] < 1e300 and abs(S[m + o.M_TOTAL]) < 1e300):
-            return o.STATUS_DIVERGED
-        m += o.MEET
-    return o.STATUS_OK if abs(S[I[o.S_CONTEXT] + o.X_JOINT]) < 1e300 else o.STATUS_DIVERGED
+    for wrap in range(2 * d.size.cables):
+        step = d.steps[wrap]
+        if not step.w > LEAST_WRAP:
+            return STATUS_UNWOUND
+        if not (0.0 < step.tau < 1e300 and abs(step.total) < 1e300):
+            return STATUS_DIVERGED
+    return STATUS_OK if abs(d.context.joint) < 1e300 else STATUS_DIVERGED
 
 
 @leaf_kernel
-def strength_used(P: Floats, I: Ints, S: Floats) -> float:
+def strength_used(d: Drive) -> float:
     """Greatest share of its breaking force that any cable bears in the pending solution; 0 where none is stated."""
     worst = 0.0
-    for c in range(I[o.N_CABLES]):
-        per_breaking = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * c + o.PER_BREAKING]
-        q = I[o.S_CABLE] + o.CABLE_STATE * c
-        worst = max(worst, per_breaking * max(S[q + o.Q_TENSION], S[q + o.Q_TENSION_IN]))
+    for c in range(d.size.cables):
+        state = d.states[c]
+        worst = max(worst, d.cables[c].per_breaking * max(state.tension, state.tension_in))
     return worst
 
 
 @kernel
-def joint_commit(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats) -> int:
+def joint_commit(d: Drive, terms: Terms, L: Floats) -> int:
     """Make the solved sample the state, unless a term's last word forbids it (the status says so)."""
-    x = I[o.S_CONTEXT]
-    if I[o.N_TERMS] > 0:
-        S[x + o.X_COMMIT] = 1.0
-        run_terms(P, I, S)
-        S[x + o.X_COMMIT] = 0.0
-        if not terms_sane(I, S):
-            return o.STATUS_EFFECT
-    for ic in range(I[o.N_CIRCUITS]):
-        circuit_commit(P, I, S, J, L, G, ic)
-    if I[o.N_TERMS] > 0:
-        _follow_pretension(P, I, S, J, L, G)
-    S[x + o.X_MOTOR_OLD] = S[x + o.X_MOTOR]
-    S[x + o.X_LOAD_OLD] = S[x + o.X_LOAD]
-    S[x + o.X_JOINT_OLDER] = S[x + o.X_JOINT_OLD]
-    S[x + o.X_JOINT_OLD] = S[x + o.X_JOINT]
-    S[x + o.X_FIRST] = 0.0
-    return o.STATUS_OK
+    x = d.context
+    if d.size.terms > 0:
+        x.commit = 1.0
+        run_terms(d, terms)
+        x.commit = 0.0
+        if not terms_sane(d):
+            return STATUS_EFFECT
+    for ic in range(d.size.circuits):
+        circuit_commit(d, L, ic)
+    if d.size.terms > 0:
+        _follow_pretension(d, L)
+    x.motor_old = x.motor
+    x.load_old = x.load
+    x.joint_older = x.joint_old
+    x.joint_old = x.joint
+    x.first = 0.0
+    return STATUS_OK

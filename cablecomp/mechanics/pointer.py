@@ -9,9 +9,7 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-TERM_SIGNATURE = types.void(
-    types.CPointer(types.float64), types.CPointer(types.float64), types.CPointer(types.float64)
-)
+TERM_SIGNATURE = types.void(types.voidptr, types.voidptr, types.voidptr)
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba is not typed

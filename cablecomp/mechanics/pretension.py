@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 
-from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import law_of
+from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import D, Floats, Ints, V, Y, accumulate
+from cablecomp.mechanics.records import WET_NODES
 from cablecomp.mechanics.tables import between, groove, tau_of_v, v_of_tau
-from cablecomp.mechanics.viscous import W_END, W_HEAD, block_of
 
 LEAST_TAU = 1e-6
 FOLLOWED = (
@@ -28,26 +27,26 @@ TOUCH = 1e-12
 
 
 @kernel
-def retension(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, c: int, factor: float) -> None:
+def retension(d: Drive, L: Floats, c: int, factor: float) -> None:
     """Bring cable c's profiles to pretension T0 * factor."""
-    p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
-    q = I[o.S_CABLE] + o.CABLE_STATE * c
-    g = factor / S[q + o.Q_T0]
+    cable, state, G = d.cables[c], d.states[c], d.profiles
+    g = factor / state.pretension
     if abs(g - 1.0) < FOLLOWED:
         return
-    S[q + o.Q_T0] = factor
-    if I[o.NODES] > 0:
+    state.pretension = factor
+    if d.size.grids > 0:
         for end in range(2):
-            b = block_of(I, 2 * c + end)
-            S[b + W_END] = _moved(S[b + W_END], g)
-            for k in range(b + W_HEAD, b + W_HEAD + 2 * I[o.NODES]):
-                S[k] = _moved(S[k], g)
+            grid = d.grids[2 * c + end]
+            grid.end = _moved(grid.end, g)
+            for k in range(WET_NODES):
+                grid.tau[k] = _moved(grid.tau[k], g)
+                grid.tau_try[k] = _moved(grid.tau_try[k], g)
     for end in range(2):
-        _shift(G, J, L, law_of(P, p, end), 2 * c + end, P[p + o.MU_OUT + end], g)
-    if I[o.N_STACKS] > 2 * I[o.N_CABLES]:
-        arc = 2 * I[o.N_CABLES] + c
-        _shift(G, J, L, 2, arc, 1.0, g)
-        S[q + o.Q_GUIDE_END] = G[arc, V, 0]
+        _shift(G, d.heights, L, cable.law[end], 2 * c + end, cable.mu[end], g)
+    if d.size.stacks > 2 * d.size.cables:
+        arc = 2 * d.size.cables + c
+        _shift(G, d.heights, L, 2, arc, 1.0, g)
+        state.guide_end = G[arc, V, 0]
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""The general history law of a wrapped cable: the tension profile is the state (sheet, section 1.1).
+"""The general history law of a wrapped cable: the tension profile is the state.
 
 A wrap is a list of points (y, v) from the termination (y = 0) to the departure point (y = wrap angle), straight in
 between: y [rad] is fixed to the drum, v = ln(T/T0) is the logarithmic tension. Coulomb friction bounds the slope,
@@ -18,7 +18,7 @@ of v that merging left in the piece below a point, B integral of D * tau: the bo
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,6 @@ from cablecomp.mechanics.tables import (
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
-Meet: TypeAlias = tuple[float, float, int, float, float, float, float, float]
 
 Y, V, C, D, B, E = 0, 1, 2, 3, 4, 5
 ROWS = 6
@@ -51,6 +50,19 @@ _x, _w = np.polynomial.legendre.leggauss(3)
 SHORT_X = (_x + 1.0) / 2.0
 SHORT_W = _w / 2.0
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
+
+
+class Meet(NamedTuple):
+    """A step of a wrap, evaluated: what it would hold, and where the cone of its end meets the old profile."""
+
+    total: float  # integral of e
+    slope: float  # its derivative by the end value
+    k: int  # last point kept
+    y: float  # the meeting point
+    v: float
+    c: float
+    b: float
+    e: float
 
 
 @kernel
@@ -68,16 +80,16 @@ def piece(
     dy = y2 - y1
     d = v2 - v1
     if L is None:
-        return _piece_plain(dy, d, t1, t2)
+        return piece_plain(dy, d, t1, t2)
     if L[0, 0, 0] == PLAIN:
-        return _piece_plain(dy, d, t1, t2)
+        return piece_plain(dy, d, t1, t2)
     if L[0, 0, 0] == STIFF:
         return _piece_stiff(L[law, 0, STIFFENING], dy, v1, d)
-    return _piece_table(L, law, y1, v1, y2, v2)
+    return piece_table(L, law, y1, v1, y2, v2)
 
 
 @leaf_kernel
-def _piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, float]:
+def piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, float]:
     """`piece` in closed form: exp(v) over a straight piece that rises by d."""
     if abs(d) > 0.1:
         grown = dy * (t2 - t1) / d
@@ -106,7 +118,7 @@ def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float
 
 
 @kernel
-def _piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
+def piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
     """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no place."""
     dy = y2 - y1
     d = v2 - v1
@@ -136,13 +148,19 @@ def _piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float
 
 
 @leaf_kernel
+def set_pending(step: Any, meet: Meet) -> None:
+    """Write an evaluated step into a wrap's record `STEP`."""
+    step.total, step.k = meet.total, meet.k
+    step.y, step.v, step.c, step.b, step.e = meet.y, meet.v, meet.c, meet.b, meet.e
+
+
+@leaf_kernel
 def wrap_eval(
     G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, tau: float, mu: float
 ) -> Meet:
     """What wrap i would hold at wrap angle w and end value v, without committing it.
 
-    `w` is above 0. Returns (integral of e, its derivative by v, last point kept, and the point where the cone meets the old profile:
-    y, v, C, B, exp(v) there). `tau` is exp(v).
+    `w` is above 0; `tau` is exp(v).
     """
     top = n - 1
     k = top
@@ -162,10 +180,10 @@ def wrap_eval(
         # cable wound on, or nothing at all happened: no slip
         cp, bp = _running(G, L, law, i, k, n, yp, vp, tp)
         if w == yp:
-            return cp, 0.0, k, yp, vp, cp, bp, tp
+            return Meet(cp, 0.0, k, yp, vp, cp, bp, tp)
         integral, slope = piece(L, law, yp, vp, tp, w, v, tau)
         # its derivative by the new end alone: about half of the whole shift's, enough for Newton's method
-        return cp + integral, 0.5 * slope, k, yp, vp, cp, bp, tp
+        return Meet(cp + integral, 0.5 * slope, k, yp, vp, cp, bp, tp)
     # the cone of the new end cuts into the profile: walk inward to where they meet
     s = 1.0 if v > vp else -1.0
     steep = s * mu
@@ -191,7 +209,7 @@ def wrap_eval(
     if k >= 0:
         cm, bm = _running(G, L, law, i, k, n, ym, vm, tm)
     integral, slope = piece(L, law, ym, vm, tm, w, v, tau)
-    return cm + integral, slope, k, ym, vm, cm, bm, tm
+    return Meet(cm + integral, slope, k, ym, vm, cm, bm, tm)
 
 
 @leaf_kernel
@@ -207,21 +225,19 @@ def _running(
 
 
 @kernel
-def wrap_commit(
-    G: Floats, L: Floats, law: int, i: int, n: int, meet: Meet, w: float, v: float, tau: float, tolerance: float
-) -> int:  # fmt: skip
-    """Make an evaluated step the state; returns the new number of points.
+def wrap_commit(G: Floats, L: Floats, law: int, i: int, n: int, step: Any, tolerance: float) -> int:
+    """Make an evaluated step, a record `STEP`, the state; returns the new number of points.
 
     `tolerance` bounds the error of v that merging of neighbours may leave in a piece; a merged piece's integral is that
     of the straight piece, so that the stretch stays a continuous function of the tension. The stack never outgrows its array.
     """
-    total, _, k, ym, vm, cm, bm, tm = meet
+    total, k, w, v, tau = step.total, int(step.k), step.w, step.end, step.tau
     below = G[i, D, k + 1] if 0 <= k < n - 1 else 0.0
     kept = k == n - 1  # nothing was cut off: cable was wound on, and may continue the piece below
     n = k + 1
-    if n == 0 or ym > G[i, Y, n - 1]:
-        G[i, Y, n], G[i, V, n], G[i, C, n] = ym, vm, cm
-        G[i, D, n], G[i, B, n], G[i, E, n] = below, bm, tm
+    if n == 0 or step.y > G[i, Y, n - 1]:
+        G[i, Y, n], G[i, V, n], G[i, C, n] = step.y, step.v, step.c
+        G[i, D, n], G[i, B, n], G[i, E, n] = below, step.b, step.e
         n += 1
         kept = False
     last = n - 1

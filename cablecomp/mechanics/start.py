@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.arc import arc_fill
-from cablecomp.mechanics.cable import law_of, stacks
+from cablecomp.mechanics.drive import drive
 from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints, wrap_fill
+from cablecomp.mechanics.records import OUT
 from cablecomp.mechanics.tables import v_of_tau
 from cablecomp.mechanics.viscous import viscous_fill
 
@@ -23,55 +23,38 @@ def joint_start(
 
     slope 0 = uniform T0; +1 and -1 = the highest and the lowest profile that friction admits at that end tension.
     """
-    x = I[o.S_CONTEXT]
-    S[x + o.X_TIME] = time
-    S[x + o.X_FIRST] = 1.0
-    S[x + o.X_MOTOR] = motor
-    S[x + o.X_MOTOR_OLD] = motor
-    G = stacks(I, S)
+    d = drive(P, I, S, J)
+    x, G = d.context, d.profiles
+    x.time = time
+    x.first = 1.0
+    x.motor = x.motor_old = motor
     angle = motor
     rigid = 1.0
-    for ic in range(I[o.N_CIRCUITS]):
-        h = o.HEADER + o.CIRCUIT * ic
-        count = I[h + o.C_COUNT]
-        for chain in range(1 + I[h + o.C_CLOSED]):
-            first = I[h] if chain == 0 else I[h + o.C_FIRST_L]
+    for ic in range(d.size.circuits):
+        circuit = d.circuits[ic]
+        for chain in range(circuit.chains):
             shaft = angle
-            for j in range(count):
-                c = first + j
-                p = o.JOINT * I[o.N_CIRCUITS] + o.CABLE * c
-                q = I[o.S_CABLE] + o.CABLE_STATE * c
-                after = shaft * P[p + o.RATIO]
+            for c in range(circuit.first[chain], circuit.first[chain] + circuit.count):
+                cable, state = d.cables[c], d.states[c]
+                after = shaft * cable.ratio
                 for end in range(2):
-                    w = (
-                        P[p + o.W_OUT] + P[p + o.SIGN] * after
-                        if end == 0
-                        else P[p + o.W_IN] - P[p + o.SIGN] * shaft
-                    )
-                    mu = P[p + o.MU_OUT] if end == 0 else P[p + o.MU_IN]
-                    law = law_of(P, p, end)
-                    v = v_of_tau(L, law, 1.0)
-                    J[2 * c + end] = wrap_fill(G, L, law, 2 * c + end, max(w, LEAST_WRAP), v, -slope * mu)
-                    if I[o.NODES] > 0:
-                        reach = P[p + o.W_OUT + end] + VISCOUS_TRAVEL
-                        viscous_fill(I, S, 2 * c + end, max(w, LEAST_WRAP), max(reach, w + 1.0))
-                if I[o.N_STACKS] > 2 * I[o.N_CABLES]:
-                    arc = 2 * I[o.N_CABLES] + c
-                    J[arc] = arc_fill(G, arc, P[p + o.GUIDE], 0.0)
-                S[q + o.Q_SHAFT_IN] = shaft
-                S[q + o.Q_SHAFT] = after
-                S[q + o.Q_T0] = 1.0
-                S[q + o.Q_EA] = 1.0
-                S[q + o.Q_TENSION] = P[p + o.T0]
-                S[q + o.Q_TENSION_IN] = P[p + o.T0]
-                S[q + o.Q_KEPT] = P[p + o.T0]
-                S[q + o.Q_REFERENCE] = 0.5 if I[h + o.C_CLOSED] == 1 else P[p + o.T0]
+                    w = cable.wrap[end] + (cable.sign * after if end == OUT else -cable.sign * shaft)
+                    wrap, law = 2 * c + end, cable.law[end]
+                    w_kept, v = max(w, LEAST_WRAP), v_of_tau(L, law, 1.0)
+                    J[wrap] = wrap_fill(G, L, law, wrap, w_kept, v, -slope * cable.mu[end])
+                    if d.size.grids > 0:
+                        viscous_fill(d.grids[wrap], w_kept, max(cable.wrap[end] + VISCOUS_TRAVEL, w + 1.0))
+                if d.size.stacks > 2 * d.size.cables:
+                    arc = 2 * d.size.cables + c
+                    J[arc] = arc_fill(G, arc, cable.guide, 0.0)
+                state.shaft_in = shaft
+                state.shaft = after
+                state.pretension = state.stiffness = 1.0
+                state.tension = state.tension_in = state.kept = cable.T0
+                state.reference = 0.5 if circuit.chains == 2 else cable.T0
                 shaft = after
-        angle *= P[o.JOINT * ic + o.J_RATIO]
-        rigid *= P[o.JOINT * ic + o.J_RATIO]
-    S[x + o.X_RIGID] = rigid
-    S[x + o.X_JOINT] = angle
-    S[x + o.X_JOINT_OLD] = angle
-    S[x + o.X_JOINT_OLDER] = angle
-    S[x + o.X_TENSION_H] = math.nan
-    S[x + o.X_TENSION_L] = math.nan
+        angle *= circuit.ratio
+        rigid *= circuit.ratio
+    x.rigid = rigid
+    x.joint = x.joint_old = x.joint_older = angle
+    x.tension_h = x.tension_l = math.nan

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer.bounds_circuit import bounds_step
 from cablecomp.observer.stepper import find_load, step_one
 
@@ -19,12 +19,12 @@ def run_bounded(
     Returns how many rows were done and the status of the row that stopped it.
     """
     for k in range(rows.shape[0]):
-        status = o.STATUS_OK
+        status = STATUS_OK
         if inverse:
             status = find_load(P, I, S, J, L, rows[k], outs[k])
-        if status == o.STATUS_OK:
+        if status == STATUS_OK:
             status = step_one(P, I, S, J, L, rows[k], outs[k])
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             return k, status
         interval[k, 0], interval[k, 1] = bounds_step(P, I, L, S, W, SL, JL, SU, JU)
-    return rows.shape[0], o.STATUS_OK
+    return rows.shape[0], STATUS_OK

@@ -5,21 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
-import numpy as np
-
 from cablecomp.mechanics.assemble import Model
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer.bounded_run import run_bounded
 from cablecomp.observer.bounds_circuit import bounds_step
-from cablecomp.observer.bounds_kernel import (
-    W_PAST_HIGH,
-    W_PAST_LOW,
-    W_STEEP,
-    bounds_size,
-    sides_start,
-    steepest,
-)
+from cablecomp.observer.bounds_kernel import bounds_numbers, sides_start
 
 Kernel: TypeAlias = tuple[Any, Any, Any, Any, Any]
 EXTREME = 30.0  # |ln(T/T0)| beyond anything
@@ -39,10 +30,9 @@ class BoundPair:
         low, high = past
         self._low = (model.S.copy(), model.J.copy())
         self._up = (model.S.copy(), model.J.copy())
-        self.numbers: Floats = np.zeros(bounds_size(model.I))
-        self.numbers[W_STEEP] = steepest(model.L)
-        self.numbers[W_PAST_LOW] = -EXTREME if low is None else math.log(low)
-        self.numbers[W_PAST_HIGH] = EXTREME if high is None else math.log(high)
+        self.numbers: Floats = bounds_numbers(
+            model, -EXTREME if low is None else math.log(low), EXTREME if high is None else math.log(high)
+        )
         self._unstarted = self.numbers.copy()
 
     def start(self, time_s: float, motor: float) -> None:

@@ -7,42 +7,106 @@ eps of the nominal one and turns the wraps by as much, so L and U get their end 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import law_of, stacks
-from cablecomp.mechanics.jit import kernel
+from cablecomp.mechanics.assemble import Model
+from cablecomp.mechanics.drive import Drive, drive
+from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.pretension import retension
-from cablecomp.mechanics.profile import LEAST_WRAP, B, Floats, Ints, Y, wrap_commit, wrap_eval, wrap_fill
+from cablecomp.mechanics.profile import (
+    LEAST_WRAP,
+    B,
+    Floats,
+    Ints,
+    Y,
+    set_pending,
+    wrap_commit,
+    wrap_eval,
+    wrap_fill,
+)
+from cablecomp.mechanics.records import OUT, floats, record
 from cablecomp.mechanics.tables import TABLED, dv_dtau, strain_of_tau, tau_of_v, v_of_tau
 
-Side: TypeAlias = tuple[Floats, Ints, Floats, float]
-"""State, stack heights, profiles of one bound, and +1 for the upper, -1 for the lower one."""
+# What is said of the drive as a whole.
+BOUNDS = record(
+    [
+        ("steepest", "f8"),  # greatest factor by which a law table raises mu
+        ("past_low", "f8"),  # least and greatest ln(T/T0) that any cable may have borne before
+        ("past_high", "f8"),
+    ]
+)
 
-# the bounds' own numbers W start with: greatest factor by which a law table steepens mu; least and greatest ln(T/T0) that
-# any cable may have borne before
-W_STEEP, W_PAST_LOW, W_PAST_HIGH, W_HEAD = range(4)
-# one circuit: surplus and deficit of stretch [rad], tensions of cable l, the same pending; pull and input angle of the
-# last step, 1 before the first
-W_UP, W_LOW, W_T_LOW, W_T_HIGH, W_PENDING, W_PULL, W_X_IN, W_FIRST, W_CIRCUIT = (0, 1, 2, 3, 4, 8, 9, 10, 11)
-# one cable: half width of its output shaft's angle; the same of the last and for the next step, factors and shaft angle of the last step
-W_EPS, W_EPS_OLD, W_NEXT, W_T0, W_EA, W_TURN, W_CABLE = range(7)
+# One circuit; `_try`: pending.
+BOUNDS_CIRCUIT = record(
+    [
+        ("surplus", "f8"),  # of stretch with both chains at their upper bounds, rad
+        ("deficit", "f8"),
+        ("low", "f8"),  # tension of cable l
+        ("high", "f8"),
+        ("surplus_try", "f8"),
+        ("deficit_try", "f8"),
+        ("low_try", "f8"),
+        ("high_try", "f8"),
+        ("pull", "f8"),  # M/R of the last step
+        ("x_in", "f8"),  # input angle of the last step
+        ("first", "f8"),  # 1 before the first step
+    ]
+)
+
+# One cable.
+BOUNDS_CABLE = record(
+    [
+        ("eps", "f8"),  # half width of its output shaft's angle,
+        ("eps_old", "f8"),  # in the last step,
+        ("eps_next", "f8"),  # for the next
+        ("pretension", "f8"),  # factors and shaft angle of the last step
+        ("stiffness", "f8"),
+        ("shaft", "f8"),
+    ]
+)
+N_BOUNDS, N_CIRCUIT, N_CABLE = floats(BOUNDS), floats(BOUNDS_CIRCUIT), floats(BOUNDS_CABLE)
+
 MERGE = 1e-13  # error of v below which neighbours are merged; more only where memory runs out
 EPS_START = 1e-4  # first guess of the half width of a shaft's angle
 
 
-@kernel
-def bounds_size(I: Ints) -> int:
-    """Number of floats in W."""
-    return int(W_HEAD + W_CIRCUIT * I[o.N_CIRCUITS] + W_CABLE * I[o.N_CABLES])
+class Bounds(NamedTuple):
+    """The bounds' own numbers, by name."""
+
+    whole: Any
+    circuits: Any
+    cables: Any
 
 
-@kernel
-def cable_block(I: Ints, c: int) -> int:
-    """Where cable c's numbers lie in W."""
-    return W_HEAD + W_CIRCUIT * I[o.N_CIRCUITS] + W_CABLE * c
+class Side(NamedTuple):
+    """The joint in the state of one bound; sign +1 for the upper, -1 for the lower one."""
+
+    drive: Drive
+    sign: float
+
+
+def named_bounds(circuits: int, W: Floats) -> Bounds:
+    """The records in the flat array W of the bounds of a joint with this many circuits."""
+    cables_at = N_BOUNDS + circuits * N_CIRCUIT
+    return Bounds(
+        W[:N_BOUNDS].view(BOUNDS)[0],
+        W[N_BOUNDS:cables_at].view(BOUNDS_CIRCUIT),
+        W[cables_at:].view(BOUNDS_CABLE),
+    )
+
+
+bounds_of = inlined_kernel(named_bounds)
+
+
+def bounds_numbers(model: Model, past_low: float, past_high: float) -> Floats:
+    """The bounds' flat array before their start; past = least and greatest ln(T/T0) that any cable has borne."""
+    size = model.named(model.S, model.J).size
+    W = np.zeros(N_BOUNDS + size.circuits * N_CIRCUIT + size.cables * N_CABLE)
+    whole = named_bounds(size.circuits, W).whole
+    whole.steepest, whole.past_low, whole.past_high = steepest(model.L), past_low, past_high
+    return W
 
 
 def steepest(L: Floats | None) -> float:
@@ -59,166 +123,131 @@ def steepest(L: Floats | None) -> float:
 def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints) -> None:
     """Fill all wraps of two started joints with the least and the greatest tension of the past; the first step cuts them
     to what friction admits."""
-    W[W_HEAD:] = 0.0
-    for c in range(I[o.N_CABLES]):
-        W[cable_block(I, c) + W_EPS] = EPS_START
-        p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
+    low, up = drive(P, I, SL, JL), drive(P, I, SU, JU)
+    b = bounds_of(low.size.circuits, W)
+    W[N_BOUNDS:] = 0.0
+    _fill(low, L, b.whole.past_low)
+    _fill(up, L, b.whole.past_high)
+    for c in range(low.size.cables):
+        b.cables[c].eps = EPS_START
+    for ic in range(low.size.circuits):
+        b.circuits[ic].first = 1.0
+
+
+@kernel
+def _fill(d: Drive, L: Floats, past: float) -> None:
+    G = d.profiles
+    for c in range(d.size.cables):
         for end in range(2):
-            wrap, law = 2 * c + end, law_of(P, p, end)
-            w = stacks(I, SL)[wrap, Y, JL[wrap] - 1]
-            JL[wrap] = wrap_fill(
-                stacks(I, SL), L, law, wrap, w, v_of_tau(L, law, math.exp(W[W_PAST_LOW])), 0.0
-            )
-            JU[wrap] = wrap_fill(
-                stacks(I, SU), L, law, wrap, w, v_of_tau(L, law, math.exp(W[W_PAST_HIGH])), 0.0
-            )
-    for ic in range(I[o.N_CIRCUITS]):
-        W[W_HEAD + W_CIRCUIT * ic + W_FIRST] = 1.0
+            wrap, law = 2 * c + end, d.cables[c].law[end]
+            w = G[wrap, Y, d.heights[wrap] - 1]
+            d.heights[wrap] = wrap_fill(G, L, law, wrap, w, v_of_tau(L, law, math.exp(past)), 0.0)
 
 
 @kernel
-def side_follow(I: Ints, N: Floats, S: Floats, first: bool) -> None:
-    """Take over stiffness factors and lengths of the nominal state N, at the first step its pretension factors too."""
-    for c in range(I[o.N_CABLES]):
-        q = I[o.S_CABLE] + o.CABLE_STATE * c
-        S[q + o.Q_EA], S[q + o.Q_OFFSET] = N[q + o.Q_EA], N[q + o.Q_OFFSET]
+def side_follow(d: Drive, nominal: Drive, first: bool) -> None:
+    """Take over stiffness factors and lengths of the nominal state, at the first step its pretension factors too."""
+    for c in range(d.size.cables):
+        state, its = d.states[c], nominal.states[c]
+        state.stiffness, state.offset = its.stiffness, its.offset
         if first:
-            S[q + o.Q_T0] = N[q + o.Q_T0]
+            state.pretension = its.pretension
 
 
 @kernel
-def side_retension(P: Floats, I: Ints, N: Floats, L: Floats, side: Side) -> None:
-    """Bring one bound to the pretension that the nominal state N took on when it committed."""
-    S, J, G, _ = side
-    for c in range(I[o.N_CABLES]):
-        retension(P, I, S, J, L, G, c, N[I[o.S_CABLE] + o.CABLE_STATE * c + o.Q_T0])
+def side_retension(d: Drive, nominal: Drive, L: Floats) -> None:
+    """Bring one bound to the pretension that the nominal state took on when it committed."""
+    for c in range(d.size.cables):
+        retension(d, L, c, nominal.states[c].pretension)
 
 
 @kernel
 def _cable(
-    P: Floats,
-    I: Ints,
-    L: Floats,
-    W: Floats,
-    side: Side,
-    c: int,
-    tension: float,
-    x_in: float,
-    x_out: float,
-    eps_in: float,
+    b: Bounds, L: Floats, side: Side, c: int, tension: float, x_in: float, x_out: float, eps_in: float
 ) -> tuple[float, float, float]:
     """Stretch [m] of cable c and its derivative by the tension, kept as pending; and the margin [m] that covers the cable
     between the possible departure points and what merging of pieces did."""
-    S, J, G, sign = side
-    p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
-    q = I[o.S_CABLE] + o.CABLE_STATE * c
-    t0 = P[p + o.T0] * S[q + o.Q_T0] * S[q + o.Q_EA]
+    d, sign = side.drive, side.sign
+    cable, state, G = d.cables[c], d.states[c], d.profiles
+    t0 = cable.T0 * state.pretension * state.stiffness
     tau = tension / t0
     v = v_of_tau(L, 2, tau)
     e, a = strain_of_tau(L, 2, tau)
     dv = dv_dtau(L, 2, tau, v)
-    total = P[p + o.LENGTH] * e
-    slope = P[p + o.LENGTH] * a
+    total = cable.length * e
+    slope = cable.length * a
     margin = 0.0
     for end in range(2):
         wrap = 2 * c + end
-        mu = P[p + o.MU_OUT + end]
-        w = P[p + o.W_OUT + end] + (P[p + o.SIGN] * x_out if end == 0 else -P[p + o.SIGN] * x_in)
+        mu = cable.mu[end]
+        w = cable.wrap[end] + (cable.sign * x_out if end == OUT else -cable.sign * x_in)
         w = max(w, LEAST_WRAP)
-        eps = W[cable_block(I, c) + W_EPS] if end == 0 else eps_in
-        shift = mu * eps * W[W_STEEP]
+        eps = b.cables[c].eps if end == OUT else eps_in
+        shift = mu * eps * b.whole.steepest
         end_v = v + sign * shift
         end_tau = tau_of_v(L, 2, end_v)
-        e_wrap, a_wrap, k, ym, vm, cm, bm, tm = wrap_eval(
-            G, L, law_of(P, p, end), wrap, J[wrap], w, end_v, end_tau, mu
-        )
-        m = I[o.S_MEET] + o.MEET * wrap
-        S[m + o.M_TOTAL], S[m + o.M_K], S[m + o.M_Y], S[m + o.M_V] = e_wrap, k, ym, vm
-        S[m + o.M_C], S[m + o.M_B], S[m + o.M_E] = cm, bm, tm
-        S[m + o.M_W], S[m + o.M_END], S[m + o.M_TAU] = w, end_v, end_tau
-        radius = P[p + o.R_OUT + end]
-        total += radius * e_wrap
-        slope += radius * a_wrap * dv
-        margin += radius * (eps * (abs(e) + 4.0 * shift * (1.0 + abs(e))) + 1.05 * G[wrap, B, J[wrap] - 1])
-    unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA]
-    return total * unit - S[q + o.Q_OFFSET], slope * unit / t0, margin * unit
+        meet = wrap_eval(G, L, cable.law[end], wrap, d.heights[wrap], w, end_v, end_tau, mu)
+        step = d.steps[wrap]
+        set_pending(step, meet)
+        step.w, step.end, step.tau = w, end_v, end_tau
+        radius = cable.radius[end]
+        total += radius * meet.total
+        slope += radius * meet.slope * dv
+        merged = G[wrap, B, d.heights[wrap] - 1]
+        margin += radius * (eps * (abs(e) + 4.0 * shift * (1.0 + abs(e))) + 1.05 * merged)
+    unit = cable.T0 * state.pretension / cable.EA
+    return total * unit - state.offset, slope * unit / t0, margin * unit
 
 
 @kernel
 def chain_bound(
-    P: Floats, I: Ints, N: Floats, L: Floats, W: Floats, side: Side, first: int, count: int, tension: float, x_in: float,
-    x_out: float, eps_in: float,
+    b: Bounds, nominal: Drive, L: Floats, side: Side, first: int, count: int, tension: float, x_in: float, x_out: float,
+    eps_in: float,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Rotation [rad] of a chain's output shaft in one bound's state, its derivative by the output tension, its margin.
 
-    All wraps stand at the nominal state's shaft angles (N); S[Q_SHAFT] gets what this state adds to each shaft's angle.
+    All wraps stand at the nominal state's shaft angles; the side's `shaft` gets what its state adds to each shaft's angle.
     """
-    S, _, _, _ = side
     theta = slope = margin = own = 0.0
     x, eps = x_in, eps_in
-    for j in range(count):
-        c = first + j
-        p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
-        q = I[o.S_CABLE] + o.CABLE_STATE * c
-        shaft = x_out if j == count - 1 else N[q + o.Q_SHAFT]
-        scale = P[p + o.SCALE]
-        stretch, a, more = _cable(P, I, L, W, side, c, tension * scale, x, shaft, eps)
-        theta += P[p + o.WEIGHT] * stretch
-        slope += P[p + o.WEIGHT] * scale * a
-        margin += P[p + o.WEIGHT] * more
-        own = P[p + o.RATIO] * own + P[p + o.SIGN] * stretch / P[p + o.R_OUT]
-        S[q + o.Q_SHAFT] = own
-        x, eps = shaft, W[cable_block(I, c) + W_EPS]
+    for c in range(first, first + count):
+        cable = side.drive.cables[c]
+        shaft = x_out if c == first + count - 1 else nominal.states[c].shaft
+        stretch, a, more = _cable(b, L, side, c, tension * cable.scale, x, shaft, eps)
+        theta += cable.weight * stretch
+        slope += cable.weight * cable.scale * a
+        margin += cable.weight * more
+        own = cable.ratio * own + cable.sign * stretch / cable.radius[OUT]
+        side.drive.states[c].shaft = own
+        x, eps = shaft, b.cables[c].eps
     return theta, slope, margin
 
 
 @kernel
-def chain_turning(
-    P: Floats, I: Ints, S: Floats, L: Floats, W: Floats, first: int, count: int
-) -> tuple[float, float, float]:
+def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> tuple[float, float, float]:
     """Out of a state's pending evaluation: rotation [rad] of the chain's output per rad by which output wraps are turned,
     at most; the same for a shift of all end values by mu per rad; and its greatest compliance [rad/N]."""
     turning = shifting = compliance = 0.0
-    for j in range(count):
-        c = first + j
-        p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
-        q = I[o.S_CABLE] + o.CABLE_STATE * c
-        unit = P[p + o.T0] * S[q + o.Q_T0] / P[p + o.EA] * P[p + o.WEIGHT]
-        soft = P[p + o.LENGTH]
+    for c in range(first, first + count):
+        cable, state = d.cables[c], d.states[c]
+        unit = cable.T0 * state.pretension / cable.EA * cable.weight
+        soft = cable.length
         for end in range(2):
-            m = I[o.S_MEET] + o.MEET * (2 * c + end)
-            mu = P[p + o.MU_OUT + end] * W[W_STEEP]
-            radius = P[p + o.R_OUT + end]
-            slid = unit * radius * mu * (S[m + o.M_TOTAL] + S[m + o.M_W])
+            step = d.steps[2 * c + end]
+            mu = cable.mu[end] * b.whole.steepest
+            radius = cable.radius[end]
+            slid = unit * radius * mu * (step.total + step.w)
             shifting += slid
-            turning += slid + unit * radius * abs(S[m + o.M_TAU] - 1.0)
-            soft += radius * W[W_STEEP] * math.expm1(mu * S[m + o.M_W]) / mu
-        compliance += soft * unit / (P[p + o.T0] * S[q + o.Q_T0] * S[q + o.Q_EA]) * P[p + o.SCALE]
+            turning += slid + unit * radius * abs(step.tau - 1.0)
+            soft += radius * b.whole.steepest * math.expm1(mu * step.w) / mu
+        compliance += soft * unit / (cable.T0 * state.pretension * state.stiffness) * cable.scale
     return turning, shifting, compliance
 
 
 @kernel
-def chain_commit(P: Floats, I: Ints, L: Floats, side: Side, first: int, count: int) -> None:
+def chain_commit(d: Drive, L: Floats, first: int, count: int) -> None:
     """Make the last evaluation of a chain its bound's state."""
-    S, J, G, _ = side
     for c in range(first, first + count):
-        p = o.CABLE * c + o.JOINT * I[o.N_CIRCUITS]
         for end in range(2):
-            wrap = 2 * c + end
-            m = I[o.S_MEET] + o.MEET * wrap
-            meet = (
-                S[m + o.M_TOTAL], 0.0, int(S[m + o.M_K]), S[m + o.M_Y], S[m + o.M_V], S[m + o.M_C], S[m + o.M_B],
-                S[m + o.M_E],
-            )  # fmt: skip
-            J[wrap] = wrap_commit(
-                G,
-                L,
-                law_of(P, p, end),
-                wrap,
-                J[wrap],
-                meet,
-                S[m + o.M_W],
-                S[m + o.M_END],
-                S[m + o.M_TAU],
-                MERGE,
-            )
+            wrap, law = 2 * c + end, d.cables[c].law[end]
+            d.heights[wrap] = wrap_commit(d.profiles, L, law, wrap, d.heights[wrap], d.steps[wrap], MERGE)

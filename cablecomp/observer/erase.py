@@ -13,9 +13,7 @@ from cablecomp.config import Limits
 from cablecomp.errors import InputError
 from cablecomp.observer.observer import Observer
 
-STEPS = (
-    60  # samples of each leg of an excitation; quasi-static, so their number only has to show the extremes
-)
+LEG = 60  # samples of each leg of an excitation; quasi-static, so their number only has to show the extremes
 AGREE = 1e-9  # of the joint's load-free deflection scale: two histories count as one
 Columns = dict[str, NDArray[np.float64]]
 
@@ -77,7 +75,7 @@ def excitation(at: tuple[float, float, float], size: float, first: int, turn: bo
     legs = (0.0, first * size, -first * size, 0.0)
     if not turn:
         legs = (load, first * size, -first * size, load)
-    way = np.concatenate([np.linspace(a, b, STEPS + 1)[1:] for a, b in pairwise(legs)])
+    way = np.concatenate([np.linspace(a, b, LEG + 1)[1:] for a, b in pairwise(legs)])
     steady = np.ones(len(way))
     return {
         "time_s": time + 0.01 * np.arange(1, len(way) + 1, dtype=np.float64),
@@ -108,7 +106,7 @@ def _smallest(
 def _erases(observer: Observer, at: tuple[float, float, float], size: float, first: int, turn: bool) -> bool:
     """True if after the excitation the history no longer shows: neither in the tensions nor along the wraps."""
     known, fresh = observer.copy(), Observer(observer.config)
-    columns = excitation(at, size, first, turn) | {name: np.zeros(3 * STEPS) for name in observer.channels}
+    columns = excitation(at, size, first, turn) | {name: np.zeros(3 * LEG) for name in observer.channels}
     begin = {key: value[:1].copy() for key, value in columns.items()}
     begin["time_s"][0], begin["motor_position_rad"][0], begin["joint_torque_Nm"][0] = at
     try:

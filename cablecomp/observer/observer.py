@@ -15,11 +15,11 @@ from cablecomp.durable import write_durably
 from cablecomp.effects import extend
 from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError, InternalError
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.invariants import heights_fit, profile_violations, violations
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.start import joint_start
+from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import stepper as st
 from cablecomp.observer.bounds import BoundPair, Kernel
 from cablecomp.observer.refusal import refused
@@ -31,7 +31,7 @@ from cablecomp.signals import NAN, Estimate, Sample
 class Observer:
     """Tracks the tension history of a joint and predicts its deflection, sample by sample.
 
-    State: the tension profile on every wrap (sheet, section 1.1). `step` commits a sample, `peek` predicts without
+    State: the tension profile on every wrap (`mechanics.profile`). `step` commits a sample, `peek` predicts without
     committing; `run` steps through a block with the same compiled code. Time is an argument of every call. With
     `bounds` two extreme histories run beside it: the true deflection lies between, whatever happened before the start
     (NaN where an effect of the configuration gives no guarantee).
@@ -50,7 +50,8 @@ class Observer:
         self._row = np.zeros(st.IN_OTHER + len(self.channels))
         self._out = np.zeros(st.OUT_WIDTH)
         self._ratio = config.drive.ratio
-        self._spare = int(self.model.I[o.S_SPARE])
+        self._named = self.model.named(self._S, self._J)
+        self._spare = int(self._named.size.spare_at)
         self._last_time = -math.inf
         self._source = config.observer.load
         self._motor_zero = config.sensors.motor_torque_offset_Nm
@@ -62,10 +63,10 @@ class Observer:
     def step(self, sample: Sample) -> Estimate:
         """Commit one sample and say what the joint does."""
         fresh = self._read(sample)
-        status = o.STATUS_OK
+        status = STATUS_OK
         if self._source == "both_encoders":
             status = st.find_load(*self._arrays, self._row, self._out)
-        if status == o.STATUS_OK:
+        if status == STATUS_OK:
             status = st.step_one(*self._arrays, self._row, self._out)
         return self._taken(sample, status, fresh)
 
@@ -79,7 +80,7 @@ class Observer:
         row = self._row
         row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_LOAD] = time_s, motor_position_rad, joint_torque_Nm
         status = st.peek_one(*self._arrays, row, self._out)
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             self._refuse(status, time_s, False)
         return float(self._out[st.OUT_JOINT]) - self._ratio * motor_position_rad
 
@@ -101,7 +102,7 @@ class Observer:
         done, status = self._run_rows(rows, outs, low, high)
         if done:
             self._last_time = float(rows[done - 1, st.IN_TIME])
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             self._out[:] = outs[done]
             self._refuse(status, rows[done, st.IN_TIME], fresh and done == 0, done)
         offset = self._ratio * rows[:, st.IN_MOTOR]
@@ -122,7 +123,7 @@ class Observer:
         """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
         fresh = self._read(sample)
         status = st.find_load(*self._arrays, self._row, self._out)
-        if status == o.STATUS_OK:
+        if status == STATUS_OK:
             status = st.peek_one(*self._arrays, self._row, self._out)
         return self._peeked(sample, status, fresh)
 
@@ -130,7 +131,7 @@ class Observer:
         """As `inverse`, and commits the sample with the torque found."""
         fresh = self._read(sample)
         status = st.find_load(*self._arrays, self._row, self._out)
-        if status == o.STATUS_OK:
+        if status == STATUS_OK:
             status = st.step_one(*self._arrays, self._row, self._out)
         return self._taken(sample, status, fresh)
 
@@ -138,14 +139,14 @@ class Observer:
 
     def snapshot(self) -> bytes:
         """The whole state as a small, versioned, checksummed block of bytes."""
-        return pack(self.config, self.model.I, *self._parts(), self._last_time)
+        return pack(self.config, self.model, *self._parts(), self._last_time)
 
     def restore(self, data: bytes) -> None:
         """Take up a state from `snapshot`; raises InputError, and changes nothing, if it is damaged, belongs to another joint or
         holds what no joint can be in."""
         before = [part.copy() for part in self._all_arrays()], self._last_time
         try:
-            self._last_time = unpack(data, self.config, self.model.I, *self._parts())
+            self._last_time = unpack(data, self.config, self.model, *self._parts())
             found = self._violations()
             if found:
                 raise InputError(
@@ -226,17 +227,12 @@ class Observer:
 
     def stiffness(self) -> float:
         """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
-        return 1.0 / float(self._S[self.model.I[o.S_CONTEXT] + o.X_COMPLIANCE])
+        return 1.0 / float(self._named.context.compliance)
 
     def merge_error_rad(self) -> float:
         """Bound [rad] on the error of the present deflection that merging of profile pieces can have made."""
-        total, ratio = 0.0, 1.0
-        I, P = self.model.I, self.model.P
-        first = int(I[o.N_CIRCUITS]) * o.JOINT
-        for c in range(int(I[o.N_CABLES])):
-            weight = P[first + o.CABLE * c + o.WEIGHT]
-            total += weight * self._S[I[o.S_CABLE] + o.CABLE_STATE * c + o.Q_ERROR]
-        return float(total * ratio)
+        pairs = zip(self._named.cables, self._named.states, strict=True)
+        return float(sum(cable.weight * state.error for cable, state in pairs))
 
     def pieces(self) -> int:
         """Number of points that describe all profiles: the memory in use."""
@@ -340,7 +336,7 @@ class Observer:
 
     def _taken(self, sample: Sample, status: int, fresh: bool) -> Estimate:
         """What a step ends with: the estimate, or the refusal."""
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             self._refuse(status, sample.time_s, fresh)
         self._last_time = sample.time_s
         low, high = NAN, NAN
@@ -350,7 +346,7 @@ class Observer:
 
     def _peeked(self, sample: Sample, status: int, fresh: bool) -> Estimate:
         """What a prediction ends with; nothing is left of it."""
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             self._refuse(status, sample.time_s, fresh)
         if fresh:
             self._forget()

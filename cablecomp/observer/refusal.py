@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from cablecomp.errors import InputError
-from cablecomp.mechanics import layout as o
+from cablecomp.mechanics import status as o
 
 
 class Refusal(IntEnum):

@@ -10,7 +10,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.mechanics import layout as o
+from cablecomp.mechanics.assemble import Model
 from cablecomp.mechanics.profile import ROWS, Floats, Ints
 
 MAGIC = b"CABLECMP"
@@ -19,7 +19,7 @@ State = tuple[Floats, Ints]
 
 
 def pack(
-    config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats], last_time: float
+    config: JointConfig, model: Model, states: Sequence[State], numbers: Sequence[Floats], last_time: float
 ) -> bytes:
     """Serialise the states (scalars whole, profiles as far as they are used) and further numbers."""
     parts = [
@@ -30,14 +30,15 @@ def pack(
     ]
     parts += [row.tobytes() for row in numbers]
     for S, J in states:
-        parts += [J.astype("<i8").tobytes(), S[: I[o.S_MEET]].tobytes()]
-        parts += [np.ascontiguousarray(_used(I, S, J, wrap)).tobytes() for wrap in range(len(J))]
+        d = model.named(S, J)
+        parts += [J.astype("<i8").tobytes(), S[: d.size.steps_at].tobytes()]
+        parts += [np.ascontiguousarray(d.profiles[k, :, : J[k]]).tobytes() for k in range(len(J))]
     body = b"".join(parts)
     return body + hashlib.sha256(body).digest()
 
 
 def unpack(
-    data: bytes, config: JointConfig, I: Ints, states: Sequence[State], numbers: Sequence[Floats]
+    data: bytes, config: JointConfig, model: Model, states: Sequence[State], numbers: Sequence[Floats]
 ) -> float:
     """Fill the states from a snapshot and return the time of its last sample; after an InputError they may be half filled."""
     body, digest = data[:-32], data[-32:]
@@ -61,40 +62,35 @@ def unpack(
             f"snapshot: holds {count} histories, this observer {len(states)}; open it with the same `bounds`"
         )
     try:
-        return _fill(body, I, states, numbers)
+        return _fill(body, model, states, numbers)
     except ValueError:
         raise InputError(
             "snapshot: holds more or less than its joint's state; start from a known state instead"
         ) from None
 
 
-def _fill(body: bytes, I: Ints, states: Sequence[State], numbers: Sequence[Floats]) -> float:
+def _fill(body: bytes, model: Model, states: Sequence[State], numbers: Sequence[Floats]) -> float:
     (last_time,) = struct.unpack_from("<d", body, 28)
     place = 36
     for row in numbers:
         row[:] = np.frombuffer(body, "<f8", len(row), place)
         place += 8 * len(row)
-    small = int(I[o.S_MEET])
     for S, J in states:
+        d = model.named(S, J)
+        small = int(d.size.steps_at)
         J[:] = np.frombuffer(body, "<i8", len(J), place)
-        if J.min() < 0 or J.max() > I[o.CAPACITY]:
+        if J.min() < 0 or J.max() > d.size.capacity:
             raise ValueError("profile longer than its room")
         place += 8 * len(J)
         S[:small] = np.frombuffer(body, "<f8", small, place)
         place += 8 * small
-        for wrap in range(len(J)):
-            used = ROWS * int(J[wrap])
-            _used(I, S, J, wrap)[:] = np.frombuffer(body, "<f8", used, place).reshape(ROWS, -1)
+        for stack in range(len(J)):
+            used = ROWS * int(J[stack])
+            d.profiles[stack, :, : J[stack]] = np.frombuffer(body, "<f8", used, place).reshape(ROWS, -1)
             place += 8 * used
     if place != len(body):
         raise ValueError("bytes left over")
     return float(last_time)
-
-
-def _used(I: Ints, S: Floats, J: Ints, wrap: int) -> Floats:
-    size = ROWS * int(I[o.CAPACITY])
-    first = int(I[o.S_PROFILE]) + wrap * size
-    return S[first : first + size].reshape(ROWS, -1)[:, : int(J[wrap])]
 
 
 def _joint_key(config: JointConfig) -> bytes:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cablecomp.mechanics import layout as o
-from cablecomp.mechanics.cable import stacks
+from cablecomp.mechanics.drive import Drive, Terms, drive, terms_of
 from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
 from cablecomp.mechanics.joint import (
     advance,
@@ -16,6 +15,19 @@ from cablecomp.mechanics.joint import (
     terms_sane,
 )
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
+from cablecomp.mechanics.records import IN
+from cablecomp.mechanics.status import (
+    STATUS_BACKWARD,
+    STATUS_BREAKS,
+    STATUS_DIVERGED,
+    STATUS_EFFECT,
+    STATUS_NAN,
+    STATUS_OK,
+    STATUS_SLACK,
+    STATUS_UNKNOWN,
+    STATUS_UNREACHABLE,
+    STATUS_UNWOUND,
+)
 
 # one row of inputs
 IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
@@ -27,135 +39,132 @@ IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
 
 
 @leaf_kernel
-def smooth(P: Floats, I: Ints, S: Floats, dt: float, motor: float, load: float) -> tuple[float, float]:
+def smooth(d: Drive, dt: float, motor: float, load: float) -> tuple[float, float]:
     """Causal input filter: an alpha-beta tracker of value and slope, critically damped; it follows ramps without lag.
 
     Uneven steps are exact in the gains; off at cutoff 0.
     """
-    cutoff = P[I[o.P_SENSOR] + o.CUTOFF]
-    f = I[o.S_FILTER]
+    cutoff, f = d.sensor.cutoff, d.filter
     if cutoff <= 0.0:
         return motor, load
-    if S[f + o.STARTED] == 0.0:
-        S[f + o.STARTED] = 1.0
-        S[f + o.MOTOR_1], S[f + o.LOAD_1] = motor, load
-        S[f + o.MOTOR_2] = S[f + o.LOAD_2] = 0.0
+    if f.started == 0.0:
+        f.started = 1.0
+        f.motor, f.load = motor, load
+        f.motor_slope = f.load_slope = 0.0
         return motor, load
     if dt <= 0.0:
-        return S[f + o.MOTOR_1], S[f + o.LOAD_1]
+        return f.motor, f.load
     keep = math.exp(-cutoff * dt)
     follow, turn = 1.0 - keep * keep, (1.0 - keep) * (1.0 - keep) / dt
-    miss = motor - (S[f + o.MOTOR_1] + S[f + o.MOTOR_2] * dt)
-    S[f + o.MOTOR_1], S[f + o.MOTOR_2] = motor - (1.0 - follow) * miss, S[f + o.MOTOR_2] + turn * miss
-    miss = load - (S[f + o.LOAD_1] + S[f + o.LOAD_2] * dt)
-    S[f + o.LOAD_1], S[f + o.LOAD_2] = load - (1.0 - follow) * miss, S[f + o.LOAD_2] + turn * miss
-    return S[f + o.MOTOR_1], S[f + o.LOAD_1]
+    miss = motor - (f.motor + f.motor_slope * dt)
+    f.motor, f.motor_slope = motor - (1.0 - follow) * miss, f.motor_slope + turn * miss
+    miss = load - (f.load + f.load_slope * dt)
+    f.load, f.load_slope = load - (1.0 - follow) * miss, f.load_slope + turn * miss
+    return f.motor, f.load
 
 
 @leaf_kernel
-def admissible(I: Ints, S: Floats, J: Ints, row: Floats) -> int:
+def admissible(d: Drive, row: Floats) -> int:
     """Whether a row of readings can be taken at all: started state, finite readings, time that does not run backwards."""
-    if J[0] < 2:
-        return o.STATUS_UNKNOWN
+    if d.heights[0] < 2:
+        return STATUS_UNKNOWN
     if not (math.isfinite(row[IN_MOTOR]) and math.isfinite(row[IN_LOAD]) and math.isfinite(row[IN_TIME])):
-        return o.STATUS_NAN
+        return STATUS_NAN
     for j in range(IN_TEMPERATURE, row.shape[0]):
         if math.isinf(row[j]):
-            return o.STATUS_NAN
-    return o.STATUS_OK if row[IN_TIME] >= S[I[o.S_CONTEXT] + o.X_TIME] else o.STATUS_BACKWARD
+            return STATUS_NAN
+    return STATUS_OK if row[IN_TIME] >= d.context.time else STATUS_BACKWARD
 
 
 @inlined_kernel
-def motor_side(P: Floats, I: Ints, S: Floats, out: Floats) -> None:
+def motor_side(d: Drive, out: Floats) -> None:
     """Tensions at the input pulley (NaN for a cable that is not there) and the torque that turns it.
 
     tau_motor = -r (T_h - T_l) + what friction before the cable takes, both tensions at the input pulley.
     """
-    h = o.HEADER
-    first = I[h + o.C_FIRST_H]
-    q = I[o.S_CABLE] + o.CABLE_STATE * first
-    pull = S[q + o.Q_TENSION_IN]
+    circuit = d.circuits[0]
+    pull = d.states[circuit.first[0]].tension_in
     out[OUT_T_H_IN] = pull
     out[OUT_T_L_IN] = math.nan
-    if I[h + o.C_CLOSED] == 1:
-        q = I[o.S_CABLE] + o.CABLE_STATE * I[h + o.C_FIRST_L]
-        out[OUT_T_L_IN] = S[q + o.Q_TENSION_IN]
-        pull -= S[q + o.Q_TENSION_IN]
-    radius = P[o.JOINT * I[o.N_CIRCUITS] + o.CABLE * first + o.R_IN]
-    out[OUT_MOTOR_TORQUE] = -radius * pull + S[I[o.S_CONTEXT] + o.X_MOTOR_MOMENT]
+    if circuit.chains == 2:
+        tension_l = d.states[circuit.first[1]].tension_in
+        out[OUT_T_L_IN] = tension_l
+        pull -= tension_l
+    radius = d.cables[circuit.first[0]].radius[IN]
+    out[OUT_MOTOR_TORQUE] = -radius * pull + d.context.motor_moment
 
 
 @inlined_kernel
-def predict(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, row: Floats, out: Floats) -> int:
+def predict(d: Drive, terms: Terms, L: Floats, row: Floats, out: Floats) -> int:
     """Solve the joint for one row of readings without committing it; `out` gets the outputs. Returns a status.
 
     The scalar state is left pending in any case: whoever commits nothing puts it back (`keep`, `put_back`).
     """
-    status = admissible(I, S, J, row)
-    if status != o.STATUS_OK:
+    status = admissible(d, row)
+    if status != STATUS_OK:
         return status
-    x = I[o.S_CONTEXT]
-    raw = (row[IN_LOAD] - P[I[o.P_SENSOR] + o.OFFSET]) / P[I[o.P_SENSOR] + o.GAIN]
-    dt = row[IN_TIME] - S[x + o.X_TIME]
-    motor, load = smooth(P, I, S, dt, row[IN_MOTOR], raw)
-    advance(P, I, S, row[IN_TIME], motor, load, row[IN_TEMPERATURE])
+    x = d.context
+    raw = (row[IN_LOAD] - d.sensor.offset) / d.sensor.gain
+    motor, load = smooth(d, row[IN_TIME] - x.time, row[IN_MOTOR], raw)
+    advance(d, row[IN_TIME], motor, load, row[IN_TEMPERATURE])
     for j in range(row.shape[0] - IN_OTHER):
-        S[x + o.X_OTHER + j] = row[IN_OTHER + j]
-    status = joint_solve(P, I, S, J, L, G)
-    ready = joint_ready(I, S)
-    if status == o.STATUS_OK or (status == o.STATUS_DIVERGED and ready == o.STATUS_UNWOUND):
+        x.other[j] = row[IN_OTHER + j]
+    status = joint_solve(d, terms, L)
+    ready = joint_ready(d)
+    if status == STATUS_OK or (status == STATUS_DIVERGED and ready == STATUS_UNWOUND):
         status = ready
-    if I[o.N_TERMS] > 0 and not terms_sane(I, S):
-        status = o.STATUS_EFFECT
-    drive = S[x + o.X_JOINT] + S[x + o.X_RIGID] * (row[IN_MOTOR] - motor)
-    out[OUT_DRIVE] = drive
-    out[OUT_JOINT] = drive + S[x + o.X_READING]
+    if d.size.terms > 0 and not terms_sane(d):
+        status = STATUS_EFFECT
+    angle = x.joint + x.rigid * (row[IN_MOTOR] - motor)
+    out[OUT_DRIVE] = angle
+    out[OUT_JOINT] = angle + x.reading
     out[OUT_LOAD] = row[IN_LOAD]
-    out[OUT_T_H] = S[x + o.X_TENSION_H]
-    out[OUT_T_L] = S[x + o.X_TENSION_L]
-    out[OUT_COMPLIANCE] = S[x + o.X_COMPLIANCE]
-    motor_side(P, I, S, out)
+    out[OUT_T_H] = x.tension_h
+    out[OUT_T_L] = x.tension_l
+    out[OUT_COMPLIANCE] = x.compliance
+    motor_side(d, out)
     out[OUT_STRENGTH] = 0.0
     return status
 
 
 @kernel
-def keep(I: Ints, S: Floats) -> None:
+def keep(d: Drive, S: Floats) -> None:
     """Copy everything but the profiles (which nothing but a commit touches) aside."""
-    copy_floats(S, 0, S, I[o.S_SPARE], I[o.S_MEET])
+    copy_floats(S, 0, S, d.size.spare_at, d.size.steps_at)
 
 
 @kernel
-def put_back(I: Ints, S: Floats) -> None:
+def put_back(d: Drive, S: Floats) -> None:
     """Undo what happened since `keep`, bit for bit."""
-    copy_floats(S, I[o.S_SPARE], S, 0, I[o.S_MEET])
+    copy_floats(S, d.size.spare_at, S, 0, d.size.steps_at)
 
 
 @inlined_kernel
-def take(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, G: Floats, row: Floats, out: Floats) -> int:
+def take(d: Drive, terms: Terms, L: Floats, row: Floats, out: Floats) -> int:
     """One sample, committed; or refused (the status says why), and the state is what it was, bit for bit."""
-    keep(I, S)
-    status = predict(P, I, S, J, L, G, row, out)
-    if status == o.STATUS_OK:
-        out[OUT_STRENGTH] = strength_used(P, I, S)
-        status = joint_commit(P, I, S, J, L, G) if out[OUT_STRENGTH] <= 1.0 else o.STATUS_BREAKS
-    if status != o.STATUS_OK:
-        put_back(I, S)
+    keep(d, terms.memory)
+    status = predict(d, terms, L, row, out)
+    if status == STATUS_OK:
+        out[OUT_STRENGTH] = strength_used(d)
+        status = joint_commit(d, terms, L) if out[OUT_STRENGTH] <= 1.0 else STATUS_BREAKS
+    if status != STATUS_OK:
+        put_back(d, terms.memory)
     return status
 
 
 @kernel
 def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
     """One sample, committed or refused."""
-    return take(P, I, S, J, L, stacks(I, S), row, out)
+    return take(drive(P, I, S, J), terms_of(P, I, S), L, row, out)
 
 
 @kernel
 def peek_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
     """One sample, nothing committed. A cable that would break is no reason to refuse a prediction."""
-    keep(I, S)
-    status = predict(P, I, S, J, L, stacks(I, S), row, out)
-    put_back(I, S)
+    d = drive(P, I, S, J)
+    keep(d, S)
+    status = predict(d, terms_of(P, I, S), L, row, out)
+    put_back(d, S)
     return status
 
 
@@ -164,12 +173,12 @@ def run_block(
     P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
 ) -> tuple[int, int]:
     """Step through a block of rows; returns how many were done and the status of the row that stopped it."""
-    G = stacks(I, S)
+    d, terms = drive(P, I, S, J), terms_of(P, I, S)
     for k in range(rows.shape[0]):
-        status = take(P, I, S, J, L, G, rows[k], outs[k])
-        if status != o.STATUS_OK:
+        status = take(d, terms, L, rows[k], outs[k])
+        if status != STATUS_OK:
             return k, status
-    return rows.shape[0], o.STATUS_OK
+    return rows.shape[0], STATUS_OK
 
 
 @kernel
@@ -181,44 +190,44 @@ def find_load(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, ou
     cannot take (an open circuit's cable slack, a drum unwound): if that is what the angle asks for, it is refused.
     """
     if not math.isfinite(row[IN_JOINT]):
-        return o.STATUS_NAN
-    x = I[o.S_CONTEXT]
+        return STATUS_NAN
+    d = drive(P, I, S, J)
     low, high = -1e300, 1e300
-    below = above = o.STATUS_OK  # what is wrong with the loads at the ends of the bracket
-    load = S[x + o.X_LOAD] * P[I[o.P_SENSOR] + o.GAIN] + P[I[o.P_SENSOR] + o.OFFSET]
-    reach = P[o.J_RADIUS] * P[o.JOINT * I[o.N_CIRCUITS] + o.T0]
+    below = above = STATUS_OK  # what is wrong with the loads at the ends of the bracket
+    load = d.context.load * d.sensor.gain + d.sensor.offset
+    reach = d.circuits[0].radius * d.cables[0].T0
     taken = 0.0  # the last load that the joint could take
     for _ in range(200):
         row[IN_LOAD] = load
         status = peek_one(P, I, S, J, L, row, out)
-        if status == o.STATUS_SLACK or status == o.STATUS_UNWOUND or status == o.STATUS_DIVERGED:
+        if status in (STATUS_SLACK, STATUS_UNWOUND, STATUS_DIVERGED):
             reach *= 2.0
-            if status == o.STATUS_SLACK or load < taken:
+            if status == STATUS_SLACK or load < taken:
                 low, below = load, status
                 new = low + reach
             else:
                 high, above = load, status
                 new = high - reach
-        elif status != o.STATUS_OK:
+        elif status != STATUS_OK:
             return status
         else:
             miss = out[OUT_JOINT] - row[IN_JOINT]
             taken = load
             if abs(miss) < 1e-13:
-                return o.STATUS_OK
+                return STATUS_OK
             if miss > 0.0:
-                high, above = load, o.STATUS_OK
+                high, above = load, STATUS_OK
             else:
-                low, below = load, o.STATUS_OK
+                low, below = load, STATUS_OK
             new = load - miss / max(out[OUT_COMPLIANCE], 1e-12)
         if not low < new < high:
             new = 0.5 * (low + high)
         if abs(new - load) <= 1e-14 + 1e-13 * abs(load):
-            if below == above == o.STATUS_OK:
-                return o.STATUS_OK
-            return o.STATUS_UNREACHABLE
+            if below == above == STATUS_OK:
+                return STATUS_OK
+            return STATUS_UNREACHABLE
         load = new
-    return o.STATUS_UNREACHABLE
+    return STATUS_UNREACHABLE
 
 
 @kernel
@@ -228,8 +237,8 @@ def run_inverse(
     """As `run_block`, with every row's load found from both encoders."""
     for k in range(rows.shape[0]):
         status = find_load(P, I, S, J, L, rows[k], outs[k])
-        if status == o.STATUS_OK:
+        if status == STATUS_OK:
             status = step_one(P, I, S, J, L, rows[k], outs[k])
-        if status != o.STATUS_OK:
+        if status != STATUS_OK:
             return k, status
-    return rows.shape[0], o.STATUS_OK
+    return rows.shape[0], STATUS_OK

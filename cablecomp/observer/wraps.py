@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
-from cablecomp.mechanics import layout as o
 from cablecomp.mechanics.assemble import Model
-from cablecomp.mechanics.profile import ROWS, Floats, Ints, V, Y
+from cablecomp.mechanics.profile import Floats, Ints, V, Y
 from cablecomp.mechanics.tables import tau_of_v
 
 
@@ -24,18 +23,15 @@ class WrapProfile(NamedTuple):
 
 def wrap_profiles(config: JointConfig, model: Model, S: Floats, J: Ints) -> list[WrapProfile]:
     """The tension profile on every wrap in the state S, J, termination first."""
-    I, P = model.I, model.P
-    wraps, stacks = 2 * int(I[o.N_CABLES]), int(I[o.N_STACKS])
-    first = int(I[o.S_PROFILE])
-    G = S[first : first + stacks * ROWS * int(I[o.CAPACITY])].reshape(stacks, ROWS, -1)
+    d = model.named(S, J)
     result = []
-    for wrap in range(wraps):
-        p = int(I[o.N_CIRCUITS]) * o.JOINT + o.CABLE * (wrap // 2)
-        q = int(I[o.S_CABLE]) + o.CABLE_STATE * (wrap // 2)
+    for wrap in range(2 * d.size.cables):
+        cable, state = d.cables[wrap // 2], d.states[wrap // 2]
         n = int(J[wrap])
-        t0 = P[p + o.T0] * S[q + o.Q_T0] * S[q + o.Q_EA]
-        tau = np.array([tau_of_v(model.L, 2, v) for v in G[wrap, V, :n]])
-        result.append(WrapProfile(_wrap_name(config, wrap, P[p + o.SIGN]), G[wrap, Y, :n].copy(), t0 * tau))
+        t0 = cable.T0 * state.pretension * state.stiffness
+        tau = np.array([tau_of_v(model.L, 2, v) for v in d.profiles[wrap, V, :n]])
+        name = _wrap_name(config, wrap, cable.sign)
+        result.append(WrapProfile(name, d.profiles[wrap, Y, :n].copy(), t0 * tau))
     return result
 
 

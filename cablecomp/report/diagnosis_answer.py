@@ -10,7 +10,7 @@ import numpy as np
 
 from cablecomp.diagnosis.result import Diagnosis, Traces
 from cablecomp.report import diagnosis_figures as figures
-from cablecomp.report import page, style
+from cablecomp.report import page
 from cablecomp.report.diagnosis_tables import angle, known
 from cablecomp.report.diagnosis_words import (
     ANSWERS,
@@ -46,7 +46,7 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     if trace is not None:
         seen = _unseen(result) if not np.all(trace.counted) else ""
         picture = page.figure(figures.at_a_glance(trace, unit), f"The end of {short(trace.name)}.{seen}")
-    return Section("Answer", _STYLE + f'<div class="answer"><div>{words}</div><div>{picture}</div></div>'
+    return Section("Answer", f'<div class="answer"><div>{words}</div><div>{picture}</div></div>'
                    + page.facts(_facts(result, unit)) + page.bullets(d.warnings))  # fmt: skip
 
 
@@ -140,18 +140,3 @@ def _arrow(before: float, after: float, unit: Scale) -> str:
 
 def _tone(before: float, after: float | None) -> Tone:
     return "good" if after is not None and after < 0.9 * before else "plain"
-
-
-_STYLE: Final = f"""<style>
-.answer {{ display: grid; grid-template-columns: minmax(0, 5fr) minmax(0, 6fr); gap: 22px; }}
-@media (max-width: 860px) {{ .answer {{ grid-template-columns: minmax(0, 1fr); }} }}
-.verdict {{ font-size: 25px; font-weight: 650; margin: 0 0 4px; }}
-.verdict.good {{ color: #0b8a6f; }} .verdict.warn {{ color: #b7791f; }} .verdict.bad {{ color: #c8102e; }}
-.missing {{ border-left: 4px solid #0b8a6f; padding: 2px 0 2px 14px; margin: 0 0 12px; }}
-.missing p {{ margin: 2px 0; }} .values {{ color: {style.MUTED}; font-size: 13.5px; overflow-wrap: anywhere; }}
-.sure {{ height: 5px; background: {style.RULE}; border-radius: 3px; max-width: 260px; }}
-.sure i {{ display: block; height: 5px; background: #0b8a6f; border-radius: 3px; }}
-h3 {{ font-size: 16px; margin: 10px 0 4px; }} h3 code {{ font-size: 13px; font-weight: 400; color: {style.MUTED}; }}
-.equation {{ font: 16px/1.7 {style.MONO}; background: #f8fafc; border-left: 4px solid {style.PREDICTED};
-  padding: 8px 16px; margin: 6px 0 12px; overflow-x: auto; border-radius: 0 8px 8px 0; }}
-</style>"""

@@ -18,9 +18,9 @@ from cablecomp.signal.smoothing import FloatArray
 
 BEFORE: Final = style.RESIDUAL
 AFTER: Final = style.PREDICTED
-NAMED, WEAK, NOT = style.CABLE_L, "#b7791f", style.translucent(style.BASELINE, 0.6)
+NAMED, WEAK, NOT = style.CABLE_L, style.WARN, style.translucent(style.BASELINE, 0.6)
 _MEASURED: Final = style.translucent(style.MEASURED, 0.45)
-_UNSEEN: Final = "rgba(107, 79, 187, 0.10)"
+_UNSEEN: Final = style.translucent(style.LOAD, 0.10)
 _TIME: Final = style.label("time", "s")
 _MOST_INTERVALS: Final = 40
 _MOST_TRIED: Final = 24
@@ -152,7 +152,7 @@ def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scal
     fig.add_hrect(
         y0=-floor_rad * unit.factor,
         y1=floor_rad * unit.factor,
-        fillcolor="rgba(100, 116, 139, 0.15)",
+        fillcolor=style.translucent(style.MUTED, 0.15),
         line_width=0,
     )
     groups = [("loading", direction > 0.0, "solid"), ("unloading", direction < 0.0, "dot")]
@@ -177,14 +177,17 @@ def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scal
 
 
 def tried(entries: Sequence[Tested], rounds: Mapping[str, int]) -> Any:
-    """Share of what was left that each hypothesis takes off data left out; `rounds`: number of the model it stood beside."""
+    """Share of what was left that each hypothesis takes off data left out, none where it adds to it.
+
+    `rounds`: number of the model that it stood beside.
+    """
     shown = sorted(entries, key=lambda t: (rounds[t.beside], -t.heldout_gain))[:_MOST_TRIED][::-1]
     fig = style.figure(96 + 24 * len(shown), margin={"l": 270, "r": 50, "t": 50, "b": 46})
     for outcome, colour in (("named", NAMED), ("candidate", WEAK), ("not needed", NOT)):
         own = [t for t in shown if t.outcome == outcome]
         if own:
             fig.add_bar(
-                x=[100.0 * t.heldout_gain for t in own],
+                x=[100.0 * max(t.heldout_gain, 0.0) for t in own],
                 y=[f"{rounds[t.beside]} · {plain(t.name)}" for t in own],
                 orientation="h",
                 marker_color=colour,
@@ -196,8 +199,7 @@ def tried(entries: Sequence[Tested], rounds: Mapping[str, int]) -> Any:
             )
     order = [f"{rounds[t.beside]} · {plain(t.name)}" for t in shown]
     fig.update_yaxes(categoryorder="array", categoryarray=order)
-    lowest = min([0.0, *(100.0 * t.heldout_gain for t in shown)])
-    fig.update_xaxes(range=[max(-30.0, 1.1 * lowest), 112])
+    fig.update_xaxes(range=[0, 112])
     fig.update_layout(bargap=0.3, showlegend=True)
     return style.axes(fig, style.label("taken off what was left, data left out", "%"), "")
 

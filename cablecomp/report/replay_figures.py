@@ -19,7 +19,7 @@ from cablecomp.report.replay_display import Display
 _MEASURED: Final = style.translucent(style.MEASURED, 0.5)  # broad and pale, so that a prediction on it shows
 _TIME: Final = style.label("time", "s")
 _INSTANT_COLOURS: Final = {
-    START: "#94a3b8",
+    START: style.FAINT,
     GREATEST: style.RESIDUAL,
     BACK: style.LOAD,
     LEAST: style.PREDICTED,
@@ -58,6 +58,8 @@ def over_time(display: Display, summary: ReplaySummary) -> Any:
     style.curve(fig, time, rows["deflection_measured_rad"] * unit.factor, "measured", _MEASURED, 3.2, row=1)
     style.curve(fig, time, rows["deflection_rad"] * unit.factor, "predicted", style.PREDICTED, 1.4, row=1)
     style.axes(fig, "", style.label("deflection", unit.unit), row=1, col=1)
+    shown = [rows[name] * unit.factor for name in ("deflection_measured_rad", "deflection_rad")]
+    style.keep_range(fig, shown, row=1)
     if loaded:
         style.curve(fig, time, rows["load_Nm"], "load", style.LOAD, 1.3, row=2)
         _mark_instants(fig, summary.snapshots)
@@ -82,23 +84,21 @@ def loop(display: Display, summary: ReplaySummary) -> Any:
     return style.axes(fig, style.label("load", "N·m"), style.label("deflection", unit.unit))
 
 
-def residual_over_time(display: Display) -> Any:
+def residual_over_time(display: Display, unit: Scale) -> Any:
     """Measured minus predicted joint position over time."""
     rows = display.rows
-    unit = scale(float(np.nanmax(np.abs(rows["residual_rad"]))))
     fig = style.figure(320)
     style.curve(fig, rows["time_s"], rows["residual_rad"] * unit.factor, "residual", style.RESIDUAL, 1.1)
     fig.update_layout(showlegend=False)
     return style.axes(fig, _TIME, style.label("measured − predicted", unit.unit))
 
 
-def histogram(display: Display) -> Any:
+def histogram(display: Display, unit: Scale) -> Any:
     """How often each size of residual occurs, with the normal curve of equal mean and spread."""
     assert display.histogram is not None
     edges, counts = display.histogram
     filled = np.flatnonzero(counts)
     first, last = int(filled[0]), int(filled[-1]) + 1
-    unit = scale(max(abs(float(edges[first])), abs(float(edges[last]))))
     centres = 0.5 * (edges[1:] + edges[:-1]) * unit.factor
     share = 100.0 * counts / counts.sum()
     fig = style.figure(340, bargap=0.04)
@@ -116,7 +116,7 @@ def histogram(display: Display) -> Any:
     return style.axes(fig, style.label("residual", unit.unit), style.label("share of samples", "%"))
 
 
-def spectra(display: Display) -> Any:
+def spectra(display: Display, unit: Scale) -> Any:
     """Amplitude spectral density of the measured deflection and of what the prediction leaves of it."""
     fig = style.figure(340)
     for density, name, colour in (
@@ -125,10 +125,12 @@ def spectra(display: Display) -> Any:
     ):
         if density is not None:
             keep = _log_spaced(density.frequency_Hz)
-            style.curve(fig, density.frequency_Hz[keep], density.amplitude[keep] * 1e6, name, colour, 1.4)
+            style.curve(
+                fig, density.frequency_Hz[keep], density.amplitude[keep] * unit.factor, name, colour, 1.4
+            )
     fig.update_xaxes(type="log", dtick=1)
     fig.update_yaxes(type="log", dtick=1, exponentformat="power")
-    return style.axes(fig, style.label("frequency", "Hz"), style.label("density", "µrad/√Hz"))
+    return style.axes(fig, style.label("frequency", "Hz"), style.label("density", f"{unit.unit}/√Hz"))
 
 
 def tensions(display: Display) -> Any:

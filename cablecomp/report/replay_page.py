@@ -58,7 +58,11 @@ def _sections(summary: ReplaySummary, display: Display, config_text: str) -> Ite
     if display.has("load_Nm"):
         yield Section("Load–deflection loop", page.figure(replay_figures.loop(display, summary)))
     if display.has("residual_rad"):
-        yield Section("Residual", _residual(display), "What the prediction leaves: measured minus predicted.")
+        yield Section(
+            "Residual",
+            _residual(display, replay_figures.scale(summary.deflection_range_rad)),
+            "What the prediction leaves: measured minus predicted.",
+        )
     if display.has("tension_h_N"):
         yield Section("Cable tension", page.figure(replay_figures.tensions(display)))
     if summary.snapshots and summary.snapshots[0].profiles:
@@ -75,39 +79,47 @@ def _sections(summary: ReplaySummary, display: Display, config_text: str) -> Ite
 
 def _band(display: Display) -> str:
     if display.has("deflection_low_rad"):
-        return "The band holds the truth for every admissible history before the recording."
+        return (
+            "The band holds the truth for every admissible history before the recording; where it is wider than the "
+            "curves it is cut."
+        )
     return "No guaranteed bounds were computed, or this joint's effects do not allow any."
 
 
-def _residual(display: Display) -> str:
-    parts = [page.figure(replay_figures.histogram(display))]
+def _residual(display: Display, unit: replay_figures.Scale) -> str:
+    parts = [page.figure(replay_figures.histogram(display, unit))]
     if display.residual_density is not None:
-        parts.append(page.figure(replay_figures.spectra(display)))
+        parts.append(page.figure(replay_figures.spectra(display, unit)))
     else:
         parts.append(page.paragraph("No spectrum: the sampling is uneven, or the recording too short."))
-    return page.figure(replay_figures.residual_over_time(display)) + page.columns(*parts)
+    return page.figure(replay_figures.residual_over_time(display, unit)) + page.columns(*parts)
 
 
 def _facts(summary: ReplaySummary) -> Iterator[Fact]:
     reach = summary.deflection_range_rad
+    unit = replay_figures.scale(reach)  # one for all of them, and that of the figures
     if summary.rmse_rad is None:
         yield Fact("RMS error", "–", "no joint position was recorded", "warn")
     else:
         share = 100.0 * summary.rmse_rad / reach if reach > 0.0 else float("nan")
-        yield Fact("RMS error", _angle(summary.rmse_rad), f"{page.number(share)} % of the deflection's range")
-        yield Fact("Mean error", _angle(summary.mean_rad), f"standard deviation {_angle(summary.sd_rad)}")
-        yield Fact("Largest error", _angle(summary.max_rad))
+        yield Fact(
+            "RMS error", _in(unit, summary.rmse_rad), f"{page.number(share)} % of the deflection's range"
+        )
+        yield Fact(
+            "Mean error", _in(unit, summary.mean_rad), f"standard deviation {_in(unit, summary.sd_rad)}"
+        )
+        yield Fact("Largest error", _in(unit, summary.max_rad))
     if summary.baseline_linear_rmse_rad is not None and summary.rmse_rad:
         gain = summary.baseline_linear_rmse_rad / summary.rmse_rad
         remark = f"{page.number(gain)} × the error of this prediction"
         tone: page.Tone = "good" if gain > 1.0 else "warn"
-        yield Fact("Best straight line", _angle(summary.baseline_linear_rmse_rad), remark, tone)
+        yield Fact("Best straight line", _in(unit, summary.baseline_linear_rmse_rad), remark, tone)
     yield Fact(
-        "Deflection's range", _angle(reach), "measured" if summary.rmse_rad is not None else "predicted"
+        "Deflection's range", _in(unit, reach), "measured" if summary.rmse_rad is not None else "predicted"
     )
     if summary.bounds_width_last_rad is not None:
-        remark = f"{_angle(summary.bounds_width_first_rad)} at the start"
-        yield Fact("Bounds at the end", _angle(summary.bounds_width_last_rad), remark)
+        remark = f"{_in(unit, summary.bounds_width_first_rad)} at the start"
+        yield Fact("Bounds at the end", _in(unit, summary.bounds_width_last_rad), remark)
     yield Fact(
         "Speed",
         f"{_count(summary.samples_per_s)} /s",
@@ -119,8 +131,5 @@ def _count(value: float) -> str:
     return f"{value:,.0f}".replace(",", " ")
 
 
-def _angle(value_rad: float | None) -> str:
-    if value_rad is None:
-        return "–"
-    factor, unit = replay_figures.scale(abs(value_rad) * 10.0)
-    return page.number(value_rad * factor, unit)
+def _in(unit: replay_figures.Scale, value_rad: float | None) -> str:
+    return "–" if value_rad is None else page.number(value_rad * unit.factor, unit.unit)

@@ -18,6 +18,7 @@ from cablecomp.report.run_data import Floats, RunData, load_run
 from cablecomp.runtime.results import JointResult, RunReport
 
 TIME = style.label("time", "s")
+BAND = "The band holds the truth for every admissible history before the run; where it is wider than the curves it is cut."
 
 
 def write_run_page(report: RunReport, config_text: str) -> Path:
@@ -46,9 +47,8 @@ def run_facts(joint: JointResult) -> list[Fact]:
     if not np.isnan(joint.torque_Nm):
         true = "" if np.isnan(joint.true_torque_Nm) else f"true: {page.number(joint.true_torque_Nm, 'N·m')}"
         facts.append(Fact("joint torque error, RMS", page.number(joint.torque_Nm, "N·m"), true))
-    stopped = joint.phases.get("stopped", 0)
-    tone: page.Tone = "bad" if stopped else "good"
     trouble = sum(n for phase, n in joint.phases.items() if phase != "normal")
+    tone: page.Tone = "bad" if joint.phases.get("stopped", 0) else "warn" if trouble else "good"
     facts.append(Fact("cycles with stale data", str(trouble), f"of {sum(joint.phases.values())}", tone))
     return facts
 
@@ -57,11 +57,11 @@ def position_figure(data: RunData) -> Any:
     """Asked and measured joint position, error, load, over time."""
     fig = stack([0.45, 0.3, 0.25], 640)
     time = data.time_s
-    curve(fig, time, data.asked_rad, "asked", style.BASELINE, 1)
-    curve(fig, time, data.column("joint_position_rad"), "measured", style.MEASURED, 1)
+    curve(fig, time, 1e3 * data.asked_rad, "asked", style.BASELINE, 1, 3.0)
+    curve(fig, time, 1e3 * data.column("joint_position_rad"), "measured", style.PREDICTED, 1)
     curve(fig, time, 1e3 * data.error_rad(), "error", style.RESIDUAL, 2)
     curve(fig, time, data.column("joint_torque_Nm"), "load", style.LOAD, 3)
-    style.axes(fig, "", style.label("joint position", "rad"), row=1, col=1)
+    style.axes(fig, "", style.label("joint position", "mrad"), row=1, col=1)
     style.axes(fig, "", style.label("error", "mrad"), row=2, col=1)
     style.axes(fig, TIME, style.label("load", "N·m"), row=3, col=1)
     error = np.abs(1e3 * data.error_rad()[data.controlled])
@@ -89,10 +89,14 @@ def deflection_figure(data: RunData) -> Any:
             col=1,
             **edge,
         )
-    curve(fig, time, 1e3 * (p["deflection_rad"] + p["residual_rad"]), "measured", style.MEASURED, 1)
+    measured = 1e3 * (p["deflection_rad"] + p["residual_rad"])
+    pale = style.translucent(style.MEASURED, 0.45)
+    curve(fig, time, measured, "measured", pale, 1, 3.0)
     curve(fig, time, 1e3 * p["deflection_rad"], "predicted", style.PREDICTED, 1)
     curve(fig, time, 1e3 * data.cycles["deflection_ahead_rad"], "made up for", style.CABLE_L, 1)
     curve(fig, time, 1e3 * p["residual_rad"], "residual", style.RESIDUAL, 2)
+    style.keep_range(fig, [c[data.controlled] for c in (measured, 1e3 * p["deflection_rad"])], row=1)
+    style.keep_range(fig, [1e3 * p["residual_rad"][data.controlled]], row=2)
     style.axes(fig, "", style.label("deflection", "mrad"), row=1, col=1)
     style.axes(fig, TIME, style.label("residual", "mrad"), row=2, col=1)
     return fig
@@ -160,7 +164,7 @@ def _sections(report: RunReport, config_text: str) -> Iterator[Section]:
         if data.rows == 0:  # a disk that was full from the beginning
             continue
         yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
-        yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data)))
+        yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data)), BAND)
         yield Section(f"{joint.name}: cables", page.figure(tension_figure(data)))
     yield timing_section(report)
     if report.events:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cablecomp.report import style
 from cablecomp.report.theory_common import Array, Figure, Subject, canvas, family, own_line
 from cablecomp.thesis.closed_forms.closed import closed_loading_normalised, unending_stage
 from cablecomp.thesis.closed_forms.models import ModelName, choose_model, model_normalised
@@ -37,7 +38,7 @@ def error(subject: Subject, name: ModelName) -> Figure:
     own = of(subject.stage.GF)
     own_line(fig, m, own, subject.label)
     for level in (-15.0, 15.0):
-        fig.add_hline(y=level, line={"color": "#94a3b8", "width": 1, "dash": "dot"})
+        fig.add_hline(y=level, line={"color": style.FAINT, "width": 1, "dash": "dot"})
     fig.update_yaxes(range=_RANGES[name])
     fig.update_xaxes(range=[0.0, limit])
     here = m <= max(m[0], min(subject.m_peak, limit))

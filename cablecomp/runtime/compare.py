@@ -74,6 +74,14 @@ class Comparison:
         return errors[over] / errors[OBSERVER]
 
     @property
+    def encoder_noise_rad(self) -> float:
+        """RMS of the joint encoder's noise and of its rounding: sqrt(noise² + resolution²/12)."""
+        s = self.nominal.sensors
+        return float(
+            np.hypot(s.joint_position_noise_rad or 0.0, (s.joint_position_resolution_rad or 0.0) / 12.0**0.5)
+        )
+
+    @property
     def force_share(self) -> float:
         """RMS torque error in force mode over the range asked for."""
         joint = self.force.joints[0]

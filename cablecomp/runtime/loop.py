@@ -15,7 +15,7 @@ from time import perf_counter
 from cablecomp.errors import DeviceError
 from cablecomp.links.link import Link
 from cablecomp.links.records import BusState, Mode
-from cablecomp.runtime.clock import Clock, Tick, Ticker
+from cablecomp.runtime.clock import Clock, SteppedClock, Tick, Ticker
 from cablecomp.runtime.histogram import CycleTimes
 from cablecomp.runtime.joint_loop import JointLoop, JointSetup
 from cablecomp.runtime.log import EventLog
@@ -155,6 +155,7 @@ class Loop:
             send_failures=status.send_failures,
             policy=tuple(self._granted.lines),
             minutes=tuple(self.minutes.done),
+            stepped=isinstance(self._clock, SteppedClock),
         )
 
     # ---- inside ----------------------------------------------------------------------------------

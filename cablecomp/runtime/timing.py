@@ -18,7 +18,8 @@ class TimingReport:
     observe, compensate, encode, record of all joints; `step`: observer and compensator of one joint;
     `data_age`: age of the oldest channel used. `misses`: cycles that ended after the next tick was due;
     `skipped`: ticks left out for that. `policy` says what of scheduling, memory and garbage collection could
-    be had, and what not; `minutes`: the whole minutes of a long run one by one.
+    be had, and what not; `minutes`: the whole minutes of a long run one by one; `stepped`: time was simulated,
+    so that rate, period, late begin and data age say nothing of this machine.
     """
 
     rate_Hz: float
@@ -42,6 +43,7 @@ class TimingReport:
     send_failures: int
     policy: tuple[str, ...]
     minutes: tuple[Minute, ...] = ()
+    stepped: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, for JSON (NaN and infinity as None)."""
@@ -56,15 +58,31 @@ class TimingReport:
         def line(s: Spread) -> str:
             return spread.format(s.p50_s * us, s.p99_s * us, s.p999_s * us, s.max_s * us)
 
-        return [
-            ("rate", f"{self.rate_Hz:.2f} Hz of {self.asked_Hz:g} Hz asked"),
-            ("ticks", f"{self.ticks}, {self.misses} missed their end, {self.skipped} skipped"),
-            ("period", line(self.period)),
-            ("late begin", line(self.jitter)),
+        work = [
             ("poll", line(self.poll)),
             ("step of one joint", line(self.step)),
             ("whole cycle", line(self.cycle)),
-            ("data age", line(self.data_age)),
+        ]
+        if self.stepped:
+            measured = [
+                (
+                    "time",
+                    f"simulated, {self.ticks} ticks of 1/{self.asked_Hz:g} s: neither rate nor lateness was measured",
+                ),
+                *work,
+                ("longer than a tick", f"{self.misses} cycles: in real time they would have been late"),
+            ]
+        else:
+            measured = [
+                ("rate", f"{self.rate_Hz:.2f} Hz of {self.asked_Hz:g} Hz asked"),
+                ("ticks", f"{self.ticks}, {self.misses} missed their end, {self.skipped} skipped"),
+                ("period", line(self.period)),
+                ("late begin", line(self.jitter)),
+                *work,
+                ("data age", line(self.data_age)),
+            ]
+        return [
+            *measured,
             (
                 "frames",
                 f"{self.frames} taken, {self.lost_frames} lost, {self.repeated_frames} repeated, "

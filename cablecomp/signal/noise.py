@@ -1,8 +1,7 @@
-"""Noise floor of a channel out of the recording itself, and the floor of a prediction's residual."""
+"""Noise floor of a channel out of the recording itself."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb, hypot, sqrt
 from typing import Final
@@ -38,15 +37,6 @@ class ChannelNoise:
     resting_share: float
     coloured: bool
     samples: int
-
-
-@dataclass(frozen=True)
-class InputNoise:
-    """What one measured input adds to the residual: `sigma` of the input as the model receives it (after any
-    filter) times the local `sensitivity` d(prediction)/d(input), per sample or one number."""
-
-    sigma: float
-    sensitivity: FloatArray | float
 
 
 def reading_sigma(white: float | None, resolution: float | None) -> float:
@@ -112,19 +102,6 @@ def channel_noise(time_s: FloatArray, values: FloatArray, resolution: float | No
     spread = max(2.0 * white**2, step**2 / 12.0)
     doubt = scatter / spread if spread > 0.0 else float("inf")
     return ChannelNoise(reading_sigma(white, step), white, step, doubt, resting, coloured, len(values))
-
-
-def residual_floor(joint_sigma: float, inputs: Sequence[InputNoise], samples: int) -> FloatArray:
-    """Return the 1-sigma floor of measured minus predicted joint angle, per sample, in rad.
-
-    sigma_r^2 = sigma_joint^2 + sum_i (d q_out/d x_i)^2 sigma_i^2: what the residual of a perfect model
-    would show, as far as the inputs' noise acts linearly (in a friction model it acts less at rest and more
-    where it shakes a threshold).
-    """
-    square = np.full(samples, joint_sigma**2)
-    for entry in inputs:
-        square = square + np.square(entry.sensitivity) * entry.sigma**2
-    return np.asarray(np.sqrt(square), dtype=np.float64)
 
 
 def _differences(time_s: FloatArray, values: FloatArray, order: int) -> FloatArray:

@@ -12,8 +12,8 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
 from cablecomp.diagnosis.errors_left import errors_of
+from cablecomp.diagnosis.explain.model import searching
 from cablecomp.diagnosis.explain.scores import Groups, Lead, lead, left_out, make_groups
-from cablecomp.diagnosis.explain.selection import searching
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError

@@ -1,5 +1,7 @@
-"""Faults on demand: at the wire (`FaultyPort`), on a pseudo-terminal, and in the device; each small, timed,
-seeded."""
+"""Faults on demand: at the wire (`FaultyPort`), on a pseudo-terminal, and in the device; each small, timed, seeded.
+
+Imports ports, wire and what it asks of a plant. Start reading at `base.py`, what a fault is.
+"""
 
 from firmware_sim.faults.base import Fault
 from firmware_sim.faults.device import (

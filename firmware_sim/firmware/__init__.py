@@ -1,5 +1,7 @@
-"""Firmware of the simulated joint: the drive at the motor, the sensor node at the joint. No input or output
-here."""
+"""Firmware of the simulated joint: the drive at the motor, the sensor node at the joint. No input or output here.
+
+Imports what it asks of a plant (`plantlike.py`) and errors alone. Start reading at `drive.py`.
+"""
 
 from firmware_sim.firmware.drive import Drive, DriveConfig, DriveReport
 from firmware_sim.firmware.records import (

@@ -1,5 +1,8 @@
-"""The simulated joint: cables as material points with Coulomb friction at every point, motor, link,
-sensors, effects."""
+"""The simulated joint: cables as material points with Coulomb friction at every point, motor, link, sensors, effects.
+
+Imports nothing of the other packages. Start reading at `records.py` (what there is, by name), then
+`stepping.py`; `dynamic.py` is the joint that runs live.
+"""
 
 from firmware_sim.plant.bench import PlantRun, simulate
 from firmware_sim.plant.config import EffectSpec, PlantConfig, StageConfig

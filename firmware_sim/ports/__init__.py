@@ -1,4 +1,7 @@
-"""Where frames go in and out: python-can buses, an slcan adapter or a serial device on a pseudo-terminal."""
+"""Where frames go in and out: python-can buses, an slcan adapter or a serial device on a pseudo-terminal.
+
+Imports the frames of `wire`. Start reading at `base.py`, what a port is.
+"""
 
 from firmware_sim.ports.base import Port
 from firmware_sim.ports.can_port import CanPort

@@ -1,4 +1,7 @@
-"""Blind trials: joints drawn with physics hidden in them, recordings in the open, the truth under a seal."""
+"""Blind trials: joints drawn with physics hidden in them, recordings in the open, the truth under a seal.
+
+Imports the plant. Start reading at `generate.py`, then `trial.py`; `python -m firmware_sim.trials.make` runs it.
+"""
 
 from firmware_sim.trials.experiment import run_experiment
 from firmware_sim.trials.generate import generate

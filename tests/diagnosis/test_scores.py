@@ -27,7 +27,7 @@ class Linear:
 
 def groups(folds: int = 6) -> Groups:
     block = np.repeat(np.arange(BLOCKS), ROWS)
-    return Groups(block, block % folds, "block")
+    return Groups(block, block % folds, "block", np.zeros_like(block))
 
 
 def linear(y: FloatArray, A: FloatArray, prior_sd: float) -> Linear:
@@ -57,7 +57,8 @@ def test_leaving_a_fold_out_is_fitting_without_it() -> None:
 def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:
     """A free step per block fits every block, and predicts none."""
     rng = np.random.default_rng(2)
-    g = Groups(np.repeat(np.arange(BLOCKS), ROWS), np.repeat(np.arange(BLOCKS), ROWS), "block")
+    blocks = np.repeat(np.arange(BLOCKS), ROWS)
+    g = Groups(blocks, blocks, "block", np.zeros_like(blocks))
     y = rng.standard_normal(BLOCKS * ROWS)
     steps = (g.block[:, None] == np.arange(BLOCKS)).astype(np.float64)
     plain = linear(y, np.ones((len(y), 1)), 1.5)
@@ -95,10 +96,10 @@ def test_chance_does_not_lead_far() -> None:
 
 def test_what_an_outlier_adds_grows_no_faster_than_itself() -> None:
     """Huber: ten times as far off counts ten times, not a hundred times."""
-    near, far = huber(np.array([50.0, 500.0]), 1.0)
+    near, far = huber(np.array([50.0, 500.0]))
     assert far / near == pytest.approx(10.0, rel=0.1)
     inside = np.linspace(-2.0, 2.0, 9)
-    np.testing.assert_allclose(huber(inside, 1.0), inside**2)
+    np.testing.assert_allclose(huber(inside), inside**2)
 
 
 def test_the_confidence_set_keeps_the_best_and_drops_what_is_clearly_worse() -> None:
@@ -123,3 +124,17 @@ def test_models_are_chosen_in_shares_that_add_up() -> None:
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares["good"] > 0.99
     assert selected_in({}, rng) == {}
+
+
+def test_a_channels_unit_decides_nothing() -> None:
+    """Each channel has its own yardstick: a torque in N mm leads as far as the same torque in N m."""
+    rng = np.random.default_rng(6)
+    block = np.tile(np.repeat(np.arange(BLOCKS), ROWS // 2), 2)
+    channel = np.repeat(np.arange(2), BLOCKS * ROWS // 2)
+    g = Groups(block, block, "block", channel)
+    better = rng.standard_normal(block.size)
+    worse = better + np.where(channel == 1, 1.0, 0.1) * rng.standard_normal(block.size)
+    unit = np.where(channel == 1, 1000.0, 1.0)
+    plain, scaled = lead(better, worse, g), lead(unit * better, unit * worse, g)
+    assert scaled.gain == pytest.approx(plain.gain, rel=1e-9)
+    assert scaled.z == pytest.approx(plain.z, rel=1e-9)

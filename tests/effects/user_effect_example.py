@@ -1,14 +1,15 @@
 """A seal that drags on the output shaft: the file `seal_drag.py` of the guide, word for word."""
 
 from cablecomp.effects import Change, Effect, Parameter, register, term
-from cablecomp.mechanics.layout import X_DT, X_FIRST, X_JOINT, X_JOINT_OLD, X_MOMENT, X_MOMENT_SLOPE
 
 
-@term(parameters=1)
-def drag(c, p, s):  # c: context, p: parameters, s: state of its own (none here)
-    if c[X_FIRST] == 0.0 and c[X_DT] > 0.0:
-        c[X_MOMENT] += p[0] * (c[X_JOINT] - c[X_JOINT_OLD]) / c[X_DT]  # taken out of the load path
-        c[X_MOMENT_SLOPE] += p[0] / c[X_DT]  # its derivative by the joint angle: keeps the solver quick
+@term(parameters=("drag",))
+def drag(c, p, s):  # c: the joint's context, p: parameters, s: state of its own (none here)
+    if c.first or c.dt <= 0.0:
+        return
+    rate = (c.joint - c.joint_old) / c.dt
+    c.moment += p.drag * rate  # taken out of the load path
+    c.moment_slope += p.drag / c.dt  # its derivative by the joint angle: keeps the solver quick
 
 
 EFFECT = Effect(
@@ -21,6 +22,6 @@ EFFECT = Effect(
     ),
     acts_through=("velocity",),
     bounded=False,  # it depends on the solved motion: no guaranteed bounds
-    change=lambda values, config: Change(terms=drag(values["drag_Nms_per_rad"])),
+    change=lambda values, config: Change(terms=drag(drag=values["drag_Nms_per_rad"])),
 )
 register(EFFECT)

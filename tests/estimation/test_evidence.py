@@ -90,3 +90,15 @@ def test_a_channel_with_hardly_a_reading_is_named() -> None:
     columns["joint_position_rad"][30:] = np.nan
     with pytest.raises(InputError, match=r"joint_position_rad. has 30 finite"):
         gathered(columns)
+
+
+def test_no_value_is_made_up_where_an_input_has_no_reading() -> None:
+    """Every row that the drive is run at was measured: a bridged motor angle would be an error of the prediction."""
+    columns = recorded()
+    broken = {k: v.copy() for k, v in columns.items()}
+    broken["motor_position_rad"][300:340] = np.nan
+    broken["joint_torque_Nm"][700] = np.nan
+    e = gather(JOINT, "one", broken, "all", fine_rows=10**6, judged_rows=300)
+    measured = columns["time_s"][np.isfinite(broken["motor_position_rad"] + broken["joint_torque_Nm"])]
+    assert len(e.columns["time_s"]) >= len(measured) - e.outliers
+    assert np.all(np.isin(e.columns["time_s"], measured))

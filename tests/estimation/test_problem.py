@@ -12,6 +12,7 @@ from cablecomp.config import with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.least_squares import covariance, solve, weighed
+from cablecomp.estimation.limits import STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
@@ -153,3 +154,18 @@ def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_a
     assert wiped.left_rad <= 1e-7
     assert 0 < wiped.first < len(first.rows) // 2
     assert kept.left_rad > 1e-6
+
+
+def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
+    three: tuple[Evidence, ...],
+) -> None:
+    """The derivative by a session's own pretension is that of running every recording again."""
+    free = tuple(
+        q for p in of_drive(JOINT) for q in (own_of(p, ("a", "b")) if p.name == "pretension_N" else (p,))
+    )
+    p = Problem(JOINT, free, three, Weighing({ANGLE: SIGMA}, {ANGLE: SPREAD}))
+    x, J = p.start, p.jacobian(p.start)
+    for k in range(len(free)):
+        moved = x.copy()
+        moved[k] += STEP
+        np.testing.assert_allclose(J[:, k], (p.residual(moved) - p.residual(x)) / STEP, rtol=1e-9, atol=1e-9)

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from observer_joints import joint, pull_unit
-from wrap_energy import friction_work_J, stored_J
 
-from cablecomp.mechanics import arc
-from cablecomp.mechanics.profile import ROWS, V, Y, wrap_commit, wrap_eval, wrap_fill
 from cablecomp.observer import Observer
 from cablecomp.thesis.closed_forms.closed import (
     closed_loading_deflection_rad,
@@ -125,71 +122,3 @@ def test_return_point_memory_and_wiping_out() -> None:
     scale = float(np.ptp(plain))
     assert abs(nested[len(outer) + len(inner) - 1] - plain[len(outer) - 1]) < 1e-12 * scale
     assert np.max(np.abs(nested[-len(rest) :] - plain[-len(rest) :])) < 1e-12 * scale
-
-
-def one_wrap(values: list[tuple[float, float]], start_rad: float, mu: float) -> tuple[Array, int]:
-    """A single wrap through (wrap angle, end value) steps from uniform tension."""
-    G = np.zeros((1, ROWS, 512))
-    n = wrap_fill(G, None, 0, 0, start_rad, 0.0, 0.0)
-    for w, v in values:
-        meet = wrap_eval(G, None, 0, 0, n, w, v, float(np.exp(v)), mu)
-        n = wrap_commit(G, None, 0, 0, n, meet, w, v, float(np.exp(v)), 0.0)
-    return G[0], n
-
-
-@pytest.mark.parametrize("now", [1.3, 0.8])
-def test_unwinding_moves_the_corner_by_half_and_erases_the_bump(now: float) -> None:
-    mu, peak, w = 0.15, 2.2, 25.0
-    corner = np.log(peak / now) / (2.0 * mu)
-    erased_by = (abs(np.log(peak)) - abs(np.log(now))) / mu  # the sheet's general form of (2-74)
-    for turned in np.linspace(0.1, 0.95, 5) * min(erased_by, 2.0 * corner):
-        steps = [(w, np.log(peak)), (w, np.log(now))]
-        steps += [(w - b, np.log(now)) for b in np.linspace(0.0, turned, 50)[1:]]
-        G, n = one_wrap(steps, w, mu)
-        top = int(np.argmax(G[V, :n]))
-        assert (w - turned) - G[Y, top] == pytest.approx(corner - turned / 2.0, abs=1e-9)  # (2-72)
-    if now > 1.0:
-        steps = [(w, np.log(peak)), (w, np.log(now)), (w - 1.0001 * erased_by, np.log(now))]
-        G, n = one_wrap(steps, w, mu)
-        assert np.max(G[V, :n]) <= np.log(now) + 1e-9
-
-
-def test_a_belt_pulley_loses_what_slip_at_its_exit_takes() -> None:
-    mu, width, low, high = 0.2, 3.0, np.log(0.8), np.log(1.15)
-    G = np.zeros((1, ROWS, 400))
-    n = arc.arc_fill(G, 0, width, 0.0)
-    turn = 0.005
-    for _ in range(1500):
-        n = arc.arc_turn(G, 0, n, turn, low)
-        n = arc.arc_commit(G, 0, n, low, high, mu)
-    y, tension = G[0, Y, :n], np.exp(G[0, V, :n])
-    slips = width - float(y[np.argmax(tension > np.exp(low) * (1.0 + 1e-9)) - 1])
-    assert slips == pytest.approx((high - low) / mu, rel=1e-3)  # (2-99), at the exit only
-    # work of friction per radian turned, from the profile: force dT times slip, strain beyond the entry's
-    fine = np.linspace(0.0, width, 200001)
-    T = np.exp(np.interp(fine, y, G[0, V, :n]))
-    loss = float(np.sum(np.diff(T) * (0.5 * (T[1:] + T[:-1]) - T[0])))
-    assert loss == pytest.approx((T[-1] - T[0]) ** 2 / 2.0, rel=1e-3)  # (2-113) in units of R T0^2/EA
-    strain = 1e-3  # T0/EA: two such pulleys make the drive's efficiency limit (2-118)
-    efficiency = 1.0 - 2.0 * loss * strain / (T[-1] - T[0])
-    assert 1.0 - efficiency == pytest.approx((T[-1] - T[0]) * strain, rel=1e-3)
-
-
-def test_work_in_is_what_is_stored_and_what_slip_takes() -> None:
-    mu, w, radius, stiffness = 0.15, 20.0, 0.04, 25000.0
-    G = np.zeros((1, ROWS, 512))
-    n = wrap_fill(G, None, 0, 0, w, 0.0, 0.0)
-    values = ramp(0.0, 0.6, -0.4, 0.3, -0.1, 0.5, 0.0, points=150)[1:]
-    work = taken = 0.0
-    before, tension, length = (G[0, Y, :n].copy(), np.exp(G[0, V, :n])), 1.0, 0.0
-    first = stored_J(before[0], before[1], radius, stiffness)
-    for v in values:
-        meet = wrap_eval(G, None, 0, 0, n, w, v, float(np.exp(v)), mu)
-        n = wrap_commit(G, None, 0, 0, n, meet, w, v, float(np.exp(v)), 0.0)
-        after = (G[0, Y, :n].copy(), np.exp(G[0, V, :n]))
-        work += 0.5 * (tension + np.exp(v)) * (meet[0] - length) * radius / stiffness
-        taken += friction_work_J(before, after, radius, stiffness)
-        before, tension, length = after, float(np.exp(v)), meet[0]
-    stored = stored_J(before[0], before[1], radius, stiffness) - first
-    assert taken > 0.0
-    assert work == pytest.approx(stored + taken, rel=2e-3)

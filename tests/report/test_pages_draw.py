@@ -1,62 +1,133 @@
-"""Pages as a browser draws them: every figure has marks, none is cut, the console stays silent.
+"""Pages as a browser draws them, wide and narrow, light, dark and on paper.
 
 Needs a headless Chromium (`chromium`, `chromium-browser` or `google-chrome` on the path); skipped without one.
 """
 
 from __future__ import annotations
 
-import re
-import shutil
-import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from browser import (
+    BLANK,
+    CUT,
+    DESKTOP,
+    OVERLAPPING,
+    PHONE,
+    SIDEWAYS,
+    SPILT,
+    TWICE,
+    browser,
+    drawn,
+    needs_browser,
+)
 from diagnosis_example import example
 
+from cablecomp.config import load_joint
+from cablecomp.control.design import design_loop
+from cablecomp.control.options import load_control
+from cablecomp.guide.page import guide_page
+from cablecomp.observer import Observer
+from cablecomp.recording.reader import open_recording
+from cablecomp.recording.writer import write_canonical
 from cablecomp.report import page, style
+from cablecomp.report.design_page import design_page
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.page import Section
+from cablecomp.report.replay_page import write_replay
 
-BROWSER = next((b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), None)
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the path to draw pages in")
-
-
-def drawn(html: str, folder: Path, ask: str) -> str:
-    """What `ask` (JavaScript) gives after the page has been drawn; the console's lines raise AssertionError."""
-    asked = f"<script>setTimeout(() => {{ document.title = JSON.stringify({ask}); }}, 6000);</script>"
-    path = folder / "page.html"
-    path.write_text(html.replace("</body>", f"{asked}</body>"), encoding="utf-8")
-    assert BROWSER is not None
-    command = [
-        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--window-size=1280,900",
-        f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=20000", "--dump-dom", path.as_uri(),
-    ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
-    said = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
-    assert not said, said
-    title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
-    assert title is not None
-    return title[1].replace("&quot;", '"')
+CONFIGS = Path(__file__).parents[2] / "configs"
+pytestmark = needs_browser
+MOST_BYTES = 2_000_000
 
 
-def test_every_figure_of_the_diagnosis_page_is_drawn(tmp_path: Path) -> None:
-    """Marks in each plot; no plot wider than its place; nothing makes the page scroll sideways."""
-    html = diagnosis_page(example())
-    plots = html.count('class="plot"')
-    ask = """[...document.querySelectorAll(".plot")].filter((p) => p.closest("details:not([open])")
-      || (p.querySelectorAll("path.js-line, .bars path, image, path.point").length
-          && p.scrollWidth <= p.parentElement.clientWidth + 1)).length * 1000
-      + Math.min(999, document.documentElement.scrollWidth - document.documentElement.clientWidth)"""
-    assert plots > 8
-    assert int(drawn(html, tmp_path, ask)) == plots * 1000
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as found:
+        yield found
 
 
-def test_long_axes_arrive_as_they_were(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """One page of each kind that needs no run."""
+    joint = load_joint(CONFIGS / "joints/wrist-capstan.toml")
+    control = load_control(CONFIGS / "control/wrist-capstan.toml")
+    return {
+        "diagnosis": diagnosis_page(example()),
+        "replay": replayed(tmp_path_factory.mktemp("replay")),
+        "design": design_page(design_loop(joint, 1000.0, control)),
+        "guide": guide_page(),
+    }
+
+
+def replayed(folder: Path) -> str:
+    """The page of a replay with bounds far wider than the deflection."""
+    joint = load_joint(CONFIGS / "joints/snow-closed-rig.toml")
+    time = np.linspace(0.0, 10.0, 2_000)
+    columns = {
+        "time_s": time, "motor_position_rad": np.zeros_like(time), "joint_torque_Nm": 1.5 * np.sin(2.0 * time),
+    }  # fmt: skip
+    found = Observer(joint).run(columns)
+    noise = 2e-5 * np.random.default_rng(1).standard_normal(len(time))
+    write_canonical(folder / "r.csv", {**columns, "joint_position_rad": found["joint_position_rad"] + noise})
+    write_replay(open_recording(folder / "r.csv"), joint, Observer(joint, bounds=True), folder / "out")
+    return (folder / "out/report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("width", [DESKTOP, PHONE])
+@pytest.mark.parametrize("kind", ["diagnosis", "replay", "design", "guide"])
+def test_everything_stands_and_nothing_is_cut(
+    chromium: Any, pages: dict[str, str], kind: str, width: int, tmp_path: Path
+) -> None:
+    """Marks in every figure, ids unique, no text cut or on another, nothing that scrolls sideways."""
+    assert len(pages[kind].encode()) < MOST_BYTES
+    with drawn(chromium, pages[kind], tmp_path, width) as seen:
+        assert seen.evaluate(SIDEWAYS) <= 0
+        for what in (TWICE, BLANK, CUT, OVERLAPPING, SPILT):
+            assert seen.evaluate(what) == [], what
+
+
+def test_figures_follow_the_reader_into_the_dark_and_onto_paper(
+    chromium: Any, pages: dict[str, str], tmp_path: Path
+) -> None:
+    """Ground and ink of page and figures change together; on paper they are light and no wider than a sheet."""
+    ground = """[getComputedStyle(document.querySelector('section')).backgroundColor,
+      document.querySelector('.plot').layout.template.layout.paper_bgcolor]"""
+    with drawn(chromium, pages["design"], tmp_path, color_scheme="dark") as seen:
+        dark = seen.evaluate(ground)
+        assert dark == ["rgb(21, 27, 36)", "#151b24"]
+        seen.evaluate("dispatchEvent(new Event('beforeprint'))")
+        seen.emulate_media(media="print", color_scheme="dark")
+        assert seen.evaluate(ground)[1] == style.PAPER
+        assert (
+            seen.evaluate(
+                "Math.max(...[...document.querySelectorAll('.main-svg')].map((s) => s.clientWidth))"
+            )
+            <= 700
+        )
+        seen.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert seen.evaluate(ground)[1] == dark[1]
+        seen.emulate_media(media="screen", color_scheme="light")
+        assert seen.evaluate(ground) == ["rgb(255, 255, 255)", style.PAPER]
+
+
+def test_bounds_do_not_flatten_what_they_bound(chromium: Any, pages: dict[str, str], tmp_path: Path) -> None:
+    """The predicted deflection takes more than half of its axis, however wide the band is."""
+    ask = """(() => { const plot = document.querySelector('.plot'), [low, high] = plot.layout.yaxis.range;
+      const y = Array.from(plot.data.find((t) => t.name === 'predicted').y);
+      return (Math.max(...y) - Math.min(...y)) / (high - low); })()"""
+    with drawn(chromium, pages["replay"], tmp_path) as seen:
+        assert 0.5 < seen.evaluate(ask) < 1.0
+
+
+def test_long_axes_arrive_as_they_were(chromium: Any, tmp_path: Path) -> None:
     """What is packed in 16 bits comes out within half a step, gaps included; figures alike are both drawn."""
     x, y = np.linspace(0.0, 9.0, 200), np.sin(np.linspace(0.0, 9.0, 200))
     y[50] = np.nan
@@ -64,9 +135,9 @@ def test_long_axes_arrive_as_they_were(tmp_path: Path) -> None:
     style.curve(fig, x, y, "sine", style.PREDICTED, 1.0)
     html = page.page("x", "", [Section("a", page.figure(fig) + page.figure(fig))])
     ask = "[...document.querySelectorAll('.plot')].map((p) => [p.data[0].x.at(-1), p.data[0].y[3], p.data[0].y[50]])"
-    first, second = re.findall(r"\[([^][]+)\]", drawn(html, tmp_path, ask))
+    with drawn(chromium, html, tmp_path) as seen:
+        first, second = seen.evaluate(ask)
+        assert seen.evaluate(BLANK) == []
     assert first == second
-    last, third, gap = first.split(",")
-    assert float(last) == pytest.approx(9.0, abs=1e-4)
-    assert float(third) == pytest.approx(y[3], abs=2e-5)
-    assert gap == "null"
+    assert first[:2] == [pytest.approx(9.0, abs=1e-4), pytest.approx(y[3], abs=2e-5)]
+    assert first[2] is None

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rendering import figures_of
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.errors import InputError
@@ -127,7 +128,7 @@ def test_the_page_is_self_contained_and_escaped(tmp_path: Path) -> None:
         "Tension on each wrap",
     ):
         assert f"<h2>{title}</h2>" in html
-    plain = re.sub(r"\\u([0-9a-f]{4})", lambda match: chr(int(match[1], 16)), html)
+    plain = re.sub(r"\\u([0-9a-f]{4})", lambda match: chr(int(match[1], 16)), "".join(figures_of(html)))
     for unit in (
         "time / s",
         "load / N·m",

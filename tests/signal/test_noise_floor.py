@@ -7,10 +7,8 @@ import pytest
 
 from cablecomp.errors import InputError
 from cablecomp.signal.noise import (
-    InputNoise,
     channel_noise,
     grid_step,
-    residual_floor,
 )
 from cablecomp.signal.smoothing import fit_to_noise, local_fit
 
@@ -77,11 +75,6 @@ def test_a_channel_at_rest_says_that_it_cannot_tell() -> None:
 def test_too_few_readings_are_refused() -> None:
     with pytest.raises(InputError, match="32 readings"):
         channel_noise(TIME[:10], TIME[:10])
-
-
-def test_residual_floor_adds_squares() -> None:
-    floor = residual_floor(3e-5, [InputNoise(2.0, np.array([0.0, 2e-5]))], 2)
-    assert floor == pytest.approx([3e-5, 5e-5])
 
 
 def test_a_local_fit_is_exact_on_parabolas_with_uneven_time() -> None:

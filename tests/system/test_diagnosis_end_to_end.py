@@ -138,13 +138,10 @@ def test_a_missing_channel_is_one_line_and_leaves_nothing(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="since the diagnosis was rewritten: bearing friction is named at this small swing, and what EA can take up is "
-    "said in could_be_unseen alone, without an experiment",
-)
-def test_a_compliance_behind_the_stiffness_is_said_not_named(tmp_path: Path) -> None:
-    """One small swing of the load, input locked: EA within its tolerance makes up for a soft mount."""
+@pytest.fixture(scope="module")
+def behind_stiffness(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The result for one small swing of the load, input locked: EA within its tolerance makes up for a soft mount."""
+    tmp_path = tmp_path_factory.mktemp("behind")
     time = np.arange(0.0, 40.0, 0.01)
     load = 0.12 * np.sin(2.0 * np.pi * time / 10.0)
     config = PlantConfig.from_dict(
@@ -163,9 +160,24 @@ def test_a_compliance_behind_the_stiffness_is_said_not_named(tmp_path: Path) -> 
         joint.read_text().replace("noise_rad = 1e-5", "noise_rad = 1e-6").replace("3e-3", "3e-4")
     )
     assert main(["diagnose", str(path), "--config", str(joint), "--out", str(tmp_path / "out")]) == 0
-    result = json.loads((tmp_path / "out/diagnosis.json").read_text())
-    assert result["missing_physics"] == []
+    return tmp_path / "out"
+
+
+def test_a_compliance_behind_the_stiffness_is_said_with_the_experiment_that_shows_it(
+    behind_stiffness: Path,
+) -> None:
+    result = json.loads((behind_stiffness / "diagnosis.json").read_text())
     (group,) = [g for g in result["not_excluded"] if "series_compliance" in g["effects"]]
     assert "EA_N" in group["why"]
-    protocol = tomllib.loads((tmp_path / "out/next_experiment.toml").read_text())
+    protocol = tomllib.loads((behind_stiffness / "next_experiment.toml").read_text())
     assert protocol["segment"]
+
+
+@pytest.mark.xfail(
+    strict=False,
+    reason="cleaning the load leaves 0.9 µrad beside 1 µrad of noise at the turning points of this joint of little "
+    "noise, and friction is named for it",
+)
+def test_a_compliance_behind_the_stiffness_is_not_named(behind_stiffness: Path) -> None:
+    result = json.loads((behind_stiffness / "diagnosis.json").read_text())
+    assert result["missing_physics"] == []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
@@ -122,21 +121,6 @@ def test_a_load_must_be_known_and_sane() -> None:
     for bad in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(InputError, match="above 0"):
             design_sheet(config, bad)
-
-
-def test_geometry_helpers() -> None:
-    assert geometry.effective_radius_m(0.0610, 0.0018) == pytest.approx(0.0619)
-    for crossed in (True, False):
-        length = geometry.tangent_length_m(0.3, 0.08, 0.03, crossed=crossed)
-        assert geometry.centre_distance_m(length, 0.08, 0.03, crossed=crossed) == pytest.approx(0.3)
-    # Points of tangency of the crossed line: both radii stand upright on it, on opposite sides.
-    length = geometry.tangent_length_m(0.3, 0.08, 0.03, crossed=True)
-    assert np.hypot(length, 0.11) == pytest.approx(0.3)
-    assert geometry.tangent_length_m(0.3, 0.05, 0.05, crossed=False) == pytest.approx(0.3)
-    with pytest.raises(InputError, match="overlap"):
-        geometry.tangent_length_m(0.1, 0.08, 0.03, crossed=True)
-    assert geometry.drive_length_m([0.2, 0.1], 0.01, 0.05) == pytest.approx(0.36)
-    assert geometry.bend_ratio(0.012, 0.0015) == pytest.approx(16.0)
 
 
 def test_sensor_twist_reaches_the_joint_by_the_square_of_the_ratio() -> None:

@@ -1,4 +1,4 @@
 """What physics explains a mismatch: hypotheses, asked cheaply, fitted, scored on data left out, held against rivals.
 
-May import estimation, effects and what lies below. Start reading at `selection.py`.
+Imports estimation, effects and what lies below. Start reading at `selection.py`.
 """

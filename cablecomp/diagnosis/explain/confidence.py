@@ -16,7 +16,7 @@ from typing import Final
 
 FEATURES: Final = (
     "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "share_total", "rivals",
-    "follows", "at_bound",
+    "follows", "unsteady", "at_bound",
 )  # fmt: skip
 _FILE: Final = Path(__file__).with_name("confidence.json")
 
@@ -57,6 +57,7 @@ def features(
     share_total: float,
     rivals: int,
     follows: float,
+    unsteady: float,
     at_bound: bool,
 ) -> dict[str, float]:
     """The evidence of one name.
@@ -65,7 +66,8 @@ def features(
     resampled data in which it is the best of its round. `lead_gain`, `lead_z`: over the nearest rival in its place.
     `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
     the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`: share of the
-    remainder that still follows what the effect acts through. `at_bound`: one of its parameters is on a bound.
+    remainder that still follows what the effect acts through. `unsteady`: difference of its amount between halves of the
+    data, in units of it. `at_bound`: one of its parameters is on a bound.
     """
     return {
         "log_gain": math.log10(max(gain, 1e-3)),
@@ -78,5 +80,6 @@ def features(
         "share_total": min(max(share_total, 0.0), 1.0),
         "rivals": float(min(rivals, 4)),
         "follows": follows,
+        "unsteady": unsteady,
         "at_bound": float(at_bound),
     }

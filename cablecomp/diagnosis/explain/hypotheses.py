@@ -19,6 +19,8 @@ PHASE = "phase_rad"
 INSTANT = "time_s"
 INSTANTS = 24
 """Instants at which an event is asked for at first, over all recordings."""
+EDGE = 0.06
+"""Share of a recording at either end within which an event has no before or no after that would show it."""
 
 
 @dataclass(frozen=True)
@@ -135,9 +137,7 @@ def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tu
     if p.name == PHASE:
         return (0.0, 0.5 * math.pi)
     if p.name == INSTANT:
-        first = min(float(e.columns["time_s"][0]) for e in evidence)
-        last = max(float(e.columns["time_s"][-1]) for e in evidence)
-        return tuple(first + (last - first) * (k + 0.5) / INSTANTS for k in range(INSTANTS))
+        return instants(evidence)
     if p.name == "reference_degC":
         means = [
             float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns
@@ -153,6 +153,28 @@ def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tu
     if p.log:
         return tuple(float(v) for v in np.geomspace(low, high, 5)[1:-1])
     return (0.5 * (low + high),)
+
+
+def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
+    """Times at which an event is asked for: even over what counts, well inside of a recording, and between recordings of one
+    session; between sessions the joint was taken apart."""
+    spans = []
+    for k, e in enumerate(evidence):
+        time = (
+            e.columns["time_s"][e.rows[e.counted[JOINT]]] if e.counted[JOINT].any() else e.columns["time_s"]
+        )
+        margin = EDGE * float(time[-1] - time[0])
+        spans.append((float(time[0]) + margin, float(time[-1]) - margin))
+        if k and evidence[k - 1].session == e.session:
+            last = float(evidence[k - 1].columns["time_s"][-1])
+            spans.append((last, float(e.columns["time_s"][0])))
+    inside = [s for s in spans if s[1] > s[0]]
+    length = sum(b - a for a, b in inside)
+    found = []
+    for a, b in inside:
+        count = max(1, round(INSTANTS * (b - a) / length))
+        found += [a + (b - a) * (k + 0.5) / count for k in range(count)]
+    return tuple(found)
 
 
 def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:

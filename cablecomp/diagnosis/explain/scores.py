@@ -20,6 +20,7 @@ from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parameter import DECADE
 from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
@@ -35,6 +36,8 @@ class Groups:
     block: IntArray
     fold: IntArray
     by: str
+    channel: IntArray
+    """Number of the output channel that each row belongs to."""
 
     @property
     def blocks(self) -> int:
@@ -60,8 +63,8 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
     memory = integrated_time_of_parts(parts)
     least, most = LIMITS.blocks
     total = int(np.clip(counts.sum() / (LIMITS.memory * memory), least, most))
-    blocks, folds = [], []
-    for c, own in zip(problem.channels, owners, strict=True):
+    blocks, folds, channels = [], [], []
+    for number, (c, own) in enumerate(zip(problem.channels, owners, strict=True)):
         block = np.full(len(own), -1, dtype=np.int64)
         first = 0
         for k in range(len(problem.evidence)):
@@ -76,7 +79,8 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
         penalty = np.full(problem.bases[c].penalty_rows, -1, dtype=np.int64)
         blocks += [block, penalty]
         folds += [fold, penalty]
-    return Groups(np.concatenate(blocks), np.concatenate(folds), by)
+        channels.append(np.full(len(own) + len(penalty), number, dtype=np.int64))
+    return Groups(np.concatenate(blocks), np.concatenate(folds), by, np.concatenate(channels))
 
 
 def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntArray:
@@ -167,11 +171,28 @@ def _free(fit: Fit) -> IntArray:
     return np.flatnonzero((fit.x > low + margin) & (fit.x < high - margin) & ~instant)
 
 
-def huber(r: FloatArray, scale: float) -> FloatArray:
-    """Huber's loss over half: r^2 within `tail` scales, linear beyond, in units of the scale's square."""
-    z = np.abs(r) / max(scale, 1e-300)
+def huber(r: FloatArray) -> FloatArray:
+    """Huber's loss over half of a residual in units of its scale: r^2 within `tail`, linear beyond."""
+    z = np.abs(r)
     k = LIMITS.tail
     return np.where(z < k, z**2, 2.0 * k * z - k * k)
+
+
+def scales(r: FloatArray, groups: Groups) -> FloatArray:
+    """Deviation (scaled median) of what is left of each channel: a torque may be followed closely and an angle not, each has its
+    own yardstick."""
+    here = groups.block >= 0
+    found = [
+        np.median(np.abs(r[here & (groups.channel == c)])) / 0.6745 for c in range(groups.channel.max() + 1)
+    ]
+    return np.maximum(np.array(found, dtype=np.float64), 1e-300)
+
+
+def block_losses(r: FloatArray, scale: FloatArray, groups: Groups) -> FloatArray:
+    """Loss of each block, by channel in units of `scale` squared."""
+    here = groups.block >= 0
+    lost = huber(r[here] / scale[groups.channel[here]])
+    return np.bincount(groups.block[here], lost, minlength=groups.blocks).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -195,14 +216,15 @@ def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
     is what the better one explains, the second is chance, and scatters by the blocks' sums of r d.
     """
     here = groups.block >= 0
-    a, b, block = better[here], worse[here], groups.block[here]
-    scale = float(np.median(np.abs(a))) / 0.6745
-    la, lb = huber(a, scale), huber(b, scale)
-    difference: FloatArray = np.bincount(block, lb - la, minlength=groups.blocks).astype(np.float64)
+    size = scales(better, groups)
+    lb = block_losses(worse, size, groups)
+    difference = lb - block_losses(better, size, groups)
+    by_row, block = size[groups.channel[here]], groups.block[here]
+    a, b = better[here] / by_row, worse[here] / by_row
     total = float(np.sum(difference))
     spread = difference - difference.mean()
     error = sqrt(float(np.sum(spread**2)) * len(difference) / max(len(difference) - 1, 1))
-    r, d = np.clip(a / scale, -LIMITS.tail, LIMITS.tail), np.clip((b - a) / scale, -30.0, 30.0)
+    r, d = np.clip(a, -LIMITS.tail, LIMITS.tail), np.clip(b - a, -30.0, 30.0)
     chance = np.bincount(block, r * d, minlength=groups.blocks)
     noise = 2.0 * sqrt(float(np.sum(chance**2)) * len(chance) / max(len(chance) - 1, 1))
     return Lead(
@@ -211,6 +233,34 @@ def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
         total / max(error, 1e-300),
         difference,
     )
+
+
+def halves(problem: Problem, groups: Groups) -> list[IntArray]:
+    """Ways to part the data rows in two (1 and -1; 0: in neither): early and late in each recording, more and less load than
+    usual, quicker and slower than usual."""
+    parts: list[list[IntArray]] = [[], [], []]
+    for c in problem.channels:
+        for e in problem.evidence:
+            here = e.counted.get(c)
+            if here is None:
+                continue
+            time = e.at_rows("time_s")
+            load = np.broadcast_to(load_of(problem.config, e.columns), e.columns["time_s"].shape)[e.rows]
+            speed = np.gradient(e.at_rows("motor_position_rad"), time)
+            ways = (time, np.abs(load - np.median(load)), np.abs(speed))
+            for found, way in zip(parts, ways, strict=True):
+                middle = float(np.median(way[here])) if here.any() else 0.0
+                found.append(np.where(way > middle, 1, -1)[here])
+        penalty = np.zeros(problem.bases[c].penalty_rows, dtype=np.int64)
+        for found in parts:
+            found.append(penalty)
+    return [np.concatenate(p) for p in parts]
+
+
+def demanded(step: Lead, first: bool = False) -> bool:
+    """Whether data left out demand what leads so; `first`: the first effect of all."""
+    usual = step.z > (LIMITS.z_first if first else LIMITS.z) and step.gain > LIMITS.gain
+    return usual or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
 
 
 def selected_in(differences: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:
@@ -246,11 +296,3 @@ def confidence_set(losses: Mapping[str, FloatArray], rng: np.random.Generator) -
         names.pop(worst)
         table = np.delete(table, worst, axis=0)
     return tuple(names)
-
-
-def mean_square(r: FloatArray, groups: Groups, span: slice) -> float:
-    """Mean square of the data rows of one channel."""
-    here = np.zeros(len(r), dtype=np.bool_)
-    here[span] = True
-    here &= groups.block >= 0
-    return float(np.mean(r[here] ** 2))

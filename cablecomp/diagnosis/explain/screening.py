@@ -14,6 +14,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import INSTANT, PHASE, Hypothesis, Start, at_instants
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Problem
@@ -81,12 +82,17 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
         t = float(best[1][INSTANT])
         times = sorted(float(s.values[INSTANT]) for s in h.starts)
         width = times[1] - times[0]
-        for _ in range(4):
+        for _ in range(2 if here.fit.problem.fine else 4):
             width *= 0.5
             closer = _best(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
             if closer is not None and closer[0] < best[0]:
                 best = closer
                 t = float(best[1][INSTANT])
+        if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
+            mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
+            other = _best(here, mirrored)
+            if other is not None and other[0] < best[0]:
+                best = other
     if best is None:
         return None
     cost, values, d, size = best
@@ -98,7 +104,8 @@ def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], F
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)
     best = None
-    for start in h.starts:
+    # an event's instants are looked at coarsely where every run is dear
+    for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
         found = contribution(here, h, start)
         if found is None:
             continue
@@ -115,6 +122,12 @@ def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], F
         if best is None or cost < best[0]:
             best = (cost, values, d, size)
     return best
+
+
+def _turned(h: Hypothesis, t: float) -> Start:
+    """The event at t with the other sign."""
+    base = h.starts[0].values
+    return Start({**base, INSTANT: t, h.amount.name: -float(base[h.amount.name])})
 
 
 def contribution(here: Anchor, h: Hypothesis, start: Start) -> tuple[FloatArray, float] | None:
@@ -195,21 +208,22 @@ def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     return sorted((replace(a, place=k) for k, a in enumerate(asked) if a is not None), key=lambda a: a.cost)
 
 
-def rough(answers: Sequence[Answer], evaluations: int, cold: Mapping[str, float] | None = None) -> Fit | None:
-    """The best of short fits from where each anchor's answer begins; None if none can be followed.
+def rough(
+    answers: Sequence[Answer], evaluations: int, further: Sequence[Mapping[str, float]] = ()
+) -> list[Fit]:
+    """Short fits from where each anchor's answer begins, best first; none if none can be followed.
 
-    `cold`: values to begin from as well, the drive at its nominal ones: effects that were added one after the other may sit in
-    a valley of their own.
+    `further`: values to begin from as well (what they do not name, at its start).
     """
     fits = []
     starts = [(a.problem, a.x) for a in answers]
-    if cold is not None:
-        problem = answers[0].problem
-        starts.append((problem, np.array([p.x(cold.get(p.name, p.start)) for p in problem.parameters])))
+    problem = answers[0].problem
+    for values in further:
+        starts.append((problem, np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters])))
     for k, (problem, x) in enumerate(starts):
         wanted = 3 if problem.fine else evaluations if k < len(answers) else evaluations + 3
         try:
-            fits.append(solve(problem, x, wanted))
+            fits.append(solve(problem, x, wanted, LIMITS.tolerance))
         except InputError:
             continue
-    return min(fits, key=lambda f: f.cost, default=None)
+    return sorted(fits, key=lambda f: f.cost)

@@ -10,10 +10,12 @@ import numpy as np
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.scores import Lead, lead
-from cablecomp.diagnosis.explain.selection import Model, Selection, rivals, without
+from cablecomp.diagnosis.explain.model import Model, Selection, without
+from cablecomp.diagnosis.explain.rivals import rivals
+from cablecomp.diagnosis.explain.scores import Groups, Lead, halves, lead, scales
 from cablecomp.diagnosis.locate import Location
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.signal.smoothing import FloatArray
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ def weigh(
             share_total=_share_of_baseline(selection, bare, final),
             rivals=len(kept),
             follows=follows,
+            unsteady=_unsteady(final, term, groups),
             at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in bounds),
         )
         confidence = learnt().probability(evidence)
@@ -90,30 +93,53 @@ def _selected(selection: Selection, term: Hypothesis) -> float:
 
 
 def _share_of_baseline(selection: Selection, bare: Model | None, final: Model) -> float:
-    """Share of the calibrated drive's square on data left out that goes with the effect."""
+    """Share of the calibrated drive's mean square on data left out that goes with the effect, in the channel in which it shows
+    most; single rows far off the rest count as at most `LIMITS.tail` deviations."""
     if bare is None:
         return 1.0
-    here = selection.groups.block >= 0
-    # weights differ between baseline and final model: back to the channels' own units
-    scale = _scales(selection.baseline, here)
-    before = float(np.mean((selection.baseline.left_out[here] * scale) ** 2))
-    own = _scales(final, here)
-    gone = float(np.mean((bare.left_out[here] * own) ** 2) - np.mean((final.left_out[here] * own) ** 2))
-    return gone / max(before, 1e-300)
+    before = _mean_squares(selection.baseline, selection.groups)
+    gone = _mean_squares(bare, selection.groups) - _mean_squares(final, selection.groups)
+    return float(np.max(gone / np.maximum(before, 1e-300)))
 
 
-def _scales(
-    model: Model, here: np.ndarray[tuple[int], np.dtype[np.bool_]]
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """What a unit of each data row is, relative to the first channel's usual size, so that channels count alike."""
+def _mean_squares(model: Model, groups: Groups) -> FloatArray:
+    """Mean square left out of each channel, in its own unit."""
+    here = groups.block >= 0
+    bound = LIMITS.tail * scales(model.left_out, groups)[groups.channel]
+    square = np.minimum(np.abs(model.left_out), bound) ** 2
     problem = model.fit.problem
-    rows = np.ones(len(here))
-    for c, span in problem.spans().items():
-        size = (
-            float(np.std(np.concatenate([e.at_rows(c) for e in problem.evidence if c in e.columns]))) or 1.0
-        )
-        rows[span] = problem.weighing.sigma[c] / size
-    return np.asarray(rows[here], dtype=np.float64)
+    return np.array([
+        float(np.mean(square[here & (groups.channel == k)])) * problem.weighing.sigma[c] ** 2
+        for k, c in enumerate(problem.channels)
+    ])  # fmt: skip
+
+
+def _unsteady(final: Model, term: Hypothesis, groups: Groups) -> float:
+    """How far the effect's amount differs between halves of the data (early and late, much and little load, quick and slow,
+    one channel and another), each fitted by a linear step of its own: a true constant is constant. In units of their mean; at
+    most 1."""
+    fit = final.fit
+    name = f"effect.{term.effect.id}.{term.amount.name}"
+    column = next((k for k, p in enumerate(fit.problem.parameters) if p.name == name), None)
+    if column is None:
+        return 1.0
+    n = len(groups.block)
+    r, J, priors = fit.residual[:n], fit.J[:n], fit.J[n:]
+    p = fit.problem.parameters[column]
+    value = abs(p.value(float(fit.x[column])))
+    if value <= 0.0:
+        return 1.0
+    worst = 0.0
+    for half in halves(fit.problem, groups):
+        found = []
+        for side in (half > 0, half < 0):
+            H = J[side].T @ J[side] + priors.T @ priors
+            scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+            H = H / np.outer(scale, scale) + 1e-6 * np.eye(len(H))
+            step = np.linalg.solve(H, J[side].T @ r[side] / scale) / scale
+            found.append(-float(step[column]) * p.slope(float(fit.x[column])))
+        worst = max(worst, abs(found[0] - found[1]) / (2.0 * value))
+    return min(worst, 1.0)
 
 
 def _follows(term: Hypothesis, remainder: Location) -> float:

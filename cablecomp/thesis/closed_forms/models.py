@@ -16,18 +16,6 @@ from cablecomp.thesis.closed_forms.wrap import Array, Number, gap
 ModelName = Literal["I", "II", "III"]
 
 
-def wide_tensions(m: Number) -> Tensions:
-    """Tensions for GF -> infinity, 1 +- m/2 (4-27, 4-28); from |m| = 2 one cable is slack and the other
-    carries |m|.
-
-    The thesis's (4-33), 1 + m once slack, misses the moment balance (4-4).
-    """
-    load = np.asarray(m, dtype=float)
-    easy = np.maximum(1.0 - np.abs(load) / 2.0, 0.0)
-    tight = easy + np.abs(load)
-    return Tensions(np.where(load < 0.0, easy, tight), np.where(load < 0.0, tight, easy))
-
-
 def narrow_tensions(m: Number) -> Tensions:
     """Tensions for GF -> 0 during loading, tau_l = m/(e^m - 1), tau_h = m e^m/(e^m - 1) (4-42, 4-44)."""
     load = np.asarray(m, dtype=float)
@@ -63,13 +51,6 @@ def wide_hysteresis_normalised(m_peak: Number) -> Array:
     """
     half = np.abs(np.asarray(m_peak, dtype=float)) / 2.0
     return (_left_over(half) + _left_over(-half)) / 2.0
-
-
-def wide_hysteresis_thesis_normalised(m_peak: Number) -> Array:
-    """2 sqrt(1 + m_pk/2) - 2 - ln(1 + m_pk/2), (4-39) as the thesis has it; see
-    `wide_hysteresis_normalised`.
-    """
-    return _left_over(np.abs(np.asarray(m_peak, dtype=float)) / 2.0)
 
 
 def model_i_normalised(m: Number, GF: Number) -> Array:

@@ -77,14 +77,6 @@ def open_stiffness_Nm_per_rad(
     return np.asarray(stage.EA_N * stage.mu_eff * stage.radius_m / compliance)
 
 
-def rotation_error_share(m: Number, strain: Number) -> Array:
-    """Bound on the relative error of the non-rotating wrap for M > 0, m T0/EA (3-30); zero for M < 0.
-
-    `strain` = T0/EA.
-    """
-    return np.asarray(np.maximum(np.asarray(m, dtype=float), 0.0) * np.asarray(strain))
-
-
 def open_slip_moments_Nm(stage: EquivalentStage) -> tuple[float, float]:
     """Moments (negative, positive) at which a wrap first slips to its termination; N m.
 

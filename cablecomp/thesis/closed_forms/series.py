@@ -52,15 +52,6 @@ def series_unloading_deflection_rad(moment_Nm: Number, peak_Nm: Number, drive: D
     )
 
 
-def series_stiffness_Nm_per_rad(moment_Nm: Number, drive: Drive) -> Array:
-    """Tangent stiffness of closed stages in series during loading, 1/k = sum N_ik^2/k_i; N m/rad."""
-    compliance = _sum(
-        drive,
-        lambda ratio, stage: ratio / closed.closed_stiffness_Nm_per_rad(ratio * _a(moment_Nm), stage),
-    )
-    return np.asarray(1.0 / compliance)
-
-
 def _sum(drive: Drive, deflection: Callable[[float, EquivalentStage], Array]) -> Array:
     return np.asarray(
         sum(geared.ratio * deflection(geared.ratio, geared.stage) for geared in acting_stages(drive))

@@ -32,24 +32,6 @@ def gap(excess: Number) -> Array:
         return np.asarray(np.where(small, y * y * series, x - np.log1p(x)))
 
 
-def signed_mu(tau: Number, mu: Number) -> Array:
-    """Return mu* = mu sgn(tau - 1) (2-51); mu itself where tau = 1, where every formula below has the limit
-    0.
-    """
-    return np.where(np.asarray(tau) < 1.0, -np.asarray(mu, dtype=float), np.asarray(mu, dtype=float))
-
-
-def affected_angle_rad(tau: Number, mu: Number) -> Array:
-    """Angle of wrap whose tension the load changes, theta_aff = ln(tau)/mu* (2-24); rad, never negative."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.abs(np.log(np.asarray(tau, dtype=float))) / mu)
-
-
-def profile_tension_N(theta_rad: Number, tau: Number, mu: Number, pretension_N: Number) -> Array:
-    """Tension at `theta_rad` from the inner edge of the affected angle, T0 exp(mu* theta) (2-30); N."""
-    return np.asarray(np.asarray(pretension_N) * np.exp(signed_mu(tau, mu) * np.asarray(theta_rad)))
-
-
 def loading_shape(tau: Number, mu_wrap: Number = math.inf) -> Array:
     """Dimensionless elongation of a wrap loaded from uniform pretension.
 
@@ -129,53 +111,6 @@ def reversal_slope(tau: Number, tau_peak: Number, mu_wrap: Number = math.inf) ->
         bump = np.abs(np.sqrt(peak / t) - 1.0)
         whole = np.abs(np.expm1(s * c))
         return np.where(in_bump, bump, np.where((back > 0.0) & slipped, whole, loading_shape_slope(t, c)))
-
-
-def unloading_shape(tau: Number, tau_peak: Number, mu_wrap: Number = math.inf) -> Array:
-    """Dimensionless elongation after one reversal: s (2 sqrt(tau tau_peak) - tau - 1 - ln
-    tau_peak) (2-79).
-    """
-    return loading_shape(tau_peak, mu_wrap) + reversal_change(tau, tau_peak, mu_wrap)
-
-
-def loading_stiffness_N_per_m(tau: Number, mu: Number, radius_m: Number, EA_N: Number) -> Array:
-    """Stiffness of the wrap during loading, k = (EA mu*/R) tau/(tau - 1) (2-49); N/m, infinite at tau = 1."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(
-            np.asarray(EA_N) * np.asarray(mu) / (np.asarray(radius_m) * loading_shape_slope(tau))
-        )
-
-
-def bump_corner_angle_rad(tau: Number, tau_peak: Number, mu: Number) -> Array:
-    """Angle from the departure point to the corner of the tension bump, alpha = ln(T_pk/T_app)/(2 mu*)
-    (2-62); rad.
-    """
-    return np.asarray(
-        np.abs(np.log(np.asarray(tau_peak, dtype=float) / np.asarray(tau))) / (2.0 * np.asarray(mu))
-    )
-
-
-def bump_corner_tension(tau: Number, tau_peak: Number) -> Array:
-    """Dimensionless tension at the corner of the bump, sqrt(tau tau_peak) (2-68)."""
-    return np.asarray(np.sqrt(np.asarray(tau, dtype=float) * np.asarray(tau_peak)))
-
-
-def bump_erasing_rotation_rad(tau: Number, tau_peak: Number, mu: Number) -> Array:
-    """Unwinding that erases the bump at constant load; rad.
-
-    beta = (|u_pk| - |u_app|)/mu, u = ln tau. The thesis's (2-74), ln(tau tau_peak)/mu*, is its special case
-    for loads at or past the pretension (tau <= 1 after a bump); above, the corner reaches the surface sooner
-    than (2-74) says.
-    """
-    erased = np.abs(np.log(np.asarray(tau_peak, dtype=float))) - np.abs(np.log(np.asarray(tau, dtype=float)))
-    return np.asarray(np.maximum(erased, 0.0) / mu)
-
-
-def corner_after_unwinding_rad(corner_rad: Number, unwound_rad: Number) -> Array:
-    """Corner angle once the pulley unwound by `unwound_rad` at constant load, alpha' = alpha - beta/2 (2-72);
-    rad.
-    """
-    return np.asarray(np.asarray(corner_rad, dtype=float) - np.asarray(unwound_rad) / 2.0)
 
 
 def _three(tau: Number, tau_peak: Number, mu_wrap: Number) -> tuple[Array, Array, Array]:

@@ -1,4 +1,7 @@
-"""Physics beyond the plain drive, in the plant's own terms: points, springs, forces."""
+"""Physics beyond the plain drive, in the plant's own terms: points, springs, forces.
+
+Imports the plant's assembly, configuration and forms. Start reading at `base.py`, what an effect is.
+"""
 
 from __future__ import annotations
 

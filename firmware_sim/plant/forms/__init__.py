@@ -1,7 +1,7 @@
 """Further forms of the catalogue's laws: the same physics in other words, one file per effect.
 
 A form goes by `effect:form`. The catalogue holds none of them; a diagnosis that knows the effect should know them
-again.
+again. Imports what an effect is, `effects/base.py`. Start reading at any file.
 """
 
 from __future__ import annotations

@@ -1,0 +1,59 @@
+"""What `replay` and `diagnose` do when they are given `--workers` or `--scheduler`: a fleet, each joint and night by itself."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
+
+from cablecomp.cli.shared import announce_compilation, console
+from cablecomp.cluster import Workers
+from cablecomp.errors import InputError
+from cablecomp.fleet.fleet import Work, run_fleet
+from cablecomp.fleet.places import nights
+from cablecomp.recording.atomic import atomic_file
+from cablecomp.report.fleet_page import fleet_page, fleet_table
+
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        min=1,
+        help="a fleet: folders hold JOINT/NIGHT, each a row of its own; this many processes",
+    ),
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", help="a fleet, worked on by the Dask cluster at this address")
+]
+
+
+def asked_for(workers: int | None, scheduler: str | None) -> Workers | None:
+    """Where a fleet is worked on; None where no fleet is meant. Raises InputError if both are given."""
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers and --scheduler say two places to work: give one of them")
+    return None if workers is None and scheduler is None else Workers(workers or 0, scheduler)
+
+
+def work_fleet(work: Work, folders: Sequence[Path], config: Path | None, out: Path, workers: Workers) -> None:
+    """Work through a fleet, show and write what became of it."""
+    places = nights(folders, config)
+    announce_compilation()
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(work, total=len(places))
+        found = run_fleet(
+            work, places, out, workers, lambda done, of: bar.update(task, completed=done, total=of)
+        )
+    with atomic_file(out / "fleet.html") as path:
+        path.write_text(fleet_page(found, " ".join(["cablecomp", *sys.argv[1:]])), encoding="utf-8")
+    console.print(fleet_table(found))
+    if found.reused:
+        console.print(f"{found.reused} nights were there already")
+    console.print(f"report: {out / 'fleet.html'}")
+    if all(row["failed"] for row in found.rows):
+        raise InputError(f"every night failed; the first: {found.rows[0]['failed']}")

@@ -1,0 +1,154 @@
+"""A drive with what was added to it: fitted, left out, compared with others by one yardstick; what a selection consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.scores import Groups, Lead, block_losses, left_out, scales
+from cablecomp.diagnosis.explain.screening import Answer
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.signal.smoothing import FloatArray
+
+Term = Hypothesis | Dependence
+"""What a round may add to a model."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A drive with what was added to it, fitted; its residual with each fold left out."""
+
+    terms: tuple[Term, ...]
+    fit: Fit
+    left_out: FloatArray
+    by_thinning: float = 1.0
+    """Loss of the model before on thinned rows over that on every sample, where this one alone runs on every sample."""
+
+    @property
+    def name(self) -> str:
+        """Names of what was added, joined."""
+        return " + ".join(t.name for t in self.terms) or "calibrated drive"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One hypothesis of a round: its model, its lead over the model before, share of resampled data in which it was best."""
+
+    term: Term
+    model: Model
+    lead: Lead
+    selected_in: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """One step: what was promised (cost before over cost after a linear step, by name), what was fitted, what was taken."""
+
+    base: Model
+    promised: Mapping[str, float]
+    tried: tuple[Tried, ...]
+    accepted: Tried | None
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The calibrated drive, the rounds, the final model; answers of the first round (how much each effect could show)."""
+
+    baseline: Model
+    rounds: tuple[Round, ...]
+    final: Model
+    groups: Groups
+    answers: tuple[Answer, ...] = field(default=())
+
+
+def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:
+    """By loss on data left out, each set of terms once."""
+    found: dict[frozenset[str], Model] = {}
+    if not models:
+        return []
+    size = common(models, groups)
+    for m in sorted(models, key=lambda m: loss(m, size, groups)):
+        found.setdefault(frozenset(t.name for t in m.terms), m)
+    return list(found.values())
+
+
+def common(models: Sequence[Model], groups: Groups) -> FloatArray:
+    """One yardstick for several models: of each channel, what the best of them leaves."""
+    return np.asarray(np.min([scales(m.left_out, groups) for m in models], axis=0), dtype=np.float64)
+
+
+def loss(model: Model, size: FloatArray, groups: Groups) -> float:
+    """Loss on data left out by a common yardstick."""
+    return model.by_thinning * float(np.sum(block_losses(model.left_out, size, groups)))
+
+
+def searching(fit: Fit) -> Weighing:
+    """Weights for a search beyond this fit: a part of what it leaves of each channel, never below the sensor's noise."""
+    problem = fit.problem
+    sigma = {}
+    for c in problem.channels:
+        noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
+        sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise, 1e-12)
+    # zeros may not take up what an effect could explain: an offset that follows the load is a compliance
+    spread = {
+        c: float(np.clip(problem.weighing.zero_sd.get(c, 0.0), 0.1 * sigma[c], LIMITS.zero * sigma[c]))
+        for c in problem.channels
+    }
+    return Weighing(sigma, spread)
+
+
+def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
+    """The model refitted with other weights."""
+    fit = refit(model.fit, weighing, 6)
+    return replace(model, fit=fit, left_out=left_out(fit, groups))
+
+
+def finely(model: Model, groups: Groups) -> Model:
+    """The model run on every sample: what a law with rates is compared with."""
+    fit = solve(model.fit.problem.finely(), model.fit.x, 4)
+    return Model(model.terms, fit, left_out(fit, groups))
+
+
+def without(model: Model, term: Term, groups: Groups) -> Model | None:
+    """The model without one of its terms, refitted."""
+    kept = tuple(t for t in model.terms if t is not term)
+    problem = stripped(model.fit.problem, term)
+    start = placed(model.fit, problem)
+    try:
+        fit = solve(problem, start, 10, LIMITS.tolerance)
+    except InputError:
+        return None
+    return Model(kept, fit, left_out(fit, groups))
+
+
+def stripped(problem: Problem, term: Term) -> Problem:
+    if isinstance(term, Dependence):
+        return term.undone(problem)
+    entries = tuple(e for e in problem.config.effect if not _is(e.id, e.parameters, term))
+    free = tuple(p for p in problem.parameters if not p.name.startswith(f"effect.{term.effect.id}."))
+    return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
+
+
+def _is(identifier: str, parameters: Mapping[str, object], term: Hypothesis) -> bool:
+    channel = term.name.partition(":")[2]
+    return identifier == term.effect.id and (not channel or channel in parameters.values())
+
+
+def placed(fit: Fit, problem: Problem) -> FloatArray:
+    """Coordinates of a changed problem: what has the same name, or the same base, stands where it stood."""
+    before = dict(
+        zip((p.name for p in fit.problem.parameters), fit.problem.values(fit.x).values(), strict=True)
+    )
+    return np.array(
+        [
+            p.x(before.get(p.name, before.get(p.base, p.start) if not p.condition else 0.0))
+            for p in problem.parameters
+        ]
+    )

@@ -1,0 +1,201 @@
+"""One round of the search: every hypothesis asked cheaply, the promising ones fitted roughly, the best of them to the end.
+
+Besides effects, a round tries dependences: a parameter that is each session's own, or grows with a condition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, loss, placed
+from cablecomp.diagnosis.explain.model import ranked as ranked_models
+from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out, scales, selected_in
+from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
+from cablecomp.diagnosis.parallel import side_by_side
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import MOTOR
+from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.parameter import DECADE, by_condition
+from cablecomp.estimation.problem import Problem
+from cablecomp.signal.smoothing import FloatArray
+
+Progress = Callable[[str, float], None]
+
+
+def one_round(
+    model: Model,
+    nominal: Fit | None,
+    pool: Sequence[Hypothesis],
+    groups: Groups,
+    rng: np.random.Generator,
+    progress: Progress,
+    number: int,
+    cold: Mapping[str, float] | None,
+    known: Sequence[Model],
+) -> tuple[Round, tuple[Answer, ...]]:
+    """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to begin from
+    where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well."""
+    anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
+    names = {t.name for t in model.terms}
+    ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
+    left = [h for h in pool if h.name not in names and (h.effect.id not in ids or h.effect.texts)]
+    done = number / LIMITS.rounds
+
+    def answer(h: Hypothesis) -> list[Answer]:
+        progress(f"asking {h.name}", done)
+        return ask_all(anchors, h)
+
+    answers = [a for a in side_by_side(answer, left) if a]
+    before = 0.5 * float(model.fit.residual @ model.fit.residual)
+    fine = finely(model, groups) if any(_wants_rates(a[0], model, before) for a in answers) else None
+    if fine is not None:
+        there = [anchor(fine.fit)]
+        answers = [
+            (ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], model, before) else a
+            for a in answers
+        ]
+    dependences = (
+        [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
+    )
+    promised = {a[0].hypothesis.name: before / max(a[0].cost, 1e-12) for a in answers}
+    promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
+    trades = cold is not None and number > 0
+    worth = [a for a in answers if a[0].cost < LIMITS.promise * before or (trades and a[0].hypothesis.trades)]
+    if number > 0:
+        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later]
+    promising = max(LIMITS.promising - 2 * number, LIMITS.promising // 2)
+
+    def begin(a: list[Answer]) -> list[Fit]:
+        progress(f"trying {a[0].hypothesis.name}", done)
+        further = _further(a[0].hypothesis, model, known, cold) if a[0].hypothesis.trades else []
+        return rough(a, LIMITS.rough, further)
+
+    roughs = side_by_side(begin, worth)
+    ranked: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    second: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    for fits, a in zip(roughs, worth, strict=True):
+        for k, f in enumerate(fits[: 2 if trades and a[0].hypothesis.trades else 1]):
+            (second if k else ranked).append((f.cost, (a[0].hypothesis,), f.problem, f.x))
+    for found in side_by_side(lambda c: _by_conditions(c), list(ranked)):
+        ranked += found
+    for d, cost, problem in dependences:
+        ranked.append((cost, (d,), problem, placed(model.fit, problem)))
+    ranked.sort(key=lambda c: c[0])
+    top = ranked[0][0] if ranked else 0.0
+    chosen = [
+        c
+        for k, c in enumerate(ranked[:promising])
+        if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
+    ]
+
+    # what lies lower need not predict better: of two valleys both are fitted to the end
+    taken = [c[1][0].name for c in chosen]
+    chosen += [c for c in second if c[1][0].name in taken and c[0] < LIMITS.hopeless * top]
+
+    def finish(c: tuple[float, tuple[Term, ...], Problem, FloatArray]) -> Model | None:
+        progress(f"fitting {c[1][0].name}", done)
+        try:
+            fit = solve(c[2], c[3], 15, LIMITS.tolerance)
+        except InputError:
+            return None
+        ratio = 1.0
+        if fine is not None and fit.problem.fine:
+            size = scales(model.left_out, groups)
+            ratio = loss(model, size, groups) / max(loss(fine, size, groups), 1e-300)
+        return Model((*model.terms, *c[1]), fit, left_out(fit, groups), ratio)
+
+    models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], groups)
+    leads = {
+        m.name: lead(
+            m.left_out, fine.left_out if fine is not None and m.fit.problem.fine else model.left_out, groups
+        )
+        for m in models
+    }
+    shares = selected_in({n: v.by_block for n, v in leads.items()}, rng)
+    first = len(model.terms)
+    tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
+    tried.sort(key=lambda t: -t.lead.gain)
+    good = [t for t in tried if demanded(t.lead, first=number == 0)]
+    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(
+        x for a in answers for x in a
+    )
+
+
+def _further(
+    h: Hypothesis, model: Model, known: Sequence[Model], cold: Mapping[str, float] | None
+) -> list[Mapping[str, float]]:
+    """Values to begin from beside where calibration stands: effects that trade places sit in a valley of their own, and an
+    earlier model that has this one may have found it; what that model lacks begins at a part of its amount."""
+    names = {t.name for t in model.terms}
+    having = [m for m in known if any(t.name == h.name for t in m.terms) and len(m.terms) <= len(names)]
+    if not having:
+        return [cold] if cold is not None and names else []
+    best = max(having, key=lambda m: len(names & {t.name for t in m.terms}))
+    values = dict(best.fit.values)
+    amounts = {f"effect.{t.effect.id}.{t.amount.name}" for t in model.terms if isinstance(t, Hypothesis)}
+    for name, value in model.fit.values.items():
+        values.setdefault(name, LIMITS.part * value if name in amounts else value)
+    return [values]
+
+
+def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
+    """Where every effect would begin beside the nominal drive; None where the drive is known better than by order of magnitude
+    (calibration then stays in its valley)."""
+    if not any(p.sd >= DECADE for p in baseline.problem.parameters if np.isfinite(p.sd)):
+        return None
+    evidence = baseline.problem.evidence
+    torque = [
+        float(np.std(e.columns[c])) for e in evidence for c in (MOTOR, "joint_torque_Nm") if c in e.columns
+    ]
+    found: dict[str, float] = {}
+    for h in pool:
+        values = dict(h.starts[0].values if h.effect.posture else h.starts[len(h.starts) // 2].values)
+        if (
+            h.amount.unit == "N m" and torque
+        ):  # a share of the torques that go round: moments are not known beforehand
+            values[h.amount.name] = 0.25 * float(np.median(torque))
+        found |= {f"effect.{h.effect.id}.{k}": v for k, v in values.items() if not isinstance(v, str)}
+    return found
+
+
+def _wants_rates(a: Answer, model: Model, before: float) -> bool:
+    return (
+        a.hypothesis.effect.rates
+        and not model.fit.problem.fine
+        and before / max(a.cost, 1e-12) > LIMITS.worth_rates
+    )
+
+
+def _by_conditions(
+    c: tuple[float, tuple[Term, ...], Problem, FloatArray],
+) -> list[tuple[float, tuple[Term, ...], Problem, FloatArray]]:
+    """The same effect with an amount that grows with a condition, for each condition of three values and more."""
+    cost, (term,), problem, x = c
+    assert isinstance(term, Hypothesis)
+    found: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    for condition in problem.evidence[0].condition:
+        values = [e.condition[condition] for e in problem.evidence]
+        if len(set(values)) < 3:
+            continue
+        name = f"effect.{term.effect.id}.{term.amount.name}"
+        amount = next((p for p in problem.parameters if p.name == name), None)
+        if amount is None or not may_depend(name, condition):
+            continue
+        here = replace(
+            amount, start=max(amount.value(float(x[problem.parameters.index(amount)])), amount.scale)
+        )
+        gain = by_condition(here, condition, float(np.ptp(values)))
+        changed = replace(problem, parameters=(*problem.parameters, gain))
+        try:
+            fit = solve(changed, np.append(x, gain.x(0.3 * here.start / float(np.ptp(values)))), LIMITS.rough)
+        except InputError:
+            continue
+        if fit.cost < LIMITS.promise * cost:
+            found.append((fit.cost, (term, Dependence(name, condition)), fit.problem, fit.x))
+    return found

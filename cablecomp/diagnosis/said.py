@@ -1,0 +1,216 @@
+"""What a diagnosis says, out of the fits and their evidence: values, names, candidates, ties, what remains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.body import Body
+from cablecomp.diagnosis.calibration import Calibrated
+from cablecomp.diagnosis.covariates import Covariates, join
+from cablecomp.diagnosis.experiment import best_experiment
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.model import Model, Selection
+from cablecomp.diagnosis.explain.verdict import Weighed
+from cablecomp.diagnosis.locate import Location
+from cablecomp.diagnosis.remainders import sensitivities
+from cablecomp.diagnosis.result import Named, Tested, Traces, Value
+from cablecomp.diagnosis.series import Series
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.diagnosis.unknown import describe
+from cablecomp.diagnosis.unseen import Hidden
+from cablecomp.diagnosis.values import effect_values
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT, load_channel
+from cablecomp.estimation.least_squares import Fit, rms_left
+
+
+def named_of(w: Weighed, final: Model) -> Named:
+    """One effect with its parameters, evidence and confidence."""
+    effect = w.term.effect
+    mine = f"effect.{effect.id}."
+    parameters: dict[str, Value | str] = {
+        v.name.removeprefix(mine): v for v in effect_values(final.fit) if v.name.startswith(mine)
+    }
+    channel = w.term.name.partition(":")[2]
+    if channel:
+        parameters[effect.texts[0]] = channel
+    return Named(
+        effect.id,
+        effect.statement,
+        effect.equation,
+        parameters,
+        _depends(w.depends, final),
+        float(w.evidence["share_total"]),
+        w.confidence,
+        dict(w.evidence),
+        effect.acts_through,
+        "" if w.confidence >= LIMITS.name else w.why_not,
+    )
+
+
+def _depends(d: Dependence | None, final: Model) -> dict[str, object] | None:
+    if d is None:
+        return None
+    found: dict[str, object] = {"parameter": d.parameter.removeprefix("effect."), "on": d.on}
+    values = final.fit.values
+    if d.on == "session":
+        found["values"] = {
+            k.partition("@")[2]: v for k, v in values.items() if k.startswith(d.parameter + "@")
+        }
+    else:
+        found["per_unit"] = values[f"{d.parameter}~{d.on}"]
+    return found
+
+
+def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> tuple[Named, ...]:
+    """Effects of the final model that are not sure enough, then what else stood out in a round."""
+    rows = [named_of(w, final) for w in found if w.confidence < LIMITS.name]
+    known = {w.term.name for w in found}
+    for r in selection.rounds:
+        for t in r.tried:
+            if (
+                t.term.name in known
+                or t.lead.gain < LIMITS.gain
+                or t.lead.z < 2.0
+                or isinstance(t.term, Dependence)
+            ):
+                continue
+            known.add(t.term.name)
+            effect = t.term.effect
+            why = f"beside {r.base.name}, {r.tried[0].term.name} takes off more; with it known, this one is not missed"
+            evidence = {"z": t.lead.z, "selected_in": t.selected_in, "gain": t.lead.gain}
+            rows.append(
+                Named(
+                    effect.id,
+                    effect.statement,
+                    effect.equation,
+                    {},
+                    None,
+                    t.lead.gain,
+                    0.0,
+                    evidence,
+                    (),
+                    why,
+                )
+            )
+    return tuple(rows)
+
+
+def tied_of(found: Sequence[Weighed]) -> tuple[tuple[tuple[str, ...], str], ...]:
+    """Effects that data left out cannot tell apart."""
+    rows = []
+    for w in found:
+        if w.rivals:
+            why = f"they predict data left out alike: the lead over the nearest is {w.lead.z:.1f} standard errors"
+            rows.append(((w.term.name, *w.rivals), why))
+    return tuple(rows)
+
+
+def tested(selection: Selection, named: Sequence[str]) -> tuple[Tested, ...]:
+    rows = []
+    taken = {t.name for t in selection.final.terms}
+    for r in selection.rounds:
+        for t in r.tried:
+            accepted = r.accepted is not None and r.accepted.term.name == t.term.name and t.term.name in taken
+            outcome = (
+                "named" if t.term.name in named and accepted else "candidate" if accepted else "not needed"
+            )
+            rows.append(Tested(t.term.name, r.base.name, t.lead.gain, t.lead.z, t.selected_in, outcome))
+    return tuple(rows)
+
+
+def next_experiment(
+    selection: Selection,
+    found: Sequence[Weighed],
+    kept: Model,
+    hidden: Sequence[Hidden],
+    drive: Calibrated,
+    seen: Sequence[Covariates],
+) -> tuple[str, str] | None:
+    """Where effects are tied, or one hides behind the calibration, what would set the predictions apart."""
+    first = drive.fit.problem.evidence[0]
+    names = {n for w in found for n in w.rivals}
+    models = [selection.final.fit.problem.joint(selection.final.fit.x, first)]
+    for r in selection.rounds:
+        for t in r.tried:
+            if t.term.name in names:
+                names.discard(t.term.name)
+                models.append(t.model.fit.problem.joint(t.model.fit.x, first))
+    if len(models) < 2:
+        models = [kept.fit.problem.joint(kept.fit.x, first), *(h.joint for h in hidden[:1])]
+    if len(models) < 2:
+        return None
+    temperature = float(np.mean(first.columns.get("temperature_degC", np.array([20.0]))))
+    try:
+        best = best_experiment(models, join(list(seen)), drive.floor_rad, temperature)
+    except InputError:
+        return None
+    return None if best is None else (best.why, best.protocol.to_toml())
+
+
+def remainder(
+    kept: Model,
+    found: Location,
+    series: Series,
+    structured: bool,
+    drive: Calibrated,
+    rng: np.random.Generator,
+) -> dict[str, object]:
+    left = rms_left(kept.fit)
+    text, equation = "noise", None
+    if structured:
+        stages = kept.fit.problem.config.drive.stage
+        ratio = float(np.prod([s.output_radius_m / s.input_radius_m for s in stages]))
+        description = describe(series, rng, sensitivities(kept.fit), ratio)
+        first = found.significant(0.01)
+        text = (
+            f"follows {first[0].covariate}: {first[0].how}; {description.text}" if first else description.text
+        )
+        equation = description.law.equation if description.law else None
+    return {
+        "rmse_rad": left,
+        "share": float(left**2 / max(rms_left(drive.fit) ** 2, 1e-300)),
+        "structured": structured,
+        "description": text,
+        "equation": equation,
+    }
+
+
+def notes(config: JointConfig, body: Body, drive: Calibrated) -> tuple[str, ...]:
+    """What was assumed and what was left out."""
+    load = load_channel(config, body.used[0].columns)
+    found = [f"load from {load}" if load else "no load channel: the joint is taken as free"]
+    if drive.lost_rows:
+        total = sum(len(e.rows) for e in body.used)
+        found.append(f"{drive.lost_rows} of {total} rows given up to the history before the first sample")
+    outliers = sum(e.outliers for e in body.used)
+    if outliers:
+        found.append(f"{outliers} single readings set aside as outliers")
+    return tuple(found)
+
+
+def channel_word(channel: str) -> str:
+    """A channel in the words of the covariates."""
+    return {"motor_position_rad": "motor_angle", "joint_torque_Nm": "load"}.get(channel, channel)
+
+
+def traces(before: Fit, after: Fit, seen: Sequence[Covariates]) -> list[Traces]:
+    """What was measured, and what the drive predicts before and after, recording by recording."""
+    stages = before.problem.config.drive.stage
+    ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in stages]))
+    rows = []
+    lefts = (before.problem.left(before.x, own_zero=False), after.problem.left(after.x, own_zero=False))
+    for k, (e, c) in enumerate(zip(before.problem.evidence, seen, strict=True)):
+        measured = e.at_rows(JOINT)
+        rigid = ratio * e.at_rows("motor_position_rad")
+        zero = float(np.median(measured - rigid))
+        rows.append(
+            Traces(
+                e.name, e.session, c.values, measured, measured - lefts[0][k], measured - lefts[1][k], rigid + zero,
+                e.counted[JOINT],
+            )
+        )  # fmt: skip
+    return rows

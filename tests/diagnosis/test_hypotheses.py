@@ -1,0 +1,32 @@
+"""What is asked: events only where there is a before and an after."""
+
+from __future__ import annotations
+
+import numpy as np
+from turning import JOINT, recorded
+
+from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.explain.hypotheses import EDGE, hypotheses, instants
+
+
+def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_session() -> None:
+    """Between sessions the joint was taken apart: what changed there is no event."""
+    body = gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": recorded(seed=2), "b/1": recorded(seed=3)})
+    spans = [(e.columns["time_s"][0], e.columns["time_s"][-1]) for e in body.used]
+    between_a, between_ab = (spans[0][1], spans[1][0]), (spans[1][1], spans[2][0])
+    asked = np.array(instants(body.used))
+    assert np.any((asked > between_a[0]) & (asked < between_a[1]))
+    assert not np.any((asked > between_ab[0]) & (asked < between_ab[1]))
+    for first, last in spans:
+        inside = asked[(asked >= first) & (asked <= last)]
+        assert len(inside) >= 3
+        assert inside.min() >= first + 0.9 * EDGE * (last - first)
+
+
+def test_an_effect_that_reads_a_channel_is_asked_once_for_each_channel_that_varies() -> None:
+    columns = recorded()
+    columns["other_wrist_Nm"] = np.sin(columns["time_s"])
+    columns["other_still_Nm"] = np.ones_like(columns["time_s"])
+    names = [h.name for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used)]
+    assert "crosstalk:other_wrist_Nm" in names
+    assert "crosstalk:other_still_Nm" not in names

@@ -1,0 +1,125 @@
+"""A fleet: one row for each joint and night, none lost by another; what changed is told from what scatters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cablecomp.cluster import Workers
+from cablecomp.errors import InputError
+from cablecomp.examples import example
+from cablecomp.fleet import fleet as fleet_module
+from cablecomp.fleet.change import EVIDENCE, change
+from cablecomp.fleet.fleet import run_fleet
+from cablecomp.fleet.places import Night, nights
+from cablecomp.fleet.rows import Compliance, Parts
+from cablecomp.report.fleet_page import FLAGS, fleet_page, fleet_table
+
+rng = np.random.default_rng(7)
+
+
+def folders(place: Path, joints: tuple[str, ...], count: int) -> Path:
+    for joint in joints:
+        (place / joint).mkdir(parents=True)
+        for k in range(count):
+            (place / joint / f"night-{k:02d}.csv").write_text("time_s\n0\n", encoding="utf-8")
+    return place
+
+
+def told(done: int, of: int) -> None:
+    assert 0 <= done <= of
+
+
+@pytest.fixture
+def made_up(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Rows with a drift, a slip, strands that go, and one night that fails; the list holds what was worked on."""
+    asked: list[str] = []
+
+    def work(night: Night) -> dict[str, float]:
+        asked.append(f"{night.joint}/{night.name}")
+        k = int(night.name[6:8])
+        if (night.joint, k) == ("sound", 3):
+            raise InputError(f"{night.name}: is cut off")
+        zero = {"drifting": 1e-4 * k, "slipping": 1e-3 * (k >= 4)}.get(night.joint, 0.0)
+        ratio = 1.04 if night.joint == "fraying" and k >= 5 else 1.0
+        scatter = rng.standard_normal(2)
+        return {"zero_rad": zero + 2e-5 * scatter[0], "compliance_ratio": ratio + 2e-3 * scatter[1]}
+
+    monkeypatch.setitem(fleet_module._WORK, "replay", work)
+    return asked
+
+
+def test_each_joint_is_told_by_what_it_does(tmp_path: Path, made_up: list[str]) -> None:
+    place = folders(tmp_path / "in", ("drifting", "fraying", "slipping", "sound"), 8)
+    config = example("joints", "capstan-arm")
+    found = run_fleet("replay", nights([place], config), tmp_path / "out", Workers(0), told)
+    assert len(found.rows) == 32
+    flags = {j.joint: j.flags for j in found.joints}
+    assert flags == {
+        "drifting": ("drifts",),
+        "slipping": ("slips",),
+        "fraying": ("loses strands",),
+        "sound": (),
+    }
+    assert [r["night"] for r in found.rows if r["failed"]] == ["night-03.csv"]
+    text = fleet_page(found, "cablecomp replay in --workers 2")
+    assert all(word in text for word in (*FLAGS, "is cut off", "night-04.csv on"))
+    assert fleet_table(found).row_count == 4
+
+    made_up.clear()  # again: only what failed, or was changed meanwhile, is worked on
+    (place / "drifting/night-00.csv").write_text("time_s\n0\n1\n", encoding="utf-8")
+    again = run_fleet("replay", nights([place], config), tmp_path / "out", Workers(0), told)
+    assert sorted(made_up) == ["drifting/night-00.csv", "sound/night-03.csv"]
+    assert again.reused == 30
+
+
+def test_a_joint_has_its_own_configuration_or_that_of_all(tmp_path: Path) -> None:
+    place = folders(tmp_path, ("a", "b"), 2)
+    common = example("joints", "capstan-arm")
+    (place / "a/joint.toml").write_text(common.read_text(encoding="utf-8"), encoding="utf-8")
+    assert {n.joint: n.config for n in nights([place], common)} == {"a": place / "a/joint.toml", "b": common}
+    with pytest.raises(InputError, match=r"b/joint\.toml: is missing"):
+        nights([place], None)
+    with pytest.raises(InputError, match="FOLDER/JOINT/RECORDING"):
+        nights([place / "a"], common)
+
+
+@pytest.mark.parametrize("how", ["", "trend", "step"])
+def test_changes_are_told_from_scatter(how: str) -> None:
+    """What is put in is found, with its size; scatter alone passes for a change in fewer than 1 in 50."""
+    wrong = 0
+    for _ in range(100):
+        values = rng.standard_normal(20)
+        if how == "trend":
+            values += np.linspace(0.0, 12.0, 20)
+        elif how == "step":
+            values[9:] += 8.0
+        found = change(values, 0.0)
+        wrong += found.how != how
+        if found.how == how == "step":
+            assert found.size == pytest.approx(8.0, abs=2.5)
+            assert abs(found.at - 9) <= 1
+        if found.how == how == "trend":
+            assert found.size == pytest.approx(12.0, abs=4.0)
+    assert wrong <= 2
+    assert change(np.zeros(4), 1.0).how == ""
+    assert change(1e-9 * np.arange(20.0), 1.0).evidence < EVIDENCE  # below what one value is known to
+
+
+def test_streams_in_any_blocks_give_the_same() -> None:
+    """Means of parts are those of the whole stream; compliance is the straight line's, offsets or not."""
+    values = rng.standard_normal(40_000) + np.linspace(0.0, 5.0, 40_000)
+    parts = Parts()
+    for block in np.array_split(values, 13):
+        parts.add(block)
+    means = parts.means()
+    assert 32 <= len(means) < 64
+    assert np.mean(means) == pytest.approx(values[: int(len(values) * 0.99)].mean(), abs=0.1)
+    assert np.all(np.diff(np.convolve(means, np.ones(8) / 8, "valid")) > 0.0)
+    load = rng.standard_normal(1_000)
+    line = Compliance()
+    for m in np.array_split(load, 7):
+        line.add(m, 2e-3 * m + 0.1, 1e-4 * m + 0.3)
+    assert line.ratio() == pytest.approx(1.05, rel=1e-9)
