@@ -67,7 +67,9 @@ def load_run(folder: Path, points: int = 6000) -> RunData:
     prediction, cycles = _columns(folder / "prediction.csv"), _columns(folder / "cycles.csv")
     rows = min(_rows(table) for table in (recording, prediction, cycles))
     step = max(1, rows // points)
-    return RunData(*({k: v[:rows:step] for k, v in table.items()} for table in (recording, prediction, cycles)))
+    return RunData(
+        *({k: v[:rows:step] for k, v in table.items()} for table in (recording, prediction, cycles))
+    )
 
 
 def _rows(table: dict[str, Floats]) -> int:
