@@ -35,6 +35,7 @@ COMMANDS: Final = {
     "design": "design.design",
     "identify": "identify.identify",
     "diagnose": "diagnose.diagnose_recordings",
+    "export": "export.export",
     "prove": "prove.prove_blindly",
     "study": "study.study_bench",
 }

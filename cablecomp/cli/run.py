@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from typing import Annotated
 
@@ -18,9 +21,12 @@ from cablecomp.control.protocol import load_protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
 from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.load import load_link
+from cablecomp.report.page import CSS
 from cablecomp.report.run_page import write_run_page
+from cablecomp.runtime.clock import Tick
+from cablecomp.runtime.loop import Loop
 from cablecomp.runtime.results import RunReport
-from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.run import RunOptions, Watch, run_joint
 from cablecomp.runtime.setup import matched, same_joint
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
@@ -61,6 +67,13 @@ def run(
     nominal: Annotated[bool, typer.Option("--nominal", help="simulated joint exactly as configured")] = False,
     live: Annotated[
         bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
+    ] = False,
+    view: Annotated[
+        bool,
+        typer.Option("--view", help="a page to look on, on this machine; Foxglove too where it is installed"),
+    ] = False,
+    plotjuggler: Annotated[
+        bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
     ] = False,
     without_drive_timeout: Annotated[
         bool,
@@ -107,14 +120,43 @@ def run(
         try:
             if simulation is not None and asked.mode == "force":
                 simulation.set_wall(1, 0.0)
-            with LiveView(console) as view:
-                beside = LiveRun(joint, bus.rate_Hz, out, view.watch, stepped=fast) if live else None
-                watch = view.watch if beside is None else beside.watch
+            with LiveView(console) as shown, _onlookers(joint, out, shown.watch, view, plotjuggler) as watch:
+                beside = LiveRun(joint, bus.rate_Hz, out, watch, stepped=fast) if live else None
+                watch = watch if beside is None else beside.watch
                 report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
         finally:
             if simulation is not None:
                 simulation.close()
         _finish(report, joint, config, beside)
+
+
+@contextmanager
+def _onlookers(joint: JointConfig, out: Path, shown: Watch, view: bool, plotjuggler: bool) -> Iterator[Watch]:
+    """What is called once a tick: the terminal's view, and the instrument where someone looks on."""
+    if not (view or plotjuggler):
+        yield shown
+        return
+    from cablecomp.monitor.viewer import Onlookers, watched  # its process costs seconds
+
+    out.mkdir(parents=True, exist_ok=True)
+    free = (p for k in count(1) if not (p := out / f"live-{k}.mcap").exists())
+    who = Onlookers(
+        view, view and _installed("foxglove"), plotjuggler, next(free) if _installed("mcap") else None
+    )
+    with watched(joint, who, CSS) as (instrument, words):
+        for line in words:
+            console.print(line, soft_wrap=True)
+
+        def both(loop: Loop, tick: Tick) -> None:
+            shown(loop, tick)
+            instrument.watch(loop, tick)
+
+        yield both
+    console.print(f"onlookers: {instrument.sent} frames sent, {instrument.dropped} dropped")
+
+
+def _installed(package: str) -> bool:
+    return find_spec(package) is not None
 
 
 def _finish(report: RunReport, joint: JointConfig, config: Path, beside: LiveRun | None) -> None:

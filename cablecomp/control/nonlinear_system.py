@@ -4,7 +4,7 @@ operators."""
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import control
 import numpy as np
@@ -21,6 +21,19 @@ Floats = NDArray[np.float64]
 INPUTS = ["motor_position_rad", "joint_torque_Nm"]
 OUTPUTS = ["joint_position_rad", "deflection_rad"]
 TENSIONS = ["tension_h_N", "tension_l_N"]
+
+
+class Plays(NamedTuple):
+    """The drive with its motor held, in few states: deflection = a M + b M² + sum w_i z_i, z_i+ = min(max(z_i, M − r_i), M + r_i).
+
+    `weights`: a [rad/Nm], b [rad/Nm²], then w_i [rad/Nm]; `radii_Nm`: r_i; `rms_rad`: error on the loops that it was fitted to;
+    `most_Nm`: the greatest load of those.
+    """
+
+    weights: Floats
+    radii_Nm: Floats
+    rms_rad: float
+    most_Nm: float
 
 
 def to_nlsys(
@@ -44,7 +57,7 @@ def to_nlsys(
         return _exact(config, period_s, name)
     if not 1 <= states <= 64:
         raise InputError(f"states is {states}; 1 to 64, or None for the whole history, are accepted")
-    return _reduced(config, period_s, name, states, greatest_load(config, load_max_Nm))
+    return _reduced(config, period_s, name, fit_plays(config, states, load_max_Nm))
 
 
 def _exact(config: JointConfig, period_s: float, name: str) -> Any:
@@ -80,9 +93,10 @@ def _exact(config: JointConfig, period_s: float, name: str) -> Any:
     )
 
 
-def _reduced(config: JointConfig, period_s: float, name: str, states: int, most_Nm: float) -> Any:
-    """Deflection = a M + b M^2 + sum w_i z_i, z_i+ = min(max(z_i, M - r_i), M + r_i): w_i >= 0 and a >= 0 by least squares
-    on nested loops of the observer; r_i evenly over the loads."""
+def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None = None) -> Plays:
+    """Fit play operators to nested loops of the observer: w_i >= 0 and a >= 0 by least squares, r_i evenly over the loads up
+    to `load_max_Nm` (None = the joint's limit, else R T0)."""
+    most_Nm = greatest_load(config, load_max_Nm)
     radii = most_Nm * (np.arange(states) + 0.5) / states
     loads = _loops(most_Nm, config.drive.circuit == "closed")
     observer = Observer(plain(config))
@@ -101,8 +115,11 @@ def _reduced(config: JointConfig, period_s: float, name: str, states: int, most_
         * np.abs(b).max()
         / size
     )
-    rms = float(np.sqrt(np.mean((A @ weights - b) ** 2)))
-    ratio = config.drive.ratio
+    return Plays(weights, radii, float(np.sqrt(np.mean((A @ weights - b) ** 2))), most_Nm)
+
+
+def _reduced(config: JointConfig, period_s: float, name: str, found: Plays) -> Any:
+    weights, radii, ratio = found.weights, found.radii_Nm, config.drive.ratio
 
     def update(t: float, x: Floats, u: Floats, params: Any) -> Floats:
         return _play(x, float(u[1]), radii)
@@ -118,9 +135,9 @@ def _reduced(config: JointConfig, period_s: float, name: str, states: int, most_
         name=name,
         inputs=INPUTS,
         outputs=OUTPUTS,
-        states=states,
+        states=len(radii),
         dt=period_s,
-        params={"rms_rad": rms},
+        params={"rms_rad": found.rms_rad},
     )
 
 

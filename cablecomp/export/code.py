@@ -1,0 +1,136 @@
+"""A joint as C, and as a functional mock-up unit: play operators in place of the wraps' profiles."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from string import Template
+from typing import Final
+
+from cablecomp.config import JointConfig
+from cablecomp.control.nonlinear_system import Plays
+from cablecomp.errors import InputError
+from cablecomp.recording.atomic import atomic_directory
+
+_C: Final = Template("""\
+/* Load and deflection of the joint $name: $count play operators (Prandtl-Ishlinskii) fitted to its observer.
+ * deflection = a M + b M^2 + sum w_i z_i,  z_i <- min(max(z_i, M - r_i), M + r_i),  q_out = ratio q_in + deflection.
+ * Fit: $rms rad RMS on loops up to +-$most N m. Left out:
+$lost
+ * C99, no library but <math.h>'s fmin and fmax, no allocation; all state is the caller's. SI units. */
+#include <math.h>
+#include <stddef.h>
+
+enum { ${prefix}_STATES = $count };
+typedef struct { double z[$count]; } ${prefix}_state; /* zeros: uniform pretension, no load */
+
+static const double ${prefix}_ratio = $ratio;
+static const double ${prefix}_linear[2] = {$linear};
+static const double ${prefix}_weight[$count] = {$weights};
+static const double ${prefix}_radius[$count] = {$radii};
+
+/* Deflection [rad] at a load [N m]; the state moves along. */
+double ${prefix}_deflection(${prefix}_state *s, double load) {
+    double sum = ${prefix}_linear[0] * load + ${prefix}_linear[1] * load * load;
+    for (size_t i = 0; i < $count; ++i) {
+        s->z[i] = fmin(fmax(s->z[i], load - ${prefix}_radius[i]), load + ${prefix}_radius[i]);
+        sum += ${prefix}_weight[i] * s->z[i];
+    }
+    return sum;
+}
+
+/* Joint angle [rad] at a motor angle [rad] and a load [N m]; the state moves along. */
+double ${prefix}_step(${prefix}_state *s, double motor, double load) {
+    return ${prefix}_ratio * motor + ${prefix}_deflection(s, load);
+}
+""")
+
+_SLAVE: Final = Template('''\
+"""$name: joint angle from motor angle and load. $rms rad RMS on loops up to +-$most N m. Left out:
+$lost"""
+
+from $package import Fmi${version}Causality, Fmi${version}Slave, $real
+
+RATIO = $ratio
+LINEAR = ($linear)
+WEIGHT = ($weights,)
+RADIUS = ($radii,)
+
+
+class $cls(Fmi${version}Slave):
+    author = "cablecomp"
+    description = "cable drive as play operators"
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.motor_position_rad = self.joint_torque_Nm = 0.0
+        self.joint_position_rad = self.deflection_rad = 0.0
+        self.z = [0.0] * len(RADIUS)
+        for name in ("motor_position_rad", "joint_torque_Nm"):
+            self.register_variable($real(name, causality=Fmi${version}Causality.input))
+        for name in ("joint_position_rad", "deflection_rad"):
+            self.register_variable($real(name, causality=Fmi${version}Causality.output))
+
+    def do_step(self, current_time, step_size):
+        load = self.joint_torque_Nm
+        self.z = [min(max(z, load - r), load + r) for z, r in zip(self.z, RADIUS)]
+        held = sum(w * z for w, z in zip(WEIGHT, self.z))
+        self.deflection_rad = LINEAR[0] * load + LINEAR[1] * load * load + held
+        self.joint_position_rad = RATIO * self.motor_position_rad + self.deflection_rad
+        return True
+''')
+LOST: Final = (
+    "what turning of the pulleys does to the history",
+    "the order of what time does: creep, relaxation, speed",
+    "bounds for what came before, cable tensions",
+)
+
+
+def c_source(config: JointConfig, found: Plays) -> str:
+    """C99 source of `PREFIX_step(state, motor, load)`, PREFIX being the joint's name as an identifier."""
+    words = _words(config, found)
+    return _C.substitute(
+        words, lost="\n".join(f" *   {line}" for line in LOST), prefix=identifier(config.name)
+    )
+
+
+def write_fmu(config: JointConfig, found: Plays, out: Path) -> Path:
+    """Write `out`/NAME.fmu, FMI 2.0 for co-simulation; who runs it needs Python. Raises InputError without `pythonfmu`."""
+    try:
+        from pythonfmu import FmuBuilder
+    except ImportError:
+        raise InputError("--fmu needs a package: pip install 'cablecomp[fmu]'") from None
+    cls = "".join(part.capitalize() for part in identifier(config.name).split("_"))
+    source = _SLAVE.substitute(
+        _words(config, found), lost="\n".join(LOST), cls=cls, version="2", package="pythonfmu", real="Real"
+    )
+    with atomic_directory(out) as folder:
+        script = folder / f"{cls.lower()}.py"
+        script.write_text(source, encoding="utf-8")
+        FmuBuilder.build_FMU(script, dest=folder)
+        script.unlink()
+    return out / f"{cls}.fmu"
+
+
+def identifier(name: str) -> str:
+    """A joint's name as an identifier of C and Python."""
+    found = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_").lower()
+    return found if found and not found[0].isdigit() else f"joint_{found}".rstrip("_")
+
+
+def _words(config: JointConfig, found: Plays) -> dict[str, str]:
+    return {
+        "name": identifier(config.name),  # what ends a comment or a string cannot stand in one
+        "count": str(len(found.radii_Nm)),
+        "rms": f"{found.rms_rad:.3g}",
+        "most": f"{found.most_Nm:.4g}",
+        "ratio": repr(float(config.drive.ratio)),
+        "linear": _numbers(found.weights[:2]),
+        "weights": _numbers(found.weights[2:]),
+        "radii": _numbers(found.radii_Nm),
+    }
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(repr(float(v)) for v in values)

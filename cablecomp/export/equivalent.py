@@ -1,0 +1,64 @@
+"""What a simulator can take of a joint: one stiffness, one dry friction, an equivalent backlash; and what that leaves out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.control.stiffness import greatest_load, stiffness_range
+
+
+class Equivalent(NamedTuple):
+    """A joint as a spring with dry friction beside it, q_out = ratio q_in + deflection.
+
+    The load cycle 0, +most, −most, 0 Nm of the observer (history and effects in it, motor held) gives: `stiffness_Nm_per_rad`
+    = load over deflection between the loop's ends; `backlash_rad` = the loop's greatest width, what a joint whose play is
+    that wide would show; `friction_Nm` = stiffness times half that width, which gives spring and friction side by side the
+    same width. `rms_rad`: what this leaves of the loop, of `reach_rad` in all.
+    """
+
+    ratio: float
+    stiffness_Nm_per_rad: float
+    friction_Nm: float
+    backlash_rad: float
+    most_Nm: float
+    rms_rad: float
+    reach_rad: float
+
+    def lost(self, config: JointConfig) -> tuple[str, ...]:
+        """What these numbers leave out, one line each."""
+        effects = ", ".join(effect.id for effect in config.effect)
+        return (
+            f"of the loop at +-{self.most_Nm:.4g} N m the equivalent leaves {1e6 * self.rms_rad:.3g} urad RMS of "
+            f"{1e6 * self.reach_rad:.3g} urad",
+            "smaller loads: their loops are narrower than those of one dry friction; the drive is stiffer at each reversal",
+            "the memory of the wraps: turning either pulley moves what earlier loads have left",
+            "bounds for what came before",
+            *(
+                (f"effects beyond the cable enter by the width of the loop alone: {effects}",)
+                if effects
+                else ()
+            ),
+        )
+
+
+def equivalent(config: JointConfig) -> Equivalent:
+    """Find the equivalent of a joint at its greatest load; raises InputError where the drive carries none."""
+    most = greatest_load(config)
+    found = stiffness_range(config, most)
+    reach = float(np.ptp(found.deflection_rad))
+    span = float(np.ptp(found.load_Nm))
+    stiffness = span / reach
+    friction = 0.5 * stiffness * found.width_rad
+    n = len(found.load_Nm) // 4
+    down = slice(n, 3 * n)  # one whole branch: from the greatest load to the least
+    middle = 0.5 * (found.deflection_rad[down].max() + found.deflection_rad[down].min())
+    centre = 0.5 * (found.load_Nm[down].max() + found.load_Nm[down].min())
+    line = middle + (found.load_Nm[down] - centre + friction) / stiffness
+    line = np.minimum(line, found.deflection_rad[n])  # held by friction until it slides
+    return Equivalent(
+        config.drive.ratio, stiffness, friction, found.width_rad, most,
+        float(np.sqrt(np.mean((found.deflection_rad[down] - line) ** 2))), reach,
+    )  # fmt: skip

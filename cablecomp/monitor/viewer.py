@@ -1,0 +1,130 @@
+"""The process beside the loop: receives datagrams, serves onlookers. It ends with the run, or when the run has gone."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Final
+
+from cablecomp.config import JointConfig
+from cablecomp.errors import CablecompError, InputError
+from cablecomp.monitor.frames import profiles_of, unpacked
+from cablecomp.monitor.instrument import END, Instrument
+from cablecomp.monitor.server import PageServer
+from cablecomp.monitor.sinks import Foxglove, Mcap, PlotJuggler, Sink
+
+READY_S: Final = 120.0
+"""How long the process may take to be there: it loads compiled code."""
+
+
+@dataclass(frozen=True)
+class Onlookers:
+    """Who looks on: the built-in page, Foxglove, PlotJuggler; and the file that is written."""
+
+    page: bool = False
+    foxglove: bool = False
+    plotjuggler: bool = False
+    mcap: Path | None = None
+
+    @property
+    def any(self) -> bool:
+        """Whether there is anyone."""
+        return self.page or self.foxglove or self.plotjuggler or self.mcap is not None
+
+
+@contextmanager
+def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[tuple[Instrument, tuple[str, ...]]]:
+    """A viewer for the time of a run: the instrument to hand to it, and a line about each place to look.
+
+    Raises InputError if the viewer cannot serve, such as for a port that is taken.
+    """
+    context = get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(
+        target=serve, args=(there, config, who, styles, os.getpid()), name="viewer", daemon=True
+    )
+    process.start()
+    there.close()
+    try:
+        port, words = _answer(here)
+        instrument = Instrument(port)
+        try:
+            yield instrument, words
+        finally:
+            instrument.close()
+            process.join(timeout=5.0)
+    finally:
+        if process.is_alive():
+            process.terminate()
+            process.join()
+        here.close()
+
+
+def _answer(here: Connection) -> tuple[int, tuple[str, ...]]:
+    found: tuple[int, tuple[str, ...]] | str = "it ended without a word"
+    with suppress(EOFError):
+        found = here.recv() if here.poll(READY_S) else "it does not answer"
+    if isinstance(found, str):
+        raise InputError(f"viewer: {found}")
+    return found
+
+
+def serve(there: Connection, config: JointConfig, who: Onlookers, styles: str, parent: int) -> None:
+    """The process's whole life: open, say where, pass frames on, close."""
+    sinks: list[Sink] = []
+    try:
+        words = _open(config, who, styles, sinks)
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        receiver.bind(("127.0.0.1", 0))
+    except (CablecompError, OSError, RuntimeError) as error:
+        there.send(str(error).partition("\n")[0])
+        return
+    there.send((receiver.getsockname()[1], words))
+    with suppress(KeyboardInterrupt):  # the run gets it too, and ends this
+        pass_on(receiver, config, sinks, parent)
+    for sink in sinks:
+        sink.close()
+    receiver.close()
+
+
+def _open(config: JointConfig, who: Onlookers, styles: str, sinks: list[Sink]) -> tuple[str, ...]:
+    words = []
+    if who.page:
+        page = PageServer(config.name, styles)
+        sinks.append(page)
+        words.append(f"live: {page.address}")
+    if who.foxglove:
+        foxglove = Foxglove()
+        sinks.append(foxglove)
+        words.append(f"Foxglove: ws://127.0.0.1:{foxglove.port}")
+    if who.plotjuggler:
+        sinks.append(PlotJuggler())
+        words.append("PlotJuggler: UDP server, JSON, port 9870")
+    if who.mcap is not None:
+        sinks.append(Mcap(who.mcap))
+    return tuple(words)
+
+
+def pass_on(receiver: socket.socket, config: JointConfig, sinks: Sequence[Sink], parent: int) -> None:
+    """Give every datagram's frame to every sink until END, or until the run's process is gone."""
+    profiles = profiles_of(config)
+    receiver.settimeout(0.5)
+    while True:
+        try:
+            datagram = receiver.recv(65_535)
+        except TimeoutError:
+            if os.getppid() != parent:
+                return
+            continue
+        if datagram == END:
+            return
+        found = unpacked(datagram, profiles)
+        for sink in sinks:
+            with suppress(OSError):
+                sink.take(found)

@@ -1,0 +1,158 @@
+"""What is exported does in the other tool what was said of it."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.config import load_joint
+from cablecomp.control.nonlinear_system import Plays
+from cablecomp.control.options import MotorModel
+from cablecomp.examples import example
+from cablecomp.export.code import c_source, identifier, write_fmu
+from cablecomp.export.equivalent import Equivalent, equivalent
+from cablecomp.export.simulators import mujoco_model, urdf_model
+
+JOINT = load_joint(example("joints", "wrist-capstan"))
+RATIO = JOINT.drive.ratio
+SPRING = Equivalent(RATIO, 500.0, 0.2, 2 * 0.2 / 500.0, 2.0, 1e-5, 8e-3)
+PLAYS = Plays(np.array([1e-3, 1e-6, 2e-4, 3e-4, 1e-4]), np.array([0.2, 0.8, 1.5]), 1e-6, 2.0)
+LOADS = np.concatenate(
+    [np.linspace(a, b, 40) for a, b in ((0, 2), (2, -2), (-2, 1), (1, -0.5), (-0.5, 1), (1, 2))]
+)
+
+
+def by_turning_points(loads: np.ndarray) -> np.ndarray:
+    """Deflection by stops: a play of radius r is the load less a stop of height r, M − clip(M − z)."""
+    stop, before, found = np.zeros(3), 0.0, []
+    for load in loads:
+        stop = np.maximum(np.minimum(stop + load - before, PLAYS.radii_Nm), -PLAYS.radii_Nm)
+        before = load
+        found.append(PLAYS.weights @ [load, load**2, *(load - stop)])
+    return np.array(found)
+
+
+def test_c_has_the_loops_of_the_plays(tmp_path: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler on the path")
+    (tmp_path / "joint.c").write_text(c_source(JOINT, PLAYS), encoding="utf-8")
+    command = [
+        compiler,
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-pedantic",
+        "-shared",
+        "-fPIC",
+        "joint.c",
+        "-o",
+        "joint.so",
+        "-lm",
+    ]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    step = ctypes.CDLL(str(tmp_path / "joint.so")).wrist_capstan_step
+    step.restype, step.argtypes = ctypes.c_double, [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
+    state = (ctypes.c_double * 3)()
+    found = np.array([step(state, 0.3, load) for load in LOADS]) - RATIO * 0.3
+    assert found == pytest.approx(by_turning_points(LOADS), abs=1e-15)
+    first, again = found[40], found[-1]  # the loop closes where it was left: return-point memory
+    assert again == pytest.approx(first, abs=1e-15)
+
+
+def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inputs and outputs by name in its description; its own code steps as the plays do."""
+    pytest.importorskip("pythonfmu", reason="pythonfmu is not installed")
+    path = write_fmu(JOINT, PLAYS, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["WristCapstan.fmu"]
+    with zipfile.ZipFile(path) as unit:
+        unit.extractall(tmp_path / "unit")
+    description = ET.parse(tmp_path / "unit/modelDescription.xml").getroot()
+    kinds = {v.get("name"): v.get("causality") for v in description.iter("ScalarVariable")}
+    assert kinds == {
+        "motor_position_rad": "input", "joint_torque_Nm": "input", "joint_position_rad": "output", "deflection_rad": "output",
+    }  # fmt: skip
+    spec = importlib.util.spec_from_file_location("unit", tmp_path / "unit/resources/wristcapstan.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module: Any = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "unit", module)
+    spec.loader.exec_module(module)
+    slave = module.WristCapstan(instance_name="one", resources=str(tmp_path))
+    found = []
+    for load in LOADS:
+        slave.joint_torque_Nm = float(load)
+        assert slave.do_step(0.0, 1e-3)
+        found.append(slave.deflection_rad)
+    assert np.array(found) == pytest.approx(by_turning_points(LOADS), abs=1e-15)
+
+
+def test_mujoco_shows_stiffness_and_width_of_the_loop() -> None:
+    """Motor held, load slowly up, down, up: the load less the friction over the stiffness, either way; then the joint follows."""
+    mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
+    hold = (
+        '<equality><joint joint1="motor" solref="0.001 1" solimp="0.9999 0.9999 0.001"/></equality></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(
+        mujoco_model(JOINT, SPRING, MotorModel()).replace("</mujoco>", hold)
+    )
+    data = mujoco.MjData(model)
+    joint, force = model.joint("joint").qposadr[0], model.joint("joint").dofadr[0]
+    ways = []
+    for begin, end in ((0.0, 2.0), (2.0, -2.0), (-2.0, 2.0)):
+        seen = []
+        for load in np.linspace(begin, end, 3_000):
+            data.qfrc_applied[force] = load
+            mujoco.mj_step(model, data)
+            seen.append((load, float(data.qpos[joint])))
+        ways.append(np.mean([q for load, q in seen if abs(load - 1.0) < 0.01]))
+    first, down, up = ways
+    assert first == pytest.approx((1.0 - SPRING.friction_Nm) / SPRING.stiffness_Nm_per_rad, rel=0.01)
+    assert down == pytest.approx((1.0 + SPRING.friction_Nm) / SPRING.stiffness_Nm_per_rad, rel=0.01)
+    assert down - up == pytest.approx(SPRING.backlash_rad, rel=0.01)
+    data.qfrc_applied[:] = 0.0
+    for q in np.linspace(0.0, 0.5, 2_000):
+        model.eq_data[0, 0] = q
+        mujoco.mj_step(model, data)
+    assert float(data.qpos[joint]) == pytest.approx(0.5 * RATIO, abs=1.1 * SPRING.backlash_rad)
+
+
+def test_urdf_holds_friction_and_says_what_it_cannot() -> None:
+    text = urdf_model(JOINT, SPRING, MotorModel())
+    robot = ET.fromstring(text)
+    dynamics = robot.find("joint[@name='joint']/dynamics")
+    assert dynamics is not None
+    assert float(dynamics.get("friction", "")) == SPRING.friction_Nm
+    mimic = robot.find("joint[@name='motor']/mimic")
+    assert mimic is not None
+    assert float(mimic.get("multiplier", "")) * RATIO == pytest.approx(1.0)
+    assert "no stiffness and no backlash" in text
+
+
+@pytest.mark.parametrize("name", ["arm 3/left", "7", "a-->b", "*/"])
+def test_any_name_makes_a_file_that_parses(name: str) -> None:
+    joint = JOINT.model_copy(update={"name": name})
+    ET.fromstring(mujoco_model(joint, SPRING, MotorModel()))
+    ET.fromstring(urdf_model(joint, SPRING, MotorModel()))
+    assert identifier(name).isidentifier()
+    assert c_source(joint, PLAYS).count("*/") == c_source(JOINT, PLAYS).count("*/")
+
+
+def test_the_equivalent_lies_on_the_observers_loop() -> None:
+    """Its peak is the loop's, its width the loop's, and it leaves less of the loop than a straight line does."""
+    found = equivalent(JOINT)
+    assert found.backlash_rad == pytest.approx(2.0 * found.friction_Nm / found.stiffness_Nm_per_rad)
+    assert 2.0 * found.most_Nm / found.stiffness_Nm_per_rad == pytest.approx(found.reach_rad, rel=0.02)
+    assert found.rms_rad < 0.5 * found.backlash_rad
+    assert all(found.lost(JOINT))

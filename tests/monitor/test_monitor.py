@@ -1,0 +1,152 @@
+"""What the loop gives away arrives whole, never waits, and is drawn."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import PHONE, SIDEWAYS, browser, needs_browser, opened
+
+from cablecomp.monitor.frames import Frame, frame, unpacked
+from cablecomp.monitor.instrument import Instrument, packed
+from cablecomp.monitor.server import PageServer
+from cablecomp.monitor.sinks import Foxglove, Mcap, PlotJuggler
+from cablecomp.observer import WrapProfile
+from cablecomp.report.page import CSS
+
+WRAP = WrapProfile(
+    "cable h, output pulley", np.linspace(0.0, 6.0, 200), 60.0 + np.sin(np.linspace(0.0, 6.0, 200))
+)
+
+
+def made_up(k: int) -> Frame:
+    """Frame number k of a joint under a swinging load."""
+    load = float(np.sin(0.1 * k))
+    return frame(
+        {
+            "time_s": 0.04 * k, "joint": "wrist", "phase": "normal", "load_Nm": load, "deflection_rad": 1e-3 * load,
+            "deflection_low_rad": -1.0, "deflection_high_rad": 1.0, "residual_rad": 1e-5, "cycle_p99_s": 1e-4,
+            "late_p99_s": float("nan"), "misses": 0, "alarms": ["motor position is stale"] if k == 60 else [], "dropped": 0,
+        },
+        [WRAP],
+    )  # fmt: skip
+
+
+def test_a_frame_survives_the_way() -> None:
+    """Scalars, what is not finite, and the state's floats bit by bit; a state too large is left out, not the frame."""
+    state = np.random.default_rng(1).standard_normal(300)
+    seen: list[Any] = []
+
+    def profiles(vector: Any) -> list[WrapProfile]:
+        seen.append(vector)
+        return [WRAP]
+
+    found = unpacked(packed({"time_s": 1.5, "residual_rad": float("nan"), "alarms": ["a"]}, state), profiles)
+    assert np.array_equal(seen[0], state)
+    assert (found["time_s"], found["residual_rad"], found["alarms"]) == (1.5, None, ["a"])
+    wrap = found["wraps"][0]
+    assert wrap["name"] == WRAP.name
+    assert len(wrap["angle_rad"]) == len(wrap["tension_N"]) <= 60
+    assert (wrap["angle_rad"][0], wrap["angle_rad"][-1]) == (0.0, 6.0)
+    assert unpacked(packed({"time_s": 2.0}, np.zeros(20_000)), profiles)["wraps"] == []
+
+
+def test_nobody_is_waited_for() -> None:
+    """With nobody there, or nobody who reads, sending returns at once; what was lost is counted."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        instrument = Instrument(receiver.getsockname()[1])
+        for _ in range(200):
+            instrument.send(bytes(30_000))
+        assert instrument.sent + instrument.dropped == 200
+    before = instrument.dropped
+    for _ in range(4):
+        instrument.send(b"x")
+    assert instrument.dropped > before  # the port is closed: the system says so
+    instrument.close()
+
+
+def test_plotjuggler_gets_curves() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5.0)
+        sink = PlotJuggler(receiver.getsockname())
+        sink.take(made_up(10))
+        found = json.loads(receiver.recv(65_535))
+        sink.close()
+    assert found["timestamp"] == pytest.approx(0.4)
+    assert found["wrist"]["load_Nm"] == pytest.approx(np.sin(1.0))
+    assert all(isinstance(v, int | float) for v in found["wrist"].values())
+
+
+def test_the_file_holds_what_came_before_a_crash(tmp_path: Path) -> None:
+    """Cut off without its end, it gives back every frame but those of the last second."""
+    reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+    stream_reader = pytest.importorskip("mcap.stream_reader", reason="mcap is not installed")
+    path = tmp_path / "live.mcap"
+    sink = Mcap(path)
+    for k in range(101):
+        sink.take(made_up(k))
+    (tmp_path / "cut.mcap").write_bytes(path.read_bytes())  # what a crash would leave
+    sink.close()
+    with path.open("rb") as stream:
+        whole = [json.loads(m.data) for _, _, m in reader.make_reader(stream).iter_messages()]
+    assert whole == [made_up(k) for k in range(101)]
+    with (tmp_path / "cut.mcap").open("rb") as stream:
+        kept = [
+            json.loads(r.data)
+            for r in _until_the_end(stream_reader.StreamReader(stream))
+            if hasattr(r, "data") and hasattr(r, "channel_id")
+        ]
+    assert kept == whole[: len(kept)]
+    assert kept[-1]["time_s"] >= whole[-1]["time_s"] - 1.0
+
+
+def _until_the_end(reader: Any) -> Iterator[Any]:
+    from mcap.exceptions import McapError
+
+    try:
+        yield from reader.records
+    except (McapError, EOFError):
+        return
+
+
+def test_foxglove_is_served_on_loopback() -> None:
+    pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
+    sink = Foxglove(port=0)
+    sink.take(made_up(1))
+    with socket.create_connection(("127.0.0.1", sink.port), timeout=5.0):
+        pass
+    sink.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1280, PHONE])
+def test_the_page_draws_plays_and_scrubs(width: int) -> None:
+    """Every panel has marks, a wrap has one of its own; pause holds, the slider goes back, the end is said."""
+    server = PageServer("wrist <1>", CSS)
+    for k in range(60):
+        server.take(made_up(k))
+    with browser() as chromium, opened(chromium, server.address, width) as page:
+        page.wait_for_function("frames.length === 60 && Object.values(canvases).length === 5")
+        page.wait_for_function("Object.values(canvases).every((c) => c.canvas.dataset.marks > 1)")
+        assert page.evaluate(SIDEWAYS) <= 0
+        assert page.inner_text("h1") == "wrist <1>"
+        server.take(made_up(60))
+        page.wait_for_function("document.getElementById('alarms').textContent.includes('stale')")
+        page.click("#play")
+        server.take(made_up(61))
+        page.wait_for_function("frames.length === 62")
+        assert page.evaluate("at") == 60
+        page.evaluate("(() => { const s = document.getElementById('scrub'); s.value = 5; s.oninput(); })()")
+        page.wait_for_function("document.getElementById('when').textContent === '0.20 s'")
+        server.close()
+        page.wait_for_function("document.getElementById('words').textContent.includes('over')")
+        page.click("#play")
+        page.wait_for_function("at > 5")
