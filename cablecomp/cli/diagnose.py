@@ -22,6 +22,7 @@ from cablecomp.recording.folder import find_recordings
 from cablecomp.recording.inspection import require_motion
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
+from cablecomp.trials.own import concealed_beside
 
 
 class Together(StrEnum):
@@ -82,7 +83,7 @@ def diagnose_recordings(
         found = diagnose(joint, data, told, seed, None if session is None else session.value)
     with atomic_directory(out) as folder:
         write_diagnosis(found, folder)
-        page = diagnosis_page(found, joint_text(found.augmented_joint))
+        page = diagnosis_page(found, joint_text(found.augmented_joint), concealed_beside(out))
         (folder / "report.html").write_text(page, encoding="utf-8")
     if as_json:
         typer.echo(json.dumps(report_json(found), indent=1))

@@ -10,7 +10,7 @@ from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings
 from firmware_sim.plant.effects import EFFECTS, FORMS, LISTED, UNLISTED, EffectKind
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.mesh import COARSE, FINE, NORMAL, Resolution
-from firmware_sim.plant.sensors import SensorSpec, measure
+from firmware_sim.plant.sensors import SensorSpec
 
 __all__ = [
     "COARSE",
@@ -33,7 +33,6 @@ __all__ = [
     "Resolution",
     "SensorSpec",
     "StageConfig",
-    "measure",
     "noiseless",
     "simulate",
 ]
