@@ -188,6 +188,9 @@ def _finish(
     except OSError as error:
         page = "no report.html was written"
         failures.append(f"{report.folder}/report.html: cannot be written ({error.strerror}); free some space")
+    except InputError as error:  # of a recording that holds no row
+        page = "no report.html was written"
+        failures.append(str(error))
     with suppress(OSError):
         if as_json:
             echo_json(report.as_dict())
