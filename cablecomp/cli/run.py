@@ -83,8 +83,6 @@ def run(
     live: Annotated[
         bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
     ] = False,
-    effects: EffectsOption = None,
-    as_json: JsonOption = False,
     view: Annotated[
         bool,
         typer.Option("--view", help="a page to look on, on this machine; Foxglove too where it is installed"),
@@ -92,6 +90,8 @@ def run(
     plotjuggler: Annotated[
         bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
     ] = False,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     without_drive_timeout: Annotated[
         bool,
         typer.Option(
@@ -188,6 +188,9 @@ def _finish(
     except OSError as error:
         page = "no report.html was written"
         failures.append(f"{report.folder}/report.html: cannot be written ({error.strerror}); free some space")
+    except InputError as error:  # of a recording that holds no row
+        page = "no report.html was written"
+        failures.append(str(error))
     with suppress(OSError):
         if as_json:
             echo_json(report.as_dict())
