@@ -6,7 +6,7 @@ Imports nothing of the other packages. Start reading at `records.py` (what there
 
 from firmware_sim.plant.bench import PlantRun, simulate
 from firmware_sim.plant.config import EffectSpec, PlantConfig, StageConfig
-from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings, PlantTruth, noiseless
+from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings, PlantTruth
 from firmware_sim.plant.effects import EFFECTS, FORMS, LISTED, UNLISTED, EffectKind
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.mesh import COARSE, FINE, NORMAL, Resolution
@@ -33,6 +33,5 @@ __all__ = [
     "Resolution",
     "SensorSpec",
     "StageConfig",
-    "noiseless",
     "simulate",
 ]
