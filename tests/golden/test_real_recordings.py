@@ -36,14 +36,12 @@ def degrees(value_rad: float) -> float:
     return float(np.degrees(value_rad))
 
 
-@pytest.mark.xfail(strict=False, reason="not reached on one recording in every state: see the guide")
 def test_one_jaw_recording_names_the_friction_of_the_path(one_jaw: Diagnosis) -> None:
     print(f"\n  jaw, one recording: {one_jaw.verdict}, {[(n.effect, n.confidence) for n in one_jaw.named]}")
     assert "routing_friction" in {n.effect for n in one_jaw.named}
     assert one_jaw.verdict in ("explained", "partly explained")
 
 
-@pytest.mark.xfail(strict=False, reason="not reached on one recording in every state: see the guide")
 def test_what_it_names_predicts_what_it_was_not_fitted_to(one_jaw: Diagnosis) -> None:
     before, after = one_jaw.baseline, one_jaw.augmented
     print(f"\n  jaw, one recording, kept for the end: {degrees(before.final_rmse_rad):.2f} -> "
