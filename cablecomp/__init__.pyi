@@ -10,6 +10,9 @@ from .errors import CablecompError as CablecompError
 from .errors import DeviceError as DeviceError
 from .errors import InputError as InputError
 from .errors import InternalError as InternalError
+from .library import calibrate as calibrate
+from .library import diagnose as diagnose
+from .library import replay as replay
 from .observer import ErasePlan as ErasePlan
 from .observer import Observer as Observer
 from .observer import WrapProfile as WrapProfile

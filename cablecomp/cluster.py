@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -38,11 +38,14 @@ class Done(Generic[R]):
     failed: str = ""
 
 
-def spread(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], workers: Workers) -> Iterator[Done[R]]:
+def spread(
+    work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], workers: Workers
+) -> Generator[Done[R], None, None]:
     """Call `work(*job)` for every job; outcomes in the order in which they come.
 
     A job that raises, or whose process dies, is an outcome like others: it stops no other job. `work` is a function of
-    a module, what it takes and returns can be pickled. Raises InputError where the scheduler does not answer.
+    a module, what it takes and returns can be pickled. Once closed, it begins nothing more. Raises InputError where the
+    scheduler does not answer.
     """
     if workers.scheduler is not None:
         yield from _on_cluster(work, jobs, workers.scheduler)

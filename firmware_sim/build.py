@@ -14,16 +14,18 @@ from firmware_sim.joint import SimulatedJoint, Timing
 from firmware_sim.plantlike import PlantLike
 from firmware_sim.ports.base import Port
 from firmware_sim.wire.base import DriveWire
+from firmware_sim.wire.cia402 import Cia402Wire, Units
 from firmware_sim.wire.cubemars import CubeMarsWire
 from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.dbc import DbcWire, load_map
+from firmware_sim.wire.dynamixel import DynamixelWire
 from firmware_sim.wire.mit import MitWire, model_of
 from firmware_sim.wire.moteus import MoteusWire
 from firmware_sim.wire.odrive import FirmwareName, OdriveRates, OdriveWire
 from firmware_sim.wire.robstride import RobStrideWire
 from firmware_sim.wire.tables import MOST_JOINTS
 
-PROTOCOLS = ("mit", "cubemars", "robstride", "moteus", "odrive", "dbc")
+PROTOCOLS = ("mit", "cubemars", "robstride", "moteus", "cia402", "dynamixel", "odrive", "dbc")
 FD_PROTOCOLS = ("moteus",)
 MakePlant = Callable[[int], PlantLike]
 
@@ -31,7 +33,7 @@ MakePlant = Callable[[int], PlantLike]
 @dataclass(frozen=True)
 class BenchConfig:
     """What a bench consists of, apart from its plants and its port; `gains_per_turn`: a moteus's own kp and kd
-    (N m/turn, N m s/turn)."""
+    (N m/turn, N m s/turn); `units`: of a CiA 402 drive."""
 
     protocol: str = "mit"
     joints: int = 1
@@ -42,6 +44,7 @@ class BenchConfig:
     firmware: FirmwareName = "0.6"
     torque_constant: float = 0.1
     gains_per_turn: tuple[float, float] = (4.0, 0.05)
+    units: Units = field(default_factory=Units)
     drive: DriveConfig = field(default_factory=DriveConfig)
     sensor: SensorNodeConfig = field(default_factory=SensorNodeConfig)
     timing: Timing = field(default_factory=Timing)
@@ -65,6 +68,10 @@ def make_wire(config: BenchConfig, number: int) -> DriveWire:
         return RobStrideWire(number, config.model)
     if config.protocol == "moteus":
         return MoteusWire(number, *config.gains_per_turn)
+    if config.protocol == "cia402":
+        return Cia402Wire(number, config.units)
+    if config.protocol == "dynamixel":
+        return DynamixelWire(number, config.torque_constant)
     if config.protocol == "odrive":
         return OdriveWire(number, config.rates, config.torque_constant, config.firmware)
     mapped = None if config.map_path is None else load_map(config.map_path)
@@ -72,10 +79,12 @@ def make_wire(config: BenchConfig, number: int) -> DriveWire:
 
 
 def _drive_of(config: BenchConfig) -> DriveConfig:
-    """The drive as its protocol knows it: an ODrive starts in position control and has no impedance mode; MIT
-    drives but Damiao's and RobStride's report no error when the host falls silent."""
+    """The drive as its protocol knows it: ODrive, CiA 402 and Dynamixel start in position control and have no impedance
+    mode; MIT drives but Damiao's and RobStride's report no error when the host falls silent."""
     if config.protocol == "odrive":
         return replace(config.drive, mode=Mode.POSITION)
+    if config.protocol in ("cia402", "dynamixel"):  # they watch nobody until they are told to
+        return replace(config.drive, mode=Mode.POSITION, command_timeout_s=0.0)
     silent = config.protocol == "cubemars" or (
         config.protocol == "mit" and model_of(config.model).maker in ("cubemars", "katz")
     )

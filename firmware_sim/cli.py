@@ -117,6 +117,8 @@ def main(arguments: Sequence[str] | None = None, make_plant: MakePlant | None = 
             maker = scenario.plant_maker(options.config, told, options.seed)
             specs += told.faults
         faults = [parse_fault(text, options.seed + i) for i, text in enumerate(specs)]
+        if (options.bus == "dynamixel") != (config.protocol == "dynamixel"):
+            raise SimError("--bus dynamixel and --protocol dynamixel go together; both or none are accepted")
         port = open_port(options.bus, options.link, options.bitrate, fd=config.protocol in FD_PROTOCOLS)
         try:
             bench = make_bench(config, maker, port, faults)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from cablecomp import __version__
 from cablecomp.errors import CablecompError, ConfigError, DeviceError, InputError, InternalError, printable
@@ -31,6 +31,7 @@ COMMANDS: Final = {
     "inspect": "inspect.inspect_recording",
     "convert": "convert.convert_recording",
     "init": "init.init",
+    "calibrate": "calibrate.calibrate_joint",
     "info": "info.info",
     "design": "design.design",
     "identify": "identify.identify",
@@ -40,6 +41,20 @@ COMMANDS: Final = {
     "study": "study.study_bench",
 }
 """Command: its module here and function."""
+
+
+class Once(TyperCommand):
+    """A command whose options are given once, unless they say otherwise: of two values, one would be ignored."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As usual; raises InputError for an option given twice."""
+        before = args[: args.index("--")] if "--" in args else args
+        for option in (p for p in self.params if p.param_type_name == "option" and not p.multiple):
+            names = (*option.opts, *option.secondary_opts)
+            given = [a for a in before if a.partition("=")[0] in names]
+            if len(given) > 1:
+                raise InputError(f"{ctx.info_name}: {names[0]} is given {len(given)} times; give it once")
+        return super().parse_args(ctx, args)
 
 
 class Commands(TyperGroup):
@@ -55,7 +70,7 @@ class Commands(TyperGroup):
             return None
         module, function = COMMANDS[cmd_name].split(".")
         single = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        single.command(cmd_name)(getattr(import_module(f"cablecomp.cli.{module}"), function))
+        single.command(cmd_name, cls=Once)(getattr(import_module(f"cablecomp.cli.{module}"), function))
         return typer.main.get_command(single)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:

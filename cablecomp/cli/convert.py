@@ -10,6 +10,7 @@ import typer
 
 from cablecomp.cli.shared import console
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
 from cablecomp.recording.progress import progress_bar
 
@@ -23,11 +24,25 @@ def convert_recording(
     joint: JointOption = None,
     begin: Annotated[float, typer.Option("--from", help="leave out rows before this time, s")] = -inf,
     end: Annotated[float, typer.Option("--to", help="leave out rows after this time, s")] = inf,
+    late: Annotated[
+        list[str] | None,
+        typer.Option(help="CHANNEL=SECONDS: values that come so much later than the others', set right"),
+    ] = None,
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
     source = sources(words, link, dbc, joint).open(recording)
     with progress_bar(f"convert {recording.name}") as told:
-        rows = convert(source, to, (begin, end), told)
+        rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())))
     for note in source.notes:
         console.print(f"note: {note}")
     console.print(f"written: {to} ({rows:,} rows: {', '.join(source.channels)})", soft_wrap=True)
+
+
+def _late(word: str) -> tuple[str, float]:
+    channel, _, text = word.partition("=")
+    try:
+        return channel.strip(), float(text)
+    except ValueError:
+        raise InputError(
+            f"--late {word}: CHANNEL=SECONDS is accepted, such as joint_torque_Nm=0.04"
+        ) from None

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from functools import partial
+from math import nan
 from pathlib import Path
 from typing import Annotated
 
@@ -10,11 +13,12 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.shared import DEMO_LINK, console
-from cablecomp.cli.simulation import start_simulation
+from cablecomp.cli.simulation import start_simulation, true_values
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlConfig, load_control
 from cablecomp.diagnosis.calibrate import calibrate
+from cablecomp.diagnosis.result import Value
 from cablecomp.examples import example
 from cablecomp.links.load import load_link
 from cablecomp.links.schema import LinkConfig
@@ -55,7 +59,7 @@ def compare_controllers(
             bus,
             wanted,
             lambda wish: start_simulation(path, wish),
-            _calibrated,
+            partial(_calibrated, true_values(path, seed)),
             CompareOptions(out, seed, duration_s, min(10.0, duration_s)),
             time.perf_counter,
             view.say,
@@ -66,13 +70,20 @@ def compare_controllers(
     console.print(f"report: {page}")
 
 
-def _calibrated(config: JointConfig, columns: Columns) -> Calibrated:
+def _calibrated(truth: Mapping[str, float], config: JointConfig, columns: Columns) -> Calibrated:
     found = calibrate(config, {"calibration": columns})
-    rows = tuple(
-        (v.name, f"{v.value:.5g} ± {v.sd:.2g}" + ("" if v.nominal is None else f" (nominal {v.nominal:.5g})"))
-        for v in found.values
-    )
-    return Calibrated(found.config, rows, found.warnings)
+    rows = [(v.name, _beside(v, truth.get(v.name))) for v in found.values]
+    rows += [
+        (k.name, f"not told: nominal {k.nominal:.5g}, truth {truth.get(k.name, nan):.5g}") for k in found.kept
+    ]
+    return Calibrated(found.config, tuple(rows), found.warnings)
+
+
+def _beside(v: Value, true: float | None) -> str:
+    """A value with its sd, what was nominal and what the simulation was given."""
+    nominal = "" if v.nominal is None else f"nominal {v.nominal:.5g}"
+    known = "" if true is None else f", truth {true:.5g}: {abs(v.value - true) / v.sd:.1f} sd off"
+    return f"{v.value:.5g} ± {v.sd:.2g} ({nominal}{known})"
 
 
 def _summary(found: Comparison) -> None:

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, Control, console, control_of, read_joint
+from cablecomp.cli.shared import (
+    Config,
+    Control,
+    EffectsOption,
+    JsonOption,
+    console,
+    control_of,
+    echo_json,
+    read_joint,
+)
 from cablecomp.control.design import design_loop
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.design_page import design_page, design_tables
@@ -18,15 +27,21 @@ def design(
     rate: Annotated[float, typer.Option(help="loop rate, Hz")] = 1000.0,
     control: Control = None,
     out: Annotated[Path | None, typer.Option(help="folder for design.html")] = None,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Design gains from the drive's stiffness range: margins, hysteresis as a describing function, plots."""
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     wanted = control_of(control, joint)
     free = {"load_filter_Hz": None, "load_lead_s": None, "joint_feedback_per_s": None}
     wanted = wanted.model_copy(update={"compensator": wanted.compensator.model_copy(update=free)})
     found = design_loop(joint, rate, wanted)
-    console.print(design_tables(found))
     if out is not None:
         with atomic_directory(out) as folder:
             (folder / "design.html").write_text(design_page(found), encoding="utf-8")
+    if as_json:
+        echo_json(found)
+        return
+    console.print(design_tables(found))
+    if out is not None:
         console.print(f"plots: {out / 'design.html'}")

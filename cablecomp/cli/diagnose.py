@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from cablecomp.cli.beliefs import believe
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
-from cablecomp.cli.shared import Config, announce_compilation, console, read_joint, share_bar
+from cablecomp.cli.shared import (
+    Config,
+    EffectsOption,
+    JsonOption,
+    announce_compilation,
+    console,
+    read_joint,
+    share_bar,
+)
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
-from cablecomp.effects import load_effects
 from cablecomp.errors import path_text
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.folder import find_recordings
 from cablecomp.recording.inspection import require_motion
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
+from cablecomp.trials.own import concealed_beside
 
 
 class Together(StrEnum):
@@ -47,12 +57,8 @@ def diagnose_recordings(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of surrogates and resampling")] = 0,
-    effects: Annotated[
-        list[Path] | None, typer.Option(help="Python file that registers an effect of your own")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print diagnosis.json in place of the summary")
-    ] = False,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     words: MapOption = None,
     link: LinkOption = None,
     dbc: DbcOption = None,
@@ -69,20 +75,19 @@ def diagnose_recordings(
     if fleet is not None:
         work_fleet("diagnose", recordings, config, out, fleet)
         return
-    for path in effects or ():
-        load_effects(path)
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     reading = sources(words, link, dbc, which, joint)
     data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
     for name, columns in data.items():
         require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
-    if not as_json:
-        announce_compilation()
+    announce_compilation()
+    doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:
         found = diagnose(joint, data, told, seed, None if session is None else session.value)
+    found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         write_diagnosis(found, folder)
-        page = diagnosis_page(found, joint_text(found.augmented_joint))
+        page = diagnosis_page(found, joint_text(found.augmented_joint), concealed_beside(out))
         (folder / "report.html").write_text(page, encoding="utf-8")
     if as_json:
         typer.echo(json.dumps(report_json(found), indent=1))

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import Config, console, read_joint
+from cablecomp.cli.shared import Config, EffectsOption, JsonOption, console, echo_json, read_joint
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.report.info import bench_table
 from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
@@ -23,16 +23,18 @@ def identify(
     narrow: Annotated[
         bool, typer.Option("--narrow", help="tensions of nearly tangent pulleys (App. C)")
     ] = False,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     words: MapOption = None,
     link: LinkOption = None,
     dbc: DbcOption = None,
     which: JointOption = None,
 ) -> None:
     """True and acting coefficient of friction from a bench recording, the thesis's way."""
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     bench = bench_recording(sources(words, link, dbc, which, joint).read(recording).columns, joint)
-    console.print(
-        bench_table(
-            evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)
-        )
-    )
+    found = evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)
+    if as_json:
+        echo_json(found)
+    else:
+        console.print(bench_table(found))

@@ -2,31 +2,115 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+import re
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Final, get_args, get_origin
 
 import typer
 
+from cablecomp.cli.shared import console, warn
+from cablecomp.config import doubts, load_joint, read_toml, validated
+from cablecomp.config.draft import Draft, draft_text
 from cablecomp.config.reference import CONVENTIONS, reference
 from cablecomp.config.schema import JointConfig
 from cablecomp.control.options import ControlConfig
 from cablecomp.errors import InputError
+from cablecomp.examples import example, with_companions
 from cablecomp.links.schema import LinkConfig
 
-_FILES = (
+_FILES: Final = (
+    (Draft, "WHAT `cablecomp init` ASKS (--from, --set)"),
     (JointConfig, "JOINT FILE (--config)"),
     (ControlConfig, "CONTROL FILE (--control)"),
     (LinkConfig, "LINK FILE (--link)"),
 )
+_LINKS: Final = {
+    "moteus": "moteus-socketcan",
+    "odrive": "odrive-socketcan",
+    "cubemars": "cubemars-servo-socketcan",
+    "robstride": "robstride-socketcan",
+    "damiao": "damiao-socketcan",
+    "mit": "mit-socketcan",
+}
 
 
 def init(
-    keys: Annotated[bool, typer.Option("--keys", help="every key of joint, control and link files")] = False,
+    out: Annotated[Path, typer.Option(help="folder for joint.toml, link.toml")] = Path(),
+    answers: Annotated[
+        Path | None, typer.Option("--from", help="TOML file with the answers (see --keys); nothing is asked")
+    ] = None,
+    given: Annotated[
+        list[str] | None, typer.Option("--set", help="one answer, KEY=VALUE, such as cable=steel-7x7")
+    ] = None,
+    keys: Annotated[
+        bool, typer.Option("--keys", help="every key of the answers, of joint, control and link files")
+    ] = False,
 ) -> None:
-    """What can stand in a configuration: every key with unit, meaning, what is accepted, default."""
-    if not keys:
-        raise InputError(
-            "init: give --keys for the reference of all keys; `cablecomp example` lists examples"
-        )
-    typer.echo(CONVENTIONS)
-    for model, head in _FILES:
-        typer.echo(reference(model, f"{head}\n{'=' * len(head)}"))
+    """A joint file from what you know (asked, or by --set and --from); --keys: what can stand in a configuration."""
+    if keys:
+        typer.echo(CONVENTIONS)
+        for model, head in _FILES:
+            typer.echo(reference(model, f"{head}\n{'=' * len(head)}"))
+        return
+    told = dict(read_toml(answers)) if answers is not None else {}
+    told |= dict(_answer(word) for word in given or ())
+    if not told:
+        if not sys.stdin.isatty():
+            raise InputError(
+                "init: nobody to ask; give --set KEY=VALUE or --from FILE (cablecomp init --keys lists the keys)"
+            )
+        told = _asked()
+    draft = validated(Draft, told, "init" if answers is None else str(answers))
+    files = {"joint.toml": draft_text(draft), **_link(draft)}
+    for name, text in files.items():
+        place = out / name
+        if place.exists() and place.read_text(encoding="utf-8") != text:
+            raise InputError(f"{place}: is there already, and differs; remove it or give another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (out / name).write_text(text, encoding="utf-8")
+        console.print(f"written: {out / name}", soft_wrap=True)
+    warn(f"{out / 'joint.toml'}: {words}" for words in doubts(load_joint(out / "joint.toml")))
+
+
+def _answer(word: str) -> tuple[str, Any]:
+    """A KEY=VALUE as TOML would have it; what is no number is text."""
+    key, equals, text = word.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"--set {word}: KEY=VALUE is accepted, such as cable=steel-7x7")
+    try:
+        return key.strip(), float(text)
+    except ValueError:
+        return key.strip(), text.strip()
+
+
+def _asked() -> dict[str, Any]:
+    """Ask for every key; an empty answer takes the default, or leaves it out."""
+    told: dict[str, Any] = {}
+    for key, field in Draft.model_fields.items():
+        choices = get_args(field.annotation) if str(get_origin(field.annotation)) == "typing.Literal" else ()
+        words = f"{key}: {field.description}" + (f" ({', '.join(map(str, choices))})" if choices else "")
+        default = None if field.is_required() else ("" if field.default is None else str(field.default))
+        text = typer.prompt(words, default=default, show_default=bool(default))
+        if str(text) != "":
+            told |= dict([_answer(f"{key}={text}")])
+    return told
+
+
+def _link(draft: Draft) -> dict[str, str]:
+    """The example link of this drive, its joint under the joint's name, and the message tables that it names."""
+    if draft.drive == "none":
+        return {}
+    source = example("links", _LINKS[draft.drive])
+    text = source.read_text(encoding="utf-8")
+    head, joint, tail = text.partition("[[joint]]")
+    tail = re.sub(
+        r'^name = "[^"]*"', lambda _: f"name = {json.dumps(draft.name)}", tail, count=1, flags=re.MULTILINE
+    )
+    text = f"# Written by `cablecomp init`: check channel, node and limits against your drive.\n{head}{joint}{tail}"
+    tomllib.loads(text)
+    beside = {p.name: p.read_text(encoding="utf-8") for p in with_companions(source)[1:]}
+    return {"link.toml": text, **beside}

@@ -1,102 +1,96 @@
-"""The command line's proof: blind trials, concealed by firmware_sim in a process of its own."""
+"""`cablecomp prove`: blind trials, on simulated joints or in the user's own recordings."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from cablecomp.cli.shared import console
-from cablecomp.errors import InputError
+from cablecomp.cli.concealing import Told, conceal_in, conceal_joints, experiment, trial_bar
+from cablecomp.cli.shared import announce_compilation, console, read_joint
+from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cluster import Workers
+from cablecomp.config_text import joint_text
+from cablecomp.errors import InputError, path_text
+from cablecomp.examples import resolve
+from cablecomp.recording.folder import find_recordings
+from cablecomp.report.concealed_page import concealed_table, write_concealed_page
 from cablecomp.report.scoreboard_page import scoreboard_table, write_scoreboard_page
+from cablecomp.trials.own import Own, OwnWish, prove_in
 from cablecomp.trials.prove import Blind, Wish, prove
 
-_TRIALS = (sys.executable, "-m", "firmware_sim.trials")
+KINDS = "single,single,single,pair,none,stranger,sessions,confounded"
 
 
 def prove_blindly(
-    trials: Annotated[int, typer.Option(min=1, help="how many joints")] = 200,
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Option("--in", help="conceal in these recordings of yours (files or folders; give it again for more)"),
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="with --in: their joint's configuration (TOML), or an example's name")
+    ] = None,
+    minutes: Annotated[
+        float, typer.Option(min=0.0, help="with --in: begin no trial after this; the same folder again goes on")
+    ] = 1.0,
+    rounds: Annotated[int, typer.Option(min=1, help="with --in: pieces; 4 hold every size once")] = 4,
+    seconds: Annotated[float, typer.Option(min=1.0, help="with --in: of recordings, in each piece")] = 20.0,
+    trials: Annotated[int, typer.Option(min=1, help="how many simulated joints")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="of everything that is drawn")] = 1,
-    out: Annotated[Path, typer.Option(help="folder for trials, verdicts, scoreboard")] = Path("prove"),
-    kind: Annotated[
-        str, typer.Option(help="mixed, or only single, pair, nothing, parameters, unknown, confounded")
-    ] = "mixed",
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
-) -> None:
-    """Blind trials: conceal physics in simulated joints, diagnose them, open the truth, keep the score."""
-    blind = Blind(out, conceal, experiment, workers=workers)
+    out: Annotated[Path, typer.Option(help="folder for trials, verdicts, answer and page")] = Path("prove"),
+    kinds: Annotated[str, typer.Option(help="what the joints conceal, in turn; one given twice comes twice")] = KINDS,
+    laws: Annotated[str, typer.Option(help="catalogue, other, or mixed")] = "mixed",
+    imperfections: Annotated[str, typer.Option(help="of the world: none, some, or all")] = "some",
+    workers: Annotated[int, typer.Option(min=1, help="processes on this machine")] = 2,
+    scheduler: Annotated[
+        str | None, typer.Option(help="address of a Dask scheduler to diagnose on, in place of --workers")
+    ] = None,
+    words: MapOption = None,
+    link: LinkOption = None,
+    dbc: DbcOption = None,
+    which: JointOption = None,
+) -> None:  # fmt: skip
+    """Blind trials: conceal physics in simulated joints or in your own recordings, diagnose, open the truth, keep the score."""
+    by = Workers(workers, scheduler)
+    announce_compilation()
+    if recordings is None:
+        if config is not None:
+            raise InputError(
+                "--config goes with --in: give recordings too, or leave it out for simulated joints"
+            )
+        _on_joints(Wish(trials, seed, kinds, laws, imperfections), out, by)
+        return
+    if config is None:
+        raise InputError("--in needs --config: the joint's configuration, as `cablecomp diagnose` takes it")
+    joint = read_joint(resolve(config, "joints"))
+    reading = sources(words, link, dbc, which, joint)
+    data = {path_text(p): reading.read(p, gaps=True).columns for p in find_recordings(recordings)}
+    own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
+    _in_recordings(own, OwnWish(seed, rounds, seconds, minutes), out)
 
-    def announce(sha256: str) -> None:
-        console.print(f"sealed truth, SHA-256 {sha256}", soft_wrap=True)
 
-    with _bar() as tell:
-        board = prove(blind, Wish(trials, seed, kind), tell, announce)
-    command = f"cablecomp prove --trials {trials} --seed {seed}" + (
-        f" --kind {kind}" if kind != "mixed" else ""
-    )
-    write_scoreboard_page(board, out / "scoreboard.html", command)
+def _on_joints(wish: Wish, out: Path, by: Workers) -> None:
+    def conceal(where: Path, wanted: Wish, told: Told) -> str:
+        return conceal_joints(where, wanted, by.processes, told)
+
+    with trial_bar() as tell:
+        board = prove(Blind(out.absolute(), conceal, experiment, by), wish, tell, _announce)
+    write_scoreboard_page(board, out / "scoreboard.html")
     console.print(scoreboard_table(board))
     console.print(f"report: {out / 'scoreboard.html'}")
 
 
-def conceal(out: Path, wish: Wish, told: Callable[[int, int], None]) -> str:
-    """Write trials and seal in a process of firmware_sim; returns the seal's SHA-256 as it printed it.
-
-    Raises InputError with that process's own line where it fails.
-    """
-    command = [*_TRIALS, "--trials", str(wish.trials), "--seed", str(wish.seed), "--kind", wish.kind]
-    sha256, last = "", ""
-    with subprocess.Popen(
-        [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            words, last = line.split(), line
-            if words[:1] == ["written"]:
-                told(int(words[1]), int(words[3]))
-            elif words[:1] == ["sha256"]:
-                sha256 = words[1]
-    if process.returncode != 0 or not sha256:
-        raise InputError(_last_line(last))
-    return sha256
+def _in_recordings(own: Own, wish: OwnWish, out: Path) -> None:
+    with trial_bar() as tell:
+        found = prove_in(own, wish, tell, _announce)
+    answer = found.as_json()
+    write_concealed_page(answer, out / "concealed.html")
+    console.print(concealed_table(answer))
+    if found.done < found.of:
+        console.print(f"{found.done} of {found.of} trials are done; the same with more --minutes goes on")
+    console.print(f"report: {out / 'concealed.html'}")
 
 
-def experiment(sealed: Path, trial: int, protocol: Path, out: Path) -> None:
-    """Play a proposed experiment on a sealed joint in a process of firmware_sim; only the recording comes
-    back."""
-    options = {"--sealed": sealed, "--trial": trial, "--protocol": protocol, "--out": out}
-    command = [*_TRIALS, "experiment", *(str(x) for pair in options.items() for x in pair)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise InputError(_last_line(done.stderr))
-
-
-def _last_line(text: str) -> str:
-    lines = text.strip().splitlines()
-    return lines[-1].removeprefix("error: ") if lines else "the concealing process ended without a word"
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[str, int, int], None]]:
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def tell(what: str, done: int, of: int) -> None:
-            if what not in tasks:
-                tasks[what] = bar.add_task(what, total=of)
-            bar.update(tasks[what], completed=done, total=of)
-
-        yield tell
+def _announce(sha256: str) -> None:
+    console.print(f"sealed truth, SHA-256 {sha256}", soft_wrap=True)

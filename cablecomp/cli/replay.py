@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from cablecomp.cli.beliefs import believe_streamed
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
-from cablecomp.cli.shared import Config, announce_compilation, console, read_joint
+from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
 from cablecomp.config import in_session, session_of
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
+from cablecomp.recording.replay import required_channels
 from cablecomp.report.replay_page import write_replay
 
 
@@ -32,6 +35,8 @@ def replay(
         str | None,
         typer.Option(help="whose own values hold; the [[session]] that names the recording if absent"),
     ] = None,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     words: MapOption = None,
     link: LinkOption = None,
     dbc: DbcOption = None,
@@ -47,15 +52,20 @@ def replay(
     if fleet is not None:
         work_fleet("replay", [recording], config, out, fleet)
         return
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     source = sources(words, link, dbc, which, joint).open(recording)
     found = session_of(joint, recording, session)
     joint = in_session(joint, found)
     announce_compilation()
+    source.require(required_channels(joint), f"with [observer] load = {joint.observer.load!r}")
+    source = dataclasses.replace(source, notes=(*source.notes, *believe_streamed(joint, source)))
     with progress_bar(f"replay {recording.name}") as told:
         summary = write_replay(
             source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), told
         )
+    if as_json:
+        typer.echo(summary.to_json(), nl=False)
+        return
     table = Table(show_header=False, box=None)
     if summary.rmse_rad is not None:
         table.add_row("prediction error, RMS", f"{1e3 * summary.rmse_rad:.5g} mrad")

@@ -13,7 +13,17 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.live import LiveRun
-from cablecomp.cli.shared import DEMO_LINK, Config, Control, console, control_of, read_joint
+from cablecomp.cli.shared import (
+    DEMO_LINK,
+    Config,
+    Control,
+    EffectsOption,
+    JsonOption,
+    console,
+    control_of,
+    echo_json,
+    read_joint,
+)
 from cablecomp.config import JointConfig
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlMode
@@ -32,6 +42,9 @@ from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
 from cablecomp.runtime.ways_out import WaysOut
 
+CALIBRATE = Path("calibrate")
+"""The protocol of this name comes with the project."""
+
 
 def run(
     config: Config,
@@ -45,7 +58,12 @@ def run(
         bool, typer.Option("--sim", help="start the simulated joint as well; nothing else is needed")
     ] = False,
     control: Control = None,
-    protocol: Annotated[Path | None, typer.Option(help="what is asked for over time (TOML)")] = None,
+    protocol: Annotated[
+        Path | None,
+        typer.Option(
+            help="what is asked for over time (TOML), or `calibrate`: about 60 s that `cablecomp calibrate` needs"
+        ),
+    ] = None,
     mode: Annotated[ControlMode | None, typer.Option(help="what is controlled")] = None,
     duration: Annotated[float | None, typer.Option(help="end after this many seconds", min=0.0)] = None,
     out: Annotated[Path, typer.Option(help="folder for recording, predictions, report")] = Path("run"),
@@ -53,9 +71,6 @@ def run(
     bounds: Annotated[
         bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
     ] = True,
-    calibration: Annotated[
-        bool, typer.Option("--calibration", help="the protocol to calibrate from")
-    ] = False,
     comparison: Annotated[
         bool, typer.Option("--compare", help="motor-side control, linear stiffness and observer side by side")
     ] = False,
@@ -75,6 +90,8 @@ def run(
     plotjuggler: Annotated[
         bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
     ] = False,
+    effects: EffectsOption = None,
+    as_json: JsonOption = False,
     without_drive_timeout: Annotated[
         bool,
         typer.Option(
@@ -86,7 +103,7 @@ def run(
     """Control a joint over a link, real or simulated; ends with a timing report and a recording that
     `replay` accepts.
     """
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     wanted = control_of(control, joint)
     bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=not sim)
     if link is None and not sim:
@@ -103,10 +120,10 @@ def run(
             update={"compensator": wanted.compensator.model_copy(update={"mode": mode})}
         )
     force = wanted.compensator.mode is ControlMode.FORCE
-    if protocol is not None:
-        asked = load_protocol(protocol)
-    elif calibration:
+    if protocol == CALIBRATE and not CALIBRATE.exists():
         asked = calibration_protocol(joint)
+    elif protocol is not None:
+        asked = load_protocol(protocol)
     else:
         span = 30.0 if duration is None else max(duration, 30.0)
         asked = force_protocol(joint, seed, span) if force else reaching_protocol(joint, seed, span)
@@ -127,7 +144,7 @@ def run(
         finally:
             if simulation is not None:
                 simulation.close()
-        _finish(report, joint, config, beside)
+        _finish(report, joint, config, beside, as_json)
 
 
 @contextmanager
@@ -159,7 +176,9 @@ def _installed(package: str) -> bool:
     return find_spec(package) is not None
 
 
-def _finish(report: RunReport, joint: JointConfig, config: Path, beside: LiveRun | None) -> None:
+def _finish(
+    report: RunReport, joint: JointConfig, config: Path, beside: LiveRun | None, as_json: bool
+) -> None:
     """Leave the page, say what came of it; a terminal that is gone by now changes nothing."""
     if beside is not None:
         report = beside.finish(report)
@@ -169,13 +188,20 @@ def _finish(report: RunReport, joint: JointConfig, config: Path, beside: LiveRun
     except OSError as error:
         page = "no report.html was written"
         failures.append(f"{report.folder}/report.html: cannot be written ({error.strerror}); free some space")
+    except InputError as error:  # of a recording that holds no row
+        page = "no report.html was written"
+        failures.append(str(error))
     with suppress(OSError):
-        _show(report)
-        for path in () if beside is None else beside.kept:
+        if as_json:
+            echo_json(report.as_dict())
+        else:
+            _show(report)
+        for path in () if beside is None or as_json else beside.kept:
             console.print(
                 f"mismatch: see {path.with_suffix('.json')}; cablecomp diagnose {path} --config {config}"
             )
-        console.print(page)
+        if not as_json:
+            console.print(page)
     if failures:
         raise DeviceError("; ".join(failures))
     if not report.ended_well:

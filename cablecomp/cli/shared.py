@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from cablecomp.config import JointConfig, doubts, load_joint
 from cablecomp.control.motors import control_for
 from cablecomp.control.options import ControlConfig, load_control
+from cablecomp.effects import load_effects
 from cablecomp.examples import resolve
 from cablecomp.mechanics.jit import is_compiled
 
@@ -36,13 +41,56 @@ Control = Annotated[
 ]
 
 
-def read_joint(path: Path) -> JointConfig:
-    """The joint configuration; what it states but hardly means is asked about on standard error."""
+EffectsOption = Annotated[
+    list[Path] | None, typer.Option("--effects", help="Python file that registers an effect of your own")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="print the result as JSON in place of the summary")]
+
+
+def read_joint(path: Path, effects: Sequence[Path] | None = None) -> JointConfig:
+    """The joint configuration, effects of the user's own registered first; what it states but hardly means is asked
+    about on standard error."""
+    for file in effects or ():
+        load_effects(file)
     joint = load_joint(path)
-    asking = Console(stderr=True, markup=False, emoji=False, highlight=False, soft_wrap=True)
-    for words in doubts(joint):
-        asking.print(f"{path}: {words}", style="yellow")
+    warn(f"{path}: {words}" for words in doubts(joint))
     return joint
+
+
+def warn(lines: Iterable[str]) -> None:
+    """One line each on standard error."""
+    asking = Console(stderr=True, markup=False, emoji=False, highlight=False, soft_wrap=True)
+    for words in lines:
+        asking.print(words, style="yellow")
+
+
+def echo_json(result: object) -> None:
+    """A result on standard output as JSON: dataclasses and named tuples as objects, what is not finite as null."""
+    typer.echo(json.dumps(_plain(result), indent=1))
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        return _plain(value._asdict())
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, float | np.floating):
+        return float(value) if isfinite(value) else None
+    if isinstance(value, complex):
+        return {"real": _plain(value.real), "imaginary": _plain(value.imag)}
+    return (
+        value.item()
+        if isinstance(value, np.generic)
+        else value
+        if isinstance(value, int | str) or value is None
+        else str(value)
+    )
 
 
 def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
@@ -53,13 +101,40 @@ def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
 def announce_compilation() -> None:
     """Say so before the first use of this very version compiles its kernels."""
     if not is_compiled():
-        console.print("compiling the kernels, once for this version (under a minute) ...", style="dim")
+        Console(stderr=True).print(
+            "compiling the kernels, once for this version (under a minute) ...", style="dim"
+        )
 
 
 @contextmanager
 def share_bar() -> Iterator[Callable[[str, float], None]]:
-    """Give a function to be told (what is being tried, share done); the bar goes when it is over."""
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    """Give a function to be told (what is being tried, share done); the bar never runs backwards, and goes when it is
+    over. Where standard error is no terminal, each new step is a plain line."""
+    console = Console(stderr=True, markup=False, emoji=False, highlight=False, soft_wrap=True)
+    done, said = 0.0, ""
+    if not console.is_terminal:
+
+        def line(what: str, share: float) -> None:
+            nonlocal done, said
+            done = max(done, share)
+            if what != said:
+                console.print(f"{100 * done:3.0f} %  {what}")
+            said = what
+
+        yield line
+        return
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
-        yield lambda what, share: bar.update(task, description=what, completed=share)
+
+        def told(what: str, share: float) -> None:
+            nonlocal done
+            done = max(done, share)
+            bar.update(task, description=what, completed=done)
+
+        yield told

@@ -13,8 +13,10 @@ from cablecomp.links.device_mit import reply_receiver
 from cablecomp.links.schema import LinkConfig, MotorEnd, SerialBus
 from cablecomp.links.schema_devices import (
     CanSimpleDevice,
+    Cia402Device,
     CubeMarsDevice,
     Device,
+    DynamixelDevice,
     MitDevice,
     MoteusDevice,
     RobStrideDevice,
@@ -24,9 +26,10 @@ from firmware_sim.build import BenchConfig
 from firmware_sim.errors import SimError
 from firmware_sim.faults import parse_fault
 from firmware_sim.firmware import DriveConfig
-from firmware_sim.hosted import HostedJoints, HostedSpec
-from firmware_sim.plant import LinkSpec, MotorSpec
+from firmware_sim.hosted import OFF_NOMINAL, HostedJoints, HostedSpec, off_nominal
+from firmware_sim.plant import LinkSpec, MotorSpec, PlantConfig
 from firmware_sim.plant.errors import PlantError
+from firmware_sim.wire.cia402 import Units
 
 
 def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
@@ -53,6 +56,13 @@ def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
         return _Joints(spec)
     except (SimError, PlantError) as error:
         raise InputError(f"simulated joint: {error}") from None
+
+
+def true_values(joint: Path, seed: int) -> dict[str, float]:
+    """What a simulated joint off its nominal values is given, by parameter (first stage)."""
+    data = read_toml(joint)
+    stage = off_nominal(PlantConfig.from_dict(data, str(joint)), data.get("tolerance", {}), seed).stages[0]
+    return {key: float(getattr(stage, key)) for key in OFF_NOMINAL}
 
 
 class _Joints(HostedJoints):
@@ -107,13 +117,21 @@ def _bench_of(device: Device, end: MotorEnd) -> BenchConfig:
         return BenchConfig(protocol="moteus", gains_per_turn=gains)
     if isinstance(device, CanSimpleDevice):
         return BenchConfig(protocol="odrive", firmware=device.firmware)
+    if isinstance(device, Cia402Device):
+        turn = device.counts_per_turn
+        second = device.joint_encoder_counts_per_turn or turn
+        units = Units(turn, device.velocity_counts_per_turn_s or turn, second, device.rated_torque_Nm)
+        return BenchConfig(protocol="cia402", units=units)
+    if isinstance(device, DynamixelDevice):
+        return BenchConfig(protocol="dynamixel", torque_constant=device.torque_constant_Nm_per_A)
     return BenchConfig(protocol="dbc")
 
 
 def _bus(link: LinkConfig) -> str:
     bus = link.bus
     if isinstance(bus, SerialBus):
-        return "serial"
+        packets = any(isinstance(device, DynamixelDevice) for device in link.device)
+        return "dynamixel" if packets else "serial"
     if bus.interface == "slcan":
         return "slcan"
     if bus.interface == "virtual":

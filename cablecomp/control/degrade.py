@@ -26,12 +26,12 @@ class DegradeTimes(NamedTuple):
     within `recover_s`. `motor_stop_s`: age of the motor position at which the joint is stopped at once.
     """
 
-    fresh_s: float = 0.004
-    hold_s: float = 0.01
-    fade_s: float = 0.1
-    stop_s: float = 0.2
-    recover_s: float = 0.1
-    motor_stop_s: float = 0.05
+    fresh_s: float
+    hold_s: float
+    fade_s: float
+    stop_s: float
+    recover_s: float
+    motor_stop_s: float
 
 
 class DegradeState(NamedTuple):
@@ -58,8 +58,6 @@ def degrade(
         return state
     age = load_age_s if load_age_s > motor_age_s else motor_age_s
     if age <= times.fresh_s:
-        if state.weight >= 1.0:
-            return NORMAL
         weight = state.weight + period_s / times.recover_s
         return NORMAL if weight >= 1.0 else DegradeState(Phase.RECOVERING, weight, age)
     if state.phase not in (Phase.NORMAL, Phase.RECOVERING):

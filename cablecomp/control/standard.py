@@ -32,44 +32,81 @@ class Span(NamedTuple):
 
 
 def span_of(config: JointConfig, share: float = 0.8) -> Span:
-    """The joint's limits, drawn in to `share`; +-45 degrees where it states none."""
-    low, high = config.limits.joint_position_min_rad, config.limits.joint_position_max_rad
-    low = -pi / 4 if low is None else low
-    high = pi / 4 if high is None else high
+    """The limits of joint and motor, drawn in to `share`; +-45 degrees where none is stated."""
+    limits, ratio = config.limits, config.drive.ratio
+    lows = [limits.joint_position_min_rad, _at_joint(limits.motor_position_min_rad, ratio)]
+    highs = [limits.joint_position_max_rad, _at_joint(limits.motor_position_max_rad, ratio)]
+    low = max((v for v in lows if v is not None), default=-pi / 4)
+    high = min((v for v in highs if v is not None), default=pi / 4)
     middle, half = 0.5 * (low + high), 0.5 * share * (high - low)
-    return Span(share * greatest_load(config), middle - half, middle + half)
+    most = greatest_load(config)
+    if limits.motor_torque_max_Nm is not None:
+        most = min(most, limits.motor_torque_max_Nm / ratio)
+    return Span(share * most, middle - half, middle + half)
+
+
+def _at_joint(motor_rad: float | None, ratio: float) -> float | None:
+    return None if motor_rad is None else ratio * motor_rad
 
 
 def calibration_protocol(config: JointConfig, share: float = 0.8) -> Protocol:
-    """About 60 s that show EA, pretension and both coefficients of friction: load loops within loops,
-    at rest and turning.
+    """About 60 s that show EA, pretension and both coefficients of friction: a swing through the range, which erases
+    what went before; load loops within loops at rest; motion under changing load.
     """
     s = span_of(config, share)
-    m = s.load_Nm
-    one_sided = config.drive.circuit == "open"
-    base = 0.5 * m if one_sided else 0.0
-    peaks = tuple(base + x * (m - base) for x in (1.0, -0.9, 0.7, -0.5, 0.35, -0.2))
-    speed = (s.high_rad - s.low_rad) / 4.0
+    m, base = s.load_Nm, _base(config, s)
+    slower = _slower(config, s)
     segments: tuple[Segment, ...] = (
         Ramp(duration_s=1.0, load_Nm=base),
-        NestedReversals(peaks=peaks, rate=0.55 * m),
-        Hold(duration_s=1.0),
-        AngleSweep(
-            from_rad=s.low_rad,
-            to_rad=s.high_rad,
-            speed_rad_s=speed,
-            load_Nm=base + 0.4 * (m - base),
-            load_rate_Nm_s=m,
-        ),
-        Ramp(duration_s=3.0, position_rad=s.low_rad, load_Nm=m),
-        Ramp(duration_s=4.0, position_rad=s.high_rad, load_Nm=base - 0.8 * (m - base)),
-        Ramp(duration_s=3.0, position_rad=0.3 * s.high_rad, load_Nm=base + 0.5 * (m - base)),
-        SineSweep(amplitude=0.35 * m if not one_sided else 0.2 * m, from_Hz=0.15, to_Hz=0.4, duration_s=10.0),
-        Ramp(duration_s=3.0, position_rad=s.low_rad, load_Nm=base - 0.5 * (m - base)),
-        Ramp(duration_s=4.0, position_rad=0.0, load_Nm=base + 0.9 * (m - base)),
+        *turning_under_load(config, share),
+        Ramp(duration_s=2.0 * slower, position_rad=0.5 * (s.low_rad + s.high_rad), load_Nm=base),
+        *loops_at_rest(config, share),
+        Ramp(duration_s=3.0 * slower, position_rad=s.low_rad, load_Nm=m),
+        Ramp(duration_s=4.0 * slower, position_rad=s.high_rad, load_Nm=base - 0.8 * (m - base)),
+        Ramp(duration_s=3.0 * slower, position_rad=0.3 * s.high_rad, load_Nm=base + 0.5 * (m - base)),
+        SineSweep(amplitude=0.35 * m if base == 0.0 else 0.2 * m, from_Hz=0.15, to_Hz=0.4, duration_s=10.0),
+        Ramp(duration_s=3.0 * slower, position_rad=s.low_rad, load_Nm=base - 0.5 * (m - base)),
+        Ramp(duration_s=4.0 * slower, position_rad=0.0, load_Nm=base + 0.9 * (m - base)),
         Unload(rate_Nm_s=0.5 * m, dwell_s=0.5),
     )
     return Protocol(name="calibration", segment=segments, note="made from the joint's limits")
+
+
+def loops_at_rest(config: JointConfig, share: float = 0.8) -> tuple[Segment, ...]:
+    """Load loops within loops, the motor at rest."""
+    s = span_of(config, share)
+    base = _base(config, s)
+    peaks = tuple(base + x * (s.load_Nm - base) for x in (1.0, -0.9, 0.7, -0.5, 0.35, -0.2))
+    return NestedReversals(peaks=peaks, rate=0.55 * s.load_Nm), Hold(duration_s=1.0)
+
+
+def turning_under_load(config: JointConfig, share: float = 0.8) -> tuple[Segment, ...]:
+    """There and back through the range under a load that is held."""
+    s = span_of(config, share)
+    base = _base(config, s)
+    return (
+        AngleSweep(
+            from_rad=s.low_rad,
+            to_rad=s.high_rad,
+            speed_rad_s=(s.high_rad - s.low_rad) / (4.0 * _slower(config, s)),
+            load_Nm=base + 0.4 * (s.load_Nm - base),
+            load_rate_Nm_s=s.load_Nm,
+        ),
+    )
+
+
+def _base(config: JointConfig, span: Span) -> float:
+    """The load about which a protocol works: an open circuit has to be kept taut."""
+    return 0.5 * span.load_Nm if config.drive.circuit == "open" else 0.0
+
+
+def _slower(config: JointConfig, span: Span) -> float:
+    """By what motions are stretched so that the motor keeps its speed; a least-jerk move peaks at 1.875 of its mean."""
+    most = config.limits.motor_velocity_max_rad_s
+    if most is None:
+        return 1.0
+    peak = 1.875 * (span.high_rad - span.low_rad) / 4.0 / config.drive.ratio
+    return max(1.0, peak / (0.8 * most))
 
 
 def reaching_protocol(

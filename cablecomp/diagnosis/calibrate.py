@@ -1,8 +1,12 @@
-"""Calibration of the nominal drive: what is only nominally known, fitted to recordings within its tolerance."""
+"""Calibration of the nominal drive: what is only nominally known, fitted to recordings within its tolerance.
+
+A value that the recordings do not tell, or that ended on its bound, is never given out as known: it keeps what was
+nominal, and its tolerance, and it is said why and which motion would tell it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,29 +14,53 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.augmented import augmented_joint
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
-from cablecomp.diagnosis.calibration import calibrate_drive
+from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
+from cablecomp.diagnosis.every_sample import on_every_sample
 from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.motion import Advice, what_would_tell
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.values import drive_values
-from cablecomp.estimation.evidence import Evidence
-from cablecomp.estimation.least_squares import covariance, rms_left
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
+from cablecomp.estimation.limits import EXACT
+from cablecomp.signal.noise import channel_noise
 
 UNTOLD = 0.9
 """Share of its prior's sd from which a parameter's own sd says that the recordings told nothing of it."""
+TIED = 0.9
+"""Correlation from which on two values are said to be known only together."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A value that stays nominal: `why`, and what would tell it (None: no motion within the limits)."""
+
+    name: str
+    nominal: float
+    tolerance: float
+    why: str
+    advice: Advice | None
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """`config`: the configuration with the fitted values and zeros; `values`: each with its sd and what was nominal;
-    `rmse_rad`, `nominal_rmse_rad`: what is left with them and with the nominal ones, zeros taken off; `noise_rad`: what noise
-    alone would leave; `warnings`: one line each."""
+    """`config`: the configuration with the values that are known now, their tolerances and zeros; `values`: those, each
+    with its sd and what was nominal; `kept`: what stays nominal; `tied`: pairs of values known only together, with
+    their correlation; `rmse_rad`, `nominal_rmse_rad`: what is left of all samples with them and with the nominal ones,
+    zeros taken off; `noise_rad`: the joint encoder's own noise; `warnings`: one line each."""
 
     config: JointConfig
     values: tuple[Value, ...]
+    kept: tuple[Kept, ...]
+    tied: tuple[tuple[str, str, float], ...]
     rmse_rad: float
     nominal_rmse_rad: float
     noise_rad: float
     warnings: tuple[str, ...]
+    fit: Fit
 
     def __getitem__(self, name: str) -> Value:
         """The value of that name."""
@@ -40,30 +68,37 @@ class Calibration:
 
 
 def calibrate(
-    config: JointConfig, recordings: Mapping[str, Columns], seed: int = 0, sessions: Sessions | None = None
+    config: JointConfig,
+    recordings: Mapping[str, Columns],
+    seed: int = 0,
+    sessions: Sessions | None = None,
+    progress: Progress = lambda what, share: None,
 ) -> Calibration:
     """Fit what `[tolerance]` frees, and the zeros, to all rows of the recordings (name or path -> canonical channels).
 
     Raises InputError for recordings that lack a channel or that the nominal joint cannot follow.
     """
+    progress("cleaning the recordings", 0.0)
     body = gather_body(config, recordings, sessions)
+    progress("a quick fit on thinned rows", 0.1)
     drive = calibrate_drive(config, _everything(body), np.random.default_rng(seed))
-    fit = drive.fit
+    progress("the fit on every sample", 0.3)
+    fit = on_every_sample(drive, recordings)
+    progress("what could not be told", 0.9)
+    unknown = _not_told(fit)
+    spread, tied = _spread(fit), _tied(fit)
+    fit = _without(fit, tuple(unknown))
     joint = augmented_joint(config, Model((), fit, fit.residual), (), body.names)
-    warnings = [f"{name} ended on its bound: its value is not known" for name in fit.at_bound()]
-    sd = np.sqrt(np.diag(covariance(fit)))
-    for p, s in zip(fit.problem.parameters, sd, strict=True):
-        if s > UNTOLD * p.sd:
-            warnings.append(f"{p.name}: these recordings tell nothing of it; it stays near its nominal value")
-    if drive.lost_rows:
-        warnings.append(f"{drive.lost_rows} rows were given up to the history before the first sample")
     return Calibration(
-        joint,
-        drive_values(fit, config),
+        _with_tolerances(joint, fit, spread),
+        tuple(_as_wide(v, fit, spread) for v in drive_values(fit, config)),
+        tuple(_kept(drive, name, why) for name, why in unknown.items()),
+        tied,
         rms_left(fit),
-        rms_left(drive.nominal),
-        drive.floor_rad,
-        tuple(warnings),
+        rms_left(replace(fit, x=fit.problem.start)),
+        float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])),
+        _warnings(drive, fit),
+        fit,
     )
 
 
@@ -75,3 +110,93 @@ def _everything(body: Body) -> list[Evidence]:
         replace(u, counted={k: v | f.counted[k] for k, v in u.counted.items()})
         for u, f in zip(body.used, body.final, strict=True)
     ]
+
+
+def _spread(fit: Fit) -> dict[str, float]:
+    """1-sigma of every parameter's coordinate, all others free: what is not told later on widens the rest as well."""
+    sd = np.sqrt(np.diag(covariance(fit)))
+    return {p.name: float(s) for p, s in zip(fit.problem.parameters, sd, strict=True)}
+
+
+def _as_wide(value: Value, fit: Fit, spread: Mapping[str, float]) -> Value:
+    """The value with the sd that it had while all others were free."""
+    for p, x in zip(fit.problem.parameters, fit.x, strict=True):
+        if p.name == value.name:
+            return replace(value, sd=spread[p.name] * abs(p.slope(float(x))))
+    return value
+
+
+def _not_told(fit: Fit) -> dict[str, str]:
+    """Parameters of which the recordings say nothing to be relied on, each with the reason."""
+    found = {}
+    sd = np.sqrt(np.diag(covariance(fit)))
+    bounded = fit.at_bound()
+    for p, s in zip(fit.problem.parameters, sd, strict=True):
+        if p.name in bounded:
+            found[p.name] = "the fit ended on its bound: what it would make up for is not its doing"
+        elif s > UNTOLD * p.sd:
+            found[p.name] = "these recordings tell nothing of it"
+    return found
+
+
+def _without(fit: Fit, names: tuple[str, ...]) -> Fit:
+    """The fit of the others, these at their nominal values."""
+    if not names:
+        return fit
+    kept = [k for k, p in enumerate(fit.problem.parameters) if p.name not in names]
+    problem = replace(fit.problem, parameters=tuple(fit.problem.parameters[k] for k in kept))
+    return refit(solve(problem, fit.x[kept], 6), fit.problem.weighing, 4)
+
+
+def _kept(drive: Calibrated, name: str, why: str) -> Kept:
+    p = next(p for p in drive.fit.problem.parameters if p.name == name)
+    advice = what_would_tell(drive.fit.problem.config, p, drive.floor_rad)
+    return Kept(name, p.start, p.sd, why, advice)
+
+
+def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:
+    cov = covariance(fit)
+    sd = np.sqrt(np.diag(cov))
+    names = [p.name for p in fit.problem.parameters]
+    found = []
+    for i in range(len(names)):
+        for k in range(i):
+            correlation = float(cov[i, k] / (sd[i] * sd[k]))
+            if abs(correlation) > TIED:
+                found.append((names[k], names[i], correlation))
+    return tuple(found)
+
+
+def _with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) -> JointConfig:
+    """Tolerances of what is known now: what the fit leaves, never less than what a drawing does."""
+    tolerance = dict(joint.tolerance)
+    for p in fit.problem.parameters:
+        if p.name in tolerance:
+            tolerance[p.name] = float(f"{max(spread[p.name], EXACT if p.log else 0.0):.2g}")
+    return joint.model_copy(update={"tolerance": tolerance})
+
+
+def _warnings(drive: Calibrated, fit: Fit) -> tuple[str, ...]:
+    found = []
+    if drive.lost_rows:
+        total = drive.lost_rows + sum(int(e.counted[JOINT].sum()) for e in drive.fit.problem.evidence)
+        found.append(
+            f"{100 * drive.lost_rows / total:.0f} % of the rows were given up to the history before the first sample"
+        )
+    count = max(_count_rad(e) for e in fit.problem.evidence) * fit.problem.config.drive.ratio
+    if count > float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
+        found.append(
+            f"one count of the motor encoder turns the joint by {1e6 * count:.2g} urad, more than the joint encoder's noise: "
+            "a motor that hunts within a count shakes friction loose unseen; mu_input is what acts then, not the material's"
+        )
+    if rms_left(fit) > 2.0 * float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
+        found.append("more than noise is left: `cablecomp diagnose` says what the model lacks")
+    return tuple(found)
+
+
+def _count_rad(e: Evidence) -> float:
+    """The motor angle's resolution as the recording shows it [rad]; 0 where it cannot be told."""
+    try:
+        return float(channel_noise(e.columns["time_s"], e.columns["motor_position_rad"]).resolution)
+    except InputError:
+        return 0.0

@@ -79,7 +79,7 @@ def diagnose(
     if not whole and final.terms:
         everything = final.fit.problem.with_evidence(drive.fit.problem.evidence)
         groups = make_groups(drive.fit)
-        fit = solve(everything, final.fit.x, 12)
+        fit = solve(everything, final.fit.x, 8)
         final = _settled(Model(final.terms, fit, left_out(fit, groups)), drive, groups)
     after = series_of(final.fit, seen, drive.floor_rad)
     rest = locate(after, rng, sensitivities(final.fit))
@@ -166,7 +166,7 @@ def _settled(model: Model, drive: Calibrated, groups: Groups) -> Model:
     """The model fitted with weights that its own remainder asks for, so that its uncertainties mean something."""
     fit = model.fit
     for _ in range(2):
-        fit = refit(fit, weighed(fit, drive.floor), 10)
+        fit = refit(fit, weighed(fit, drive.floor), 6)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 

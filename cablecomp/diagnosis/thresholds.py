@@ -18,12 +18,12 @@ class Thresholds:
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
     rows_each: int = 120
     """Judged rows that a recording has at least, however many recordings there are: six strokes of twenty."""
-    searched: int = 12
+    searched: int = 9
     """Recordings among which hypotheses are compared, spread over sessions and order; the final model is fitted to all."""
     search_weight: float = 0.5
     """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
     the calibration do not stand in the way of a better law."""
-    rounds: int = 5
+    rounds: int = 4
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
     zero: float = 0.7
     """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row counts for."""

@@ -10,10 +10,11 @@ from cablecomp.links.devices import Drive, Receiver, Take
 from cablecomp.links.port_can import can_port, fd_options
 from cablecomp.links.port_line import serial_port
 from cablecomp.links.ports import Port
-from cablecomp.links.protocols import extra_channels, make_drive, sensor_receivers
+from cablecomp.links.protocols import Shared, extra_channels, make_drive, sensor_receivers
 from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import NOT_TAKEN, BusState, Mode, MotorCommand, Request
 from cablecomp.links.schema import CanBus, LinkConfig
+from cablecomp.links.schema_devices import DynamixelDevice
 from cablecomp.signals import Wire
 
 
@@ -94,6 +95,9 @@ class Link(Protocol):
     def silent(self, now_s: float, longer_than_s: float) -> tuple[str, ...]:
         """Messages that never came, or not for longer than that, by name."""
 
+    def error_text(self, joint: int) -> str:
+        """The maker's words for the drive's present error; empty if there is none."""
+
     def close(self) -> None:
         """Close; may be called twice."""
 
@@ -108,9 +112,10 @@ class BusLink:
         readings: list[JointReadings] = []
         drives: list[Drive | None] = []
         receivers: list[Receiver] = []
+        shared = Shared()
         for ends in config.joint:
             joint = JointReadings(ends.name, extra_channels(config, ends))
-            drive = make_drive(config, ends, joint)
+            drive = make_drive(config, ends, joint, shared)
             readings.append(joint)
             drives.append(drive)
             receivers += drive.receivers() if drive is not None else ()
@@ -232,7 +237,7 @@ class BusLink:
         return tuple(m.name for m, age in zip(messages, ages, strict=True) if age > longer_than_s)
 
     def error_text(self, joint: int) -> str:
-        """The maker's words for the drive's present error; empty if there is none."""
+        """See `Link.error_text`."""
         drive = self._drives[joint]
         return "" if drive is None else drive.error_text(self.joints[joint].error)
 
@@ -247,7 +252,8 @@ def make_port(config: LinkConfig) -> Port:
     if isinstance(bus, CanBus):
         options = {**fd_options(bus.interface, bus.fd, bus.bitrate, bus.data_bitrate), **bus.options}
         return can_port(bus.interface, bus.channel, bus.bitrate, options)
-    return serial_port(bus.port, bus.baud)
+    packets = any(isinstance(device, DynamixelDevice) for device in config.device)
+    return serial_port(bus.port, bus.baud, dynamixel=packets)
 
 
 class Strangers:

@@ -10,8 +10,8 @@ from cablecomp.errors import InputError
 from cablecomp.examples import resolve
 from cablecomp.links.devices import Claim
 from cablecomp.links.protocols import claims_of
-from cablecomp.links.schema import CanBus, LinkConfig
-from cablecomp.links.schema_devices import MoteusDevice
+from cablecomp.links.schema import CanBus, LinkConfig, SerialBus
+from cablecomp.links.schema_devices import DynamixelDevice, MoteusDevice
 
 
 def _tuples(data: Any) -> Any:
@@ -36,6 +36,7 @@ def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkC
     lines = data.lines() if isinstance(data, TomlTable) else None
     config = validated(LinkConfig, {**_tuples(data), "folder": folder}, where, lines)
     _check_fd(config, where)
+    _check_line(config, where)
     _check_identifiers(config, where)
     return config
 
@@ -47,6 +48,16 @@ def _check_fd(config: LinkConfig, where: str) -> None:
         raise InputError(
             f"{where}: device `{wanting.id}` speaks `{wanting.protocol}`, which needs CAN FD; set bus.fd = true, "
             "on an interface that can"
+        )
+
+
+def _check_line(config: LinkConfig, where: str) -> None:
+    """Raise InputError where Dynamixel packets would go over a CAN bus, or share a line with something else."""
+    packets = [isinstance(device, DynamixelDevice) for device in config.device]
+    if any(packets) and not (all(packets) and isinstance(config.bus, SerialBus)):
+        raise InputError(
+            f'{where}: a `dynamixel` needs a line of its own: bus.kind = "serial", and no other protocol on it, is '
+            "accepted"
         )
 
 

@@ -1,5 +1,5 @@
-"""A line of bytes (serial port, pseudo-terminal): records on it are cut by a reader, slcan text or COBS
-records."""
+"""A line of bytes (serial port, pseudo-terminal): records on it are cut by a reader, slcan text, COBS
+records or Dynamixel packets."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import can
 import serial
 
 from cablecomp.errors import DeviceError
+from cablecomp.links import dynamixel as packets
 from cablecomp.links import serial_frames, slcan_frames
 from cablecomp.links.ports import PortBase, Sink
 from cablecomp.links.records import BusState
@@ -174,8 +175,8 @@ class LinePort(PortBase):
         self.state = BusState.CLOSED
 
 
-def serial_port(port: str, baud: int) -> LinePort:
-    """COBS records on a serial port; opening raises DeviceError if it cannot be had."""
+def serial_port(port: str, baud: int, *, dynamixel: bool = False) -> LinePort:
+    """COBS records, or Dynamixel packets, on a serial port; opening raises DeviceError if it cannot be had."""
 
     def attach() -> tuple[Any, Callable[[], None]]:
         try:
@@ -188,6 +189,8 @@ def serial_port(port: str, baud: int) -> LinePort:
             ) from None
         return line, line.close
 
+    if dynamixel:
+        return LinePort(attach, packets.pack, packets.StatusReader())
     return LinePort(attach, serial_frames.pack_record, serial_frames.RecordReader())
 
 

@@ -7,27 +7,34 @@ from collections.abc import Iterator
 from cablecomp.errors import InputError
 from cablecomp.links import (
     device_cansimple,
+    device_cia402,
     device_cubemars,
     device_dbc,
+    device_dynamixel,
     device_mit,
     device_moteus,
     device_robstride,
 )
 from cablecomp.links.device_cansimple import CanSimpleDrive
+from cablecomp.links.device_cia402 import Cia402Drive
 from cablecomp.links.device_cubemars import CubeMarsDrive
 from cablecomp.links.device_damiao import DamiaoDrive
 from cablecomp.links.device_dbc import DbcDrive, build_sources
+from cablecomp.links.device_dynamixel import DynamixelDrive, Line
 from cablecomp.links.device_mit import MitDrive
 from cablecomp.links.device_moteus import MoteusDrive
 from cablecomp.links.device_robstride import RobStrideDrive
 from cablecomp.links.devices import Claim, Drive, Receiver
 from cablecomp.links.readings import JointReadings
+from cablecomp.links.rounds import Round
 from cablecomp.links.schema import JointEnds, LinkConfig, MotorEnd, SensorEnd
 from cablecomp.links.schema_devices import (
     CanSimpleDevice,
+    Cia402Device,
     CubeMarsDevice,
     DbcDevice,
     Device,
+    DynamixelDevice,
     MitDevice,
     MoteusDevice,
     RobStrideDevice,
@@ -51,6 +58,10 @@ def _extra(device: Device) -> tuple[str, ...]:
         return device_moteus.EXTRAS
     if isinstance(device, CanSimpleDevice):
         return device_cansimple.extra_channels(device)
+    if isinstance(device, Cia402Device):
+        return ()
+    if isinstance(device, DynamixelDevice):
+        return (device_dynamixel.VOLTAGE,)
     return device_dbc.extra_channels(device)
 
 
@@ -68,19 +79,31 @@ def second_encoder(config: LinkConfig, ends: JointEnds) -> SensorEnd | None:
     return end
 
 
-def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings) -> Drive | None:
-    """The drive of a joint, None where it has none on this link."""
+class Shared:
+    """What the drives of one link have in common."""
+
+    def __init__(self) -> None:
+        self.sync: Round[None] = Round()
+        self.line = Line()
+
+
+def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings, shared: Shared) -> Drive | None:
+    """The drive of a joint, None where it has none on this link; `shared` is all drives' of the link."""
     end = ends.motor
     if end is None:
         return None
     device, second = config.device_of(end), second_encoder(config, ends)
     if isinstance(device, MoteusDevice):
         return MoteusDrive(device, end, joint, second)
+    if isinstance(device, Cia402Device):
+        return Cia402Drive(device, end, joint, shared.sync, config.rate_Hz, second)
     if second is not None:
         raise InputError(
             f"joint `{ends.name}`: device `{device.id}` speaks `{device.protocol}`, which tells of no second "
-            "encoder; a `dbc` device or a `moteus` drive is accepted as the joint's sensor"
+            "encoder; a `dbc` device, a `moteus` or a `cia402` drive is accepted as the joint's sensor"
         )
+    if isinstance(device, DynamixelDevice):
+        return DynamixelDrive(device, end, joint, shared.line)
     if isinstance(device, MitDevice):
         damiao = device_mit.family_of(device) == "damiao"
         return DamiaoDrive(device, end, joint) if damiao else MitDrive(device, end, joint)
@@ -127,4 +150,8 @@ def _claims(config: LinkConfig, end: MotorEnd | SensorEnd) -> tuple[Claim, ...]:
         return device_robstride.claims(device, end)
     if isinstance(device, MoteusDevice):
         return device_moteus.claims(device, end)
+    if isinstance(device, Cia402Device):
+        return device_cia402.claims(device, end)
+    if isinstance(device, DynamixelDevice):
+        return device_dynamixel.claims(device, end)
     return device_cansimple.claims(end)

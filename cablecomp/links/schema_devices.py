@@ -98,6 +98,39 @@ class MoteusDevice(Frozen):
     joint_encoder: Annotated[int, Field(ge=0, le=2)] = 1
 
 
+class Cia402Device(Frozen):
+    """A CANopen drive of profile CiA 402; `host`: the node number whose heartbeat it watches.
+
+    `counts_per_turn`: position units per turn of the shaft that it reports, `velocity_counts_per_turn_s` (if it is
+    not the same) velocity units per turn/s; `rated_torque_Nm`: what its torques are thousandths of (0x6076).
+    `feed_forward`: torque goes with position and velocity commands, as 0x60B2. `joint_encoder_counts_per_turn`: of
+    the encoder at the joint on its second input (0x60E4:01), if the joint's sensor is this drive.
+    """
+
+    protocol: Literal["cia402"]
+    id: Name
+    host: Annotated[int, Field(ge=1, le=127)] = 127
+    counts_per_turn: Positive
+    velocity_counts_per_turn_s: Positive | None = None
+    rated_torque_Nm: Positive
+    feed_forward: bool = True
+    heartbeat_s: Annotated[float, Field(ge=0.01, le=10.0)] = 0.1
+    joint_encoder_counts_per_turn: Positive | None = None
+
+
+class DynamixelDevice(Frozen):
+    """A Dynamixel of the X series, protocol 2.0, on a serial line that carries nothing else.
+
+    `current_unit_A`: current of one count, as in the model's control table; `torque_constant_Nm_per_A`: at the
+    output shaft.
+    """
+
+    protocol: Literal["dynamixel"]
+    id: Name
+    torque_constant_Nm_per_A: Positive
+    current_unit_A: Positive = 2.69e-3
+
+
 class CanSimpleDevice(Frozen):
     """An ODrive: `cyclic` names what it sends by itself, `polled` what is asked for with every command
     (firmware 0.6: all)."""
@@ -222,6 +255,13 @@ class DbcDevice(Frozen):
 
 
 Device = Annotated[
-    MitDevice | CubeMarsDevice | RobStrideDevice | MoteusDevice | CanSimpleDevice | DbcDevice,
+    MitDevice
+    | CubeMarsDevice
+    | RobStrideDevice
+    | MoteusDevice
+    | Cia402Device
+    | DynamixelDevice
+    | CanSimpleDevice
+    | DbcDevice,
     Field(discriminator="protocol"),
 ]

@@ -6,13 +6,14 @@ For tests, for a snapshot that is taken up, and for whoever doubts a state; far 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.mechanics.assemble import Model
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.profile import LEAST_WRAP, B, C, D, E, Floats, Ints, V, Y, piece_table
+from cablecomp.mechanics.profile import LEAST_WRAP, B, C, D, E, Floats, Ints, V, Y, piece
 from cablecomp.mechanics.records import IN, OUT, WET_NODES
 from cablecomp.mechanics.tables import groove
 
@@ -84,14 +85,14 @@ def _profile(model: Model, d: Drive, stack: int) -> list[str]:
 
 
 def _integrals(model: Model, law: int, y: Floats, v: Floats) -> Floats:
-    """Integral of e over every piece; for a tabulated law by the kernel's own quadrature, which defines it."""
+    """Integral of e over every piece: in closed form for the plain law, else by the kernel's own quadrature, which defines it."""
     dy, d = np.diff(y), np.diff(v)
     if model.L is None or model.L[0, 0, 0] == 0.0:
         small = np.abs(d) < 1e-9
         mean = np.where(small, 1.0 - 0.5 * d, -np.expm1(-d) / np.where(small, 1.0, d))
         return np.asarray(dy * (np.exp(v[1:]) * mean - 1.0))
-    ends = zip(y[:-1].tolist(), v[:-1].tolist(), y[1:].tolist(), v[1:].tolist(), strict=True)
-    return np.array([piece_table(model.L, law, *piece)[0] for piece in ends])
+    points = list(zip(y.tolist(), v.tolist(), np.exp(v).tolist(), strict=True))
+    return np.array([piece(model.L, law, *near, *far)[0] for near, far in pairwise(points)])
 
 
 def _sigma(model: Model, law: int, y: Floats) -> Floats:

@@ -35,6 +35,28 @@ def _base() -> Path:
 CACHE = _base() / "cablecomp" / _source_key()
 
 
+def drop_cut_short(folder: Path) -> int:
+    """Delete cached files that a power cut or a full disk cut short, so that they are made anew; returns how many.
+
+    Numba's files are pickles, whose last byte is a stop code; it replaces them whole, but leaves them to the disk.
+    """
+    dropped = 0
+    for path in folder.rglob("*.nb[ic]"):
+        try:
+            with path.open("rb") as file:
+                file.seek(max(path.stat().st_size - 1, 0))
+                whole = file.read(1) == b"."
+            if not whole:
+                path.unlink()
+                dropped += 1
+        except OSError:  # another process has just replaced it
+            continue
+    return dropped
+
+
+drop_cut_short(CACHE)
+
+
 def is_compiled() -> bool:
     """True if an earlier run left compiled kernels of these very sources on disk."""
     return any(CACHE.rglob("*.nbi"))

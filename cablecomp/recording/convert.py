@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import inf
 from pathlib import Path
 from typing import Final
@@ -26,8 +26,12 @@ def convert(
     to: Path,
     between_s: tuple[float, float] = (-inf, inf),
     progress: Callable[[float, int], None] | None = None,
+    late_s: Mapping[str, float] | None = None,
 ) -> int:
     """Write the rows of `source` with times within `between_s` to `to`, by its ending; returns how many.
+
+    `late_s`: channels whose values come so much later than the others', set right by interpolation; rows at the ends that
+    have no value then are left out, and all of the recording is held in memory.
 
     The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
     reading does.
@@ -35,7 +39,8 @@ def convert(
     ending = next((e for e in _ENDINGS if to.name.endswith(e)), None)
     if ending is None:
         raise InputError(f"{to}: {', '.join(_ENDINGS)} are accepted endings")
-    counted = _Counted(source.blocks(), between_s, progress)
+    blocks = _set_right(source, late_s) if late_s else source.blocks()
+    counted = _Counted(blocks, between_s, progress)
     names = order(source.channels)
     with atomic_file(to) as temporary:
         part = temporary.with_name(f"{temporary.name}{ending}")
@@ -49,6 +54,20 @@ def convert(
         finally:
             part.unlink(missing_ok=True)
     return counted.rows
+
+
+def _set_right(source: Recording, late_s: Mapping[str, float]) -> Iterator[Block]:
+    """The whole recording as one block, late channels moved to where they belong."""
+    source.require(late_s, "which is said to be late")
+    parts = [block.columns for block in source.blocks()]
+    whole = {n: np.concatenate([p[n] for p in parts]) for n in source.channels}
+    time = whole["time_s"]
+    for name, late in late_s.items():
+        whole[name] = np.interp(time + late, time, whole[name])
+    latest, earliest = max(*late_s.values(), 0.0), min(*late_s.values(), 0.0)
+    first, last = np.searchsorted(time, [time[0] - earliest, time[-1] - latest], side="left")
+    if last > first:
+        yield Block(1, {n: v[first:last] for n, v in whole.items()}, 1.0)
 
 
 class _Counted:

@@ -10,6 +10,7 @@ from cablecomp.diagnosis.result import Diagnosis, Traces, report_json
 from cablecomp.effects import catalogue
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report import page
+from cablecomp.report.concealed_page import concealed_section
 from cablecomp.report.diagnosis_answer import answer, shown_first
 from cablecomp.report.diagnosis_tables import (
     angle,
@@ -39,15 +40,16 @@ _DRAWN: Final = 6
 """Recordings whose curves are drawn."""
 
 
-def diagnosis_page(d: Diagnosis, augmented_toml: str = "") -> str:
-    """Return the page of one diagnosis as HTML that opens offline; `augmented_toml` is shown folded."""
+def diagnosis_page(d: Diagnosis, augmented_toml: str = "", concealed: Mapping[str, Any] | None = None) -> str:
+    """Return the page of one diagnosis as HTML that opens offline; `augmented_toml` is shown folded, `concealed` is what
+    `cablecomp prove --in` found of physics concealed in the same recordings."""
     many = len(d.sessions) > 1
     count = f"{len(d.recordings)} recording{'s' if len(d.recordings) > 1 else ''}"
     lead = f"{count}{f' in {len(d.sessions)} sessions' if many else ''}; {d.runtime_s:.0f} s."
-    return page.page(f"Diagnosis: {d.config.name}", lead, _sections(d, augmented_toml))
+    return page.page(f"Diagnosis: {d.config.name}", lead, _sections(d, augmented_toml, concealed))
 
 
-def _sections(d: Diagnosis, augmented_toml: str) -> Iterator[Section]:
+def _sections(d: Diagnosis, augmented_toml: str, concealed: Mapping[str, Any] | None) -> Iterator[Section]:
     result = report_json(d)
     unit = unit_for(result)
     yield answer(d, result, unit)
@@ -78,6 +80,8 @@ def _sections(d: Diagnosis, augmented_toml: str) -> Iterator[Section]:
     yield from _open_questions(d)
     if d.could_be_unseen:
         yield _unseen(d)
+    if concealed is not None:
+        yield concealed_section(concealed)
     yield from _files(d, augmented_toml)
 
 

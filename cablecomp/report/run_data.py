@@ -23,6 +23,11 @@ class RunData:
     cycles: dict[str, Floats]
 
     @property
+    def rows(self) -> int:
+        """Rows that there are to draw."""
+        return _rows(self.recording)
+
+    @property
     def controlled(self) -> NDArray[np.bool_]:
         """Rows under control, from half a second after it began."""
         time, on = self.recording["time_s"], self.cycles["controlled"] > 0.0
@@ -55,19 +60,27 @@ class RunData:
 
 
 def load_run(folder: Path, points: int = 6000) -> RunData:
-    """Read what a run left in a joint's folder."""
+    """Read what a run left in a joint's folder: the rows that all three tables hold (a disk that filled up may have
+    taken more of one than of another).
+    """
     recording = read_all(folder / "recording.csv").columns
-    step = max(1, len(recording["time_s"]) // points)
+    prediction, cycles = _columns(folder / "prediction.csv"), _columns(folder / "cycles.csv")
+    rows = min(_rows(table) for table in (recording, prediction, cycles))
+    step = max(1, rows // points)
     return RunData(
-        {name: values[::step] for name, values in recording.items()},
-        _columns(folder / "prediction.csv", step),
-        _columns(folder / "cycles.csv", step),
+        *({k: v[:rows:step] for k, v in table.items()} for table in (recording, prediction, cycles))
     )
 
 
-def _columns(path: Path, step: int) -> dict[str, Floats]:
+def _rows(table: dict[str, Floats]) -> int:
+    return min((len(column) for column in table.values()), default=0)
+
+
+def _columns(path: Path) -> dict[str, Floats]:
+    if not path.exists() or path.stat().st_size == 0:
+        return {}
     table = pl.read_csv(path, infer_schema_length=None)
     return {
-        name: np.asarray(table[name].cast(pl.Float64).fill_null(np.nan).to_numpy()[::step], dtype=np.float64)
+        name: np.asarray(table[name].cast(pl.Float64).fill_null(np.nan).to_numpy(), dtype=np.float64)
         for name in table.columns
     }

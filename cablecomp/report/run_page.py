@@ -161,6 +161,8 @@ def _sections(report: RunReport, config_text: str) -> Iterator[Section]:
         if not (folder / "recording.csv").exists():  # stopped before its first sample
             continue
         data = load_run(folder)
+        if data.rows == 0:  # a disk that was full from the beginning
+            continue
         yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
         yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data)), BAND)
         yield Section(f"{joint.name}: cables", page.figure(tension_figure(data)))

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from cablecomp.report import style
-from cablecomp.trials.scoreboard import Rate, Scoreboard
+from cablecomp.trials.scoreboard import Scoreboard
+from cablecomp.trials.shares import Rate
 
 RIGHT, WRONG, NOTHING = style.CABLE_L, style.CABLE_H, style.BASELINE
 _DECIDABLE = style.PREDICTED
@@ -18,11 +19,11 @@ def naming_by_size(board: Scoreboard) -> Any:
     """Share of single effects named rightly and wrongly against their size, with 95 % intervals."""
     fig = style.figure(360)
     series = (
-        ("named first, where decidable", _DECIDABLE, [b.right_decidable for b in board.sizes]),
-        ("named first, all", RIGHT, [b.right for b in board.sizes]),
-        ("wrong name", WRONG, [b.wrong for b in board.sizes]),
+        ("named first, where decidable", _DECIDABLE, [b.right for b in board.by_size]),
+        ("located, where decidable", RIGHT, [b.located for b in board.by_size]),
+        ("wrong name, all", WRONG, [b.wrong for b in board.by_size]),
     )
-    middle = [100.0 * sqrt(b.low * b.high) for b in board.sizes]
+    middle = [100.0 * sqrt(b.low * b.high) for b in board.by_size]
     for shift, (label, colour, rates) in zip((0.96, 1.0, 1.04), series, strict=True):
         fig.add_scatter(
             x=[m * shift for m in middle],
@@ -44,19 +45,33 @@ def reliability(board: Scoreboard) -> Any:
     fig.add_scatter(
         x=[0, 100], y=[0, 100], mode="lines", name="calibrated", line={"color": NOTHING, "dash": "dot"}
     )
-    rates = [r for _, _, _, r in board.reliability]
+    rates = [r for _, _, _, r in board.trust.bins]
     fig.add_scatter(
-        x=[100.0 * mean for _, _, mean, _ in board.reliability],
+        x=[100.0 * mean for _, _, mean, _ in board.trust.bins],
         y=[_percent(r.value) for r in rates],
         error_y=_bars(rates),
         mode="markers",
         marker={"size": 10, "color": _DECIDABLE},
-        name="names given",
+        name="effects weighed",
         hovertext=[f"{r.hits} of {r.of}" for r in rates],
     )
     fig.update_xaxes(range=[0, 103])
     fig.update_yaxes(range=[0, 103])
     return style.axes(fig, style.label("confidence stated", "%"), style.label("names that are true", "%"))
+
+
+def risk(board: Scoreboard) -> Any:
+    """Share of wrong names among those with the highest confidence, or the highest z, against how many of all they are."""
+    fig, trust = style.figure(360), board.trust
+    coverage = [100.0 * c for c in trust.coverage]
+    for label, colour, values in (
+        ("by confidence", _DECIDABLE, trust.risk),
+        ("by z alone", NOTHING, trust.risk_by_z),
+    ):
+        fig.add_scatter(
+            x=coverage, y=[100.0 * v for v in values], mode="lines", name=label, line_color=colour
+        )
+    return style.axes(fig, style.label("coverage", "%"), style.label("wrong", "%"))
 
 
 def confusion(board: Scoreboard) -> Any:
@@ -85,7 +100,7 @@ def confusion(board: Scoreboard) -> Any:
 
 
 def ratios(board: Scoreboard) -> Any:
-    """Held-out RMSE after modelling over that of the true model with true parameters, against size."""
+    """Error left out after modelling over noise, against size."""
     fig = style.figure(360)
     for kind, colour in (("single", _DECIDABLE), ("pair", style.LOAD), ("confounded", style.RESIDUAL)):
         rows = [r for r in board.of_kind(kind) if isfinite(r.heldout_rad) and r.true_rad > 0.0]
@@ -100,7 +115,7 @@ def ratios(board: Scoreboard) -> Any:
     fig.add_hline(y=1.0, line={"color": NOTHING, "dash": "dot"})
     fig.update_xaxes(type="log")
     fig.update_yaxes(type="log")
-    return style.axes(fig, "contribution over loop width / %", "RMSE after modelling / true model's")
+    return style.axes(fig, "contribution over loop width / %", "error left out / noise")
 
 
 def deviations(board: Scoreboard) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -14,46 +14,67 @@ from cablecomp.recording.atomic import atomic_file
 from cablecomp.report import page
 from cablecomp.report import scoreboard_figures as figures
 from cablecomp.report.page import Fact, Section
-from cablecomp.trials.scoreboard import Scoreboard, Target, rate
+from cablecomp.trials.scoreboard import Part, Scoreboard, Target
 from cablecomp.trials.scoring import Row
+from cablecomp.trials.shares import Rate
 
 
 def scoreboard_table(board: Scoreboard) -> Table:
     """What was reached against what is to be reached, for the terminal."""
-    table = Table(title=f"{len(board.rows)} blind trials, seed {board.seed}", title_justify="left")
+    table = Table(title=f"{len(board.rows)} blind trials, seed {board.wish['seed']}", title_justify="left")
     table.add_column("what")
-    for name in ("reached", "to reach", "of"):
+    for name in ("reached", "95 % interval", "to reach", "of"):
         table.add_column(name, justify="right")
     for t in board.targets:
         colour = {True: "green", False: "red", None: "dim"}[t.ok]
-        table.add_row(t.what, Text(_reached(t), colour), _asked(t), str(t.of))
+        table.add_row(t.what, Text(_shown(t, t.reached), colour), _interval(t), _asked(t), str(t.of))
     return table
 
 
-def write_scoreboard_page(board: Scoreboard, path: Path, command: str) -> None:
-    """Write the page; `command` is what reproduces it."""
+def write_scoreboard_page(board: Scoreboard, path: Path) -> None:
+    """Write the page."""
     with atomic_file(path) as temporary:
-        temporary.write_text(scoreboard_page(board, command), encoding="utf-8")
+        temporary.write_text(scoreboard_page(board), encoding="utf-8")
 
 
-def scoreboard_page(board: Scoreboard, command: str) -> str:
-    """The whole page: figures to reach, confusion, naming by size, confidence, errors, every trial."""
+def scoreboard_page(board: Scoreboard) -> str:
+    """The whole page: figures to reach, what they hang on, confidence, confusion, errors, every trial."""
+    wish = board.wish
+    command = "cablecomp prove " + " ".join(f"--{k} {v}" for k, v in wish.items())
     lead = (
-        f"{len(board.rows)} simulated joints with concealed physics, seed {board.seed}. The truth was sealed "
-        "before any diagnosis and opened after all verdicts were written."
+        f"{len(board.rows)} simulated joints with concealed physics, seed {wish['seed']}, laws: {wish['laws']}, imperfections: "
+        f"{wish['imperfections']}. The truth was sealed before any diagnosis and opened after all verdicts were written."
     )
     sections = [
         Section("What was reached", _facts(board) + _targets(board) + page.code(command)),
         Section(
+            "What it hangs on",
+            page.columns(_parts("imperfection", board.by_imperfection), _parts("size / loop", board.by_size))
+            + page.fold("by law", _parts("law", board.by_law)),
+            "Named first and located by the residual itself where decidable; wrong names of all trials. An imperfection's trials "
+            "mostly have others too.",
+        ),
+        Section(
             "Named by size",
             page.columns(
                 page.figure(figures.naming_by_size(board), "Single effects; bars are 95 % intervals."),
-                page.figure(figures.reliability(board), "All names given, in bins of confidence."),
+                page.figure(
+                    figures.confusion(board), "What was concealed, and the first name; trials counted."
+                ),
             ),
-            "Decidable are the trials in which the true model itself beats the recalibrated drive on "
-            "held-out data beyond its margin.",
+            "Decidable are the trials in which the true law itself, taken off the recorded angle, beats the recalibrated drive on "
+            "data left out by what an effect has to bring.",
         ),
-        Section("Concealed and named", page.figure(figures.confusion(board)), "Trials counted."),
+        Section(
+            "Confidence",
+            page.columns(
+                page.figure(
+                    figures.reliability(board), "All effects that were weighed, named or not, in bins."
+                ),
+                page.figure(figures.risk(board), "Of the surest share of them, how many are wrong."),
+            ),
+            f"Expected calibration error {page.number(board.trust.error)}, Brier score {page.number(board.trust.brier)}.",
+        ),
         Section(
             "How good the models are",
             page.columns(
@@ -61,7 +82,6 @@ def scoreboard_page(board: Scoreboard, command: str) -> str:
                 page.figure(figures.deviations(board), "Values that fall outside are drawn at the edge."),
             ),
         ),
-        Section("By effect", _by_effect(board)),
         Section("Trials that went wrong", _wrong(board) or page.paragraph("None.")),
         Section("All trials", page.fold("Every trial", _trials(board.rows))),
     ]
@@ -73,7 +93,7 @@ def _facts(board: Scoreboard) -> str:
     failed = sum(bool(r.failed) for r in board.rows)
     return page.facts(
         [
-            Fact("trials", str(len(board.rows)), f"seed {board.seed}"),
+            Fact("trials", str(len(board.rows)), f"seed {board.wish['seed']}"),
             Fact("seal", board.sha256[:12] + "…", "SHA-256 of the sealed truth, checked"),
             Fact("one diagnosis", page.number(float(np.median(seconds)) if seconds else None, "s"), "median"),
             Fact("failed", str(failed), "diagnoses without a verdict", "bad" if failed else "good"),
@@ -82,31 +102,18 @@ def _facts(board: Scoreboard) -> str:
 
 
 def _targets(board: Scoreboard) -> str:
-    mark = {True: "reached", False: "not reached", None: "no trials"}
-    rows = [(t.what, _reached(t), _asked(t), t.of, mark[t.ok]) for t in board.targets]
-    return page.table(("what", "reached", "to reach", "of", ""), rows)
+    mark = {True: "reached", False: "not reached", None: ""}
+    rows = [(t.what, _shown(t, t.reached), _interval(t), _asked(t), t.of, mark[t.ok]) for t in board.targets]
+    return page.table(("what", "reached", "95 % interval", "to reach", "of", ""), rows)
 
 
-def _by_effect(board: Scoreboard) -> str:
-    single = board.of_kind("single", "unknown")
-    rows = []
-    for name in sorted({r.truth[0] for r in single}):
-        own = [r for r in single if r.truth[0] == name]
-        decidable = [r for r in own if r.decidable]
-        rows.append(
-            (
-                name,
-                len(own),
-                len(decidable),
-                sum(r.first_right for r in decidable),
-                sum(bool(r.located) for r in decidable),
-                sum(r.wrong for r in own),
-                _median([r.heldout_rad / r.true_rad for r in own if r.true_rad > 0.0]),
-                rate(own, lambda r: r.verdict == "unexplained").hits,
-            )
-        )
-    heads = ("effect", "trials", "decidable", "named", "located", "wrong name", "RMSE / true", "unexplained")
-    return page.table(heads, rows)
+def _parts(head: str, parts: Sequence[Part]) -> str:
+    rows = [(p.name, p.trials, _hits(p.right), _hits(p.located), _hits(p.wrong)) for p in parts]
+    return page.table((head, "trials", "named first", "located", "wrong name"), rows)
+
+
+def _hits(r: Rate) -> str:
+    return f"{r.hits} of {r.of}" if r.of else "–"
 
 
 def _wrong(board: Scoreboard) -> str:
@@ -118,11 +125,9 @@ def _fine(row: Row) -> bool:
         return False
     if row.kind in ("single", "pair"):
         return row.all_right and bool(row.located) if row.decidable else True
-    if row.kind == "unknown":
-        return row.verdict == "unexplained" or not row.visible
     if row.kind == "confounded":
         return bool(row.said_tied and row.settled)
-    return not row.named
+    return not (row.kind == "none" and row.empirical)
 
 
 def _trials(rows: Iterable[Row]) -> str:
@@ -130,13 +135,14 @@ def _trials(rows: Iterable[Row]) -> str:
         "trial",
         "kind",
         "concealed",
+        "imperfections",
         "size / %",
         "course",
         "verdict",
         "named",
         "first covariate",
         "decidable",
-        "RMSE / true",
+        "RMSE / noise",
         "time / s",
         "remark",
     )
@@ -149,7 +155,8 @@ def _trial(r: Row) -> tuple[object, ...]:
     return (
         r.number,
         r.case or r.kind,
-        ", ".join(r.truth),
+        ", ".join(r.forms),
+        ", ".join(r.imperfections),
         100.0 * r.size,
         r.excitation,
         r.verdict,
@@ -162,28 +169,17 @@ def _trial(r: Row) -> tuple[object, ...]:
     )
 
 
-def _reached(t: Target) -> str:
-    if not isfinite(t.reached):
+def _shown(t: Target, value: float) -> str:
+    if not isfinite(value):
         return "–"
-    return f"{t.reached:.2f}" if _is_plain(t) else f"{100 * t.reached:.1f} %"
+    return f"{100 * value:.1f} %" if t.unit == "%" else page.number(value, "" if t.unit == "1" else t.unit)
+
+
+def _interval(t: Target) -> str:
+    low, high = t.interval
+    return f"{_shown(t, low)} … {_shown(t, high)}" if isfinite(low) else ""
 
 
 def _asked(t: Target) -> str:
-    def shown(value: float) -> str:
-        return f"{value:g}" if _is_plain(t) else f"{100 * value:g} %"
-
-    parts = [
-        f"≥ {shown(t.least)}" if t.least is not None else "",
-        f"≤ {shown(t.most)}" if t.most is not None else "",
-    ]
-    return " ".join(p for p in parts if p)
-
-
-def _is_plain(t: Target) -> bool:
-    """Whether the figure is a number and no share."""
-    return (t.most or 0.0) > 1.0
-
-
-def _median(values: list[float]) -> float:
-    kept = [v for v in values if isfinite(v)]
-    return float(np.median(kept)) if kept else float("nan")
+    parts = [f"{sign} {_shown(t, v)}" for sign, v in (("≥", t.least), ("≤", t.most)) if v is not None]
+    return " ".join(parts)

@@ -132,6 +132,7 @@ class Health:
         self._share = 1.0 - exp(-period_s / o.confirm_s)
         self._shake_square = inf if o.shake_Nm is None else o.shake_Nm**2
         self._motor_changed_s = nan
+        self._motor_heard_s = inf
         self._target_then = nan
 
     def check(
@@ -216,10 +217,9 @@ class Health:
             return flags
         if motor.changed_s != self._motor_changed_s or self._target_then != self._target_then:
             self._motor_changed_s, self._target_then = motor.changed_s, target_rad
-        elif (
-            abs(target_rad - self._target_then) > self._stuck_rad and motor.arrived_s > self._motor_changed_s
-        ):
-            flags |= MOTOR_STUCK
+        elif abs(target_rad - self._target_then) > self._stuck_rad and motor.arrived_s > self._motor_heard_s:
+            flags |= MOTOR_STUCK  # heard since the target went there; a silent motor is stale, not stuck
+        self._motor_heard_s = motor.arrived_s
         return flags
 
     def _who_is_stuck(self, now_s: float) -> int:

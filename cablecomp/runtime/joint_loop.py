@@ -94,6 +94,14 @@ class JointLoop:
         """Whether the drive says that it is enabled."""
         return self.readings.state is DriveState.ENABLED
 
+    @property
+    def drive_words(self) -> str:
+        """State and error of the drive, in words."""
+        readings = self.readings
+        error = f"error {readings.error:#x}" if readings.error else ""
+        words = ", ".join(filter(None, (error, self._link.error_text(self.setup.place))))
+        return readings.state.name.lower() + (f" ({words})" if words else "")
+
     def listen(self, now_s: float) -> None:
         """Before anything is commanded: judge what comes, until the drive is known."""
         self.checked = self.setup.health.check(self.readings, now_s)
@@ -240,8 +248,7 @@ class JointLoop:
         elif checked.fatal:
             self.stop_reason = self.stop_reason or ", ".join(health_names(checked.flags))
         elif drive and self.readings.state in _NOT_RUNNING:
-            state = self.readings.state.name.lower()
-            self.stop_reason = self.stop_reason or f"drive reports {state} (error {self.readings.error:#x})"
+            self.stop_reason = self.stop_reason or f"drive reports {self.drive_words}"
 
     def _pass(self, command: Command, checked: Checked, now_s: float) -> None:
         """Through the gate, and out."""

@@ -14,7 +14,7 @@ from time import perf_counter
 
 from cablecomp.errors import DeviceError
 from cablecomp.links.link import Link
-from cablecomp.links.records import BusState, Mode
+from cablecomp.links.records import BusState, DriveState, Mode
 from cablecomp.runtime.clock import Clock, SteppedClock, Tick, Ticker
 from cablecomp.runtime.histogram import CycleTimes
 from cablecomp.runtime.joint_loop import JointLoop, JointSetup
@@ -225,6 +225,8 @@ class Loop:
             silent = ", ".join(self.link.silent(now, listened / 2)) or "a channel that is needed"
             if foreign := self.link.status().foreign:
                 silent += f"; {foreign} frames came from other devices on the same identifiers"
+            faulty = [j for j in mute if j.readings.state is DriveState.FAULT]
+            silent += "".join(f"; the drive of {j.setup.name} reports {j.drive_words}" for j in faulty)
             names = ", ".join(j.setup.name for j in mute)
             return (
                 f"nothing from {names} within {listened:g} s (silent: {silent}); "
@@ -249,7 +251,7 @@ class Loop:
             self._armed_s = now
             self._go(Stage.RUNNING, now)
         elif waited > self.options.enable_s:
-            states = ", ".join(f"{j.setup.name} is {j.readings.state.name.lower()}" for j in self.joints)
+            states = ", ".join(f"{j.setup.name} is {j.drive_words}" for j in self.joints)
             raise DeviceError(
                 f"link `{self.link.config.name}`: not every drive enabled within {self.options.enable_s:g} s "
                 f"({states}); clear its faults and calibrate it"

@@ -1,10 +1,14 @@
-"""The yardstick of a blind trial: what the true model itself reaches on the same rows, fitted as a hypothesis is."""
+"""The yardstick of a blind trial: what the true law itself, whatever its form, takes off the recalibrated drive.
+
+The plant's own noise-free contribution of an effect is taken off the recorded angle and the drive is calibrated again: that
+is what a catalogue that held the very law could reach.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import nan, sqrt
 
 import numpy as np
 
@@ -15,101 +19,111 @@ from cablecomp.diagnosis.errors_left import errors_of
 from cablecomp.diagnosis.explain.model import searching
 from cablecomp.diagnosis.explain.scores import Groups, Lead, lead, left_out, make_groups
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
-from cablecomp.estimation.parameter import of_effect
-from cablecomp.estimation.problem import Problem, Weighing
-from cablecomp.estimation.simulate import knows_rates
+from cablecomp.estimation.problem import Weighing
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.sealed import Truth
 
-_HELD = ("phase_rad", "time_s", "reference_degC")
-EVALUATIONS = 12
+EVALUATIONS = 8
 
 
 @dataclass(frozen=True)
 class Yardstick:
     """What the truth reaches.
 
-    `true_rmse_rad`: RMSE of the true model with true parameters; `baseline_rmse_rad`: held-out RMSE of the recalibrated drive;
-    `decidable`: the true effects, refitted, beat the recalibrated drive on data left out by what an effect has to bring
-    (in a pair: each of them beats the model without it as well); `gain`: share of the baseline's square on data left
-    out that they take off, with its `z`.
+    `true_rmse_rad`: RMS of the recorded angle about the true one (noise alone); `baseline_rmse_rad`: held-out RMSE of the
+    recalibrated drive; `decidable`: the true laws beat the recalibrated drive on data left out by what an effect has to
+    bring (in a pair: each of them beats the drive with the other one as well); `gain`: share of the baseline's square on
+    data left out that they take off, with its `z`.
     """
 
-    true_rmse_rad: float
-    baseline_rmse_rad: float
-    decidable: bool
-    gain: float
-    z: float
+    true_rmse_rad: float = nan
+    baseline_rmse_rad: float = nan
+    decidable: bool = False
+    gain: float = 0.0
+    z: float = 0.0
 
 
 def measure_truth(
-    config: JointConfig, recordings: Sequence[Mapping[str, FloatArray]], truth: Truth, seed: int = 0
+    config: JointConfig,
+    recordings: Mapping[str, Mapping[str, FloatArray]],
+    truth: Truth,
+    angles: Mapping[str, FloatArray],
+    seed: int = 0,
 ) -> Yardstick:
-    """Fit the true effects with the calibration and compare them with the drive alone, on data left out.
+    """Compare the drive with and without its true effects, on data left out.
 
-    Raises InputError if the joint cannot follow the recordings.
+    `angles`: `time_s_k`, `joint_rad_k` (as it is), `plain_rad_k` (without any effect), `without_<id>_rad_k` of recordings
+    k = 1, 2, … in order. Raises InputError if the joint cannot follow the recordings.
     """
     rng = np.random.default_rng(seed)
-    body = gather_body(config, {f"recording-{k + 1}": c for k, c in enumerate(recordings)}, "one")
+    body = gather_body(config, recordings)
+    places = {name: k for k, name in enumerate(recordings, start=1)}
     drive = calibrate_drive(config, body.used, rng)
     groups = make_groups(drive.fit)
-    true = replace(
-        drive.fit.problem, config=truth.model, parameters=(), fine=knows_rates(truth.model), bases={}
-    )
-    rmse = _rms(true.left(np.empty(0)), true)
+    evidence = drive.fit.problem.evidence
+    rmse = _noise(evidence, places, angles)
     baseline = errors_of(drive.fit, body.final, groups.by).heldout_rmse_rad
-    known = [e.id for e in truth.effects if e.known]
-    whole = _with(drive, truth, known) if known else None
+    if not truth.main:
+        return Yardstick(rmse, baseline)
+    # companions stay: both sides have them
+    parts = {k.partition("without_")[2].rpartition("_rad_")[0] for k in angles if k.startswith("without_")}
+    mine = [p for p in parts if any(p.partition(".")[0] == e.id for e in truth.main)]
+    single = "plain" if len(mine) != 1 else f"without_{mine[0]}"
+    whole = _told(drive, places, angles, single)
     if whole is None:
-        return Yardstick(rmse, baseline, False, 0.0, 0.0)
-    step = _step(whole, _with(drive, truth, [], whole.problem), groups)
+        return Yardstick(rmse, baseline)
+    step = _step(whole, drive, drive.fit.problem.evidence, groups)
     decidable = _enough(step)
-    for name in known if len(known) > 1 else ():
-        less = _with(drive, truth, [n for n in known if n != name], whole.problem)
-        decidable = decidable and less is not None and _enough(_step(whole, less, groups))
+    for name in mine if len(mine) > 1 else ():
+        rest = _without(evidence, places, angles, "plain", f"without_{name}")
+        decidable = decidable and _enough(_step(whole, drive, rest, groups))
     return Yardstick(rmse, baseline, decidable, step.gain, step.z)
 
 
-def _step(whole: Fit, less: Fit | None, groups: Groups) -> Lead:
-    assert less is not None
-    return lead(left_out(whole, groups), left_out(less, groups), groups)
+def _noise(
+    evidence: Sequence[Evidence], places: Mapping[str, int], angles: Mapping[str, FloatArray]
+) -> float:
+    """RMS of recorded minus true angle on counted rows, weighed by the time that they stand for."""
+    parts = []
+    for e in evidence:
+        k, kept = places[e.name], e.counted[JOINT]
+        off = e.at_rows(JOINT) - _at(e, angles[f"time_s_{k}"], angles[f"joint_rad_{k}"])[e.rows]
+        parts.append((e.weight * (off - np.median(off[kept])))[kept])
+    joined = np.concatenate(parts)
+    return sqrt(float(np.mean(joined**2))) if len(joined) else nan
 
 
-def _enough(step: Lead) -> bool:
-    return step.z > LIMITS.z and step.gain > LIMITS.gain
+def _at(e: Evidence, time: FloatArray, values: FloatArray) -> FloatArray:
+    """Values of a recording at its fine rows."""
+    return np.asarray(np.interp(e.columns["time_s"] - e.shift_s, time, values))
 
 
-def _with(drive: Calibrated, truth: Truth, names: Sequence[str], like: Problem | None = None) -> Fit | None:
-    """These true effects fitted with the calibration from their true values; None where the drive cannot follow.
+def _without(
+    evidence: Sequence[Evidence],
+    places: Mapping[str, int],
+    angles: Mapping[str, FloatArray],
+    lack: str,
+    own: str = "joint",
+) -> list[Evidence]:
+    """The recordings with what `own` has and `lack` has not taken off the joint's angle."""
+    found = []
+    for e in evidence:
+        k = places[e.name]
+        added = _at(e, angles[f"time_s_{k}"], angles[f"{own}_rad_{k}"] - angles[f"{lack}_rad_{k}"])
+        found.append(replace(e, columns={**e.columns, JOINT: e.columns[JOINT] - added}))
+    return found
 
-    `like`: take its weights and its way to run, so that both fits compare. Without it, the weights are those with which a
-    search leaves the model that holds these effects.
-    """
-    config = drive.fit.problem.config
-    entries = tuple(e for e in truth.model.effect if e.id in names)
-    free = list(drive.fit.problem.parameters)
-    for entry in entries:
-        effect = catalogue()[entry.id]
-        values = {
-            k: float(v)
-            for k, v in entry.parameters.items()
-            if not isinstance(v, str) and v and k not in _HELD
-        }
-        free += of_effect(effect, values, config)
-    problem = replace(
-        drive.fit.problem,
-        config=config.model_copy(update={"effect": (*config.effect, *entries)}),
-        parameters=tuple(free),
-        fine=like.fine if like else knows_rates(truth.model),
-    )
-    start = np.array([p.x(float(truth.true.get(p.base, p.start))) for p in free])
+
+def _told(
+    drive: Calibrated, places: Mapping[str, int], angles: Mapping[str, FloatArray], lack: str
+) -> Fit | None:
+    """The drive calibrated on what its effects leave, with the weights with which a search leaves such a model."""
+    problem = drive.fit.problem.with_evidence(_without(drive.fit.problem.evidence, places, angles, lack))
     try:
-        if like is not None:
-            return solve(problem.with_weighing(like.weighing), start, EVALUATIONS)
-        fit = solve(problem, start, EVALUATIONS)
+        fit = solve(problem, drive.fit.x, EVALUATIONS)
         return solve(problem.with_weighing(_sharper(fit, drive)), fit.x, EVALUATIONS)
     except InputError:
         return None
@@ -122,9 +136,12 @@ def _sharper(fit: Fit, drive: Calibrated) -> Weighing:
     return Weighing(sigma, mine.zero_sd)
 
 
-def _rms(parts: Sequence[FloatArray], problem: Problem) -> float:
-    """RMS on counted rows, weighed by the time that they stand for."""
-    joined = np.concatenate([
-        (e.weight * p)[e.counted["joint_position_rad"]] for e, p in zip(problem.evidence, parts, strict=True)
-    ])  # fmt: skip
-    return sqrt(float(np.mean(joined**2)))
+def _step(whole: Fit, drive: Calibrated, evidence: Sequence[Evidence], groups: Groups) -> Lead:
+    """The lead of the whole truth over the drive on this evidence, under the same weights."""
+    problem = whole.problem.with_evidence(list(evidence))
+    less = solve(problem, drive.fit.x, EVALUATIONS)
+    return lead(left_out(whole, groups), left_out(less, groups), groups)
+
+
+def _enough(step: Lead) -> bool:
+    return step.z > LIMITS.z and step.gain > LIMITS.gain

@@ -1,58 +1,40 @@
-"""The scoreboard of blind trials: rates with their intervals, against what is to be reached."""
+"""The scoreboard of blind trials: rates with their intervals against what is to be reached, and what they hang on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from math import isfinite, nan, sqrt
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
-from cablecomp.trials.scoring import Row
+from cablecomp.trials.calibrated import brier, calibration_error, risk_area, risk_coverage
+from cablecomp.trials.scoring import SURE, Named, Row
+from cablecomp.trials.shares import Rate, bootstrapped, finite, quantile, rate
 
 SIZE_EDGES = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.6001)
-CONFIDENCE_EDGES = (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0001)
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A share of trials with its 95 % interval (Wilson); NaN where there is none."""
-
-    hits: int
-    of: int
-
-    @property
-    def value(self) -> float:
-        """The share."""
-        return self.hits / self.of if self.of else nan
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval."""
-        if not self.of:
-            return nan, nan
-        z, n, p = 1.959964, self.of, self.value
-        middle = (p + z * z / (2 * n)) / (1 + z * z / n)
-        half = z * sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-        return max(middle - half, 0.0), min(middle + half, 1.0)
+CONFIDENCE_EDGES = (0.0, 0.2, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0001)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A figure to be reached: `reached` against `least` or `most`; `ok` None if there were no trials."""
+    """A figure with its 95 % interval, against `least` or `most` (both None: told, not judged); `ok` None if there were no
+    trials, or nothing is asked."""
 
     what: str
     reached: float
+    interval: tuple[float, float]
     of: int
-    least: float | None
-    most: float | None
+    least: float | None = None
+    most: float | None = None
+    unit: str = "%"
 
     @property
     def ok(self) -> bool | None:
         """Whether it is reached."""
-        if not isfinite(self.reached):
+        if not isfinite(self.reached) or (self.least is None and self.most is None):
             return None
         return (self.least is None or self.reached >= self.least) and (
             self.most is None or self.reached <= self.most
@@ -60,130 +42,195 @@ class Target:
 
 
 @dataclass(frozen=True)
-class SizeBin:
-    """Single effects of one range of sizes: named rightly, named wrongly, not named."""
+class Part:
+    """Trials of one sort (a law, an imperfection, a size): named first and located where decidable, wrong names of all."""
 
-    low: float
-    high: float
+    name: str
+    trials: int
     right: Rate
-    right_decidable: Rate
+    located: Rate
     wrong: Rate
+    low: float = nan
+    high: float = nan
+
+
+@dataclass(frozen=True)
+class Trust:
+    """Whether confidence can be trusted, over all effects that were weighed: expected calibration error, Brier score, area under
+    risk against coverage by confidence and by z alone, the curve itself, and by bins (low, high, mean confidence, true)."""
+
+    of: int
+    error: float
+    brier: float
+    area: float
+    area_by_z: float
+    coverage: tuple[float, ...]
+    risk: tuple[float, ...]
+    risk_by_z: tuple[float, ...]
+    bins: tuple[tuple[float, float, float, Rate], ...]
 
 
 @dataclass(frozen=True)
 class Scoreboard:
-    """All scores of a run; `confusion[truth][outcome]` counts trials."""
+    """All scores of a run; `wish` is what was asked for, `confusion[truth][outcome]` counts trials."""
 
     sha256: str
-    seed: int
-    kind: str
+    wish: Mapping[str, Any]
     rows: tuple[Row, ...]
     targets: tuple[Target, ...]
     confusion: dict[str, dict[str, int]]
-    sizes: tuple[SizeBin, ...]
-    reliability: tuple[tuple[float, float, float, Rate], ...]
-    """(lowest, highest, mean confidence, share of names that are true) of each bin."""
+    by_law: tuple[Part, ...]
+    by_imperfection: tuple[Part, ...]
+    by_size: tuple[Part, ...]
+    trust: Trust
 
     def of_kind(self, *kinds: str) -> list[Row]:
         """Rows of some kinds."""
         return [r for r in self.rows if r.kind in kinds]
 
 
-def scoreboard(rows: Iterable[Row], sha256: str, seed: int, kind: str) -> Scoreboard:
+def scoreboard(rows: Iterable[Row], sha256: str, wish: Mapping[str, Any]) -> Scoreboard:
     """Put all scores together."""
     listed = tuple(sorted(rows, key=lambda r: r.number))
+    trust = _trust([n for r in listed for n in r.weighed])
     return Scoreboard(
         sha256,
-        seed,
-        kind,
+        wish,
         listed,
-        tuple(_targets(listed)),
+        tuple(_targets(listed, trust)),
         _confusion(listed),
-        _sizes(listed),
-        _reliability(listed),
+        tuple(_by_law(listed)),
+        tuple(_by_imperfection(listed)),
+        tuple(_by_size(listed)),
+        trust,
     )
 
 
-def rate(rows: Iterable[Row], hit: Callable[[Row], bool]) -> Rate:
-    """Share of rows that hit."""
-    answers = [hit(r) for r in rows]
-    return Rate(sum(answers), len(answers))
-
-
-def _targets(rows: Sequence[Row]) -> list[Target]:
+def _targets(rows: Sequence[Row], trust: Trust) -> list[Target]:
     single = [r for r in rows if r.kind == "single"]
     decidable = [r for r in single if r.decidable]
     pairs = [r for r in rows if r.kind == "pair" and r.decidable]
-    clean = [r for r in rows if r.kind in ("nothing", "parameters")]
-    unknown = [r for r in rows if r.kind == "unknown"]
-    confounded = [r for r in rows if r.kind == "confounded"]
-    worst = max((b.wrong.value for b in _sizes(rows) if b.wrong.of), default=nan)
-    ratios = _ratios(rows)
-    z = _z(rows)
-    times = [r.seconds for r in rows]
-    kept = [r.final_rad / r.heldout_rad for r in rows if r.heldout_rad > 0.0 and isfinite(r.final_rad)]
+    clean = [r for r in rows if r.kind == "none"]
+    strange = [r for r in rows if r.kind == "stranger"]
+    unlike = [r for r in strange if r.decidable]
+    tied = [r for r in rows if r.kind == "confounded"]
+    depends = [r for r in rows if r.depends is not None]
+    z = [(e.z, r) for r in rows for e in r.estimates]
     bounds = [b for r in rows for b in r.bounds]
-    names = [n for r in rows for n in r.named]
-    over = "held-out RMSE over the true model's"
+    kept = [r.final_rad / r.heldout_rad for r in rows if r.heldout_rad > 0.0 and isfinite(r.final_rad)]
+    ratios = [
+        r.heldout_rad / r.true_rad for r in rows if r.laws in ("catalogue", "none") and r.true_rad > 0.0
+    ]
+    times = [r.seconds for r in rows if isfinite(r.seconds)]
 
-    def share(what: str, r: Rate, least: float | None, most: float | None = None) -> Target:
-        return Target(what, r.value, r.of, least, most)
+    def law(name: str) -> list[Row]:
+        return [r for r in decidable if r.laws == name]
+
+    def share(what: str, r: Rate, least: float | None = None, most: float | None = None) -> Target:
+        return Target(what, r.value, r.interval, r.of, least, most)
+
+    def at(what: str, values: Sequence[float], q: float, most: float | None, unit: str) -> Target:
+        span = bootstrapped(values, lambda v: quantile(v, q))
+        return Target(what, quantile(values, q), span, len(values), None, most, unit)
 
     return [
-        share("single effect named first, where decidable", rate(decidable, lambda r: r.first_right), 0.95),
-        Target("wrong names in the worst range of sizes", worst, len(single), None, 0.02),
-        Target(
-            "wrong among names given (confidence 0.5 and more)",
-            _mean([not n.right for n in names]),
-            len(names),
-            None,
-            0.05,
-        ),
-        share(
-            "mismatch located by the residual itself, same trials",
-            rate(decidable, lambda r: bool(r.located)),
-            0.95,
-        ),
-        share("pairs: both named, nothing else, where decidable", rate(pairs, lambda r: r.all_right), 0.80),
-        share("false names where nothing is missing", rate(clean, lambda r: bool(r.named)), None, 0.01),
-        share("unknown: unexplained, no known name", rate(unknown, _abstained), 0.90),
-        share("unknown: located by the residual itself", rate(unknown, lambda r: bool(r.located)), 0.90),
-        share("confounded: said so, named together", rate(confounded, lambda r: bool(r.said_tied)), 0.95),
-        share("confounded: experiment proposed", rate(confounded, lambda r: bool(r.proposed)), 0.95),
-        share("confounded: that experiment settles it", rate(confounded, lambda r: bool(r.settled)), 0.95),
-        Target(f"{over}, median", _quantile(ratios, 0.5), len(ratios), None, 1.10),
-        Target(f"{over}, 90th percentile", _quantile(ratios, 0.9), len(ratios), None, 1.5),
-        Target("stated 95 % intervals that hold the truth", _mean(np.abs(z) <= 1.96), len(z), 0.90, 0.99),
-        Target(
-            "what was not named lies below its stated bound",
-            _mean([b.held for b in bounds]),
-            len(bounds),
-            0.95,
-            None,
-        ),
-        Target(
-            "RMSE kept for the end over that held out, median", _quantile(kept, 0.5), len(kept), None, 1.25
-        ),
-        Target("time of one diagnosis, median, s", _quantile(times, 0.5), len(rows), None, 10.0),
-        Target("time of one diagnosis, 90th percentile, s", _quantile(times, 0.9), len(rows), None, 40.0),
-        Target("time of one diagnosis, worst, s", _quantile(times, 1.0), len(rows), None, 90.0),
-    ]
+        share("single effect named first, catalogue's law, decidable", rate(law("catalogue"), _first), 0.97),
+        share("single effect named first, another law, decidable", rate(law("other"), _first), 0.90),
+        share("single effect: a wrong name", rate(single, lambda r: r.wrong), None, 0.02),
+        share("nothing missing: a name", rate(clean, lambda r: bool(r.named)), None, 0.01),
+        share("pairs: both named, decidable", rate(pairs, lambda r: r.all_right), 0.80),
+        share("strangers: no wrong name", rate(strange, lambda r: not r.wrong and not r.failed), 0.90),
+        share("strangers: located by the residual itself, decidable", rate(unlike, _located), 0.80),
+        share("single effect: located by the residual itself, decidable", rate(decidable, _located), 0.90),
+        Target("confidence: expected calibration error", trust.error, (nan, nan), trust.of, None, 0.05, "1"),
+        Target("confidence: area under risk–coverage, over that of z alone",
+               trust.area / trust.area_by_z if trust.area_by_z > 0.0 else nan, (nan, nan), trust.of, None, 1.0, "1"),
+        share("95 % intervals that hold the truth, catalogue's laws", rate(z, lambda e: abs(e[0]) <= 1.96), 0.92, 0.98),
+        share("not named: the truth below its stated bound", rate(bounds, lambda b: b.held), 0.95),
+        at("error kept for the end over that left out, median", kept, 0.5, 1.25, "1"),
+        at("error kept for the end over that left out, 90 %", kept, 0.9, None, "1"),
+        at("error left out over noise, catalogue's laws, median", ratios, 0.5, 1.10, "1"),
+        at("error left out over noise, catalogue's laws, 90 %", ratios, 0.9, 1.5, "1"),
+        share("nothing missing: a law without a name", rate(clean, lambda r: bool(r.empirical)), None, 0.05),
+        share("dependences found", Rate(*_sum(r.depends for r in depends))),
+        share("dependences that are not true, per trial", rate(rows, lambda r: r.depends_wrongly > 0), None, 0.02),
+        share("confounded: said so, named together", rate(tied, lambda r: bool(r.said_tied))),
+        share("confounded: experiment proposed", rate(tied, lambda r: bool(r.proposed))),
+        share("confounded: that experiment settles it", rate(tied, lambda r: bool(r.settled))),
+        at("time of one diagnosis, median", times, 0.5, 10.0, "s"),
+        at("time of one diagnosis, 90 %", times, 0.9, 40.0, "s"),
+        at("time of one diagnosis, worst", times, 1.0, 90.0, "s"),
+        share("diagnoses without a verdict", rate(rows, lambda r: bool(r.failed)), None, 0.0),
+    ]  # fmt: skip
 
 
-def _abstained(row: Row) -> bool:
-    """No known name, and said to be unexplained where it can be seen above the noise at all."""
-    return not row.named and (row.verdict == "unexplained" or not row.visible) and not row.failed
+def _first(row: Row) -> bool:
+    return row.first_right
 
 
-def _ratios(rows: Sequence[Row]) -> list[float]:
-    """Held-out RMSE after modelling over the true model's, where the catalogue holds the truth."""
-    return [
-        r.heldout_rad / r.true_rad for r in rows if r.kind != "unknown" and r.true_rad > 0.0 and not r.failed
-    ]
+def _located(row: Row) -> bool:
+    return bool(row.located)
 
 
-def _z(rows: Sequence[Row]) -> Any:
-    return np.array([e.z for r in rows for e in r.estimates])
+def _sum(pairs: Iterable[tuple[int, int] | None]) -> tuple[int, int]:
+    known = [p for p in pairs if p is not None]
+    return sum(p[0] for p in known), sum(p[1] for p in known)
+
+
+def _part(name: str, rows: Sequence[Row], low: float = nan, high: float = nan) -> Part:
+    decidable = [r for r in rows if r.decidable]
+    return Part(
+        name, len(rows), rate(decidable, _first), rate(decidable, _located), rate(rows, lambda r: r.wrong), low, high
+    )  # fmt: skip
+
+
+def _by_law(rows: Sequence[Row]) -> Iterable[Part]:
+    one = [r for r in rows if r.kind in ("single", "stranger")]
+    for name in sorted({f for r in one for f in r.forms}):
+        yield _part(name, [r for r in one if name in r.forms])
+
+
+def _by_imperfection(rows: Sequence[Row]) -> Iterable[Part]:
+    """Single effects (clean trials too, for wrong names) with each imperfection, after those with none at all."""
+    these = [r for r in rows if r.kind in ("single", "none")]
+    names = sorted({i for r in these for i in r.imperfections})
+    yield _part("none at all", [r for r in these if not r.imperfections])
+    for name in names:
+        yield _part(name, [r for r in these if name in r.imperfections])
+
+
+def _by_size(rows: Sequence[Row]) -> Iterable[Part]:
+    single = [r for r in rows if r.kind == "single"]
+    for low, high in pairwise(SIZE_EDGES):
+        here = [r for r in single if low <= r.size < high]
+        yield _part(f"{100 * low:g}–{100 * min(high, 0.6):g} %", here, low, min(high, 0.6))
+
+
+def _trust(weighed: Sequence[Named]) -> Trust:
+    known = [n for n in weighed if isfinite(n.confidence)]
+    p, right = [n.confidence for n in known], [n.right for n in known]
+    z = [n.evidence.get("z", nan) for n in known]
+    by_z = [v if isfinite(v) else -np.inf for v in z]
+    coverage, risk = risk_coverage(p, right)
+    return Trust(
+        len(known),
+        calibration_error(p, right),
+        brier(p, right),
+        risk_area(p, right),
+        risk_area(by_z, right),
+        tuple(coverage.tolist()),
+        tuple(risk.tolist()),
+        tuple(risk_coverage(by_z, right)[1].tolist()),
+        tuple(_bins(known)),
+    )
+
+
+def _bins(names: Sequence[Named]) -> Iterable[tuple[float, float, float, Rate]]:
+    for low, high in pairwise(CONFIDENCE_EDGES):
+        here = [n for n in names if low <= n.confidence < high]
+        if here:
+            mean = float(np.mean([n.confidence for n in here]))
+            yield low, min(high, 1.0), mean, rate(here, lambda n: n.right)
 
 
 def _confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
@@ -194,83 +241,36 @@ def _confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
     return table
 
 
-def _sizes(rows: Sequence[Row]) -> tuple[SizeBin, ...]:
-    single = [r for r in rows if r.kind == "single"]
-    found = []
-    for low, high in pairwise(SIZE_EDGES):
-        here = [r for r in single if low <= r.size < high]
-        found.append(
-            SizeBin(
-                low,
-                min(high, 0.6),
-                rate(here, lambda r: r.first_right),
-                rate([r for r in here if r.decidable], lambda r: r.first_right),
-                rate(here, lambda r: r.wrong),
-            )
-        )
-    return tuple(found)
-
-
-def _reliability(rows: Sequence[Row]) -> tuple[tuple[float, float, float, Rate], ...]:
-    names = [n for r in rows for n in r.named if isfinite(n.confidence)]
-    found = []
-    for low, high in pairwise(CONFIDENCE_EDGES):
-        here = [n for n in names if low <= n.confidence < high]
-        if here:
-            mean = float(np.mean([n.confidence for n in here]))
-            found.append((low, min(high, 1.0), mean, Rate(sum(n.right for n in here), len(here))))
-    return tuple(found)
-
-
-def _quantile(values: Sequence[float], q: float) -> float:
-    kept = [v for v in values if isfinite(v)]
-    return float(np.quantile(kept, q)) if kept else nan
-
-
-def _mean(values: Any) -> float:
-    return float(np.mean(values)) if len(values) else nan
-
-
 def as_json(board: Scoreboard) -> dict[str, Any]:
-    """The contents of `scoreboard.json`: targets, rates, confusion matrix, every trial."""
-
-    def shown(r: Rate) -> dict[str, Any]:
-        return {"hits": r.hits, "of": r.of, "share": r.value, "interval_95": list(r.interval)}
-
+    """The contents of `scoreboard.json`: targets, breakdowns, trust, confusion matrix, every trial."""
     result = {
-        "schema": 1,
+        "schema": 2,
         "sha256": board.sha256,
-        "seed": board.seed,
-        "kind": board.kind,
-        "trials": len(board.rows),
+        **dict(board.wish),
         "targets": [{**asdict(t), "ok": t.ok} for t in board.targets],
         "confusion": board.confusion,
-        "by_size": [
-            {
-                "from": b.low,
-                "to": b.high,
-                "named": shown(b.right),
-                "named_where_decidable": shown(b.right_decidable),
-                "wrong": shown(b.wrong),
-            }
-            for b in board.sizes
-        ],
-        "reliability": [
-            {"from": low, "to": high, "confidence": mean, "true": shown(r)}
-            for low, high, mean, r in board.reliability
-        ],
+        "by_law": [_entry(p) for p in board.by_law],
+        "by_imperfection": [_entry(p) for p in board.by_imperfection],
+        "by_size": [_entry(p) for p in board.by_size],
+        "confidence": {
+            **{k: v for k, v in asdict(board.trust).items() if k != "bins"},
+            "sure_from": SURE,
+            "bins": [
+                {"from": low, "to": high, "confidence": mean, "true": r.entry()}
+                for low, high, mean, r in board.trust.bins
+            ],
+        },
         "rows": [asdict(r) | {"outcome": r.outcome} for r in board.rows],
     }
-    finite: dict[str, Any] = _finite(result)
-    return finite
+    known: dict[str, Any] = finite(result)
+    return known
 
 
-def _finite(value: Any) -> Any:
-    """JSON knows no NaN: None instead."""
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return value
+def _entry(p: Part) -> dict[str, Any]:
+    return {
+        "name": p.name,
+        "trials": p.trials,
+        "named_first": p.right.entry(),
+        "located": p.located.entry(),
+        "wrong_name": p.wrong.entry(),
+    }

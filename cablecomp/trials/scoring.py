@@ -1,29 +1,31 @@
-"""One blind trial scored: what the verdict said against what was true."""
+"""The score of one blind trial: what was named, located, promised and bounded, against what is true."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import isfinite, nan, pi
+from dataclasses import dataclass, field
+from math import inf, isfinite, nan, pi
 from typing import Any
 
 from cablecomp.config import EffectEntry
-from cablecomp.effects import catalogue
+from cablecomp.diagnosis.explain.conformal import deficits
 from cablecomp.effects.catalogue import acts_through
 from cablecomp.trials.reference import Yardstick
 from cablecomp.trials.sealed import TrueEffect, Truth
 
 EVENT_SLACK_S = 1.0  # how far beside an interval an event may lie and still count as inside
 VISIBLE = 1.5  # mean square over the noise floor from which unknown physics can be seen at all
+SURE = 0.5  # confidence from which a name is given
 
 
 @dataclass(frozen=True)
 class Named:
-    """A name given, with its confidence, and whether it is true."""
+    """An effect that was weighed: its confidence and evidence, and whether it is true. It is a name given from `SURE` on."""
 
     effect: str
     confidence: float
     right: bool
+    evidence: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -59,14 +61,15 @@ class Bound:
 class Row:
     """The score of one trial.
 
-    `decidable`: the true model itself beats the recalibrated drive beyond its margin; `located`: the first covariate of
-    the calibrated drive's residual, before any name, or an interval, is what the concealed effect acts through (None if
-    nothing is concealed); `bounds`: of what was concealed and not named; `final_rad`: RMSE after modelling on data kept for
-    the end;
-    `said_tied`, `proposed`, `settled`: of confounded trials (None otherwise); `heldout_rad`, `baseline_rad`,
-    `true_rad`, `floor_rad`: RMSE after modelling, of the recalibrated drive, of the true model with true
-    parameters, of noise alone as the recording's own (averaged) rows have it; `failed`: why there is no
-    verdict.
+    `laws`, `forms`: whose laws the concealed effects follow, and each effect's `id:form`; `imperfections` by name;
+    `named`: names given, `weighed`: all effects of the final model, named or not, with their evidence; `decidable`: the true
+    laws beat the recalibrated drive beyond what an effect has to bring; `located`: the first covariate of the calibrated
+    drive's residual, before any name, or an interval, is what the concealed effect acts through (None if nothing is
+    concealed); `bounds`: of what was concealed and not named; `depends`: true dependences found, of all (None: there are
+    none to be found), `depends_wrongly`: those stated that are not true; `final_rad`: RMSE after modelling on data kept for
+    the end; `empirical`: laws without a name; `said_tied`, `proposed`, `settled`: of confounded trials (None otherwise);
+    `heldout_rad`, `baseline_rad`, `true_rad`, `floor_rad`: RMSE after modelling, of the recalibrated drive, of the true angle
+    (the recording's own noise), of noise as the verdict states it; `failed`: why there is no verdict.
     """
 
     number: int
@@ -76,23 +79,31 @@ class Row:
     excitation: str
     size: float
     truth: tuple[str, ...]
-    verdict: str
-    named: tuple[Named, ...]
-    tied: tuple[tuple[str, ...], ...]
+    laws: str
+    forms: tuple[str, ...]
+    imperfections: tuple[str, ...]
     decidable: bool
-    located: bool | None
-    covariate: str
-    said_tied: bool | None
-    proposed: bool | None
-    settled: bool | None
-    estimates: tuple[Estimate, ...]
-    bounds: tuple[Bound, ...]
-    heldout_rad: float
-    final_rad: float
     baseline_rad: float
     true_rad: float
-    floor_rad: float
-    seconds: float
+    verdict: str = "failed"
+    named: tuple[Named, ...] = ()
+    weighed: tuple[Named, ...] = ()
+    tied: tuple[tuple[str, ...], ...] = ()
+    located: bool | None = None
+    covariate: str = ""
+    said_tied: bool | None = None
+    proposed: bool | None = None
+    settled: bool | None = None
+    depends: tuple[int, int] | None = None
+    depends_wrongly: int = 0
+    short_by: float | None = None
+    estimates: tuple[Estimate, ...] = ()
+    bounds: tuple[Bound, ...] = ()
+    empirical: tuple[str, ...] = ()
+    heldout_rad: float = nan
+    final_rad: float = nan
+    floor_rad: float = nan
+    seconds: float = nan
     failed: str = ""
 
     @property
@@ -102,23 +113,23 @@ class Row:
 
     @property
     def first_right(self) -> bool:
-        """Whether the first name is true."""
-        return bool(self.named) and self.named[0].right
+        """Whether the first name is what the trial is about."""
+        return self.first in self.truth
 
     @property
     def wrong(self) -> bool:
-        """Whether any name given (confidence 0.5 and more) is not true."""
+        """Whether any name given is not true."""
         return any(not n.right for n in self.named)
 
     @property
     def all_right(self) -> bool:
-        """Whether all that is concealed is named, and nothing else."""
-        return sorted(n.effect for n in self.named) == sorted(self.truth)
+        """Whether all that the trial is about is named, and nothing wrong."""
+        return set(self.truth) <= {n.effect for n in self.named} and not self.wrong
 
     @property
     def visible(self) -> bool:
         """Whether the recalibrated drive leaves clearly more than noise."""
-        return self.baseline_rad**2 > VISIBLE * self.floor_rad**2
+        return self.baseline_rad**2 > VISIBLE * self.true_rad**2
 
     @property
     def outcome(self) -> str:
@@ -137,34 +148,34 @@ def score_trial(
 ) -> Row:
     """Score the contents of a `diagnosis.json` (and of the one after the proposed experiment) against the
     truth."""
-    named = _named(verdict, truth)
     confounded = truth.kind == "confounded"
     mismatch = verdict["mismatch"]
+    stated = _dependences(verdict) - _neither(truth)
     return Row(
-        truth.number,
-        truth.kind,
-        truth.case,
-        truth.label,
-        truth.excitation,
-        truth.size,
-        truth.names,
-        verdict["verdict"],
-        named,
-        tuple(tuple(g["effects"]) for g in verdict["not_excluded"]),
-        yardstick.decidable,
-        _located(truth, mismatch) if truth.effects else None,
-        mismatch[0]["covariate"] if mismatch else "",
-        _said_tied(truth, verdict) if confounded else None,
-        verdict["next_experiment"] is not None if confounded else None,
-        _settled(truth, second) if confounded else None,
-        tuple(_estimates(truth, verdict)),
-        tuple(_bounds(truth, verdict)),
-        _number(verdict["augmented"]["heldout_rmse_rad"]),
-        _number(verdict["augmented"]["final_rmse_rad"]),
-        yardstick.baseline_rmse_rad,
-        yardstick.true_rmse_rad,
-        _number(verdict["noise_floor_rad"]),
-        seconds,
+        **_known(truth, yardstick),
+        verdict=verdict["verdict"],
+        named=tuple(_weighed(m, truth) for m in verdict["missing_physics"]),
+        weighed=tuple(
+            _weighed(m, truth)
+            for m in (*verdict["missing_physics"], *verdict["candidates"])
+            if "selected_in" in m["evidence"]
+        ),
+        tied=tuple(tuple(g["effects"]) for g in verdict["not_excluded"]),
+        located=_located(truth, mismatch) if truth.main else None,
+        covariate=mismatch[0]["covariate"] if mismatch else "",
+        said_tied=_said_tied(truth, verdict) if confounded else None,
+        proposed=verdict["next_experiment"] is not None if confounded else None,
+        settled=_settled(truth, second) if confounded else None,
+        depends=(len(stated & set(truth.depends_on)), len(truth.depends_on)) if truth.depends_on else None,
+        depends_wrongly=len(stated - set(truth.depends_on)),
+        short_by=_short_by(truth, verdict) if truth.kind == "single" else None,
+        estimates=tuple(_estimates(truth, verdict)),
+        bounds=tuple(_bounds(truth, verdict)),
+        empirical=tuple(law["law"] for law in verdict["empirical"]),
+        heldout_rad=_number(verdict["augmented"]["heldout_rmse_rad"]),
+        final_rad=_number(verdict["augmented"]["final_rmse_rad"]),
+        floor_rad=_number(verdict["noise_floor_rad"]),
+        seconds=seconds,
     )
 
 
@@ -172,44 +183,46 @@ def failed_trial(truth: Truth, yardstick: Yardstick, why: str, seconds: float = 
     """The row of a trial whose diagnosis came to no verdict."""
     confounded = False if truth.kind == "confounded" else None
     return Row(
-        truth.number,
-        truth.kind,
-        truth.case,
-        truth.label,
-        truth.excitation,
-        truth.size,
-        truth.names,
-        "failed",
-        (),
-        (),
-        yardstick.decidable,
-        False if truth.effects else None,
-        "",
-        confounded,
-        confounded,
-        confounded,
-        (),
-        (),
-        nan,
-        nan,
-        yardstick.baseline_rmse_rad,
-        yardstick.true_rmse_rad,
-        truth.floor_rad,
-        seconds,
-        why,
+        **_known(truth, yardstick),
+        located=False if truth.main else None,
+        said_tied=confounded,
+        proposed=confounded,
+        settled=confounded,
+        depends=(0, len(truth.depends_on)) if truth.depends_on else None,
+        floor_rad=truth.floor_rad,
+        seconds=seconds,
+        failed=why,
     )
 
 
-def _named(verdict: Mapping[str, Any], truth: Truth) -> tuple[Named, ...]:
-    return tuple(
-        Named(m["effect"], _number(m["confidence"]), m["effect"] in truth.names)
-        for m in verdict["missing_physics"]
-    )
+def _known(truth: Truth, yardstick: Yardstick) -> dict[str, Any]:
+    """What a row holds whatever was said."""
+    return {
+        "number": truth.number,
+        "kind": truth.kind,
+        "case": truth.case,
+        "label": truth.label,
+        "excitation": truth.excitation,
+        "size": truth.size,
+        "truth": truth.names,
+        "laws": truth.laws,
+        "forms": tuple(f"{e.id}:{e.form}" for e in truth.main),
+        "imperfections": tuple(truth.imperfections),
+        "decidable": yardstick.decidable,
+        "baseline_rad": yardstick.baseline_rmse_rad,
+        "true_rad": yardstick.true_rmse_rad,
+    }
+
+
+def _weighed(entry: Mapping[str, Any], truth: Truth) -> Named:
+    name = entry["effect"].partition(":")[0]
+    evidence = {k: _number(v) for k, v in entry["evidence"].items()}
+    return Named(name, _number(entry["confidence"]), name in truth.right, evidence)
 
 
 def _covariates(effect: TrueEffect) -> tuple[str, ...]:
-    """What the effect acts through: the first two of the catalogue; a stranger's as its truth says."""
-    if not effect.known:
+    """What the effect acts through: the first two of the catalogue for its laws; otherwise as its truth says."""
+    if not effect.listed:
         return effect.covariates
     entry = EffectEntry(id=effect.id, **dict(effect.parameters))
     return acts_through(entry)[:2]
@@ -220,7 +233,7 @@ def _located(truth: Truth, mismatch: list[Mapping[str, Any]]) -> bool:
     if not mismatch:
         return False
     first = mismatch[0]
-    for effect in truth.effects:
+    for effect in truth.main:
         instant = effect.parameters.get("time_s")
         if isinstance(instant, float):
             intervals = first["intervals_s"] if first["covariate"] == "time" else []
@@ -233,8 +246,9 @@ def _located(truth: Truth, mismatch: list[Mapping[str, Any]]) -> bool:
 
 def _said_tied(truth: Truth, verdict: Mapping[str, Any]) -> bool:
     """Whether the truth stands in a group of what cannot be told apart, with its partner if an effect."""
-    wanted = {*truth.names, *([truth.partner] if truth.partner in catalogue() else [])}
-    return any(wanted <= set(group["effects"]) for group in verdict["not_excluded"])
+    groups = [{n.partition(":")[0] for n in group["effects"]} for group in verdict["not_excluded"]]
+    wanted = {*truth.names, *([truth.partner] if not truth.partner.endswith("_N") else [])}
+    return any(wanted <= group for group in groups)
 
 
 def _settled(truth: Truth, second: Mapping[str, Any] | None) -> bool:
@@ -246,14 +260,48 @@ def _settled(truth: Truth, second: Mapping[str, Any] | None) -> bool:
     )
 
 
+def _dependences(verdict: Mapping[str, Any]) -> set[tuple[str, str]]:
+    """(parameter, on) of all dependences that were stated, effects' and drive's; zeros are each session's own anyway."""
+    found = {
+        (d["parameter"].removeprefix("effect."), d["on"])
+        for m in verdict["missing_physics"]
+        if (d := m.get("depends_on")) is not None
+    }
+    for name in verdict["calibration"]:
+        base, tilde, condition = name.partition("~")
+        if tilde:
+            found.add((base.removeprefix("effect."), condition))
+        base, at, _ = name.partition("@")
+        if at and not base.endswith(("_offset_rad", "_offset_Nm")):
+            found.add((base, "session"))
+    return found
+
+
+def _short_by(truth: Truth, verdict: Mapping[str, Any]) -> float:
+    tried = verdict["hypotheses"]
+    first = [t for t in tried if t["beside"] == tried[0]["beside"]]
+    short = deficits({t["name"]: _number(t["z"]) for t in first})
+    return min((d for name, d in short.items() if name.partition(":")[0] in truth.names), default=inf)
+
+
+def _neither(truth: Truth) -> set[tuple[str, str]]:
+    """Dependences that are there in small, or were declared: stating them is neither right nor wrong."""
+    return (
+        {("pretension_N", "session")} - set(truth.depends_on) if "sessions" in truth.imperfections else set()
+    )
+
+
 def _estimates(truth: Truth, verdict: Mapping[str, Any]) -> list[Estimate]:
-    """Stated values of what was named rightly, and of the calibration, where the verdict rests on them."""
+    """Stated values of what was named rightly, and of the calibration, where the verdict rests on the true laws."""
     found: list[Estimate] = []
     right = {m["effect"]: m for m in verdict["missing_physics"] if m["effect"] in truth.names}
     if (
         len(right) != len(truth.effects)
         or len(verdict["missing_physics"]) != len(right)
         or verdict["empirical"]
+        or truth.depends_on
+        or not all(e.listed for e in truth.effects)
+        or {"configuration", "gain"} & set(truth.imperfections)  # other values than the true ones fit better
     ):
         return found  # the values of a model that is not the true one say nothing about their uncertainty
     calibration = dict(truth.true)
@@ -274,10 +322,12 @@ def _estimates(truth: Truth, verdict: Mapping[str, Any]) -> list[Estimate]:
 
 
 def _bounds(truth: Truth, verdict: Mapping[str, Any]) -> list[Bound]:
-    """What was said of the size of known effects that are there and were not named."""
+    """What was said of the size of the catalogue's effects that are there and were not named."""
     said = {u["effect"]: u for u in verdict["could_be_unseen"]}
     found = []
     for effect in truth.effects:
+        if not effect.listed:
+            continue
         channel = effect.parameters.get("channel")
         entry = said.get(f"{effect.id}:{channel}" if channel else effect.id)
         true = effect.parameters.get(entry["parameter"]) if entry else None

@@ -6,11 +6,11 @@ Imports nothing of the other packages. Start reading at `records.py` (what there
 
 from firmware_sim.plant.bench import PlantRun, simulate
 from firmware_sim.plant.config import EffectSpec, PlantConfig, StageConfig
-from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings, PlantTruth, noiseless
+from firmware_sim.plant.dynamic import LinkSpec, MotorSpec, Plant, PlantReadings, PlantTruth
 from firmware_sim.plant.effects import EFFECTS, FORMS, LISTED, UNLISTED, EffectKind
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.mesh import COARSE, FINE, NORMAL, Resolution
-from firmware_sim.plant.sensors import SensorSpec, measure
+from firmware_sim.plant.sensors import SensorSpec
 
 __all__ = [
     "COARSE",
@@ -33,7 +33,5 @@ __all__ = [
     "Resolution",
     "SensorSpec",
     "StageConfig",
-    "measure",
-    "noiseless",
     "simulate",
 ]

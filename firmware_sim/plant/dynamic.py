@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -324,12 +324,4 @@ def _counted(value: float, resolution: float) -> float:
     return float(value) if resolution <= 0 else round(float(value) / resolution) * resolution
 
 
-def noiseless(sensors: SensorSpec) -> SensorSpec:
-    """The same sensors without noise and rounding; gain, offset and compliance stay."""
-    quiet = {
-        name: 0.0 for name in sensors.__dataclass_fields__ if "_noise_" in name or "_resolution_" in name
-    }
-    return replace(sensors, **quiet)
-
-
-__all__ = ["Joint", "LinkSpec", "MotorSpec", "Plant", "PlantReadings", "PlantTruth", "noiseless"]
+__all__ = ["Joint", "LinkSpec", "MotorSpec", "Plant", "PlantReadings", "PlantTruth"]

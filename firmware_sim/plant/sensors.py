@@ -7,9 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from firmware_sim.plant.bench import PlantRun
 from firmware_sim.plant.errors import PlantError
-from firmware_sim.plant.records import Floats
 
 
 @dataclass(frozen=True)
@@ -48,41 +46,3 @@ class SensorSpec:
         """From a configuration's [sensors] table; keys that only the observer knows are left aside."""
         known = {f.name for f in fields(cls)}
         return cls(**{k: float(v) for k, v in table.items() if k in known})
-
-
-def rounded(value: Floats, resolution: float) -> Floats:
-    """Round to whole counts; resolution 0 leaves the value alone."""
-    return value if resolution <= 0 else np.round(value / resolution) * resolution
-
-
-def measure(run: PlantRun, sensors: SensorSpec, rng: np.random.Generator) -> dict[str, Floats]:
-    """The recording that the sensors make of a run: canonical channel names, SI units, one value per sample.
-
-    Tensions, which no usual joint measures, are left out; `rng` draws all noise, in the order of the
-    channels below.
-    """
-    n = len(run.time_s)
-
-    def noisy(value: Floats, sigma: float, resolution: float) -> Floats:
-        return rounded(value + sigma * rng.standard_normal(n), resolution)
-
-    s = sensors
-    joint = run.joint_position_rad + s.joint_torque_compliance_rad_per_Nm * run.load_path_Nm
-    channels = {
-        "time_s": run.time_s.copy(),
-        "motor_position_rad": noisy(
-            run.motor_position_rad, s.motor_position_noise_rad, s.motor_position_resolution_rad
-        ),
-        "joint_position_rad": noisy(
-            joint + s.joint_position_offset_rad, s.joint_position_noise_rad, s.joint_position_resolution_rad
-        ),
-        "joint_torque_Nm": noisy(
-            s.joint_torque_gain * run.joint_torque_Nm + s.joint_torque_offset_Nm,
-            s.joint_torque_noise_Nm,
-            s.joint_torque_resolution_Nm,
-        ),
-        "motor_torque_Nm": noisy(run.motor_torque_Nm, s.motor_torque_noise_Nm, s.motor_torque_resolution_Nm),
-        "temperature_degC": noisy(run.temperature_degC, s.temperature_noise_K, 0.0),
-        "other_1": run.other_1.copy(),
-    }
-    return channels

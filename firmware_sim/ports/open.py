@@ -1,4 +1,4 @@
-"""A port from its name: `virtual[:CHANNEL]`, `udp_multicast[:GROUP[:PORT]]`, `slcan`, `serial`,
+"""A port from its name: `virtual[:CHANNEL]`, `udp_multicast[:GROUP[:PORT]]`, `slcan`, `serial`, `dynamixel`,
 `INTERFACE:CHANNEL`."""
 
 from __future__ import annotations
@@ -11,9 +11,12 @@ import can
 from firmware_sim.errors import SimError
 from firmware_sim.ports.base import Port
 from firmware_sim.ports.can_port import CanPort
-from firmware_sim.ports.pty_port import SerialPort, SlcanPort
+from firmware_sim.ports.pty_port import DynamixelPort, SerialPort, SlcanPort
 
-BUSES = "virtual[:CHANNEL], udp_multicast[:GROUP[:PORT]], slcan, serial, or INTERFACE:CHANNEL of python-can"
+BUSES = (
+    "virtual[:CHANNEL], udp_multicast[:GROUP[:PORT]], slcan, serial, dynamixel, "
+    "or INTERFACE:CHANNEL of python-can"
+)
 GROUP, UDP_PORT = "239.74.163.2", 43113
 
 
@@ -25,6 +28,8 @@ def open_port(bus: str, link: Path | None = None, bitrate: int | None = None, *,
         return SlcanPort(link)
     if interface == "serial" and not rest:
         return SerialPort(link)
+    if interface == "dynamixel" and not rest:
+        return DynamixelPort(link)
     return open_can(interface, rest, bitrate, fd=fd)
 
 

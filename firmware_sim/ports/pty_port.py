@@ -1,5 +1,5 @@
-"""Pseudo-terminals: an slcan adapter, or a device with COBS records, as a serial port that any client can
-open.
+"""Pseudo-terminals: an slcan adapter, a device with COBS records, or a line of Dynamixels, as a serial port that any
+client can open.
 
 The terminal's far end is kept closed here, so the kernel reports a hang-up while no client has it open:
 then nothing is
@@ -18,6 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from firmware_sim.wire.dynamixel_packets import InstructionReader, status_packet
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.serial_records import RecordReader, encode_record
 from firmware_sim.wire.slcan import SlcanAdapter
@@ -199,3 +200,25 @@ class SerialPort(PtyPort):
     def bytes_of(self, frame: Frame, now_s: float) -> bytes:
         """One record."""
         return encode_record(frame)
+
+
+class DynamixelPort(PtyPort):
+    """A line of Dynamixels; frames of other numbers than theirs have no place on it."""
+
+    interface = "serial"
+
+    def __init__(self, link: Path | None = None) -> None:
+        self.reader = InstructionReader()
+        super().__init__(link)
+
+    def forget(self) -> None:
+        """Half a packet is no packet."""
+        self.reader.reset()
+
+    def frames(self, data: bytes, now_s: float) -> list[Frame]:
+        """Whole instructions in these bytes."""
+        return self.reader.feed(data) if data else []
+
+    def bytes_of(self, frame: Frame, now_s: float) -> bytes:
+        """One status packet."""
+        return status_packet(frame) if frame.identifier <= 0xFC else b""

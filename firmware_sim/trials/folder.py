@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -11,26 +10,31 @@ import numpy as np
 
 from firmware_sim.plant import EFFECTS, FORMS
 from firmware_sim.trials.order import Wanted
+from firmware_sim.trials.seal import ANGLES, TRUTH, truth_text
 from firmware_sim.trials.spoil import UNITS, coarser
 from firmware_sim.trials.world import Hidden, World
 from firmware_sim.trials.writing import JOINT_FILE, joint_toml, observer_parameters, write_recording
 
-RECORDINGS, TRUTH_FILE, ANGLES_FILE = "recordings", "truth.json", "truth.npz"
+RECORDINGS = "recordings"
 
 
 def write_world(folder: Path, world: World, wanted: Wanted) -> None:
     """Write recordings, configuration and truth; the folder appears whole or not at all."""
     spare = folder.with_name(folder.name + ".part")
     shutil.rmtree(spare, ignore_errors=True)
+    write_public(spare, world)
+    (spare / TRUTH).write_text(truth_text(full_truth(world, wanted)), encoding="utf-8")
+    np.savez_compressed(spare / ANGLES, **true_angles(world))
+    spare.rename(folder)
+
+
+def write_public(folder: Path, world: World) -> None:
+    """Write what a diagnosis may see: recordings and nominal configuration."""
     for k, leg in enumerate(world.legs):
-        path = spare / recording_file(world, k)
+        path = folder / recording_file(world, k)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_recording(path, leg.recorded.channels)
-    (spare / JOINT_FILE).write_text(public_joint(world), encoding="utf-8")
-    truth = json.dumps(full_truth(world, wanted), indent=1) + "\n"
-    (spare / TRUTH_FILE).write_text(truth, encoding="utf-8")
-    np.savez_compressed(spare / ANGLES_FILE, **true_angles(world))
-    spare.rename(folder)
+    (folder / JOINT_FILE).write_text(public_joint(world), encoding="utf-8")
 
 
 def recording_file(world: World, k: int) -> str:
@@ -75,7 +79,8 @@ def full_truth(world: World, wanted: Wanted) -> dict[str, Any]:
         "loop_rad": world.plain.loop_rad,
         "noise_floor_rad": world.floor_rad,
         "effects": [_effect(h, world.other) for h in world.hidden if not _is_dependence(world, h)],
-        "case": "" if world.order.case is None else world.order.case.name,
+        "case": case_name(world),
+        "partner": world.partner,
         "depends_on": _dependences(world),
         "imperfections": world.how.truth(),
         "recordings": [_recording(world, k) for k in range(len(world.legs))],
@@ -90,6 +95,12 @@ def full_truth(world: World, wanted: Wanted) -> dict[str, Any]:
     }
 
 
+def case_name(world: World) -> str:
+    """Name of the case of a trial of several sessions, or of one that is confounded by design; empty otherwise."""
+    case = world.order.case or world.order.tie
+    return "" if case is None else case.name
+
+
 def _recording(world: World, k: int) -> dict[str, Any]:
     leg = world.legs[k]
     return {
@@ -97,6 +108,7 @@ def _recording(world: World, k: int) -> dict[str, Any]:
         "session": str(leg.session + 1),
         "course": leg.course.kind,
         "rows": len(leg.recorded.rows),
+        "ends_s": float(leg.course.time_s[-1]),
         "history_s": float(leg.course.seen.time_s[0] - leg.course.time_s[0]),
         "zeros": dict(leg.zeros),
         "pretension_N": leg.drive.stages[0].pretension_N,
@@ -130,6 +142,7 @@ def _effect(hidden: Hidden, other: str) -> dict[str, Any]:
     spec = hidden.sized.spec
     kind = EFFECTS.get(spec.id) or FORMS[spec.id]
     return {
+        "id": spec.id,
         "effect": kind.effect,
         "form": "catalogue" if kind.listed or kind.form == "bending" else kind.form or "stranger",
         "role": hidden.role,

@@ -1,18 +1,22 @@
-"""Drawing and writing all trials of a run: public folders first, then the sealed truth."""
+"""Writing the trials of a blind run: public folders, and each truth under a seal of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import io
+import shutil
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from firmware_sim.plant import PlantError
-from firmware_sim.trials.plan import assignment
-from firmware_sim.trials.seal import SEALED, TRUTH, write_seal
-from firmware_sim.trials.trial import draw_trial
-from firmware_sim.trials.writing import folder_name, true_model, truth_of, truth_text, write_public
+from firmware_sim.trials.folder import full_truth, true_angles, write_public
+from firmware_sim.trials.order import Wanted
+from firmware_sim.trials.seal import ANGLES, SEALED, TRUTH, digest, truth_text, write_seal
+from firmware_sim.trials.world import draw_world
+from firmware_sim.trials.writing import folder_name
 
 Progress = Callable[[int, int], None]
 """Told how many trials are written, and of how many."""
@@ -20,52 +24,53 @@ Progress = Callable[[int, int], None]
 PUBLIC = "trials"
 
 
-def make_trial(seed: int, number: int, kind: str, out: str) -> tuple[dict[str, Any], str]:
-    """Draw one trial and write its public folder; returns its truth and its true model's configuration."""
-    trial = draw_trial(seed, assignment(seed, number, kind))
-    write_public(Path(out) / PUBLIC / folder_name(number), trial)
-    return truth_of(trial), true_model(trial)
+def make_trial(wanted: Wanted, number: int, out: str) -> None:
+    """Draw one trial, write its public folder and, once that is there, its seal."""
+    world = draw_world(wanted, number)
+    public = Path(out) / PUBLIC / folder_name(number)
+    shutil.rmtree(public, ignore_errors=True)
+    write_public(public, world)
+    angles = io.BytesIO()
+    np.savez_compressed(angles, **true_angles(world))
+    files: dict[str, str | bytes] = {TRUTH: truth_text(full_truth(world, wanted)), ANGLES: angles.getvalue()}
+    write_seal(_seal(out, number), files)
 
 
 def generate(
-    trials: int,
-    seed: int,
-    out: Path,
-    kind: str = "mixed",
-    workers: int = 2,
-    progress: Progress | None = None,
+    wanted: Wanted, trials: int, out: Path, workers: int = 2, progress: Progress | None = None
 ) -> str:
-    """Write `trials` trials under `out` and seal their truth; returns the SHA-256 of the sealed archive.
+    """Write `trials` trials under `out` with their seals; returns the SHA-256 of all seals.
 
-    What is written depends on seed, kind and number of trials, not on the number of worker processes.
-    Raises PlantError for a kind that is none, fewer than one trial, or a folder that holds another run.
+    Those whose seal is there already are kept. What is written depends on what is wanted and on each trial's number, not on
+    how many there are nor on the number of worker processes. Raises PlantError for fewer than one trial, or a place that
+    cannot be written.
     """
-    assignment(seed, 0, kind)
     if trials < 1 or workers < 1:
         raise PlantError(f"{trials} trials by {workers} workers; at least one of each is accepted")
-    if (out / SEALED).exists():
-        raise PlantError(f"{out}: holds a sealed run already; give another folder")
     try:
         (out / PUBLIC).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise PlantError(f"{out}: cannot be made ({error.strerror}); give another folder") from None
-    files: dict[str, str] = {}
-    truths: dict[int, dict[str, Any]] = {}
-    for done, (truth, model) in enumerate(_each(trials, seed, kind, str(out), workers), start=1):
-        truths[truth["trial"]] = truth
-        files[f"models/{folder_name(truth['trial'])}/true-model.toml"] = model
+    left = [k for k in range(trials) if not _seal(out, k).exists()]
+    done = trials - len(left)
+
+    def tell() -> None:
         if progress is not None:
             progress(done, trials)
-    files[TRUTH] = truth_text([truths[k] for k in sorted(truths)], seed, kind)
-    return write_seal(out / SEALED, files)
 
-
-def _each(trials: int, seed: int, kind: str, out: str, workers: int) -> Iterator[tuple[dict[str, Any], str]]:
     if workers == 1:
-        for k in range(trials):
-            yield make_trial(seed, k, kind, out)
-        return
+        for k in left:
+            make_trial(wanted, k, str(out))
+            done += 1
+            tell()
+        return digest(out / SEALED)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = [pool.submit(make_trial, seed, k, kind, out) for k in range(trials)]
-        for job in as_completed(jobs):
-            yield job.result()
+        for job in as_completed([pool.submit(make_trial, wanted, k, str(out)) for k in left]):
+            job.result()
+            done += 1
+            tell()
+    return digest(out / SEALED)
+
+
+def _seal(out: Path | str, number: int) -> Path:
+    return Path(out) / SEALED / f"{folder_name(number)}.zip"

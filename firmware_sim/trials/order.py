@@ -7,18 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from firmware_sim.plant import PlantError
+from firmware_sim.trials import confounded
 from firmware_sim.trials.forms_cable import CABLE
 from firmware_sim.trials.forms_friction import FRICTION
 from firmware_sim.trials.forms_joint import JOINT
-from firmware_sim.trials.strangers import NEAR_AND_FAR
+from firmware_sim.trials.strangers import STRANGERS
 from firmware_sim.trials.suspects import CATALOGUE, Suspect
 from firmware_sim.trials.tabletop import Case, case_in_turn
 
-KINDS = ("single", "pair", "none", "stranger", "sessions")
+T = TypeVar("T")
+
+KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded")
 LAWS = ("catalogue", "other", "mixed")
 IMPERFECTIONS = ("none", "some", "all")
 OTHER_FORMS = (*FRICTION, *CABLE, *JOINT)
@@ -49,24 +53,30 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Order:
-    """What one trial is to hold; `suspects` in no order of size, `case` of one of several sessions."""
+    """What one trial is to hold; `suspects` in no order of size, `case` of one of several sessions, `tie` of one in which two
+    explanations coincide."""
 
     number: int
     kind: str
     suspects: tuple[Suspect, ...]
     case: Case | None = None
+    tie: confounded.Case | None = None
 
 
 def order(wanted: Wanted, number: int) -> Order:
-    """What trial `number` (from 0) is to hold: kinds in turn as they were given, and each kind's effects in turn."""
-    place, within = divmod(number, len(wanted.kinds))
+    """What trial `number` (from 0) is to hold: kinds in turn as they were given (one given twice comes twice as often), and
+    each kind's effects in turn."""
+    turn, within = divmod(number, len(wanted.kinds))
     kind = wanted.kinds[within]
+    place = turn * wanted.kinds.count(kind) + wanted.kinds[:within].count(kind)
     if kind == "sessions":
         return Order(number, kind, (), case_in_turn(wanted.seed, place))
+    if kind == "confounded":
+        return Order(number, kind, (), tie=_in_turn(wanted.seed, place, confounded.CASES, 1))
     if kind == "none":
         return Order(number, kind, ())
     if kind == "stranger":
-        return Order(number, kind, (_in_turn(wanted.seed, place, NEAR_AND_FAR, 3),))
+        return Order(number, kind, (_in_turn(wanted.seed, place, STRANGERS, 3),))
     if kind == "single":
         effect = _in_turn(wanted.seed, place, CATALOGUE, 4)
         return Order(number, kind, (form_of(wanted, effect, place),))
@@ -82,7 +92,7 @@ def form_of(wanted: Wanted, effect: Suspect, place: int) -> Suspect:
     return forms[int(rng.integers(len(forms)))]
 
 
-def _in_turn(seed: int, place: int, pool: Sequence[Suspect], stream: int) -> Suspect:
+def _in_turn(seed: int, place: int, pool: Sequence[T], stream: int) -> T:
     """Every one once in each round, in a new order each round."""
     turn, within = divmod(place, len(pool))
     return pool[int(np.random.default_rng([seed, stream, turn]).permutation(len(pool))[within])]

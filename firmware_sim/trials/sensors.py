@@ -6,9 +6,6 @@ import math
 
 import numpy as np
 
-from firmware_sim.plant import PlantRun, SensorSpec, measure
-from firmware_sim.plant.records import Floats
-from firmware_sim.trials.courses import Course
 from firmware_sim.trials.joints import DrawnJoint, log_uniform
 from firmware_sim.trials.measures import PlainDrive
 
@@ -48,23 +45,3 @@ def noise_floor_rad(joint: DrawnJoint, plain: PlainDrive) -> float:
         + (plain.compliance * s["joint_torque_noise_Nm"]) ** 2
         + (plain.compliance * s["joint_torque_resolution_Nm"]) ** 2 / 12.0
     )
-
-
-def read_sensors(
-    rng: np.random.Generator, run: PlantRun, joint: DrawnJoint, course: Course, neighbour: bool
-) -> dict[str, Floats]:
-    """The recording that a joint's sensors make of a run, by canonical channel names."""
-    spec = SensorSpec.from_table(
-        {
-            **joint.sensors,
-            "joint_position_offset_rad": joint.offset_rad,
-            "temperature_noise_K": TEMPERATURE_NOISE_K,
-        }
-    )
-    channels = measure(run, spec, rng)
-    other = channels.pop("other_1")
-    channels.pop("motor_torque_Nm")
-    noise = NEIGHBOUR_NOISE * float(np.ptp(course.other)) * rng.standard_normal(len(other))
-    if neighbour:
-        channels[NEIGHBOUR] = other + noise
-    return channels

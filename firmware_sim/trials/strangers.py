@@ -1,9 +1,8 @@
 """Effects outside of any catalogue: physics that a diagnosis must locate and describe, and not name.
 
-`STRANGERS` leaves out those effects of the plant that are a catalogue effect in other words (a neighbour
-that bends the frame, an eccentric input pulley, a cable climbing its groove, a flexible link, which is a
-series compliance first), and one that only a recorded motor torque shows (cogging). `NEAR_AND_FAR` has what is near
-the catalogue too, but for what is a further form of one of its laws; every kind says what it is nearest to.
+Some lie far from the catalogue, some near it (a neighbour that bends the frame, a cable climbing its groove, play at the
+motor): every kind of the plant says which names are the nearest to it. What is a further form of one of the catalogue's
+laws is not here.
 """
 
 from __future__ import annotations
@@ -46,12 +45,6 @@ def _creep(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(
         {"time_constant_s": float(rng.uniform(0.8, 5.0))}, {"compliance_rad_per_Nm": 1.0}, first, 50 * first
     )
-
-
-def _bottoming(rng: np.random.Generator, scene: Scene) -> Shape:
-    saturation = float(rng.uniform(0.1, 0.3)) * scene.joint.load_Nm
-    first = scene.plain.loop_rad / saturation
-    return Shape({"saturation_Nm": saturation}, {"compliance_rad_per_Nm": 1.0}, first, 50.0 * first)
 
 
 def _joint_ripple(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -156,19 +149,11 @@ STRANGERS = (
     Suspect("joint_viscous_friction", TURNING, _seal),
     Suspect("parallel_spring", TURNING, _harness),
     Suspect("creeping_mount", ANY, _creep),
-    Suspect("stiffening_mount", ANY, _bottoming),
     Suspect("joint_encoder_ripple", TURNING, _joint_ripple),
     Suspect("motor_encoder_ripple", TURNING, _motor_ripple),
     Suspect("torque_sensor_quadratic", ANY, _bent_sensor),
     Suspect("torque_sensor_hysteresis", ANY, _lazy_sensor),
     Suspect("torque_sensor_drift", ANY, _drifting_sensor, warm=True),
-)
-
-
-_FORMS_BY_NOW = ("stiffening_mount",)  # a series compliance that stiffens is one of its forms
-
-NEAR_AND_FAR = (
-    *(s for s in STRANGERS if s.id not in _FORMS_BY_NOW),
     Suspect("frame_flex", ANY, _frame, neighbour=True),
     Suspect("groove_climb", TURNING, _climb),
     Suspect("flange_climb", TURNING, _flange),

@@ -12,8 +12,8 @@ from firmware_sim.trials.courses import KINDS, RATES_HZ, Course, draw_course
 from firmware_sim.trials.history import uneven, with_history
 from firmware_sim.trials.imperfections import Imperfections
 from firmware_sim.trials.joints import DrawnJoint, log_uniform
+from firmware_sim.trials.scene import PAUSE_S, usable
 from firmware_sim.trials.suspects import Scene, Shape
-from firmware_sim.trials.trial import PAUSE_S, usable
 
 SESSIONS, SAMPLES = 2, 11_000
 _GREATEST = 1.5  # rad, of a bend or of a wrist's turn

@@ -10,23 +10,26 @@ import numpy as np
 
 from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantError, PlantRun, StageConfig
 from firmware_sim.plant.records import Floats
+from firmware_sim.trials.confounded import Case as Tie
+from firmware_sim.trials.confounded import draw_truth
 from firmware_sim.trials.courses import KINDS, RATES_HZ, Course, draw_course
 from firmware_sim.trials.history import uneven, with_history
 from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
 from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
 from firmware_sim.trials.measures import PlainDrive
 from firmware_sim.trials.order import OTHER_FORMS, Order, Wanted, order
+from firmware_sim.trials.scene import PAUSE_S, is_slack, plain_scene, usable
 from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
 from firmware_sim.trials.spoil import Recorded, record
-from firmware_sim.trials.suspects import CATALOGUE, Scene, Suspect
+from firmware_sim.trials.suspects import CATALOGUE, Scene, Shape, Suspect
 from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
-from firmware_sim.trials.trial import PAUSE_S, is_slack, plain_scene, usable
 
 SAMPLES = (10_000, 12_000)
 """Of all recordings of a trial together."""
 
 RECORDINGS = {1: 0.2, 2: 0.5, 3: 0.3}
+CONFOUNDED_RECORDINGS = 2
 _ATTEMPTS = 80
 
 
@@ -58,7 +61,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class World:
-    """A trial with all its truth; `joint` holds the true drive of the first session and the nominal one."""
+    """A trial with all its truth; `joint` holds the true drive of the first session and the nominal one, `partner` is the other
+    explanation of a trial that is confounded by design."""
 
     order: Order
     joint: DrawnJoint
@@ -68,6 +72,7 @@ class World:
     legs: tuple[Leg, ...]
     how: Imperfections
     other: str
+    partner: str = ""
 
 
 def draw_world(wanted: Wanted, number: int) -> World:
@@ -80,12 +85,12 @@ def draw_world(wanted: Wanted, number: int) -> World:
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([wanted.seed, 21, number, attempt])
         try:
-            world = _draw(rng, wanted, asked)
+            world = _draw_confounded(rng, asked, asked.tie) if asked.tie else _draw(rng, wanted, asked)
         except PlantError:
             continue
         if world is not None:
             return world
-    names = ", ".join(s.id for s in asked.suspects)
+    names = ", ".join(s.id for s in asked.suspects) or (asked.tie.name if asked.tie else "")
     raise PlantError(f"trial {number} ({asked.kind}: {names}): no joint of {_ATTEMPTS} can show it")
 
 
@@ -124,6 +129,46 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
         other = f"other_{asked.case.condition}"
     legs = _legs(rng, joint, scene.plain, hidden, courses, sessions, how, other)
     return None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other)
+
+
+def _draw_confounded(rng: np.random.Generator, asked: Order, case: Tie) -> World | None:
+    """A trial in which two explanations coincide, in a world without imperfections: they would tell them apart."""
+    joint = draw_joint(rng, between=case.geometry_friction, closed=True)
+    within = usable(joint)
+    true, partner = draw_truth(rng, case)
+    courses: list[Course] = []
+    for _ in range(CONFOUNDED_RECORDINGS):
+        start = float(np.ceil(courses[-1].time_s[-1] + PAUSE_S)) if courses else 0.0
+        courses.append(case.course(rng, within).later(start))
+    if case.tie is not None:
+        courses = list(case.tie(joint, courses))
+    usual, _ = plain_scene(joint, draw_course(rng, "bench", within))  # what sensors are bought for
+    scene, plain_run = plain_scene(joint, courses[0])
+    # sizes count in loops of the usual course: this one may hardly have any
+    own = {k: getattr(scene.plain, k) for k in ("speed_rms", "acceleration_rms", "other_rms")}
+    scene = replace(scene, plain=replace(usual.plain, **own))
+    shape = case.shape(rng, scene, true)
+    if case.sizes is None:
+        drawn = _as_drawn(scene, true, shape, plain_run)
+        sized = drawn if drawn.size >= SMALLEST else None
+    else:
+        sized = give_size(scene, true, shape, log_uniform(rng, *case.sizes), plain_run)
+    if sized is None:
+        return None
+    joint = joint.with_sensors(draw_sensors(rng, joint, usual.plain))
+    floor, how = noise_floor_rad(joint, scene.plain), Imperfections()
+    other = NEIGHBOUR if "crosstalk" in case.pair or rng.uniform() < 0.6 else ""
+    hidden = (Hidden(sized, "main"),)
+    legs = _legs(rng, joint, scene.plain, hidden, courses, (0,) * len(courses), how, other)
+    return (
+        None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other, partner)
+    )
+
+
+def _as_drawn(scene: Scene, identifier: str, shape: Shape, plain: PlantRun) -> Sized:
+    spec = EffectSpec(identifier, shape.parameters(shape.first))
+    added = run_course(scene, (spec,)).joint_position_rad - plain.joint_position_rad
+    return Sized(spec, float(np.std(added)) / scene.plain.loop_rad)
 
 
 def _courses(

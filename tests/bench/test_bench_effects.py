@@ -6,6 +6,7 @@ Run with: pytest tests/bench/test_bench_effects.py --benchmark-only
 from __future__ import annotations
 
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from cablecomp.config import JointConfig, load_joint
 from cablecomp.effects import catalogue, extend, with_effects
 from cablecomp.mechanics.assemble import assemble
 from cablecomp.observer import Observer
+from cablecomp.signals import Sample
 
 CONFIG = Path(__file__).parents[2] / "configs" / "joints" / "snow-closed-rig.toml"
 SAMPLES = 20_000
@@ -58,3 +60,46 @@ def test_build(benchmark: Any, name: str) -> None:
     config = richer(name)
     assemble(config, extend(config))
     benchmark(lambda: assemble(config, extend(config)))
+
+
+def steps_us(config: JointConfig, bounds: bool) -> np.ndarray:
+    """What each sample of a course costs [us]: the quickest of three repeats, so that other work does not count."""
+    load = 0.5 * config.drive.stage[-1].pretension_N * config.drive.stage[-1].output_radius_m
+    best = np.full(1500, np.inf)
+    for _ in range(3):
+        observer = Observer(config, bounds=bounds)
+        for k in range(len(best)):
+            t = 1e-3 * k
+            sample = Sample(
+                t, 0.3 * np.sin(1.8 * t), load * np.sin(4.6 * t) * np.cos(1.24 * t), 0.0, 0.0, 20.0
+            )
+            begin = perf_counter()
+            observer.step(sample)
+            best[k] = min(best[k], perf_counter() - begin)
+    return 1e6 * best
+
+
+@pytest.mark.benchmark(group="one step from Python, two stages in parallel")
+@pytest.mark.parametrize("bounds", [False, True])
+@pytest.mark.parametrize(
+    "names",
+    [(), ("pressure_dependent_friction",), ("pressure_dependent_friction", "nonlinear_cable")],
+    ids=lambda names: "+".join(names) or "plain",
+)
+def test_steps_of_two_stages(benchmark: Any, names: tuple[str, ...], bounds: bool) -> None:
+    """The dearest laws on the dearest joint that ships."""
+    config = load_joint(CONFIG.with_name("two-stage-parallel.toml"))
+    middle = [
+        (
+            name,
+            {
+                p.name: 0.25 * p.bounds(config)[0] + 0.75 * p.bounds(config)[1]
+                for p in catalogue()[name].parameters
+            },
+        )
+        for name in names
+    ]
+    taken = benchmark.pedantic(lambda: steps_us(with_effects(config, middle), bounds), rounds=1)
+    p50, p99 = np.percentile(taken, [50, 99])
+    benchmark.extra_info.update(p50_us=p50, p99_us=p99)
+    print(f"\n{'+'.join(names) or 'plain'}{', bounds' if bounds else ''}: p50 {p50:.1f} p99 {p99:.1f} us")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -50,3 +51,14 @@ def test_an_unknown_command_is_one_line(capsys: pytest.CaptureFixture[str]) -> N
     said = capsys.readouterr().err
     assert "fly" in said
     assert said.count("\n") == 1
+
+
+def test_an_option_given_twice_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", "--config", "capstan-arm", "--config", "wrist-capstan"]) == 2
+    assert "--config is given 2 times" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["info", "design"])
+def test_a_result_is_had_as_json(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--config", "capstan-arm", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["name"] == "capstan-arm"

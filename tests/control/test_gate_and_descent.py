@@ -215,6 +215,45 @@ def test_a_stop_is_never_left_and_the_weight_stays_a_share(ages: list[float]) ->
         assert feed_of(state).held == (state.phase in (Phase.HELD, Phase.FADING, Phase.STOPPED))
 
 
+@pytest.mark.parametrize(
+    ("motor_age_s", "load_age_s", "phase"),
+    [
+        (0.004, 0.004, Phase.NORMAL),
+        (0.0, 0.0041, Phase.HELD),
+        (0.01, 0.01, Phase.HELD),
+        (0.0, 0.0101, Phase.FADING),
+        (0.05, 0.0, Phase.FADING),
+        (0.05, 0.1999, Phase.FADING),
+        (0.0501, 0.0, Phase.STOPPED),
+        (0.0, 0.2, Phase.STOPPED),
+    ],
+)
+def test_every_age_belongs_to_the_phase_that_its_times_say(
+    motor_age_s: float, load_age_s: float, phase: Phase
+) -> None:
+    """A time is the last of its phase; that of the stop the first of the stop."""
+    assert degrade(NORMAL, PERIOD, motor_age_s, load_age_s, TIMES).phase is phase
+
+
+def test_recovery_ends_where_the_whole_feed_forward_is_back() -> None:
+    half = DegradeState(Phase.RECOVERING, 0.5, 0.02)
+    assert degrade(half, 0.05, 0.0, 0.0, TIMES) == NORMAL == DegradeState(Phase.NORMAL, 1.0, 0.0)
+    assert degrade(half, 0.025, 0.0, 0.001, TIMES) == DegradeState(Phase.RECOVERING, 0.75, 0.001)
+    assert degrade(half, 0.05, 0.0, 0.006, TIMES) == DegradeState(Phase.HELD, 0.5, 0.006)
+
+
+def test_phases_are_numbers_in_files() -> None:
+    """`cycles.csv` holds them."""
+    assert [phase.name for phase in map(Phase, range(5))] == [
+        "NORMAL",
+        "HELD",
+        "FADING",
+        "RECOVERING",
+        "STOPPED",
+    ]
+    assert len(Phase) == 5
+
+
 @pytest.mark.parametrize("name", ["capstan-arm", "wrist-capstan", "snow-closed-rig"])
 def test_no_speed_is_plausible_that_no_target_ever_has(name: str) -> None:
     joint = load_joint(Path(__file__).parents[2] / f"configs/joints/{name}.toml")

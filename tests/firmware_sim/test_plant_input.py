@@ -15,8 +15,6 @@ from firmware_sim.plant import (
     Resolution,
     SensorSpec,
     StageConfig,
-    measure,
-    noiseless,
     simulate,
 )
 
@@ -124,33 +122,6 @@ def test_stage_values_are_checked() -> None:
         StageConfig(0.1, 0.1, 0.1, 1e4, 10.0, 0.1, float("nan"), 6.0, 6.0)
 
 
-def test_measured_channels_carry_noise_resolution_and_the_sensors_own_compliance() -> None:
-    config = joint()
-    t = np.arange(0, 10, 0.005)
-    run = simulate(config, t, 0.5 * np.sin(t), np.sin(1.3 * t))
-    sensors = SensorSpec(
-        joint_position_noise_rad=1e-4,
-        joint_torque_noise_Nm=0.01,
-        joint_torque_offset_Nm=0.3,
-        joint_torque_gain=0.9,
-        motor_position_resolution_rad=1e-3,
-        joint_torque_compliance_rad_per_Nm=2e-3,
-    )
-    seen = measure(run, sensors, np.random.default_rng(1))
-    again = measure(run, sensors, np.random.default_rng(1))
-    assert all(np.array_equal(seen[k], again[k]) for k in seen)
-    joint_error = seen["joint_position_rad"] - run.joint_position_rad - 2e-3 * run.load_path_Nm
-    assert np.std(joint_error) == pytest.approx(1e-4, rel=0.05)
-    torque_error = seen["joint_torque_Nm"] - 0.9 * run.joint_torque_Nm - 0.3
-    assert np.std(torque_error) == pytest.approx(0.01, rel=0.05)
-    assert np.mean(torque_error) == pytest.approx(0.0, abs=1e-3)
-    steps = seen["motor_position_rad"] / 1e-3
-    assert np.max(np.abs(steps - np.round(steps))) < 1e-9
-    quiet = measure(run, noiseless(sensors), np.random.default_rng(1))
-    np.testing.assert_allclose(
-        quiet["joint_position_rad"], run.joint_position_rad + 2e-3 * run.load_path_Nm, atol=1e-15
-    )
-    assert "tension_h_N" not in seen
-    assert "tension_h_N" in run.channels()
+def test_a_sensors_noise_is_checked() -> None:
     with pytest.raises(PlantError, match="joint_torque_noise_Nm"):
         SensorSpec(joint_torque_noise_Nm=-1.0)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from firmware_sim.plant import COARSE, EFFECTS, LISTED, UNLISTED, PlantError
-from firmware_sim.trials import assignment, digest, draw_trial, generate, open_truth
+from firmware_sim.plant import EFFECTS, LISTED, UNLISTED
+from firmware_sim.trials import Wanted, digest, generate, open_truth
 from firmware_sim.trials.__main__ import main
+from firmware_sim.trials.confounded import CASES
 from firmware_sim.trials.courses import KINDS as COURSES
 from firmware_sim.trials.courses import Range, draw_course
 from firmware_sim.trials.joints import OFF_NOMINAL, draw_joint
 from firmware_sim.trials.measures import loop_width
-from firmware_sim.trials.plan import KINDS, SHARES, Assignment
-from firmware_sim.trials.sizes import LARGEST, SMALLEST, run_course
+from firmware_sim.trials.order import order
+from firmware_sim.trials.seal import truth_text, write_seal
 from firmware_sim.trials.strangers import STRANGERS
-from firmware_sim.trials.suspects import CATALOGUE, Scene
+from firmware_sim.trials.suspects import CATALOGUE
 
 
 def test_suspects_are_the_plants_listed_effects_and_strangers_are_not() -> None:
@@ -28,16 +26,15 @@ def test_suspects_are_the_plants_listed_effects_and_strangers_are_not() -> None:
     assert {s.id for s in STRANGERS} <= set(UNLISTED)
 
 
-def test_mixed_assignments_keep_their_shares_and_cover_the_catalogue() -> None:
-    drawn = [assignment(3, k) for k in range(100)]
-    assert {k: sum(a.kind == k for a in drawn) for k in KINDS} == {k: 2 * SHARES[k] for k in KINDS}
-    singles = [a.effects[0] for a in drawn if a.kind == "single"]
-    counts = [singles.count(s.id) for s in CATALOGUE]
-    assert max(counts) - min(counts) <= 1
-    assert [assignment(3, k) for k in range(100)] == drawn
-    assert [assignment(4, k) for k in range(100)] != drawn
-    with pytest.raises(PlantError, match="mixed, single"):
-        assignment(3, 0, "several")
+def test_kinds_come_in_turn_and_every_one_its_effects_in_turn() -> None:
+    kinds = ("single", "single", "pair", "confounded")
+    wanted = Wanted(3, kinds, "catalogue", "none")
+    drawn = [order(wanted, k) for k in range(4 * len(CATALOGUE))]
+    assert [o.kind for o in drawn] == list(kinds) * len(CATALOGUE)
+    singles = [o.suspects[0].id for o in drawn if o.kind == "single"]
+    assert {singles.count(s.id) for s in CATALOGUE} == {2}  # one given twice comes twice, with other effects
+    ties = [o.tie.name for o in drawn if o.tie is not None]
+    assert set(ties[: len(CASES)]) == {c.name for c in CASES}
 
 
 @pytest.mark.parametrize("kind", COURSES)
@@ -79,66 +76,45 @@ def test_joints_lie_in_the_stated_ranges_and_off_nominal_within_twice_their_tole
     assert stated.true == stated.nominal
 
 
-@pytest.mark.parametrize("effect", ["bearing_friction", "pulley_runout", "routing_friction"])
-def test_an_effect_adds_to_the_joint_angle_what_its_size_says(effect: str) -> None:
-    trial = draw_trial(2, Assignment(0, "single", (effect,)))
-    sized = trial.effects[0]
-    assert SMALLEST <= sized.size <= LARGEST
-    scene = Scene(trial.joint, trial.courses[0], trial.plain)
-    absent = replace(sized.spec, parameters={**sized.spec.parameters, "mu_angle": 0.0})
-    without = run_course(scene, (absent,) if effect == "routing_friction" else (), COARSE)
-    added = run_course(scene, (sized.spec,), COARSE).joint_position_rad - without.joint_position_rad
-    assert np.std(added) / trial.plain.loop_rad == pytest.approx(sized.size, rel=1e-6)
-
-
-def test_noise_floor_is_a_small_share_of_the_loop_and_is_what_the_sensors_make() -> None:
-    trial = draw_trial(2, Assignment(0, "nothing"))
-    assert 0.003 < trial.floor_rad / trial.plain.loop_rad < 0.025
-    run = run_course(Scene(trial.joint, trial.courses[0], trial.plain), (), COARSE)
-    read = trial.recordings[0]
-    sensors = trial.joint.sensors
-    noise = read["joint_position_rad"] - run.joint_position_rad - trial.joint.offset_rad
-    expected = np.hypot(
-        sensors["joint_position_noise_rad"], sensors["joint_position_resolution_rad"] / 12**0.5
-    )
-    assert np.std(noise) == pytest.approx(expected, rel=0.15)
-
-
-def test_a_run_is_the_same_whatever_the_workers_and_hides_its_truth(tmp_path: Path) -> None:
-    first = generate(2, 9, tmp_path / "a", "single", workers=1)
-    second = generate(2, 9, tmp_path / "b", "single", workers=2)
-    assert first == second == digest(tmp_path / "a" / "sealed.zip")
+def test_a_run_is_the_same_whatever_was_there_and_hides_its_truth(tmp_path: Path) -> None:
+    wanted = Wanted(9, ("single", "none"), "catalogue", "none")
+    first = generate(wanted, 2, tmp_path / "a", workers=1)
+    told: list[tuple[int, int]] = []
+    generate(wanted, 1, tmp_path / "b", workers=1)  # stopped after the first
+    kept = (tmp_path / "b" / "sealed" / "00000.zip").stat().st_mtime_ns
+    second = generate(wanted, 2, tmp_path / "b", 1, lambda done, of: told.append((done, of)))
+    assert told == [(2, 2)]
+    assert (tmp_path / "b" / "sealed" / "00000.zip").stat().st_mtime_ns == kept
+    assert first == second == digest(tmp_path / "a" / "sealed")
     for path in sorted((tmp_path / "a" / "trials").rglob("*.*")):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
-    public = sorted(p.name for p in (tmp_path / "a" / "trials" / "00000").iterdir())
-    assert public == ["joint.toml", "recording-1.csv.gz", "recording-2.csv.gz"]
-    truths = open_truth(tmp_path / "a" / "sealed.zip")
-    text = (tmp_path / "a" / "trials" / "00000" / "joint.toml").read_text()
-    assert not any(name in text for name in EFFECTS)
-    assert [truths[k]["effects"][0]["id"] for k in range(2)] == [
-        assignment(9, k, "single").effects[0] for k in range(2)
-    ]
-    with pytest.raises(PlantError, match="sealed run already"):
-        generate(3, 9, tmp_path / "a", "single")
+    folder = tmp_path / "a" / "trials" / "00000"
+    names = {p.name for p in folder.rglob("*") if p.is_file()}
+    assert names <= {"joint.toml", "recording-1.csv.gz", "recording-2.csv.gz", "recording-3.csv.gz"}
+    assert not any(name in (folder / "joint.toml").read_text() for name in EFFECTS)
+    truth = open_truth(tmp_path / "a" / "sealed" / "00000.zip")
+    assert [e["effect"] for e in truth["effects"]] == [order(wanted, 0).suspects[0].id]
+    assert open_truth(tmp_path / "a" / "sealed" / "00001.zip")["effects"] == []
 
 
 def test_a_changed_truth_changes_the_digest(tmp_path: Path) -> None:
-    generate(1, 1, tmp_path, "nothing", workers=1)
-    before = digest(tmp_path / "sealed.zip")
-    with zipfile.ZipFile(tmp_path / "sealed.zip") as archive:
-        truth = json.loads(archive.read("truth.json"))
-    assert truth["trials"][0]["effects"] == []
-    with zipfile.ZipFile(tmp_path / "sealed.zip", "a") as archive:
-        archive.writestr("more.txt", "later")
-    assert digest(tmp_path / "sealed.zip") != before
+    write_seal(tmp_path / "00000.zip", {"truth.json": truth_text({"trial": 0})})
+    write_seal(tmp_path / "00001.zip", {"truth.json": truth_text({"trial": 1})})
+    before = digest(tmp_path)
+    write_seal(tmp_path / "00001.zip", {"truth.json": truth_text({"trial": 1})})
+    assert digest(tmp_path) == before
+    write_seal(tmp_path / "00001.zip", {"truth.json": truth_text({"trial": 2})})
+    assert digest(tmp_path) != before
+    (tmp_path / "00000.zip").unlink()
+    assert digest(tmp_path) != before
 
 
-def test_command_line_prints_the_digest_and_one_line_for_bad_input(
+def test_command_line_ends_in_one_line_for_bad_input(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--trials", "1", "--seed", "4", "--kind", "nothing", "--workers", "1", "--out"]
-    assert main([*arguments, str(tmp_path / "run")]) == 0
-    printed = capsys.readouterr().out.splitlines()
-    assert printed == ["written 1 of 1", f"sha256 {digest(tmp_path / 'run' / 'sealed.zip')}"]
-    assert main([*arguments, str(tmp_path / "run")]) == 2
-    assert capsys.readouterr().err.startswith("error: ")
+    arguments = ["--trials", "1", "--seed", "4", "--workers", "1", "--out", str(tmp_path / "run")]
+    for more in (["--kinds", "several"], ["--laws", "mine"], ["--trials", "0"]):
+        assert main([*arguments, *more]) == 2
+        message = capsys.readouterr().err
+        assert message.startswith("error: ")
+        assert message.count("\n") == 1

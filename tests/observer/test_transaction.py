@@ -229,3 +229,18 @@ def test_an_impossible_state_is_told_and_no_snapshot_of_it_is_taken_up() -> None
     with pytest.raises(InputError, match="impossible state"):
         sound.restore(poisoned.snapshot())
     assert sound.snapshot() == before
+
+
+def test_a_snapshot_brings_history_along_and_no_calibration() -> None:
+    """Gain and offset of the load channel are the configuration's, whatever they were when it was taken."""
+    config = load_joint(JOINTS[-1])
+    sensors = config.sensors.model_copy(update={"joint_torque_gain": 1.25, "joint_torque_offset_Nm": 0.25})
+    before, after = Observer(config), Observer(config.model_copy(update={"sensors": sensors}))
+    samples = walk(config, np.random.default_rng(5), 40)
+    for sample in samples[:30]:
+        before.step(sample)
+    after.restore(before.snapshot())
+    for sample in samples[30:]:
+        known = before.step(sample)
+        read = after.step(sample._replace(joint_torque_Nm=1.25 * sample.joint_torque_Nm + 0.25))
+        assert read.deflection_rad == pytest.approx(known.deflection_rad, abs=1e-12)

@@ -11,7 +11,10 @@ from cablecomp.config import load_joint
 from cablecomp.config_text import joint_text
 from cablecomp.control.design import design_loop
 from cablecomp.control.options import load_control
+from cablecomp.recording.replay import PredictionCsv
 from cablecomp.report.design_page import design_page, design_rows, design_tables
+from cablecomp.report.run_data import load_run
+from cablecomp.runtime.log import CYCLE
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -38,3 +41,30 @@ def test_a_joint_written_back_reads_as_the_same_joint(path: Path, tmp_path: Path
     again = tmp_path / "again.toml"
     again.write_text(joint_text(config, ("a remark",)), encoding="utf-8")
     assert load_joint(again) == config
+
+
+TABLES = {
+    "recording.csv": "time_s,motor_position_rad,joint_position_rad,joint_torque_Nm",
+    "prediction.csv": ",".join(PredictionCsv.COLUMNS),
+    "cycles.csv": ",".join(CYCLE),
+}
+
+
+@pytest.mark.parametrize("short", TABLES)
+@pytest.mark.parametrize("rows", [None, 0, 7])
+def test_tables_that_a_full_disk_cut_short_are_drawn_as_far_as_all_of_them_go(
+    short: str, rows: int | None, tmp_path: Path
+) -> None:
+    """`rows` of one table, None = not even its head; forty of the others."""
+    for name, head in TABLES.items():
+        count = 40 if name != short else 0 if rows is None else rows
+        width = len(head.split(","))
+        lines = [",".join([repr(1e-3 * k)] * width) for k in range(count)]
+        empty = name == short and rows is None and name != "recording.csv"
+        (tmp_path / name).write_text("" if empty else "\n".join([head, *lines]) + "\n")
+    if short == "recording.csv" and not rows:
+        return  # says that it holds no rows, as every reader of recordings does
+    data = load_run(tmp_path)
+    assert data.rows == (rows or 0)
+    if data.rows:
+        assert len(data.error_rad()) == len(data.time_s) == len(data.controlled) == data.rows

@@ -240,3 +240,17 @@ def test_a_motor_that_says_nothing_is_stale_and_not_stuck() -> None:
     assert flags & MOTOR_STALE
     assert flags & ENCODERS_DISAGREE
     assert not flags & MOTOR_STUCK
+
+
+def test_a_motor_whose_frames_are_lost_while_its_target_moves_is_not_stuck() -> None:
+    """It said the same twice, then nothing for some cycles, then where it had gone meanwhile."""
+    wire = Wire()
+    for k in range(20):
+        wire.cycle(1e-3 * k, 0.0, 0.0, target=1e-3 * k)
+    wire.cycle(0.019, 0.0, 0.0, target=0.020)
+    for k in range(8):
+        checked = wire.cycle(None, 0.0, 0.0, target=0.021 + 1e-3 * k)
+        assert not checked.fatal
+    assert checked.flags & MOTOR_STALE
+    assert not wire.cycle(0.028, 0.0, 0.0, target=0.029).fatal
+    assert wire.cycle(0.028, 0.0, 0.0, target=0.035).flags & MOTOR_STUCK

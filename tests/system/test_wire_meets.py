@@ -35,6 +35,9 @@ PROTOCOLS = {
     "cubemars-servo": ("cubemars-servo-socketcan.toml", {"protocol": "cubemars"}),
     "moteus": ("moteus-socketcan.toml", {"protocol": "moteus", "gains_per_turn": (1000.0, 10.0)}),
     "moteus-dual": ("moteus-dual-encoder.toml", {"protocol": "moteus", "gains_per_turn": (1000.0, 10.0)}),
+    "cia402": ("cia402-socketcan.toml", {"protocol": "cia402"}),
+    "cia402-dual": ("cia402-dual-encoder.toml", {"protocol": "cia402"}),
+    "dynamixel": ("dynamixel-serial.toml", {"protocol": "dynamixel", "torque_constant": 1.78}),
     "dbc": ("dbc-virtual.toml", {"protocol": "dbc"}),
 }
 # Half a count of what each wire carries: motor position in rad, motor velocity in rad/s, motor torque in Nm
@@ -47,6 +50,7 @@ RESOLUTION = {
     "cubemars-v3": (0.06 * 0.0175, 10 / 1800, 36 / 4095),  # the status has steps of 0.1 deg, 10 ERPM, 0.01 A
     "cubemars-servo": (0.06 * 0.0175, 10 / 1800, 36 / 4095),
     "moteus": (2e-6, 2e-5, 1e-5),
+    "cia402": (1e-4, 1e-4, 5e-3),  # 65536 counts per turn, thousandths of 10 Nm
     "dbc": (1e-6, 0.025, 1e-3),
 }
 
@@ -117,6 +121,25 @@ class Meeting:
             self.bench.port.wait(0.001)
         raise AssertionError(f"not reached: {self.link.status()}")
 
+    def climb(self) -> None:
+        """As the loop does: ask until the drive tells where it is, then command until it is enabled."""
+        joint, device, asked = self.link.joints[0], self.bench.joints[0], False
+        self.bench.port.send(device.advance_sample(), self.bench.time_s)
+        for _ in range(4000):
+            self.now_s += 1e-3
+            if not joint.updates[MOTOR_POSITION]:
+                self.link.request(0, Request.REPORT)
+            elif not asked:
+                asked = self.link.request(0, Request.CLEAR_FAULTS) and self.link.request(0, Request.ENABLE)
+            else:
+                self.link.send(0, MotorCommand(joint.values[MOTOR_POSITION]))
+            self.bench.pump()
+            self.link.poll(self.now_s)
+            if joint.state == DriveState.ENABLED:
+                return
+            self.bench.port.wait(1e-3)
+        raise AssertionError(f"not enabled: {self.link.status()}")
+
     def cycle(self, command: MotorCommand) -> None:
         """One command to every joint, one step of each, and all that they tell."""
         self.now_s += 1e-3
@@ -161,15 +184,18 @@ def meet() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("wire", WIRES)
-@pytest.mark.parametrize("protocol", [p for p in PROTOCOLS if p != "moteus-dual"])
+@pytest.mark.parametrize("protocol", [p for p in PROTOCOLS if not p.endswith(("-dual", "dynamixel"))])
 def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting = meet(protocol, wire)
     link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
 
-    own_loops = protocol.startswith("odrive") or protocol == "cubemars-servo"
+    own_loops = protocol.startswith("odrive") or protocol in ("cubemars-servo", "cia402")
     mode = Mode.POSITION if own_loops else Mode.IMPEDANCE
-    assert link.request(0, Request.CLEAR_FAULTS)
-    assert link.request(0, Request.ENABLE, mode)
+    if protocol == "cia402":
+        meeting.climb()
+    else:
+        assert link.request(0, Request.CLEAR_FAULTS)
+        assert link.request(0, Request.ENABLE, mode)
     meeting.until(lambda: device.drive.state.name == "ENABLED")
     meeting.until(
         lambda: min(joint.updates[MOTOR_POSITION], joint.updates[JOINT_POSITION]) >= meeting.bench.steps
@@ -208,16 +234,47 @@ def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting.until(lambda: device.drive.state.name in ("DISABLED", "FAULT"))
 
 
-def test_the_joints_encoder_on_the_drives_second_input(meet: Any) -> None:
-    meeting = meet("moteus-dual", "virtual")
+@pytest.mark.parametrize("protocol", ["moteus-dual", "cia402-dual"])
+def test_the_joints_encoder_on_the_drives_second_input(meet: Any, protocol: str) -> None:
+    meeting = meet(protocol, "virtual")
     link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
-    link.request(0, Request.ENABLE, Mode.IMPEDANCE)
-    meeting.until(lambda: device.drive.state.name == "ENABLED")
+    gains: tuple[Any, Any] = (None, None)
+    if protocol == "cia402-dual":
+        meeting.climb()
+    else:
+        gains = (60.0, 2.0)
+        link.request(0, Request.ENABLE, Mode.IMPEDANCE)
+        meeting.until(lambda: device.drive.state.name == "ENABLED")
+    first = device.plant.load_Nm / 50.0
     for _ in range(50):
-        meeting.cycle(MotorCommand(-0.3, 0.0, -device.plant.load_Nm, 60.0, 2.0))
-        assert joint.values[JOINT_POSITION] == pytest.approx(device.truth.joint_position_rad, abs=1e-6)
-    assert joint.values[JOINT_POSITION] < -0.05
+        meeting.cycle(MotorCommand(-0.3, 0.0, -device.plant.load_Nm, *gains))
+        assert joint.values[JOINT_POSITION] == pytest.approx(device.truth.joint_position_rad, abs=4e-6)
+    assert joint.values[JOINT_POSITION] < first - 5e-3
     assert joint.updates[JOINT_TORQUE] == 0
+
+
+def test_a_dynamixel_on_a_line_of_its_own(meet: Any) -> None:
+    meeting = meet("dynamixel", "dynamixel")
+    link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
+    meeting.climb()
+    for _ in range(40):
+        steps = meeting.bench.steps
+        updates = joint.updates[MOTOR_POSITION]
+        link.send(0, MotorCommand(0.4))
+        meeting.until(
+            lambda steps=steps, updates=updates: (
+                meeting.bench.steps > steps and joint.updates[MOTOR_POSITION] > updates
+            )
+        )
+        truth = device.truth
+        assert joint.values[MOTOR_POSITION] == pytest.approx(truth.motor_position_rad, abs=8e-4)
+        assert joint.values[MOTOR_VELOCITY] == pytest.approx(truth.motor_velocity_rad_s, abs=0.0121)
+        assert joint.values[MOTOR_TORQUE] == pytest.approx(truth.motor_torque_Nm, abs=2.5e-3)
+    assert device.drive.setpoint.position_rad == pytest.approx(0.4, abs=8e-4)
+    assert joint.updates[JOINT_POSITION] == 0
+    assert link.status().invalid == 0
+    assert link.stop()
+    meeting.until(lambda: device.drive.state.name == "DISABLED")
 
 
 def test_eight_joints_on_one_bus(meet: Any) -> None:

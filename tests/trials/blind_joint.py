@@ -36,7 +36,7 @@ JOINT = parse_joint(
 )
 
 
-def recording(joint: JointConfig, seed: int) -> dict[str, NDArray[np.float64]]:
+def recording(joint: JointConfig, seed: int, noise: bool = True) -> dict[str, NDArray[np.float64]]:
     """Ramps at two rates with holds, input locked; the joint encoder is noisy."""
     rng = np.random.default_rng(seed)
     turns = np.array([0.0, 0.7, 0.7, -0.6, -0.6, 0.5, -0.4, 0.3, 0.3, -0.2, 0.6, 0.0, 0.0])
@@ -45,5 +45,6 @@ def recording(joint: JointConfig, seed: int) -> dict[str, NDArray[np.float64]]:
     load = np.interp(time, at * 40.0 / at[-1], turns)
     columns = {"time_s": time, "motor_position_rad": np.zeros_like(time), "joint_torque_Nm": load}
     columns["joint_position_rad"] = Observer(joint).run(columns)["joint_position_rad"]
-    columns["joint_position_rad"] = columns["joint_position_rad"] + NOISE_RAD * rng.standard_normal(len(time))
+    sigma = NOISE_RAD if noise else 0.0
+    columns["joint_position_rad"] = columns["joint_position_rad"] + sigma * rng.standard_normal(len(time))
     return columns

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from collections.abc import Callable, Sequence
@@ -14,23 +15,29 @@ import numpy as np
 import pytest
 from blind_joint import JOINT, recording
 
+from cablecomp.cluster import Workers
 from cablecomp.config_text import joint_text
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
 from cablecomp.recording.writer import write_canonical
 from cablecomp.report.scoreboard_page import scoreboard_page, scoreboard_table
-from cablecomp.trials.prove import SEALED, Blind, Wish, prove
+from cablecomp.trials.prove import Blind, Wish, prove
 from cablecomp.trials.reference import Yardstick, measure_truth
-from cablecomp.trials.scoreboard import Rate, as_json, scoreboard
+from cablecomp.trials.scoreboard import as_json, scoreboard
 from cablecomp.trials.scoring import Row, failed_trial, score_trial
-from cablecomp.trials.sealed import TrueEffect, Truth, digest, open_sealed
+from cablecomp.trials.sealed import SEALED, TrueEffect, Truth, check_seal, digest, read_sealed, truth_from
+from cablecomp.trials.shares import Rate
 
 SURE = Yardstick(1e-5, 5e-5, True, 0.9, 20.0)
+WISH = {"trials": 3, "seed": 7, "kinds": "single", "laws": "mixed", "imperfections": "some"}
+EVIDENCE = {"selected_in": 1.0, "z": 4.0}
 
 
-def truth(kind: str = "single", *effects: TrueEffect, partner: str = "", number: int = 0) -> Truth:
+def truth(
+    kind: str = "single", *effects: TrueEffect, partner: str = "", number: int = 0, **imperfections: Any
+) -> Truth:
     drive = {k: v for k, v in JOINT.drive.stage[0].model_dump().items() if v is not None}
-    return Truth(number, kind, "", partner, "bench", effects, 1e-3, 1e-5, drive, 0.0, JOINT)
+    return Truth(number, kind, "", partner, "bench", effects, (), imperfections, 1e-3, 1e-5, drive, (0.0,))
 
 
 def effect(name: str, size: float = 0.1, **parameters: float | str) -> TrueEffect:
@@ -45,7 +52,14 @@ def verdict(*names: str, **changes: Any) -> dict[str, Any]:
         "augmented": {"heldout_rmse_rad": 1.05e-5, "final_rmse_rad": 1.1e-5},
         "calibration": {},
         "mismatch": [{"covariate": "load", "intervals_s": [[3.0, 5.0]]}],
-        "missing_physics": [{"effect": n, "confidence": 0.97, "parameters": {}} for n in names],
+        "missing_physics": [
+            {"effect": n, "confidence": 0.97, "parameters": {}, "evidence": EVIDENCE, "depends_on": None}
+            for n in names
+        ],
+        "candidates": [],
+        "hypotheses": [
+            {"name": n, "beside": "the drive", "z": 5.0 - k} for k, n in enumerate((*names, "crosstalk"))
+        ],
         "not_excluded": [],
         "empirical": [],
         "could_be_unseen": [],
@@ -59,7 +73,7 @@ def row(t: Truth, said: dict[str, Any], **further: Any) -> Row:
 
 
 def target(rows: Sequence[Row], words: str) -> float:
-    return next(t.reached for t in scoreboard(rows, "", 0, "mixed").targets if words in t.what)
+    return next(t.reached for t in scoreboard(rows, "", WISH).targets if words in t.what)
 
 
 def test_names_are_right_wrong_or_missing() -> None:
@@ -68,11 +82,51 @@ def test_names_are_right_wrong_or_missing() -> None:
     assert (right.first_right, right.wrong, right.all_right) == (True, False, True)
     assert (wrong.first_right, wrong.wrong) == (False, True)
     assert (none.first_right, none.wrong, none.outcome) == (False, False, "consistent")
-    assert target([right, wrong, none], "named first") == pytest.approx(1 / 3)
-    assert target([right, wrong, none], "wrong names") == pytest.approx(1 / 3)
+    assert target([right, wrong, none], "named first, catalogue") == pytest.approx(1 / 3)
+    assert target([right, wrong, none], "a wrong name") == pytest.approx(1 / 3)
     unclear = replace(wrong, decidable=False)
-    assert target([right, unclear], "named first") == 1.0
-    assert target([right, unclear], "wrong names") == 0.5  # at any size, decidable or not
+    assert target([right, unclear], "named first, catalogue") == 1.0
+    assert target([right, unclear], "a wrong name") == 0.5  # at any size, decidable or not
+
+
+def test_laws_are_told_apart_and_companions_and_imperfections_are_no_wrong_names() -> None:
+    greased = replace(effect("termination_backlash"), form="greased")
+    other = truth("single", greased, replace(effect("clock_skew"), role="companion"))
+    assert other.laws == "other"
+    both = row(other, verdict("termination_backlash", "clock_skew"))
+    assert (both.first_right, both.wrong, both.all_right) == (True, False, True)
+    assert not row(other, verdict("clock_skew")).first_right
+    assert target([both], "named first, another law") == 1.0
+    assert isnan(target([both], "named first, catalogue"))
+    late = truth("none", late={"channel": "joint_position", "acts_as": ["clock_skew"]})
+    assert not row(late, verdict("clock_skew")).wrong
+    assert row(late, verdict("crosstalk")).wrong
+    board = scoreboard([both, row(late, verdict("crosstalk"))], "", WISH)
+    assert [p.name for p in board.by_law] == ["clock_skew:catalogue", "termination_backlash:greased"][1:]
+    assert {p.name: p.wrong.hits for p in board.by_imperfection} == {"none at all": 0, "late": 1}
+
+
+def test_dependences_count_but_for_those_that_were_declared() -> None:
+    tied = replace(truth("sessions"), depends_on=(("routing_friction.mu_angle", "sheath_bend_rad"),))
+    on = {"parameter": "routing_friction.mu_angle", "on": "sheath_bend_rad"}
+    said = verdict("routing_friction")
+    said["missing_physics"][0]["depends_on"] = on
+    said["calibration"] = {
+        "pretension_N@1": {"value": 1.0, "sd": 0.1},
+        "joint_position_offset_rad@1": {"value": 0.0, "sd": 0.1},
+    }
+    found = row(tied, said)
+    assert (found.depends, found.depends_wrongly) == ((1, 1), 1)
+    own = replace(tied, imperfections={"sessions": {"declared": True}})
+    assert row(own, said).depends_wrongly == 0
+    assert row(tied, verdict()).depends == (0, 1)
+
+
+def test_the_truth_falls_short_of_the_best_by_what_the_first_step_says() -> None:
+    one = truth("single", effect("crosstalk"))
+    assert row(one, verdict("gravity_load", "clock_skew")).short_by == pytest.approx(2.0)
+    assert row(one, verdict()).short_by == 0.0
+    assert row(truth("single", effect("strand_break")), verdict()).short_by == np.inf
 
 
 def test_pairs_ask_for_both_and_nothing_else() -> None:
@@ -94,16 +148,17 @@ def test_location_counts_by_the_effect_and_by_the_event() -> None:
     channel = truth("single", effect("crosstalk", load_coefficient=0.1, channel="other_neighbour"))
     named = verdict(mismatch=[{"covariate": "other:neighbour", "intervals_s": []}])
     assert row(channel, named).located
-    assert row(truth("nothing"), verdict()).located is None
+    assert row(truth("none"), verdict()).located is None
 
 
-def test_abstention_is_asked_for_where_there_is_something_to_see() -> None:
-    unknown = truth("unknown", effect("creeping_mount"))
-    assert target([row(unknown, verdict(verdict="unexplained"))], "unknown: unexplained") == 1.0
-    assert target([row(unknown, verdict())], "unknown: unexplained") == 0.0
-    unseen = score_trial(unknown, replace(SURE, baseline_rmse_rad=1.05e-5), verdict())
-    assert target([unseen], "unknown: unexplained") == 1.0
-    assert target([row(unknown, verdict("viscous_slip"))], "unknown: unexplained") == 0.0
+def test_a_stranger_may_be_called_what_it_is_nearest_to_and_nothing_else() -> None:
+    unknown = truth("stranger", replace(effect("creeping_mount"), form="stranger", nearest=("viscous_slip",)))
+    assert unknown.laws == "stranger"
+    words = "strangers: no wrong name"
+    assert target([row(unknown, verdict(verdict="unexplained"))], words) == 1.0
+    assert target([row(unknown, verdict("viscous_slip"))], words) == 1.0
+    assert target([row(unknown, verdict("gravity_load"))], words) == 0.0
+    assert target([failed_trial(unknown, SURE, "no luck")], words) == 0.0
 
 
 def test_confounded_trials_are_to_be_said_proposed_and_settled() -> None:
@@ -158,7 +213,7 @@ def test_what_was_not_named_is_held_against_its_stated_bound() -> None:
 
 
 def test_what_was_kept_for_the_end_is_held_against_what_was_promised() -> None:
-    rows = [row(truth("nothing"), verdict(augmented={"heldout_rmse_rad": 2.0, "final_rmse_rad": 3.0}))]
+    rows = [row(truth("none"), verdict(augmented={"heldout_rmse_rad": 2.0, "final_rmse_rad": 3.0}))]
     assert target(rows, "kept for the end") == pytest.approx(1.5)
 
 
@@ -183,56 +238,72 @@ def test_wilsons_interval() -> None:
     assert isnan(Rate(0, 0).value)
 
 
-def test_reliability_compares_confidence_with_truth() -> None:
+def test_trust_compares_confidence_with_truth() -> None:
     one = truth("single", effect("clock_skew"))
     rows = [row(one, verdict("clock_skew")) for _ in range(3)] + [row(one, verdict("crosstalk"))]
-    ((_, _, mean, share),) = scoreboard(rows, "", 0, "single").reliability
+    trust = scoreboard(rows, "", WISH).trust
+    ((_, _, mean, share),) = trust.bins
     assert (mean, share.hits, share.of) == (pytest.approx(0.97), 3, 4)
+    assert trust.brier == pytest.approx((3 * 0.03**2 + 0.97**2) / 4)
+    assert trust.risk[-1] == 0.25
 
 
 def test_page_and_table_hold_every_trial_and_json_no_nan() -> None:
     rows = [
         row(truth("single", effect("clock_skew"), number=3), verdict("clock_skew"), seconds=4.0),
         failed_trial(truth("pair", effect("gravity_load"), effect("crosstalk"), number=4), SURE, "no luck"),
-        row(truth("nothing", number=5), verdict("crosstalk")),
+        row(truth("none", number=5, gaps={}), verdict("crosstalk")),
     ]
-    board = scoreboard(rows, "ab" * 32, 7, "mixed")
-    text = scoreboard_page(board, "cablecomp prove --seed 7")
+    board = scoreboard(rows, "ab" * 32, WISH)
+    text = scoreboard_page(board)
     assert "no luck" in text
     assert "abababababab" in text
+    assert "--imperfections some" in text
     assert scoreboard_table(board).row_count == len(board.targets)
     assert json.loads(json.dumps(as_json(board), allow_nan=False))["confusion"]["a pair"] == {"failed": 1}
-    assert target(rows, "false names") == 1.0
+    assert target(rows, "nothing missing: a name") == 1.0
 
 
-def test_the_true_model_is_the_yardstick() -> None:
-    """With the truth concealed the true model leaves noise, beats the calibrated drive and is decidable."""
-    values = {"gap_rad": 8e-5}
-    true = with_effects(JOINT, [("termination_backlash", values)])
-    columns = recording(true, 1)
-    t = replace(truth("single", effect("termination_backlash", **values)), model=true)
-    found = measure_truth(JOINT, [columns], t)
+def test_the_true_law_is_the_yardstick() -> None:
+    """With its law's contribution known, the drive leaves noise, beats itself without and is decidable."""
+    true = with_effects(JOINT, [("termination_backlash", {"gap_rad": 8e-5})])
+    columns, plain = recording(true, 1), recording(JOINT, 1, noise=False)
+    angles = {
+        "time_s_1": columns["time_s"],
+        "joint_rad_1": recording(true, 1, noise=False)["joint_position_rad"],
+        "plain_rad_1": plain["joint_position_rad"],
+    }
+    found = measure_truth(JOINT, {"a": columns}, truth("single", effect("termination_backlash")), angles)
     assert found.decidable
     assert found.gain > 0.5
     assert found.true_rmse_rad < 0.8 * found.baseline_rmse_rad
-    nothing = measure_truth(JOINT, [recording(JOINT, 2)], truth("nothing"))
-    assert not nothing.decidable
-    assert nothing.baseline_rmse_rad == pytest.approx(nothing.true_rmse_rad, rel=0.15)
+    nothing = {**angles, "joint_rad_1": plain["joint_position_rad"]}
+    none = measure_truth(JOINT, {"a": recording(JOINT, 1)}, truth("none"), nothing)
+    assert not none.decidable
+    assert none.baseline_rmse_rad == pytest.approx(none.true_rmse_rad, rel=0.15)
+
+
+def seal(out: Path, number: int, plain: dict[str, Any]) -> None:
+    """A trial's truth under its seal, with the true angles that a plant would know."""
+    angles = io.BytesIO()
+    clean = recording(JOINT, number, noise=False)
+    np.savez(angles, time_s_1=clean["time_s"], joint_rad_1=clean["joint_position_rad"],
+             plain_rad_1=clean["joint_position_rad"])  # fmt: skip
+    (out / SEALED).mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(out / SEALED / f"{number:05d}.zip", "w") as archive:
+        archive.writestr("truth.json", json.dumps(plain))
+        archive.writestr("truth.npz", angles.getvalue())
 
 
 def _conceal(log: list[str]) -> Callable[..., str]:
     def work(out: Path, wish: Wish, told: Callable[[int, int], None]) -> str:
-        trials = []
-        with zipfile.ZipFile(out / SEALED, "w") as archive:
-            for k in range(wish.trials):
-                folder = out / "trials" / f"{k:05d}"
-                folder.mkdir(parents=True)
-                (folder / "joint.toml").write_text(joint_text(JOINT))
-                write_canonical(folder / "recording-1.csv", recording(JOINT, k))
-                archive.writestr(f"models/{k:05d}/true-model.toml", joint_text(JOINT))
-                trials.append(_plain_truth(k))
-                told(k + 1, wish.trials)
-            archive.writestr("truth.json", json.dumps({"schema": 1, "trials": trials}))
+        for k in range(wish.trials):
+            folder = out / "trials" / f"{k:05d}"
+            (folder / "recordings").mkdir(parents=True)
+            (folder / "joint.toml").write_text(joint_text(JOINT))
+            write_canonical(folder / "recordings" / "recording-1.csv", recording(JOINT, k))
+            seal(out, k, _plain_truth(k))
+            told(k + 1, wish.trials)
         log.append("concealed")
         return digest(out / SEALED)
 
@@ -242,14 +313,15 @@ def _conceal(log: list[str]) -> Callable[..., str]:
 def _plain_truth(number: int) -> dict[str, Any]:
     drive = {k: v for k, v in JOINT.drive.stage[0].model_dump().items() if v is not None}
     return {
-        "trial": number, "kind": "nothing", "case": "", "partner": "", "excitation": "bench", "effects": [],
-        "loop_rad": 1e-3, "noise_floor_rad": 1e-5, "true": drive, "offset_rad": 0.0,
+        "trial": number, "kind": "none", "case": "", "partner": "", "effects": [], "depends_on": [],
+        "imperfections": {}, "loop_rad": 1e-3, "noise_floor_rad": 1e-5, "true": drive,
+        "recordings": [{"course": "bench", "zeros": {"joint_position": 0.0}}],
     }  # fmt: skip
 
 
 def _fake_diagnosis(log: list[str]) -> Callable[[Path, Sequence[Path], Path], None]:
     def work(folder: Path, further: Sequence[Path], out: Path) -> None:
-        assert sorted(p.name for p in folder.iterdir()) == ["joint.toml", "recording-1.csv"]
+        assert sorted(p.name for p in folder.iterdir()) == ["joint.toml", "recordings"]
         log.append(f"diagnosed {folder.name} with {len(further)}")
         if folder.name == "00001":
             raise InputError("the joint cannot follow")
@@ -261,9 +333,9 @@ def _fake_diagnosis(log: list[str]) -> Callable[[Path, Sequence[Path], Path], No
     return work
 
 
-def _fake_experiment(log: list[str]) -> Callable[[Path, int, Path, Path], None]:
-    def work(sealed: Path, trial: int, protocol: Path, out: Path) -> None:
-        log.append(f"experiment {trial}")
+def _fake_experiment(log: list[str]) -> Callable[[Path, Path, Path], None]:
+    def work(sealed: Path, protocol: Path, out: Path) -> None:
+        log.append(f"experiment {sealed.stem}")
         out.write_text("")
 
     return work
@@ -271,32 +343,37 @@ def _fake_experiment(log: list[str]) -> Callable[[Path, int, Path, Path], None]:
 
 def test_the_whole_way_in_order_and_again_without_work(tmp_path: Path) -> None:
     log: list[str] = []
-    blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), _fake_diagnosis(log), workers=0)
-    board = prove(blind, Wish(2, 5), lambda what, done, of: None, log.append)
+    blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), Workers(0), _fake_diagnosis(log))
+    wish = Wish(2, 5, "none", "catalogue", "none")
+    board = prove(blind, wish, lambda what, done, of: None, log.append)
     assert log[0] == "concealed"
     assert log[1] == digest(tmp_path / SEALED)
     assert log[2:] == [
         "diagnosed 00000 with 0",
         "diagnosed 00001 with 0",
-        "experiment 0",
+        "experiment 00000",
         "diagnosed 00000 with 1",
     ]
     assert [r.outcome for r in board.rows] == ["consistent", "failed"]
     assert json.loads((tmp_path / "scoreboard.json").read_text())["trials"] == 2
     before = len(log)
-    prove(blind, Wish(2, 5), lambda what, done, of: None, log.append)
+    prove(blind, wish, lambda what, done, of: None, log.append)
     assert log[before:] == [digest(tmp_path / SEALED)]
     with pytest.raises(InputError, match="holds another run"):
-        prove(blind, Wish(3, 5), lambda what, done, of: None, log.append)
+        prove(blind, replace(wish, trials=3), lambda what, done, of: None, log.append)
 
 
 def test_a_broken_seal_is_not_opened(tmp_path: Path) -> None:
-    log: list[str] = []
-    _conceal(log)(tmp_path, Wish(1, 0), lambda done, of: None)
+    seal(tmp_path, 0, _plain_truth(0))
     sha256 = digest(tmp_path / SEALED)
-    assert open_sealed(tmp_path / SEALED, sha256)[0].kind == "nothing"
-    with zipfile.ZipFile(tmp_path / SEALED, "a") as archive:
+    (path,) = check_seal(tmp_path / SEALED, sha256)
+    plain, angles = read_sealed(path)
+    assert truth_from(plain).kind == "none"
+    assert isnan(truth_from(plain).size)
+    assert "joint_rad_1" in angles
+    with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("more.txt", "later")
     with pytest.raises(InputError, match="the truth was changed"):
-        open_sealed(tmp_path / SEALED, sha256)
-    assert isnan(truth("nothing").size)
+        check_seal(tmp_path / SEALED, sha256)
+    with pytest.raises(InputError, match="lacks or misstates 'kind'"):
+        truth_from({k: v for k, v in plain.items() if k != "kind"})

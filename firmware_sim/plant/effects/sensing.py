@@ -176,6 +176,7 @@ MOTOR_TORQUE_COGGING = EffectKind(
     ("motor_angle",),
     _readout(cog_Nm="amplitude_Nm", cog_order="order", cog_phase="phase_rad"),
     listed=False,
+    nearest=("motor_friction",),
 )
 
 KINDS = (

@@ -1,0 +1,312 @@
+"""A check before belief: do signs, ratio, units, timing of a recording agree with what the drive allows?
+
+Straight lines, joint angle on motor angle and load; for delays alone the nominal drive, so that its hysteresis does not pass
+for one. What is said is a suspicion with its numbers; nothing is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import log, pi
+from typing import Final
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.control.stiffness import plain, stiffness_range
+from cablecomp.errors import CablecompError
+from cablecomp.estimation.evidence import JOINT, MOTOR
+from cablecomp.estimation.evidence import load_channel as channel_of_load
+from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
+
+INPUT: Final = "motor_position_rad"
+ROWS: Final = 20_000
+"""Rows that are looked at; of more, every n-th."""
+SURE: Final = 0.5
+"""Least partial correlation from which on a slope means something."""
+RATIO_OFF: Final = 0.05
+"""Relative departure from the rigid ratio that no compliance or slip makes."""
+SCALE_OFF: Final = 4.0
+"""Factor between the compliance seen and the nominal one that friction, stiffening and tolerances do not make."""
+LATE_GAIN: Final = 0.75
+"""A delay is believed where it takes what a straight line leaves down to this share."""
+MOST_LATE_S: Final = 0.25
+DELAY_ROWS: Final = 1500
+"""Rows on which delays are looked for."""
+GAP: Final = 10.0
+"""Usual steps that make a gap."""
+MOVED: Final = 0.05
+"""Share of its range that a channel has to have moved across a gap for the gap to matter."""
+
+_ANGLES: Final = {
+    180.0 / pi: "joint_position_rad seems to be in degrees",
+    pi / 180.0: "motor_position_rad seems to be in degrees",
+    2.0 * pi: "motor_position_rad seems to be in turns",
+    0.5 / pi: "joint_position_rad seems to be in turns",
+    1000.0: "joint_position_rad seems to be in milliradians",
+    0.001: "motor_position_rad seems to be in milliradians",
+}
+_TORQUES: Final = {
+    1e-3: "mNm",
+    1e-2: "Ncm",
+    0.112985: "inlbf",
+    0.0980665: "kgfcm",
+    1.35582: "ftlbf",
+    1e3: "kNm",
+}
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """`kind`: sign, ratio, unit, scale, delay or gap; `channel`: which one is meant first; `text`: one line with the numbers;
+    `numbers`: those."""
+
+    kind: str
+    channel: str
+    text: str
+    numbers: Mapping[str, float]
+
+
+def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[Suspicion, ...]:
+    """What in a recording (canonical channels) hardly fits the drive; empty where all agrees or nothing can be said."""
+    found = list(_gaps(columns))
+    if INPUT not in columns or JOINT not in columns:
+        return tuple(found)
+    load = channel_of_load(config, columns)
+    rows = _rows(columns, (INPUT, JOINT, *((load,) if load else ())))
+    if len(rows["time_s"]) < 40:
+        return tuple(found)
+    view = _View(config, rows, load)
+    found += view.angles()
+    found += view.torques()
+    found += view.delays() if not found else []
+    if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
+        found += _motor_torque(config, _rows(columns, (INPUT, MOTOR, "joint_torque_Nm")))
+    return tuple(found)
+
+
+class _View:
+    """One recording's rows beside what the nominal drive makes of them."""
+
+    def __init__(self, config: JointConfig, rows: Mapping[str, FloatArray], load: str | None) -> None:
+        self.config, self.rows, self.channel = config, rows, load
+        self.ratio = config.drive.ratio
+        self.time, self.q, self.y = rows["time_s"], rows[INPUT], rows[JOINT]
+        self.M = np.zeros(len(self.q)) if load is None else rows[load]
+        if load == MOTOR:
+            self.M = -self.M / self.ratio
+        self.compliance = _compliance(config)
+        self.slope, self.sure = _partial(self.y, self.q, self.M)
+
+    def left(self, turn: float = 1.0, ratio: float | None = None, scale: float = 1.0) -> float:
+        """RMS that the linear nominal drive leaves of the joint angle, zero taken off."""
+        r = self.ratio if ratio is None else ratio
+        return _rms(self.y - r * self.q - turn * scale * self.compliance * self.M)
+
+    def angles(self) -> list[Suspicion]:
+        """Signs, units and ratio of the two angles."""
+        factor = self.slope / self.ratio
+        moves = np.std(self.ratio * self.q) > 0.2 * np.std(self.y)
+        if not moves and abs(self.slope) * np.std(self.q) < 0.5 * np.std(self.y):
+            return list(self._reach())
+        if abs(self.sure) < SURE:
+            return []
+        found = []
+        if factor < 0.0:
+            words = (
+                f"motor_position_rad and joint_position_rad seem to turn against each other: RMS {_mrad(self.left())} as "
+                f"they are, {_mrad(self.left(ratio=-self.ratio))} with one of them turned"
+            )
+            found.append(Suspicion("sign", JOINT, words, {"slope_over_ratio": factor}))
+        off = abs(factor)
+        if abs(log(off)) > RATIO_OFF and not _loose(self.config, "radius"):
+            unit = next((words for f, words in _ANGLES.items() if abs(log(off / f)) < 0.1), None)
+            words = unit or "a gear between encoder and pulley, or a radius that is off?"
+            kind = "unit" if unit else "ratio"
+            left = _rms(self.y - self.slope * self.q)
+            said = (
+                f"{words}: the joint moves {off:.4g} times as far as the drive's ratio allows; RMS {_mrad(self.left())} as "
+                f"it is, {_mrad(left)} with the ratio seen"
+            )
+            found.append(Suspicion(kind, JOINT, said, {"slope_over_ratio": factor}))
+        return found or list(self._reach())
+
+    def _reach(self) -> Iterator[Suspicion]:
+        """Angles in degrees both: far beyond what is wound on the pulleys."""
+        last = self.config.drive.stage[-1]
+        reach, most = float(np.ptp(self.y)), 2.0 * last.wrap_output_rad
+        if reach > 4.0 * most:
+            words = (
+                f"both angles seem to be in degrees: the joint moves over {reach:.4g} rad, what is wound on its pulley "
+                f"allows {most:.3g}"
+            )
+            yield Suspicion("unit", JOINT, words, {"reach_rad": reach, "allowed_rad": most})
+
+    def torques(self) -> list[Suspicion]:
+        """Sign and unit of the load."""
+        if self.channel is None or not np.ptp(self.M) > 0.0:
+            return []
+        seen, sure = _partial(self.y, self.M, self.q)
+        if abs(sure) < SURE:
+            return []
+        factor = seen / self.compliance
+        ratio = self.slope if abs(self.sure) > SURE else self.ratio
+        found = []
+        if factor < 0.0:
+            line = _rms(self.y - ratio * self.q - seen * self.M)
+            words = (
+                f"{self.channel} seems to have the opposite sign: RMS {_mrad(self.left(ratio=ratio))}, "
+                f"{_mrad(self.left(-1.0, ratio))} with it turned; a straight line leaves {_mrad(line)}"
+            )
+            found.append(Suspicion("sign", self.channel, words, {"compliance_over_nominal": factor}))
+        off = abs(factor)
+        most = SCALE_OFF * (8.0 if _loose(self.config, "EA_N") else 1.0)
+        if not 1.0 / most < off < most:
+            unit = min(_TORQUES, key=lambda f: abs(log(off / f)))
+            near = f" (in {_TORQUES[unit]}?)" if abs(log(off / unit)) < 0.5 else ""
+            words = (
+                f"{self.channel} moves the joint {off:.3g} times as far as the drive allows{near}: RMS "
+                f"{_mrad(self.left(ratio=ratio))} as it is, {_mrad(self.left(np.sign(factor), ratio, off))} scaled so"
+            )
+            found.append(Suspicion("scale", self.channel, words, {"compliance_over_nominal": factor}))
+        return found
+
+    def delays(self) -> list[Suspicion]:
+        """Whether the load, or the joint angle, comes late or early: the nominal drive, which knows its own hysteresis, is
+        run with each of them shifted."""
+        found = []
+        wanted = [JOINT, *([self.channel] if self.channel and np.ptp(self.M) > 0.0 else [])]
+        step = float(np.median(np.diff(self.time)))
+        for name in wanted:
+            late, before, after = self._best_shift(name)
+            if abs(late) >= 1.5 * step and after < LATE_GAIN * before:
+                how = "late" if late > 0.0 else "early"
+                words = (
+                    f"{name} seems to come {1e3 * abs(late):.3g} ms {how}: the nominal drive leaves {_mrad(before)} RMS, "
+                    f"{_mrad(after)} with it shifted"
+                )
+                numbers = {"late_s": late, "rms_rad": before, "left_rad": after}
+                found.append(Suspicion("delay", name, words, numbers))
+        return sorted(found, key=lambda s: s.numbers["left_rad"])[:1]
+
+    def _best_shift(self, name: str) -> tuple[float, float, float]:
+        """(how late, s; RMS as it is; RMS shifted)."""
+        most = min(MOST_LATE_S, 0.02 * float(self.time[-1] - self.time[0]))
+        left: dict[float, float] = {}
+
+        def at(shift: float) -> float:
+            if shift not in left:
+                left[shift] = self._left_shifted(name, shift)
+            return left[shift]
+
+        best, width = 0.0, 0.5 * most
+        while width > 0.005 * most:  # the least of three, closer and closer
+            best = min((best - width, best, best + width), key=at)
+            width *= 0.5
+        return best, at(0.0), at(best)
+
+    def _left_shifted(self, name: str, shift_s: float) -> float:
+        every = max(1, len(self.time) // DELAY_ROWS)
+        time, q = self.time[::every], self.q[::every]
+        y, M = self.y[::every], self.M[::every]
+        if name == JOINT:
+            y = np.interp(time + shift_s, self.time, self.y)
+        else:
+            M = np.interp(time + shift_s, self.time, self.M)
+        try:
+            bent = Observer(_bare(self.config)).run({"time_s": time, INPUT: q, "joint_torque_Nm": M})[
+                "deflection_rad"
+            ]
+        except CablecompError:  # such a load the nominal drive cannot bear
+            return float("inf")
+        A = np.column_stack((np.ones_like(q), q - q.mean(), M - M.mean(), bent))
+        later = slice(len(q) // 4, None)  # what went before is not known
+        return _rms((y - A @ np.linalg.lstsq(A[later], y[later], rcond=None)[0])[later])
+
+
+def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[Suspicion]:
+    """The motor holds against the load: tau = -(r/R) M at rest."""
+    wanted = -config.drive.ratio * rows["joint_torque_Nm"]
+    torque = rows[MOTOR]
+    slope, sure = _partial(torque, wanted, np.gradient(rows[INPUT]))
+    if sure > -0.7:
+        return []
+    words = (
+        f"motor_torque_Nm seems to have the opposite sign: it would help the load instead of holding it (correlation "
+        f"{sure:.2f}); RMS {_rms(torque - wanted):.3g} Nm as it is, {_rms(torque + wanted):.3g} Nm with it turned"
+    )
+    return [Suspicion("sign", MOTOR, words, {"slope": slope, "correlation": sure})]
+
+
+def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
+    time = columns["time_s"]
+    steps = np.diff(time)
+    if not len(steps) or not np.any(steps > 0.0):
+        return
+    usual = float(np.median(steps[steps > 0.0]))
+    for name in (INPUT, "joint_torque_Nm"):
+        values = columns.get(name)
+        if values is None or not np.any(np.isfinite(values)):
+            continue
+        moved = np.abs(np.diff(values)) / max(float(np.nanmax(values) - np.nanmin(values)), 1e-300)
+        at = np.flatnonzero((steps > GAP * usual) & (moved > MOVED))
+        if len(at):
+            k = int(at[np.argmax(moved[at])])
+            more = f" ({len(at) - 1} more such gaps)" if len(at) > 1 else ""
+            words = (
+                f"gap of {steps[k]:.3g} s after {time[k]:.6g} s, over which {name} moved by {100 * moved[k]:.0f} % of its "
+                f"range{more}: the way between is not known, the drive is taken as having gone straight"
+            )
+            yield Suspicion("gap", name, words, {"at_s": float(time[k]), "gap_s": float(steps[k])})
+            return
+
+
+def _rows(columns: Mapping[str, FloatArray], names: tuple[str, ...]) -> dict[str, FloatArray]:
+    """Rows with a finite value in all of these channels, at most `ROWS`, their time rising."""
+    good = np.isfinite(columns["time_s"])
+    for name in names:
+        good &= np.isfinite(columns[name])
+    place = np.flatnonzero(good)
+    place = place[:: max(1, len(place) // ROWS)]
+    place = place[np.concatenate(([True], np.diff(columns["time_s"][place]) > 0.0))] if len(place) else place
+    return {n: np.asarray(columns[n], dtype=np.float64)[place] for n in ("time_s", *names)}
+
+
+def _compliance(config: JointConfig) -> float:
+    """Deflection per load of the nominal drive at its greatest load [rad/Nm]."""
+    try:
+        return 1.0 / stiffness_range(_bare(config)).secant_Nm_per_rad
+    except CablecompError:  # effects that the walk cannot take: the cable alone
+        last = config.drive.stage[-1]
+        wrapped = last.free_length_m / (last.EA_N * last.output_radius_m**2)
+        return wrapped * (0.5 if config.drive.circuit == "closed" else 1.0)
+
+
+def _partial(y: FloatArray, x: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """Slope of y on x, `other` held, and their partial correlation; zero where x does not move."""
+    A = np.column_stack((np.ones_like(x), other - other.mean()))
+    left = [v - A @ np.linalg.lstsq(A, v, rcond=None)[0] for v in (y, x)]
+    yy, xx, xy = float(left[0] @ left[0]), float(left[1] @ left[1]), float(left[0] @ left[1])
+    if xx <= 1e-12 * float(x @ x) or yy <= 0.0:
+        return 0.0, 0.0
+    return xy / xx, xy / float(np.sqrt(xx * yy))
+
+
+def _bare(config: JointConfig) -> JointConfig:
+    """The drive alone, loaded by a known torque."""
+    return plain(config).model_copy(update={"effect": (), "empirical": ()})
+
+
+def _loose(config: JointConfig, key: str) -> bool:
+    """Whether a value is known by order of magnitude only."""
+    return any(key in name and value >= 1.0 for name, value in config.tolerance.items())
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.std(values))
+
+
+def _mrad(value: float) -> str:
+    return f"{1e3 * value:.3g} mrad"

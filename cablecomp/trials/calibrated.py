@@ -1,0 +1,51 @@
+"""How far stated probabilities can be trusted: calibration error, Brier score, risk against coverage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BINS = 10
+
+
+def calibration_error(probability: Sequence[float], right: Sequence[bool], bins: int = BINS) -> float:
+    """Expected calibration error: sum over bins of n_b/n |share right - mean probability|, bins of equal counts.
+
+    Equal counts because names cluster near 0 and 1 (M. Naeini, G. Cooper, M. Hauskrecht, AAAI 2015, with the adaptive bins
+    of K. Nguyen and B. O'Connor, EMNLP 2015). NaN for none.
+    """
+    p, y = _sorted(probability, right)
+    if not len(p):
+        return nan
+    parts = np.array_split(np.arange(len(p)), min(bins, len(p)))
+    return float(sum(len(k) * abs(float(np.mean(y[k])) - float(np.mean(p[k]))) for k in parts) / len(p))
+
+
+def brier(probability: Sequence[float], right: Sequence[bool]) -> float:
+    """Mean of (probability - right)^2; NaN for none."""
+    p, y = _sorted(probability, right)
+    return float(np.mean((p - y) ** 2)) if len(p) else nan
+
+
+def risk_coverage(score: Sequence[float], right: Sequence[bool]) -> tuple[Floats, Floats]:
+    """(coverage, risk): of the names with the highest score, that share of all, how many are wrong."""
+    s, y = np.asarray(score, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    order = np.argsort(-s, kind="stable")
+    count = np.arange(1, len(s) + 1)
+    return np.asarray(count / max(len(s), 1)), np.asarray(np.cumsum(1.0 - y[order]) / count)
+
+
+def risk_area(score: Sequence[float], right: Sequence[bool]) -> float:
+    """Area under risk against coverage, the less the better (Y. Geifman and R. El-Yaniv, NeurIPS 2017); NaN for none."""
+    return float(np.mean(risk_coverage(score, right)[1])) if len(score) else nan
+
+
+def _sorted(probability: Sequence[float], right: Sequence[bool]) -> tuple[Floats, Floats]:
+    p, y = np.asarray(probability, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    return p[order], y[order]

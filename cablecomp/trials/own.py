@@ -1,0 +1,161 @@
+"""Blind trials in somebody's own recordings: known physics concealed in pieces of them, and what of it would have been found."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+
+from cablecomp.cluster import Workers
+from cablecomp.errors import InputError
+from cablecomp.signal.smoothing import FloatArray
+from cablecomp.trials.curves import Concealed, Curves, curves, score_concealed
+from cablecomp.trials.run import (
+    JOINT_FILE,
+    Announce,
+    Diagnose,
+    Job,
+    Place,
+    Tell,
+    committed,
+    diagnose_all,
+    diagnose_folder,
+    verdict_of,
+)
+from cablecomp.trials.sealed import SEALED, check_seal, read_sealed
+from cablecomp.trials.shares import write_json
+
+PIECES, ANSWER = "pieces", "concealed.json"
+Columns = Mapping[str, FloatArray]
+Conceal = Callable[[Path, int, Path, Callable[[int, int], None]], str]
+"""Reads pieces of recordings, writes public trials and sealed truths into a folder; returns the SHA-256 of the seals."""
+
+
+@dataclass(frozen=True)
+class OwnWish:
+    """How much: `rounds` pieces of at most `seconds` of recordings each (one twin and one trial of every physics in each),
+    begun for at most `minutes` (None: until all are done)."""
+
+    seed: int
+    rounds: int
+    seconds: float
+    minutes: float | None
+
+
+@dataclass(frozen=True)
+class Own:
+    """A run's folder, the recordings by their paths, their joint's configuration as text, and what works on them."""
+
+    out: Path
+    recordings: Mapping[str, Columns]
+    joint: str
+    conceal: Conceal
+    workers: Workers
+    diagnose: Diagnose = diagnose_folder
+
+
+def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
+    """Conceal, diagnose each trial blindly, open the truth, and say what size of each physics would have been found.
+
+    Writes `concealed.json`. With the same folder again (and more minutes), it goes on where it stopped. Raises InputError for
+    recordings that cannot be used, or a folder that holds another run.
+    """
+    out = own.out
+    wanted = {
+        "recordings": sorted(own.recordings),
+        "seed": wish.seed,
+        "rounds": wish.rounds,
+        "seconds": wish.seconds,
+    }
+    sha256 = committed(out, wanted, lambda: _conceal(own, wish, tell))
+    announce(sha256)
+    numbers = [int(p.stem) for p in sorted((out / SEALED).glob("*.zip"))]
+    places = [Place(out, k) for k in numbers]
+    until = None if wish.minutes is None else time.monotonic() + 60.0 * wish.minutes
+    jobs: list[Job] = [(own.diagnose, p.public, (), p.verdict) for p in places]
+    diagnose_all(jobs, own.workers, "diagnosing", tell, until, least=2)
+    check_seal(out / SEALED, sha256)
+    truths = [read_sealed(p.sealed)[0] for p in places]
+    found = curves(_scored(places, truths), len(places), wanted | {"sha256": sha256})
+    write_json(out / ANSWER, found.as_json())
+    return found
+
+
+def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
+    pieces = own.out / PIECES
+    for k in range(wish.rounds):
+        folder = pieces / f"{k:05d}"
+        folder.mkdir(parents=True, exist_ok=True)
+        for n, table in enumerate(piece(own.recordings, wish.seconds, wish.seed, k), start=1):
+            np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]  # its stub takes no such names
+    (pieces / JOINT_FILE).write_text(own.joint, encoding="utf-8")
+    return own.conceal(pieces, wish.seed, own.out, lambda done, of: tell("concealing", done, of))
+
+
+def piece(
+    recordings: Mapping[str, Columns], seconds: float, seed: int, number: int
+) -> list[dict[str, FloatArray]]:
+    """One piece: stretches of recordings of one session (folder), at most `seconds` together, drawn from the seed.
+
+    Raises InputError where nothing lasts long enough to be diagnosed.
+    """
+    rng = np.random.default_rng([seed, 41, number])
+    usable = {n: c for n, c in recordings.items() if "joint_position_rad" in c and len(c["time_s"]) >= 200}
+    if not usable:
+        raise InputError("no recording holds 200 samples of joint_position_rad; physics is concealed in such")
+    names = list(usable)
+    first = names[int(rng.integers(len(names)))]
+    mates = [n for n in names if PurePath(n).parent == PurePath(first).parent and n != first]
+    chosen, left = {}, seconds
+    for name in (first, *(str(n) for n in rng.permutation(np.asarray(mates, dtype=object)))):
+        if left < 0.2 * seconds:
+            break
+        stretch = _stretch(rng, usable[name], left)
+        left -= float(np.ptp(stretch["time_s"]))
+        chosen[name] = stretch
+    shared = set.intersection(*(set(c) for c in chosen.values()))
+    return [{k: v for k, v in chosen[n].items() if k in shared} for n in names if n in chosen]
+
+
+def _stretch(rng: np.random.Generator, columns: Columns, seconds: float) -> dict[str, FloatArray]:
+    clock = columns["time_s"]
+    begin = float(clock[0] + rng.uniform() * max(float(np.ptp(clock)) - seconds, 0.0))
+    here = (clock >= begin) & (clock <= begin + seconds)
+    return {name: values[here] for name, values in columns.items()}
+
+
+def _scored(places: Sequence[Place], truths: Sequence[Mapping[str, Any]]) -> list[Concealed]:
+    """Every trial that has a verdict and whose twin has one."""
+    twins = {
+        t["round"]: verdict_of(p.verdict)
+        for p, t in zip(places, truths, strict=True)
+        if t["physics"] == "twin"
+    }
+    found = []
+    for p, t in zip(places, truths, strict=True):
+        twin, mine = twins[t["round"]], verdict_of(p.verdict)
+        if mine.said is None and mine.failed == "not diagnosed":
+            continue
+        if twin.said is None:
+            continue
+        found.append(score_concealed(t, mine, twin.said))
+    return found
+
+
+def concealed_beside(folder: Path) -> dict[str, Any] | None:
+    """What `concealed.json` in a folder says; None where there is none. Raises InputError for one that is none."""
+    path = folder / ANSWER
+    if not path.exists():
+        return None
+    try:
+        answer: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if answer["schema"] == 1 and answer["curves"] is not None:
+            return answer
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise InputError(f"{path}: is no answer of `cablecomp prove --in`; move it away, or run that again")

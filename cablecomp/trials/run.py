@@ -1,0 +1,145 @@
+"""What every blind run does: commit to a sealed truth, diagnose public folders elsewhere, keep verdicts, go on after a stop."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from cablecomp.cluster import Workers, spread
+from cablecomp.config import load_joint
+from cablecomp.diagnosis.diagnose import diagnose
+from cablecomp.diagnosis.result import write_diagnosis
+from cablecomp.errors import InputError
+from cablecomp.recording.atomic import atomic_directory
+from cablecomp.recording.folder import find_recordings
+from cablecomp.recording.reader import read_all
+from cablecomp.trials.sealed import SEALED, digest
+from cablecomp.trials.shares import write_json
+
+COMMITMENT, PUBLIC, VERDICTS, RECORDINGS = "commitment.json", "trials", "verdicts", "recordings"
+JOINT_FILE = "joint.toml"
+
+Tell = Callable[[str, int, int], None]
+"""Told what is being done, how much of it is done, and of how much."""
+Announce = Callable[[str], None]
+"""Told the SHA-256 of the sealed truth, before anything is diagnosed."""
+Diagnose = Callable[[Path, Sequence[Path], Path], None]
+"""Reads a trial's folder and further recordings, writes its verdict into a folder."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A trial's places by its number: what a diagnosis may see, its verdict, its sealed truth."""
+
+    out: Path
+    number: int
+
+    @property
+    def public(self) -> Path:
+        """Recordings and configuration."""
+        return self.out / PUBLIC / f"{self.number:05d}"
+
+    @property
+    def verdict(self) -> Path:
+        """What the diagnosis wrote."""
+        return self.out / VERDICTS / f"{self.number:05d}"
+
+    @property
+    def sealed(self) -> Path:
+        """The truth."""
+        return self.out / SEALED / f"{self.number:05d}.zip"
+
+
+def committed(out: Path, wanted: Mapping[str, Any], conceal: Callable[[], str]) -> str:
+    """Conceal the trials, or find them concealed already; returns the SHA-256 that was committed to.
+
+    Raises InputError if the folder holds another run, or what was written is not what was announced.
+    """
+    path = out / COMMITMENT
+    if path.exists():
+        found = json.loads(path.read_text())
+        sha256: str = found.pop("sha256")
+        if found != dict(wanted):
+            raise InputError(f"{out}: holds another run ({found}); give another folder with --out")
+        return sha256
+    sha256 = conceal()
+    if digest(out / SEALED) != sha256:
+        raise InputError(f"{out / SEALED}: is not what its SHA-256 says; run again in another folder")
+    write_json(path, {**wanted, "sha256": sha256})
+    return sha256
+
+
+Job = tuple[Diagnose, Path, Sequence[Path], Path]
+
+
+def diagnose_all(
+    jobs: Sequence[Job], workers: Workers, what: str, tell: Tell, until: float | None = None, least: int = 0
+) -> None:
+    """Diagnose what has no verdict yet; no trial stops another, and a worker's death costs that trial alone.
+
+    `until`: an instant of `time.monotonic` after which nothing more is begun, once `least` have been done.
+    """
+    left = [j for j in jobs if not (j[3] / "timing.json").exists()]
+    done = len(jobs) - len(left)
+    tell(what, done, len(jobs))
+    with closing(spread(_timed, left, workers)) as outcomes:
+        for outcome in outcomes:
+            if outcome.failed:  # the process died, or its folder could not be written
+                place = left[outcome.job][3]
+                place.mkdir(parents=True, exist_ok=True)
+                write_json(place / "timing.json", {"seconds": None, "failed": outcome.failed})
+            done += 1
+            tell(what, done, len(jobs))
+            if until is not None and time.monotonic() >= until and done >= least:
+                return
+
+
+def _timed(work: Diagnose, folder: Path, further: Sequence[Path], out: Path) -> None:
+    """One diagnosis and how long it took; what went wrong is written instead of a verdict."""
+    out.mkdir(parents=True, exist_ok=True)
+    started, failed = time.perf_counter(), ""
+    try:
+        work(folder, further, out)
+    except Exception as error:  # whatever it is, it is this trial's failure: counted, and shown on the page
+        failed = f"{type(error).__name__}: {error}"
+    write_json(out / "timing.json", {"seconds": time.perf_counter() - started, "failed": failed})
+
+
+def diagnose_folder(folder: Path, further: Sequence[Path], out: Path) -> None:
+    """Diagnose the recordings of a folder (and further ones) with its `joint.toml`; writes the verdict."""
+    found = diagnose(load_joint(folder / JOINT_FILE), columns_of(folder, further))
+    with atomic_directory(out) as spare:
+        write_diagnosis(found, spare)
+
+
+def columns_of(folder: Path, further: Sequence[Path] = ()) -> dict[str, Any]:
+    """Channels of all recordings of a trial, by their paths in its folder."""
+    paths = {str(p.relative_to(folder)): p for p in find_recordings([folder / RECORDINGS])}
+    paths |= {f"{RECORDINGS}/{p.name}": p for p in further}
+    return {name: read_all(p, gaps=True).columns for name, p in paths.items()}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a diagnosis said (None: it came to no verdict, `failed` says why), and how long it took."""
+
+    said: dict[str, Any] | None
+    seconds: float
+    failed: str
+
+
+def verdict_of(place: Path) -> Verdict:
+    """The verdict in a folder."""
+    if not (place / "timing.json").exists():
+        return Verdict(None, nan, "not diagnosed")
+    timing = json.loads((place / "timing.json").read_text())
+    seconds = nan if timing["seconds"] is None else float(timing["seconds"])
+    if timing["failed"] or not (place / "diagnosis.json").exists():
+        return Verdict(None, seconds, timing["failed"] or "no verdict")
+    return Verdict(json.loads((place / "diagnosis.json").read_text()), seconds, "")

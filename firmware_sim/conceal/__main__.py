@@ -1,0 +1,74 @@
+"""`python -m firmware_sim.conceal --in PIECES --seed S --out DIR`: conceal physics in pieces of recordings, seal the truth.
+
+PIECES/00000 holds `recording-1.npz`, … (canonical channels) of the first round, and so on; `PIECES/joint.toml` goes along
+into every trial's folder DIR/trials/00000; its truth is sealed in DIR/sealed/00000.zip. Prints `written K of N`, then
+`sha256 HEX` of all seals.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from firmware_sim.conceal.physics import Table
+from firmware_sim.conceal.plan import Trial, trials_of, usable
+from firmware_sim.errors import SimError
+from firmware_sim.trials.seal import SEALED, TRUTH, digest, truth_text, write_seal
+
+JOINT_FILE = "joint.toml"
+
+
+def conceal(pieces: Path, seed: int, out: Path) -> str:
+    """Write all trials and the seal; returns the seal's SHA-256. Raises SimError for a folder without pieces."""
+    folders = sorted(p for p in pieces.iterdir() if p.is_dir())
+    tables = [_read(f) for f in folders]
+    if not tables or not all(usable(t) for t in tables):
+        raise SimError(f"{pieces}: holds no piece with a joint_position_rad in every recording")
+    joint = (pieces / JOINT_FILE).read_text(encoding="utf-8")
+    trials, missing = trials_of(tables, seed)
+    for k, trial in enumerate(trials, start=1):
+        name = f"{trial.number:05d}"
+        _write(out / "trials" / name, trial, joint)
+        write_seal(out / SEALED / f"{name}.zip", {TRUTH: truth_text(trial.truth())})
+        print(f"written {k} of {len(trials)}", flush=True)
+    for physics, why in missing.items():
+        print(f"left out {physics}: {why}", flush=True)
+    return digest(out / SEALED)
+
+
+def _read(folder: Path) -> list[Table]:
+    found = []
+    for path in sorted(folder.glob("recording-*.npz")):
+        with np.load(path) as data:
+            found.append({name: np.asarray(data[name], dtype=np.float64) for name in data.files})
+    return list(found)
+
+
+def _write(folder: Path, trial: Trial, joint: str) -> None:
+    (folder / "recordings").mkdir(parents=True, exist_ok=True)
+    (folder / JOINT_FILE).write_text(joint, encoding="utf-8")
+    for k, table in enumerate(trial.recordings, start=1):
+        np.savez(folder / "recordings" / f"recording-{k}.npz", **table)  # type: ignore[arg-type]  # its stub
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status: 0, or 2 for bad input (one line on stderr)."""
+    parser = argparse.ArgumentParser(prog="python -m firmware_sim.conceal", description=__doc__)
+    parser.add_argument("--in", dest="pieces", type=Path, required=True)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    a = parser.parse_args(arguments)
+    try:
+        print(f"sha256 {conceal(a.pieces, a.seed, a.out)}", flush=True)
+    except (SimError, OSError, ValueError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+"""`cablecomp init`: what a person knows becomes a joint and a link that load, tolerances as wide as the knowledge."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from cablecomp.cli import main
+from cablecomp.config import load_joint
+from cablecomp.config.cables import CABLES
+from cablecomp.config.draft import PRETENSION
+from cablecomp.links.load import load_link
+
+KNOWN = {
+    "output_radius_mm": 30.0,
+    "input_radius_mm": 10.0,
+    "cable": "steel-7x7",
+    "cable_diameter_mm": 0.5,
+    "free_length_mm": 100.0,
+    "output_turns": 1.5,
+    "input_turns": 2.0,
+    "joint_torque_max_Nm": 2.0,
+}
+
+
+def init(out: Path, **more: object) -> int:
+    told = [f"--set={k}={v}" for k, v in {**KNOWN, **more}.items()]
+    return main(["init", "--out", str(out), *told])
+
+
+def test_values_and_tolerances_follow_from_what_is_known(tmp_path: Path) -> None:
+    assert init(tmp_path, pretension_N=40.0, pretension_set="weight", drive="moteus", name='my "wrist"') == 0
+    joint = load_joint(tmp_path / "joint.toml")
+    (stage,) = joint.drive.stage
+    cable = CABLES["steel-7x7"]
+    assert stage.output_radius_m == pytest.approx(0.03 + 0.00025)  # bare radius + half the cable
+    assert pytest.approx(cable.modulus_Pa * math.pi * 0.25e-6 / 4, rel=1e-5) == stage.EA_N
+    assert stage.wrap_output_rad == pytest.approx(3.0 * math.pi, rel=1e-5)
+    assert joint.tolerance["EA_N"] == cable.EA_spread
+    assert joint.tolerance["pretension_N"] == PRETENSION["weight"]
+    assert [j.name for j in load_link(tmp_path / "link.toml").joint] == ['my "wrist"'] == [joint.name]
+
+
+@pytest.mark.parametrize("kind", CABLES)
+def test_every_cable_makes_a_joint_and_an_unknown_pretension_is_an_order_of_magnitude(
+    tmp_path: Path, kind: str
+) -> None:
+    assert init(tmp_path, cable=kind, radii="effective") == 0
+    joint = load_joint(tmp_path / "joint.toml")
+    assert joint.tolerance["pretension_N"] == 1.0
+    assert joint.drive.stage[0].output_radius_m == pytest.approx(0.03)
+    text = (tmp_path / "joint.toml").read_text()
+    assert tomllib.loads(text)["drive"]["stage"][0]["EA_N"] == pytest.approx(
+        CABLES[kind].EA_N(5e-4), rel=1e-5
+    )
+
+
+def test_everything_wrong_is_said_at_once_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["init", "--out", str(tmp_path), "--set", "cable=stel", "--set", "output_radius=30"]) == 2
+    said = capsys.readouterr().err
+    assert "steel-7x7" in said
+    assert "did you mean `output_radius_mm`" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_differs_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert init(tmp_path) == 0
+    before = (tmp_path / "joint.toml").read_text()
+    assert init(tmp_path, cable_diameter_mm=0.6) == 2
+    assert "differs" in capsys.readouterr().err
+    assert (tmp_path / "joint.toml").read_text() == before
+
+
+def test_a_metre_for_a_millimetre_is_asked_about(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert init(tmp_path, output_radius_mm=30_000.0) == 0
+    assert "output_radius_m" in capsys.readouterr().err

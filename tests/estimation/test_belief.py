@@ -1,0 +1,58 @@
+"""The check before belief: what is turned, scaled, late or missing is named; what is right is left in peace."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from turning import JOINT, recorded
+
+from cablecomp.estimation.belief import suspicions
+from cablecomp.signal.smoothing import FloatArray
+
+COLUMNS = recorded()
+
+
+def kinds(**changed: FloatArray) -> list[tuple[str, str]]:
+    return [(s.kind, s.channel) for s in suspicions(JOINT, {**COLUMNS, **changed})]
+
+
+def moved(name: str, late_s: float) -> FloatArray:
+    return np.interp(COLUMNS["time_s"] - late_s, COLUMNS["time_s"], COLUMNS[name])
+
+
+def test_a_right_recording_raises_no_suspicion() -> None:
+    assert kinds() == []
+
+
+def test_signs() -> None:
+    assert kinds(joint_torque_Nm=-COLUMNS["joint_torque_Nm"]) == [("sign", "joint_torque_Nm")]
+    assert ("sign", "joint_position_rad") in kinds(joint_position_rad=-COLUMNS["joint_position_rad"])
+
+
+def test_units_and_gears() -> None:
+    for name in ("joint_position_rad", "motor_position_rad"):
+        (said, *_) = suspicions(JOINT, {**COLUMNS, name: np.degrees(COLUMNS[name])})
+        assert said.text.startswith(f"{name} seems to be in degrees")
+    (gear,) = suspicions(JOINT, {**COLUMNS, "motor_position_rad": 8.0 * COLUMNS["motor_position_rad"]})
+    assert (gear.kind, gear.numbers["slope_over_ratio"]) == ("ratio", pytest.approx(1.0 / 8.0, rel=1e-2))
+    assert ("scale", "joint_torque_Nm") in kinds(joint_torque_Nm=1e3 * COLUMNS["joint_torque_Nm"])
+
+
+def test_both_angles_in_degrees() -> None:
+    both = {n: np.degrees(COLUMNS[n]) for n in ("joint_position_rad", "motor_position_rad")}
+    assert ("unit", "joint_position_rad") in kinds(**both)
+
+
+@pytest.mark.parametrize("late_s", [0.1, -0.1])
+@pytest.mark.parametrize("name", ["joint_torque_Nm", "joint_position_rad"])
+def test_delays(name: str, late_s: float) -> None:
+    (said,) = suspicions(JOINT, {**COLUMNS, name: moved(name, late_s)})
+    assert (said.kind, said.channel) == ("delay", name)
+    assert said.numbers["late_s"] == pytest.approx(late_s, abs=0.02)
+
+
+def test_a_gap_over_which_the_joint_moved() -> None:
+    kept = (COLUMNS["time_s"] < 8.0) | (COLUMNS["time_s"] > 10.0)
+    (said,) = suspicions(JOINT, {n: v[kept] for n, v in COLUMNS.items()})
+    assert said.kind == "gap"
+    assert said.numbers["gap_s"] == pytest.approx(2.0, abs=0.05)

@@ -1,0 +1,124 @@
+"""Physics concealed in recordings: what the drive felt stays what was measured, sizes are as stated, twins hold nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim.conceal.__main__ import main
+from firmware_sim.conceal.physics import JOINT, MOTOR, NEIGHBOUR, PHYSICS, TIME, TORQUE, acceleration, dahl
+from firmware_sim.conceal.plan import Trial, trials_of
+from firmware_sim.trials import digest, open_truth
+
+Table = dict[str, np.ndarray]
+
+
+def table(seed: int = 0, torque: bool = True) -> Table:
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 20.0, 0.004)
+    q = 0.5 * np.sin(1.3 * t)
+    found = {TIME: t, MOTOR: q, JOINT: q + 1e-4 * rng.standard_normal(len(t))}
+    return found | ({TORQUE: 0.3 * np.sin(0.7 * t) + 0.02} if torque else {})
+
+
+def trials(torque: bool = True, rounds: int = 4) -> tuple[list[Trial], dict[str, str]]:
+    return trials_of([[table(2 * r, torque), table(2 * r + 1, torque)] for r in range(rounds)], 5)
+
+
+def added(trial: Trial, twin: Trial, channel: str) -> np.ndarray:
+    pairs = zip(trial.recordings, twin.recordings, strict=True)
+    return np.concatenate([a[channel] - b[channel] for a, b in pairs])
+
+
+def test_every_size_once_in_as_many_rounds_beside_a_twin_that_differs_by_nothing_else() -> None:
+    found, missing = trials()
+    assert missing == {}
+    assert len(found) == 4 * (1 + len(PHYSICS))
+    for physics in PHYSICS:
+        mine = [t for t in found if t.physics is physics]
+        assert sorted(t.share for t in mine) == sorted(physics.shares)
+        for t in mine:
+            twin = next(o for o in found if o.round == t.round and o.physics is None)
+            assert t.change is not None
+            for name in t.recordings[0]:
+                assert np.any(added(t, twin, name)) == (name == t.change.channel), (physics.id, name)
+    assert found[1].share == PHYSICS[0].shares[2]
+
+
+def test_sizes_are_what_the_truth_says() -> None:
+    found, _ = trials()
+    travel, torque = 1.0, float(np.std(table()[TORQUE]))
+    for t in found:
+        if t.physics is None or t.change is None:
+            continue
+        twin = next(o for o in found if o.round == t.round and o.physics is None)
+        delta = added(t, twin, t.change.channel)
+        size = t.change.numbers["size"]
+        if t.physics.id in ("neighbour", "weight", "inertia", "friction"):
+            assert np.std(delta) == pytest.approx(size, rel=1e-6)
+            assert size == pytest.approx(t.share * torque, rel=0.05)
+        elif t.physics.id in ("slip", "play"):
+            assert np.ptp(delta) == pytest.approx(size, rel=0.02)
+            assert size == pytest.approx(t.share * travel, rel=0.02)
+        elif t.physics.id == "drift":
+            assert np.std(delta) == pytest.approx(size, rel=1e-6)
+        elif t.physics.id == "late":
+            late, own = t.recordings[0][JOINT], twin.recordings[0][JOINT]
+            lag = round(size / 0.004)
+            if size >= 0.004:  # by whole samples: the same readings, later
+                np.testing.assert_allclose(late[lag:], own[:-lag], atol=1e-12)
+        assert t.truth()["size"] == pytest.approx(size * t.physics.per_unit)
+
+
+def test_a_slip_goes_on_into_the_recordings_after_it() -> None:
+    for trial in (t for t in trials()[0] if t.physics is not None and t.physics.id == "slip"):
+        assert trial.change is not None
+        where = int(trial.change.numbers["recording"])
+        for k, step in enumerate(trial.change.added):
+            expected = {k < where: 0.0, k > where: trial.change.numbers["size"]}.get(True)
+            if expected is not None:
+                assert np.all(np.abs(step) == expected)
+
+
+def test_acceleration_of_a_sine_and_dahls_limits() -> None:
+    t = np.arange(0.0, 10.0, 0.005)
+    a = acceleration(t, np.sin(3.0 * t))[100:-100]
+    np.testing.assert_allclose(a, -9.0 * np.sin(3.0 * t)[100:-100], atol=0.1)
+    z = dahl(np.concatenate([np.linspace(0, 1, 500), np.linspace(1, 0, 500)]), 0.05)
+    assert z[499] == pytest.approx(1.0, abs=1e-6)
+    assert z[-1] == pytest.approx(-1.0, abs=1e-6)
+    # half a turn of build-up after the reversal: 1 - 2 (1 - exp(-q/turn)) = 0 at q = turn ln 2
+    assert abs(z[500 + round(0.05 * np.log(2.0) * 500)]) < 0.03
+
+
+def test_without_a_torque_channel_what_needs_one_is_left_out_and_said() -> None:
+    found, missing = trials(torque=False, rounds=1)
+    assert {t.physics.id for t in found if t.physics is not None} == {"late", "slip", "drift"}
+    assert set(missing) == {"neighbour", "weight", "inertia", "friction", "play", "gain"}
+    assert all(NEIGHBOUR in r for t in found for r in t.recordings)
+
+
+def test_command_line_writes_public_folders_and_seals(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    piece = tmp_path / "pieces" / "00000"
+    piece.mkdir(parents=True)
+    (tmp_path / "pieces" / "joint.toml").write_text("schema = 1\n")
+    np.savez(piece / "recording-1.npz", **table())
+    arguments = ["--in", str(tmp_path / "pieces"), "--seed", "3", "--out", str(tmp_path / "out")]
+    assert main(arguments) == 0
+    lines = capsys.readouterr().out.splitlines()
+    count = 1 + len(PHYSICS)
+    assert lines[-1] == f"sha256 {digest(tmp_path / 'out' / 'sealed')}"
+    assert lines[count - 1] == f"written {count} of {count}"
+    assert open_truth(tmp_path / "out" / "sealed" / "00000.zip")["physics"] == "twin"
+    public = tmp_path / "out" / "trials" / "00003"
+    assert sorted(str(p.relative_to(public)) for p in public.rglob("*.*")) == [
+        "joint.toml",
+        "recordings/recording-1.npz",
+    ]
+    (piece / "recording-1.npz").unlink()
+    assert main(arguments) == 2
+    assert capsys.readouterr().err.startswith("error: ")

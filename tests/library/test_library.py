@@ -1,0 +1,61 @@
+"""The commands as calls: paths, arrays and frames are one recording; errors are one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from turning import JOINT, recorded
+
+import cablecomp
+from cablecomp.errors import InputError
+from cablecomp.recording.writer import write_canonical
+
+COLUMNS = recorded(duration_s=8.0, step_s=0.05)
+
+
+class Frame:
+    """A frame as pandas has it: `columns`, and columns by name."""
+
+    def __init__(self, data: dict[str, np.ndarray]) -> None:
+        self.columns, self._data = list(data), data
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._data[name]
+
+
+def test_a_path_arrays_and_frames_are_the_same_recording(tmp_path: Path) -> None:
+    write_canonical(tmp_path / "r.csv", COLUMNS)
+    other = {"time_ms": 1e3 * COLUMNS["time_s"], "joint_torque_mNm": 1e3 * COLUMNS["joint_torque_Nm"]}
+    other |= {n: COLUMNS[n] for n in ("motor_position_rad", "joint_position_rad")}
+    first = cablecomp.replay(COLUMNS, JOINT)
+    for given in (tmp_path / "r.csv", pl.DataFrame(COLUMNS), Frame(COLUMNS), other):
+        again = cablecomp.replay(given, JOINT)
+        np.testing.assert_allclose(
+            again.columns["deflection_rad"], first.columns["deflection_rad"], atol=1e-9
+        )
+    assert first.to_frame().height == len(COLUMNS["time_s"])
+    assert len(first.figure().data) == 2
+
+
+def test_a_turned_sign_is_said_before_it_is_believed() -> None:
+    turned = COLUMNS | {"joint_torque_Nm": -COLUMNS["joint_torque_Nm"]}
+    (said,) = cablecomp.replay(turned, JOINT).doubts
+    assert (said.kind, said.channel) == ("sign", "joint_torque_Nm")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"time_s": [0.0, 1.0], "angle": [0.0, 1.0]}, "angle"),
+        ({"time_s": [0.0, 1.0], "motor_position_rad": [0.0]}, "one length"),
+        ({"time_s": [0.0], "motor_position_rad": ["x"]}, "numbers"),
+        (3.0, "a path"),
+    ],
+)
+def test_errors_are_one_line(given: object, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        cablecomp.replay(given, JOINT)
+    assert "\n" not in str(caught.value)

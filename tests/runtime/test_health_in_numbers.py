@@ -1,0 +1,342 @@
+"""The health watch in numbers worked out by hand; the period is a power of two, so that ages are exact."""
+
+from __future__ import annotations
+
+from math import exp, inf, nan
+
+import pytest
+
+from cablecomp.control.options import HealthOptions
+from cablecomp.links.readings import JointReadings
+from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE, TEMPERATURE
+from cablecomp.runtime import health as h
+from cablecomp.runtime.channel import Channel, Latency, Shaking, Sustained
+
+T = 1.0 / 1024.0
+N = 0.25
+WORDS = (
+    "motor position is stale",
+    "joint torque is stale",
+    "joint position is stale",
+    "motor encoder jumped",
+    "joint torque jumped",
+    "joint encoder jumped",
+    "torque sensor is at its limit",
+    "joint encoder disagrees with the model",
+    "torque sensor disagrees with motor torque",
+    "motor does not follow",
+    "drive does not answer",
+    "sensor data come late",
+    "load shakes",
+    "motor encoder is stuck",
+    "joint encoder is stuck",
+    "encoders disagree",
+)
+
+
+def options(**more: float | None) -> HealthOptions:
+    return HealthOptions(
+        **{
+            "motor_rate_rad_s": 64.0,
+            "joint_rate_rad_s": 64.0,
+            "torque_rate_Nm_s": 4096.0,
+            "torque_max_Nm": 4.0,
+            "joint_residual_rad": None,
+            "torque_mismatch_Nm": None,
+            "lead_rad": None,
+            "stuck_rad": None,
+            "shake_Nm": None,
+            "confirm_s": 8.0 * T,
+            **more,
+        }
+    )
+
+
+class Fed:
+    """Readings by hand; what is not given does not come."""
+
+    def __init__(self, chosen: HealthOptions | None = None, count: int = 0, **needs: object) -> None:
+        self.readings = JointReadings("joint", tuple(f"other_{k}" for k in range(count)))
+        self.health = h.Health(options() if chosen is None else chosen, N, 2.5 * T, T, **needs)
+        self.k = 0
+
+    def cycle(self, predicted: float = nan, target: float = nan, **came: float) -> h.Checked:
+        self.k += 1
+        now, r = self.k * T, self.readings
+        for name, place in (("motor", MOTOR_POSITION), ("torque", JOINT_TORQUE), ("joint", JOINT_POSITION)):
+            if name in came:
+                r.values[place], r.arrived_s[place] = came[name], now
+                r.updates[place] += 1
+        r.values[MOTOR_TORQUE] = came.get("motor_torque", nan)
+        return self.health.check(r, now, predicted, target)
+
+
+ALL = {"motor": 0.0, "torque": 0.0, "joint": 0.0}
+
+
+def test_every_flag_has_its_bit_and_its_words() -> None:
+    flags = (
+        *(h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE, h.MOTOR_JUMP, h.TORQUE_JUMP, h.JOINT_JUMP),
+        *(h.TORQUE_SATURATED, h.JOINT_RESIDUAL, h.TORQUE_MISMATCH, h.MOTOR_LAGS, h.UNANSWERED, h.LATE),
+        *(h.SHAKES, h.MOTOR_STUCK, h.JOINT_STUCK, h.ENCODERS_DISAGREE),
+    )
+    assert flags == tuple(1 << k for k in range(16))
+    assert [h.health_names(flag) for flag in flags] == [(words,) for words in WORDS]
+    assert h.health_names(sum(flags)) == WORDS
+    assert h.FATAL == h.MOTOR_LAGS | h.MOTOR_STUCK | h.ENCODERS_DISAGREE
+
+
+@pytest.mark.parametrize(
+    ("silent", "flag"), [("motor", h.MOTOR_STALE), ("torque", h.TORQUE_STALE), ("joint", h.JOINT_STALE)]
+)
+def test_a_channel_is_stale_after_two_periods_and_a_half(silent: str, flag: int) -> None:
+    fed = Fed(needs_joint=True)
+    fed.cycle(**ALL)
+    came = {name: value for name, value in ALL.items() if name != silent}
+    for k in range(1, 6):
+        checked = fed.cycle(**came)
+        assert checked.flags == (flag if k >= 3 else 0)
+        assert checked.motor_age_s == (k * T if silent == "motor" else 0.0)
+        assert checked.load_age_s == (0.0 if silent == "motor" else k * T)
+        assert checked.joint_ok == (silent != "joint" or k < 3)
+        assert checked.ready
+        assert not checked.fatal
+
+
+def test_a_channel_is_fresh_up_to_its_time_and_that_included() -> None:
+    fed = Fed()
+    fed.health = h.Health(options(), N, 2.0 * T, T)
+    fed.cycle(**ALL)
+    fed.cycle()
+    at = fed.cycle()
+    assert (at.flags, at.joint_ok) == (0, True)
+    over = fed.cycle()
+    assert over.flags == h.MOTOR_STALE | h.TORQUE_STALE | h.JOINT_STALE
+    assert not over.joint_ok
+
+
+def test_what_control_does_not_live_on_makes_nothing_old() -> None:
+    fed = Fed(needs_torque=False)
+    fed.cycle(**ALL)
+    for _ in range(5):
+        checked = fed.cycle(motor=0.0)
+    assert checked.load_age_s == 0.0
+    assert checked.flags == h.TORQUE_STALE | h.JOINT_STALE
+
+
+def test_a_sample_holds_what_came_and_the_other_channels_in_the_observer_s_order() -> None:
+    fed = Fed(count=3, others=(len_of_channels() + 2, len_of_channels()))
+    fed.readings.values[len_of_channels() :] = [7.0, 8.0, 9.0]
+    fed.readings.values[TEMPERATURE] = 31.0
+    s = fed.cycle(motor=0.5, torque=1.5, joint=0.25, motor_torque=0.75).sample
+    assert s == (T, 0.5, 1.5, 0.25, 0.75, 31.0, (9.0, 7.0))
+
+
+def len_of_channels() -> int:
+    from cablecomp.links.records import CHANNELS
+
+    return len(CHANNELS)
+
+
+def test_a_drive_may_leave_as_many_commands_unanswered_as_stated() -> None:
+    fed = Fed(options(unanswered=3))
+    for count, flags in ((0, 0), (3, 0), (4, h.UNANSWERED)):
+        fed.readings.unanswered = count
+        assert fed.cycle(**ALL).flags == flags
+
+
+@pytest.mark.parametrize(("torque", "flags"), [(3.9, 0), (4.0, 64), (-3.9, 0), (-4.0, 64)])
+def test_a_torque_sensor_at_its_limit_is_named(torque: float, flags: int) -> None:
+    assert Fed().cycle(motor=0.0, torque=torque, joint=0.0).flags == flags
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_joint_encoder_is_distrusted_once_it_has_been_off_for_so_long(sign: float) -> None:
+    """More than 1/64 rad for eight periods; as much as that is allowed."""
+    fed, near = (
+        Fed(options(joint_residual_rad=1 / 64), needs_joint=True),
+        Fed(options(joint_residual_rad=1 / 64)),
+    )
+    for k in range(20):
+        assert near.cycle(predicted=sign / 64, **ALL).flags == 0
+        checked = fed.cycle(predicted=sign / 63, **ALL)
+        assert checked.flags == (h.JOINT_RESIDUAL if k >= 8 else 0)
+        assert checked.joint_ok == (k < 8)
+        assert checked.load_age_s == max(k - 8, 0) * T
+    assert fed.cycle(predicted=0.0, **ALL).flags == 0
+
+
+@pytest.mark.parametrize(
+    ("motor", "joint", "flag"),
+    [(0.0, 0.01, h.MOTOR_STUCK), (0.01, 0.0, h.JOINT_STUCK), (0.01, 0.01, h.ENCODERS_DISAGREE),
+     (0.0, 0.0, h.ENCODERS_DISAGREE)],
+)  # fmt: skip
+def test_of_two_encoders_far_apart_the_one_that_rests_lies(motor: float, joint: float, flag: int) -> None:
+    """More than five times the limit for 3 ms; at rest = no change for 8 ms."""
+    fed = Fed(options(joint_residual_rad=1 / 64))
+    for k in range(12):
+        fed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k)
+    seen = [
+        fed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k + 5.1 / 64).flags
+        for k in range(12, 17)
+    ]
+    assert seen == [0, 0, 0, 0, flag]  # 4 T = 3.9 ms
+    allowed = Fed(options(joint_residual_rad=1 / 64))
+    for k in range(8):
+        checked = allowed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k + 5 / 64)
+        assert not checked.flags & flag
+
+
+def test_a_motor_that_lags_for_long_is_fatal() -> None:
+    fed, near = Fed(options(lead_rad=0.25)), Fed(options(lead_rad=0.25))
+    for k in range(12):
+        assert near.cycle(target=-0.25, **ALL).flags == 0
+        checked = fed.cycle(target=-0.26, **ALL)
+        assert checked.flags == (h.MOTOR_LAGS if k >= 8 else 0)
+        assert checked.fatal == (k >= 8)
+
+
+def test_a_motor_is_stuck_once_it_is_heard_to_stand_while_its_target_went_far() -> None:
+    """Further than 1/64 rad from where the target was when it last changed."""
+    fed = Fed(options(stuck_rad=1 / 64))
+    fed.cycle(target=0.5, **ALL)
+    for target, flags in ((0.5, 0), (0.5 + 1 / 64, 0), (0.5 - 1 / 64, 0), (0.5 + 1.1 / 64, h.MOTOR_STUCK)):
+        assert fed.cycle(target=target, **ALL).flags == flags
+    assert fed.cycle(target=0.5 - 1.1 / 64, torque=0.0, joint=0.0).flags == 0  # not heard
+    moved = {**ALL, "motor": 0.001}
+    assert fed.cycle(target=0.9, **moved).flags == 0
+    assert fed.cycle(target=0.9 + 1.1 / 64, **moved).fatal
+
+
+@pytest.mark.parametrize("preload_Nm", [0.0, 0.5])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_joint_torque_and_motor_torque_have_to_balance(sign: float, preload_Nm: float) -> None:
+    """M + (tau + preload)/N = 0; its mean over `confirm_s` beyond the limit for as long again."""
+    good, bad = (Fed(options(torque_mismatch_Nm=0.5), preload_Nm=preload_Nm) for _ in range(2))
+    count, mean, began = 0, 0.0, None
+    for k in range(60):
+        assert good.cycle(motor=0.0, torque=0.8, joint=0.0, motor_torque=-N * 0.8 - preload_Nm).flags == 0
+        checked = bad.cycle(motor=0.0, torque=sign, joint=0.0, motor_torque=-preload_Nm)
+        mean += (1.0 - exp(-1.0 / 8.0)) * (1.0 - mean)
+        began = k if began is None and mean > 0.5 else began
+        over = began is not None and k - began >= 8
+        assert checked.flags == (h.TORQUE_MISMATCH if over else 0)
+        assert checked.load_age_s == pytest.approx(max(k - began - 8, 0) * T if began is not None else 0.0)
+        count += over
+    assert count > 20
+
+
+def test_a_load_that_shakes_is_old_a_fifth_of_the_confirmation_later() -> None:
+    """Alternating +-1 Nm about nothing: the mean square of the quick part goes to nearly 1."""
+    fed, shaking, begun = (
+        Fed(options(shake_Nm=0.5, confirm_s=40.0 * T, torque_rate_Nm_s=1e5)),
+        Shaking(T),
+        None,
+    )
+    for k in range(100):
+        value = 1.0 if k % 2 else -1.0
+        checked = fed.cycle(motor=0.0, torque=value, joint=0.0)
+        begun = k if shaking.step(value) > 0.25 and begun is None else begun
+        over = begun is not None and k - begun >= 8
+        assert checked.flags == (h.SHAKES if over else 0)
+        assert checked.load_age_s == pytest.approx(max(k - begun - 8, 0) * T if begun is not None else 0.0)
+    assert begun is not None
+    assert begun < 60
+
+
+def test_data_that_a_device_stamped_long_ago_are_late_and_not_stale() -> None:
+    fed = Fed()
+    r = fed.readings
+    for k in range(1, 12):
+        r.device_s[JOINT_TORQUE] = min(k, 5 + 0.125 * (k - 5)) * T  # from the sixth on ever later
+        checked = fed.cycle(**ALL)
+        late = max(0.875 * (k - 5), 0.0)
+        assert checked.load_age_s == pytest.approx(late * T, abs=1e-6)
+        assert checked.flags == (h.LATE if late > 2.5 else 0)
+        assert checked.joint_ok == (late <= 2.5)
+
+
+# ---- channels ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("moved", "taken"), [(0.5 + 0.125, True), (0.5 + 0.126, False)])
+def test_a_value_may_move_by_rate_times_time_and_the_floor(moved: float, taken: bool, sign: float) -> None:
+    channel = Channel(64.0, 0.125, 4.0 * T, 100.0)
+    assert channel.take(1.0, 0.0)
+    assert channel.take(1.0 + sign * moved, 8.0 * T) is taken
+    assert channel.suspect is not taken
+    assert channel.refused == (not taken)
+    assert channel.value == (1.0 + sign * moved if taken else 1.0)
+    assert (channel.arrived_s, channel.changed_s) == ((8.0 * T, 8.0 * T) if taken else (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("back", "taken"), [(0.25 + 0.125, True), (0.25 + 0.126, False)])
+def test_after_a_jump_a_value_has_to_come_back_near_the_last_good_one(back: float, taken: bool) -> None:
+    """Within the rate times the time that a value is held, and the floor."""
+    channel = Channel(64.0, 0.125, 4.0 * T, 100.0)
+    channel.take(1.0, 0.0)
+    channel.take(50.0, T)
+    for at in (1.0 + back, 1.0 - back):
+        judged = Channel(64.0, 0.125, 4.0 * T, 100.0)
+        judged.take(1.0, 0.0)
+        assert not judged.take(50.0, T)
+        assert judged.take(at, 9.0 * T) is taken
+        assert judged.suspect is not taken
+        assert judged.refused == 1 + (not taken)
+
+
+@pytest.mark.parametrize(("value", "suspect"), [(2.0, False), (-2.0, False), (inf, True), (nan, True)])
+def test_what_is_out_of_range_is_turned_down_and_what_is_no_number_is_suspect(
+    value: float, suspect: bool
+) -> None:
+    channel = Channel(1e9, 0.0, T, 2.0)
+    assert channel.take(1.9, 0.0)
+    assert not channel.take(value, T)
+    assert (channel.value, channel.suspect, channel.refused) == (1.9, suspect, 1)
+
+
+def test_a_value_that_stays_has_arrived_and_not_changed() -> None:
+    channel = Channel(1.0, 1.0, T)
+    for k in range(3):
+        assert channel.take(0.5, k * T)
+        assert (channel.arrived_s, channel.changed_s) == (k * T, 0.0)
+    assert channel.take(0.6, 3.0 * T)
+    assert channel.changed_s == 3.0 * T
+
+
+def test_the_first_value_is_taken_wherever_it_is() -> None:
+    channel = Channel(1.0, 0.0, T)
+    assert (channel.arrived_s, channel.changed_s, channel.suspect) == (-inf, -inf, False)
+    assert channel.take(12345.0, 7.0)
+
+
+def test_a_condition_lasts_from_its_first_step() -> None:
+    held = Sustained(4.0 * T)
+    ages = [(held.step(k >= 2, k * T), held.age_s / T) for k in range(9)]
+    assert ages == [(False, 0), (False, 0), (False, 0), (False, 0), (False, 0), (False, 0), (True, 0), (True, 1), (True, 2)]  # fmt: skip
+    assert held.begun
+    assert not held.step(False, 9.0 * T)
+    assert not held.begun
+    assert not held.step(True, 20.0 * T)
+
+
+def test_the_least_lateness_rises_by_200_ppm() -> None:
+    latency = Latency()
+    assert latency.take(10.5, 10.0) == 0.0
+    assert latency.take(20.75, 20.0) == pytest.approx(0.25 - 2e-4 * 10.0)
+    assert latency.take(99.0, 20.0) == latency.take(99.0, nan) == pytest.approx(0.248)  # nothing new
+    assert latency.take(30.4, 30.0) == 0.0
+    assert latency.take(31.4, 31.0) == 0.0
+
+
+def test_shaking_is_what_two_filters_in_a_row_leave() -> None:
+    shaking = Shaking(T)
+    follow, forget = 1.0 - exp(-2.0 * 3.141592653589793 * 10.0 * T), 1.0 - exp(-T / 0.03)
+    slow, square = 2.0, 0.0
+    for value in (2.0, 3.0, nan, 1.0, 5.0):
+        found = shaking.step(value)
+        if value == value:
+            slow += follow * (value - slow)
+            square += forget * ((value - slow) ** 2 - square)
+        assert found == pytest.approx(square)

@@ -1,0 +1,171 @@
+"""Physics concealed in somebody's own recordings: scored beside the twin, resumed where it stopped, nothing told beforehand."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from blind_joint import JOINT, recording
+
+from cablecomp.cli import main
+from cablecomp.cluster import Workers
+from cablecomp.config_text import joint_text
+from cablecomp.errors import InputError
+from cablecomp.report.concealed_page import concealed_page, concealed_section, concealed_table
+from cablecomp.trials.curves import Curves, curves, score_concealed
+from cablecomp.trials.own import ANSWER, Own, OwnWish, concealed_beside, piece, prove_in
+from cablecomp.trials.run import Verdict
+from cablecomp.trials.sealed import digest
+
+Said = dict[str, Any]
+
+
+def said(*names: str, covariate: str = "load", EA: float = 1.0) -> Said:
+    return {
+        "missing_physics": [{"effect": n, "confidence": 0.9} for n in names],
+        "candidates": [],
+        "mismatch": [{"covariate": covariate, "p_value": 0.001}],
+        "calibration": {"EA_N": {"value": EA, "sd": 0.01}},
+    }
+
+
+def put(physics: str, share: float = 0.1, **changes: Any) -> dict[str, Any]:
+    named = {"late": ["clock_skew"], "friction": ["bearing_friction"]}.get(physics, [])
+    return {
+        "trial": 1, "round": 0, "physics": physics, "named": named, "shows_in": ["temperature"],
+        "calibrates": physics == "gain", "share": share, "size": None if physics == "twin" else 10.0 * share,
+        "unit": "ms", "words": physics,
+    } | changes  # fmt: skip
+
+
+def test_what_counts_is_new_beside_the_twin() -> None:
+    twin = said("bearing_friction")
+    late = score_concealed(put("late"), Verdict(said("bearing_friction", "clock_skew"), 1.0, ""), twin)
+    assert (late.found, late.wrong, late.already, late.new) == (True, False, False, ("clock_skew",))
+    other = score_concealed(put("late"), Verdict(said("bearing_friction", "crosstalk"), 1.0, ""), twin)
+    assert (other.found, other.wrong) == (False, True)
+    same = score_concealed(put("friction"), Verdict(twin, 1.0, ""), twin)
+    assert (same.found, same.wrong, same.already) == (False, False, True)
+    none = score_concealed(put("late"), Verdict(None, 2.0, "no luck"), twin)
+    assert (none.found, none.wrong, none.failed) == (False, False, "no luck")
+
+
+def test_what_has_no_name_is_found_by_its_covariate_or_by_the_calibration() -> None:
+    drift = score_concealed(put("drift"), Verdict(said(covariate="temperature"), 1.0, ""), said())
+    assert drift.found
+    assert not score_concealed(
+        put("drift"), Verdict(said(covariate="temperature"), 1.0, ""), said(covariate="temperature")
+    ).found
+    assert score_concealed(put("gain"), Verdict(said(EA=1.1), 1.0, ""), said()).found
+    assert not score_concealed(put("gain"), Verdict(said(EA=1.001), 1.0, ""), said()).found
+
+
+def answered() -> Curves:
+    twin = said("strand_friction")
+    rows = [score_concealed(put("twin"), Verdict(twin, 1.0, ""), twin)]
+    for share, names in (
+        (0.1, ()),
+        (0.2, ("clock_skew",)),
+        (0.4, ("clock_skew",)),
+        (0.4, ("clock_skew", "crosstalk")),
+    ):
+        rows.append(score_concealed(put("late", share), Verdict(said(*names), 3.0, ""), twin))
+    rows.append(score_concealed(put("gain"), Verdict(said(), float("nan"), "no luck"), twin))
+    wish = {"recordings": ["a.csv"], "seed": 1, "rounds": 4, "seconds": 20.0, "sha256": "ab" * 32}
+    return curves(rows, 40, wish)
+
+
+def test_curves_count_by_size_and_say_from_where_all_are_found() -> None:
+    found = answered()
+    late, gain = found.curves
+    assert [(p.size, p.found.hits, p.found.of) for p in late.points] == [
+        (1.0, 0, 1),
+        (2.0, 1, 1),
+        (4.0, 2, 2),
+    ]
+    assert late.from_size == 2.0
+    assert isnan(gain.from_size)
+    assert found.names_in_twins == {"strand_friction": 1}
+    assert (late.in_twins.hits, late.in_twins.of, found.wrong.hits, found.wrong.of) == (0, 1, 1, 5)
+    entry = json.loads(json.dumps(found.as_json(), allow_nan=False))
+    assert entry["curves"][0]["found_from"] == 2.0
+    assert entry["curves"][1]["found_from"] is None
+
+
+def test_page_table_and_section_hold_it() -> None:
+    answer = answered().as_json()
+    text = concealed_page(answer)
+    for words in ("no luck", "abababababab", "6 of 40", "a.csv"):
+        assert words in text
+    assert concealed_table(answer).row_count == 2
+    assert "2 ms" in concealed_section(answer).body
+
+
+def test_pieces_are_stretches_of_one_session_and_the_same_again() -> None:
+    whole = {f"{s}/{k}.csv": recording(JOINT, k) for s in ("one", "two") for k in range(2)}
+    for number in range(4):
+        found = piece(whole, 30.0, 2, number)
+        assert sum(float(np.ptp(t["time_s"])) for t in found) == pytest.approx(30.0, abs=0.1)
+        np.testing.assert_array_equal(found[0]["time_s"], piece(whole, 30.0, 2, number)[0]["time_s"])
+    assert len(piece(whole, 70.0, 2, 0)) == 2
+    with pytest.raises(InputError, match="200 samples"):
+        piece({"a": {"time_s": np.arange(5.0)}}, 20.0, 0, 0)
+
+
+def _conceal(pieces: Path, seed: int, out: Path, told: Callable[[int, int], None]) -> str:
+    (out / "sealed").mkdir()
+    assert (pieces / "joint.toml").exists()
+    for k, physics in enumerate(("twin", "late", "late")):
+        (out / "trials" / f"{k:05d}").mkdir(parents=True)
+        with zipfile.ZipFile(out / "sealed" / f"{k:05d}.zip", "w") as archive:
+            archive.writestr("truth.json", json.dumps(put(physics, 0.1 * k, trial=k)))
+        told(k + 1, 3)
+    return digest(out / "sealed")
+
+
+def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    log: list[str] = []
+
+    def diagnose(folder: Path, further: Sequence[Path], out: Path) -> None:
+        log.append(folder.name)
+        (out / "diagnosis.json").write_text(
+            json.dumps(said(*(["clock_skew"] if folder.name != "00000" else [])))
+        )
+
+    own = Own(tmp_path, {"a.csv": recording(JOINT, 0)}, joint_text(JOINT), _conceal, Workers(0), diagnose)
+    wish = OwnWish(1, 1, 20.0, 0.0)
+    first = prove_in(own, wish, lambda what, done, of: None, log.append)
+    seal = digest(tmp_path / "sealed")
+    assert log == [seal, "00000", "00001"]  # the least: a twin and one beside it
+    assert (first.done, first.of) == (2, 3)
+    second = prove_in(own, replace(wish, minutes=None), lambda what, done, of: None, log.append)
+    assert log[3:] == [seal, "00002"]
+    assert (second.done, second.of, second.curves[0].in_twins.hits) == (3, 3, 0)
+    answer = concealed_beside(tmp_path)
+    assert answer is not None
+    assert answer["done"] == 3
+    with pytest.raises(InputError, match="holds another run"):
+        prove_in(own, replace(wish, seed=2), lambda what, done, of: None, log.append)
+    (tmp_path / ANSWER).write_text("[]")
+    with pytest.raises(InputError, match="is no answer"):
+        concealed_beside(tmp_path)
+    assert concealed_beside(tmp_path / "trials") is None
+
+
+@pytest.mark.parametrize(
+    ("options", "words"), [(["--in", "a.csv"], "--in needs --config"), (["--config", "x"], "goes with --in")]
+)
+def test_recordings_and_their_configuration_go_together(
+    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["prove", *options]) == 2
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.count("\n") == 1
