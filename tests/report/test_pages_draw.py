@@ -115,7 +115,9 @@ def test_figures_follow_the_reader_into_the_dark_and_onto_paper(
         seen.evaluate("dispatchEvent(new Event('afterprint'))")
         assert seen.evaluate(ground)[1] == dark[1]
         seen.emulate_media(media="screen", color_scheme="light")
-        assert seen.evaluate(ground) == ["rgb(255, 255, 255)", style.PAPER]
+        # the figures are drawn anew after the change, not within it
+        light = f'JSON.stringify({ground}) === \'["rgb(255, 255, 255)","{style.PAPER}"]\''
+        seen.wait_for_function(light, timeout=20_000)
 
 
 def test_bounds_do_not_flatten_what_they_bound(chromium: Any, pages: dict[str, str], tmp_path: Path) -> None:
