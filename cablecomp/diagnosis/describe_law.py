@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from cablecomp.config import Empirical
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import Groups, Lead, lead
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 TERMS = 10
@@ -51,10 +52,7 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
             centre, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
             if half <= 0.0:
                 continue
-            T = (
-                np.polynomial.chebyshev.chebvander((x - centre) / half, TERMS)[:, 1:]
-                * (weight / sigma)[:, None]
-            )
+            T = _basis(x, centre, half) * (weight / sigma)[:, None]
             predicted = _crossed(T, left, fold)
             step = lead(left - predicted, left, here)
             if step.z > LIMITS.z and step.gain > LIMITS.gain and (best is None or step.gain > best.lead.gain):
@@ -71,6 +69,36 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
             return found
         found.append(best)
         left = left - gone
+
+
+def value_of(law: Empirical, recording: Evidence) -> FloatArray:
+    """What a law adds to the joint angle [rad] on a recording's counted rows, as the observer runs it."""
+    x = recording.at_rows(law.of)[recording.counted[JOINT]]
+    return np.asarray(
+        _basis(x, law.centre, law.half_width) @ np.array(law.coefficients_rad[1:]), dtype=np.float64
+    )
+
+
+def refitted(
+    laws: Sequence[Empirical], recordings: Sequence[Evidence], left: Sequence[FloatArray]
+) -> list[Empirical]:
+    """The same series fitted to other data: `left`, each recording's misfit [rad] on counted rows, one law after the other."""
+    weight = np.concatenate([e.weight[e.counted[JOINT]] for e in recordings])
+    rest = np.concatenate(left)
+    found = []
+    for law in laws:
+        x = np.concatenate([e.at_rows(law.of)[e.counted[JOINT]] for e in recordings])
+        T = _basis(x, law.centre, law.half_width)
+        c = _ridge(T * weight[:, None], rest * weight)
+        rest = rest - T @ c
+        found.append(law.model_copy(update={"coefficients_rad": (0.0, *(float(v) for v in c))}))
+    return found
+
+
+def _basis(x: FloatArray, centre: float, half: float) -> FloatArray:
+    """Chebyshev polynomials after the constant of a channel held within its range."""
+    inside = np.clip((x - centre) / half, -1.0, 1.0)
+    return np.asarray(np.polynomial.chebyshev.chebvander(inside, TERMS)[:, 1:], dtype=np.float64)
 
 
 def _ridge(T: FloatArray, y: FloatArray) -> FloatArray:

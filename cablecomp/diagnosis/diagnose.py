@@ -12,7 +12,7 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.augmented import augmented_joint
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, spread
 from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
-from cablecomp.diagnosis.describe_law import Found, empirical_laws
+from cablecomp.diagnosis.describe_law import empirical_laws
 from cablecomp.diagnosis.errors_left import errors_of
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.model import Model
@@ -23,7 +23,7 @@ from cablecomp.diagnosis.explain.verdict import Weighed, weigh
 from cablecomp.diagnosis.locate import Location, locate
 from cablecomp.diagnosis.remainders import covariates_of, sensitivities, series_of
 from cablecomp.diagnosis.repeatability import repeatability
-from cablecomp.diagnosis.result import Diagnosis, Errors, Law
+from cablecomp.diagnosis.result import Diagnosis, Law
 from cablecomp.diagnosis.said import (
     candidates,
     channel_word,
@@ -98,10 +98,9 @@ def diagnose(
     progress("counting errors on data left out", 0.95)
     by = groups.by
     baseline = errors_of(drive.fit, body.final, by)
-    augmented = errors_of(kept.fit, body.final, by) if kept is final and final.terms else baseline
-    if laws:
-        augmented = _with_laws(augmented, laws)
-    joint = augmented_joint(config, kept, [f.law for f in laws], body.names)
+    empirical = [f.law for f in laws]
+    augmented = errors_of(kept.fit, body.final, by, empirical) if kept is final and final.terms else baseline
+    joint = augmented_joint(config, kept, empirical, body.names)
     unseen, hidden = could_be_unseen(kept.fit, pool, [w.term.name for w in named])
     tied = (*tied_of(weighed_terms), *(((h.effect,), h.why) for h in hidden))
     return Diagnosis(
@@ -194,8 +193,3 @@ def _verdict(named: Sequence[Weighed], structured: bool, drive: Calibrated) -> s
         return "unexplained"
     before, after = rms_left(drive.nominal), rms_left(drive.fit)
     return "recalibrate" if after < LIMITS.recalibrate * before else "consistent"
-
-
-def _with_laws(errors: Errors, laws: Sequence[Found]) -> Errors:
-    factor = float(np.sqrt(np.prod([1.0 - f.lead.gain for f in laws])))
-    return Errors(errors.rmse_rad * factor, errors.heldout_rmse_rad * factor, errors.final_rmse_rad)

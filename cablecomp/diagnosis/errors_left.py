@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from cablecomp.config import Empirical
+from cablecomp.diagnosis.describe_law import refitted, value_of
 from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.result import Errors
 from cablecomp.errors import InputError
@@ -18,17 +20,27 @@ FOLDS = 5
 BLOCKS = 20
 
 
-def errors_of(fit: Fit, final: Sequence[Evidence], by: str) -> Errors:
-    """The three errors; zeros are the sessions', as `replay` takes them."""
-    inside = _rms(_left(fit, fit.problem.evidence))
+def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
+    """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them."""
+    inside = _rms(_left(fit, fit.problem.evidence, laws))
     folds = _folds(fit.problem.evidence, by)
 
     def left_out(k: int) -> list[FloatArray]:
         train, test = folds[k]
-        return _left(solve(fit.problem.with_evidence(train), fit.x, 3), test)
+        again = solve(fit.problem.with_evidence(train), fit.x, 3)
+        return _left(again, test, _again(again, laws))
 
     parts = [p for found in side_by_side(left_out, range(len(folds))) for p in found]
-    return Errors(inside, _rms(parts), _rms(_left(fit, final)))
+    return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)))
+
+
+def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
+    """The laws fitted to what this fit leaves of its own recordings."""
+    if not laws:
+        return []
+    kept = [e for e in fit.problem.evidence if e.counted[JOINT].any()]
+    weighted = _left(fit, kept)
+    return refitted(laws, kept, [r / e.weight[e.counted[JOINT]] for r, e in zip(weighted, kept, strict=True)])
 
 
 def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], list[Evidence]]]:
@@ -51,9 +63,9 @@ def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], 
     return found
 
 
-def _left(fit: Fit, evidence: Sequence[Evidence]) -> list[FloatArray]:
-    """Weighted misfit of the joint angle [rad] on counted rows, the session's zero (the mean of what is there, for a session
-    that the fit has not seen) taken off."""
+def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
+    """Weighted misfit of the joint angle [rad] on counted rows, laws and the session's zero (the mean of what is there, for a
+    session that the fit has not seen) taken off."""
     problem = fit.problem
     zeros = problem.zeros(fit.x)[JOINT]
     try:
@@ -65,8 +77,9 @@ def _left(fit: Fit, evidence: Sequence[Evidence]) -> list[FloatArray]:
         kept = e.counted[JOINT]
         if not kept.any():
             continue
-        zero = zeros[e.session][0] if e.session in zeros else float(np.mean(m[kept]))
-        parts.append(e.weight[kept] * (m[kept] - zero))
+        left = m[kept] - sum((value_of(law, e) for law in laws), np.zeros(int(kept.sum())))
+        zero = zeros[e.session][0] if e.session in zeros else float(np.mean(left))
+        parts.append(e.weight[kept] * (left - zero))
     return parts
 
 
