@@ -45,11 +45,12 @@ def calibrate_drive(
     fit = solve(problem, evaluations=15)
     fit = refit(fit, weighed(fit, floor), 10)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
-    size = rms_left(fit)
+    size = {c: rms_left(fit, c) for c in fit.problem.channels}
     cut, constant = [], []
     for e in fit.problem.evidence:
-        found = forgotten(fit.problem, fit.x, e, LIMITS.history * size)
-        cut.append(e.counting_from(max(found.first, full_swing(fit.problem, e, LIMITS.history_most))))
+        found = forgotten(fit.problem, fit.x, e, size, LIMITS.history)
+        first = max(found.first, full_swing(fit.problem, e, LIMITS.history_most))
+        cut.append(replace(e.counting_from(first), past=found.past))
         constant.append(found.constant_rad)
     floor = Weighing(
         floor.sigma, {**floor.zero_sd, JOINT: max(floor.zero_sd[JOINT], float(np.mean(constant)))}

@@ -46,7 +46,8 @@ class Evidence:
     `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are judged, thinned
     by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time that a judged row stands
     for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside;
-    `shift_s`: what was added to the recording's own clock.
+    `shift_s`: what was added to the recording's own clock; `past`: by output channel, what pasts that nobody recorded would
+    add to the judged rows, a column each.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Evidence:
     samples: int = 0
     step_s: float = 0.0
     shift_s: float = 0.0
+    past: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""

@@ -2,13 +2,13 @@
 
 The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke); rows count
 from where these runs agree but for a constant, and how far the constants differ is how far a recording's zero may
-depart from its session's.
+depart from its session's. What they still differ by from there on is estimated with the zeros, each with a prior.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,16 +22,19 @@ CUTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 """Shares of a recording that may be given up."""
 LEG = 12
 """Rows of one leg of an assumed past."""
+FAINT = 0.02
+"""Share of what is usually left over below which a past's trace is not worth a column."""
 
 
 @dataclass(frozen=True)
 class Forgotten:
     """From which judged row on a recording's past no longer matters, how far it may still move the joint from there (RMS,
-    rad, a constant apart), and how far the constants differ (rad)."""
+    rad, a constant apart), how far the constants differ (rad), and what the assumed pasts add by channel (columns)."""
 
     first: int
     left_rad: float
     constant_rad: float
+    past: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
@@ -72,28 +75,32 @@ def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
     return first if first <= most * len(motor) else 0
 
 
-def forgotten(problem: Problem, x: FloatArray, recording: Evidence, tolerance_rad: float) -> Forgotten:
-    """Where the past is forgotten to within `tolerance_rad`; the best cut there is if it is nowhere."""
+def forgotten(
+    problem: Problem, x: FloatArray, recording: Evidence, size: Mapping[str, float], share: float
+) -> Forgotten:
+    """Where the past is forgotten to within `share` of what is usually left over of each channel (`size`); the best cut there
+    is if it is nowhere."""
     made = simulator(problem.joint(x, recording))
     try:
-        base = made.predict(recording)[JOINT]
+        base = made.predict(recording)
     except InputError:
         return Forgotten(0, 0.0, 0.0)
     runs = []
     for past in pasts(problem, recording):
         try:
-            runs.append(made.predict(recording, past)[JOINT] - base)
+            run = made.predict(recording, past)
         except InputError:
             continue  # a past that the drive could not have had
+        runs.append({c: run[c] - base[c] for c in size})
     if not runs:
         return Forgotten(0, 0.0, 0.0)
-    apart = np.stack(runs)
+    apart = np.stack([run[JOINT] for run in runs])
     best: tuple[float, int] | None = None
-    for share in CUTS:
-        first = int(share * apart.shape[1])
+    for cut in CUTS:
+        first = int(cut * apart.shape[1])
         later = apart[:, first:]
         left = float(np.sqrt(np.mean((later - later.mean(axis=1, keepdims=True)) ** 2)))
-        if left <= tolerance_rad:
+        if left <= share * size[JOINT]:
             best = (left, first)
             break
         if best is None or left < 0.7 * best[0]:
@@ -101,4 +108,13 @@ def forgotten(problem: Problem, x: FloatArray, recording: Evidence, tolerance_ra
     assert best is not None
     left, first = best
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
-    return Forgotten(first, left, constant)
+    past = {c: _columns(np.column_stack([run[c] for run in runs]), first, FAINT * size[c]) for c in size}
+    return Forgotten(first, left, constant, {c: columns for c, columns in past.items() if columns.shape[1]})
+
+
+def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:
+    """Principal columns of what the pasts add from row `first` on, a constant apart; rotated, so that one prior does for all."""
+    centred = runs - runs[first:].mean(axis=0)
+    _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)
+    kept = s > faint * np.sqrt(len(centred) - first)
+    return np.asarray(centred @ Vt[kept].T, dtype=np.float64)

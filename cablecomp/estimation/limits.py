@@ -16,6 +16,8 @@ INSTANT_REACH_S: Final = 3.0
 """How far an event's instant may move from where it was found by asking."""
 ZERO: Final = 0.5
 """How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up what compliances do."""
+PAST: Final = 0.5
+"""Prior sd of what went before a recording, in pasts that go to the greatest load, or to the end of the stroke, and back."""
 EXACT: Final = 0.003
 """Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without it, calibration
 would answer a slightly wrong ratio by physics."""

@@ -18,7 +18,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.limits import HOPELESS, STEP
+from cablecomp.estimation.limits import HOPELESS, PAST, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing
@@ -212,9 +212,10 @@ class Problem:
             width = 2 if c == MOTOR else 1
             sessions = self.sessions
             by_name = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(sessions)}
-            departures = solved[width * len(sessions) :]
+            first = width * len(sessions)
+            departures = solved[first : first + len(self.evidence)] if self._departs else None
             for r, d in zip(
-                self.evidence, departures if len(departures) else np.zeros(len(self.evidence)), strict=True
+                self.evidence, np.zeros(len(self.evidence)) if departures is None else departures, strict=True
             ):
                 own = by_name[r.session].copy()
                 own[0] += d
@@ -225,12 +226,34 @@ class Problem:
     def left(self, x: FloatArray, channel: str = JOINT, own_zero: bool = True) -> list[FloatArray]:
         """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions') taken off."""
         misfits, zeros = self.misfits(x)[channel], self.zeros(x)[channel]
+        pasts = self._pasts(channel, self.bases[channel].solve(self._rows(channel, misfits)))
         parts = []
-        for r, m in zip(self.evidence, misfits, strict=True):
+        for r, m, past in zip(self.evidence, misfits, pasts, strict=True):
             zero = zeros[r.name if own_zero else r.session]
             line = zero[0] + (zero[1] * r.at_rows("motor_position_rad") if len(zero) > 1 else 0.0)
-            parts.append(m - line)
+            parts.append(m - line - past)
         return parts
+
+    def _pasts(self, channel: str, solved: FloatArray) -> list[FloatArray]:
+        """What each recording's past adds to its judged rows."""
+        first = (2 if channel == MOTOR else 1) * len(self.sessions) + (
+            len(self.evidence) if self._departs else 0
+        )
+        found = []
+        for r in self.evidence:
+            columns = r.past.get(channel) if channel in r.counted else None
+            count = 0 if columns is None else columns.shape[1]
+            found.append(
+                np.zeros(len(r.rows)) if columns is None else columns @ solved[first : first + count]
+            )
+            first += count
+        return found
+
+    @property
+    def _departs(self) -> bool:
+        """Whether recordings have zeros beside their sessions': one alone in its session has none, and whether there are
+        penalties must not hang on weights."""
+        return len(self.evidence) > len(self.sessions)
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -270,26 +293,33 @@ class Problem:
         sigma, spread = self.weighing.sigma[channel], self.weighing.zero_sd.get(channel, 0.0)
         width = 2 if channel == MOTOR else 1
         sessions = self.sessions
-        # a recording alone in its session has no zero beside the session's; whether there are penalties must not hang on weights
-        n_dep = len(self.evidence) if len(self.evidence) > len(sessions) else 0
+        n_dep = len(self.evidence) if self._departs else 0
         spread = max(spread, 1e-6 * sigma)
+        past = [
+            r.past[channel].shape[1] if channel in r.counted and channel in r.past else 0
+            for r in self.evidence
+        ]
+        own = width * len(sessions)
+        free = own + n_dep
         blocks = []
         for k, r in enumerate(self.evidence):
             if channel not in r.counted:
                 continue
             kept = r.counted[channel]
             w = r.weight[kept] / sigma
-            block = np.zeros((len(w), width * len(sessions) + n_dep))
+            block = np.zeros((len(w), free + sum(past)))
             first = width * sessions.index(r.session)
             block[:, first] = w
             if width == 2:
                 block[:, first + 1] = w * r.at_rows("motor_position_rad")[kept]
             if n_dep:
-                block[:, width * len(sessions) + k] = w
+                block[:, own + k] = w
+            if past[k]:
+                at = free + sum(past[:k])
+                block[:, at : at + past[k]] = w[:, None] * r.past[channel][kept]
             blocks.append(block)
         matrix = np.vstack(blocks)
-        penalty = np.zeros((n_dep, matrix.shape[1]))
-        for k in range(n_dep):
-            penalty[k, width * len(sessions) + k] = 1.0 / spread
+        penalty = np.zeros((n_dep + sum(past), matrix.shape[1]))
+        penalty[:, own:] = np.diag([1.0 / spread] * n_dep + [1.0 / PAST] * sum(past))
         Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
-        return Zeros(Q, R, n_dep)
+        return Zeros(Q, R, len(penalty))

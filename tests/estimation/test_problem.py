@@ -150,10 +150,30 @@ def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_a
         for order in ((swing, small, small), (small, small, swing))
     )
     p = problem((first, last))
-    wiped, kept = (forgotten(p, p.start, e, 1e-7) for e in (first, last))
+    wiped, kept = (forgotten(p, p.start, e, {ANGLE: 1e-6}, 0.1) for e in (first, last))
     assert wiped.left_rad <= 1e-7
     assert 0 < wiped.first < len(first.rows) // 2
     assert kept.left_rad > 1e-6
+
+
+def test_a_past_that_nobody_recorded_is_estimated_with_the_zeros() -> None:
+    """Half of the way to the greatest load and back went before; small swings keep its bump, a constant does not hide it."""
+    ramp = np.linspace(0.0, 1.0, 60)
+    before = np.concatenate([2.0 * ramp, 2.0 - 2.0 * ramp])
+    small = np.concatenate([0.8 * ramp, 0.8 - 1.2 * ramp, -0.4 + 1.8 * ramp])
+    whole = held(np.concatenate([before, small, 1.4 - 0.8 * ramp]))
+    seen = {k: v[len(before) :] for k, v in whole.items()}
+    blind = evidence(seen, "one", "a")
+    p = problem((blind,), spread=0.0)
+    found = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9)
+    told = p.with_evidence([replace(blind, past=found.past)])
+    without, with_ = (float(np.sum(q.residual(q.start) ** 2)) for q in (p, told))
+    assert without > 100.0
+    assert with_ < 0.1 * without
+    np.testing.assert_allclose(
+        np.concatenate(told.left(told.start)) / SIGMA, told.residual(told.start)[: len(blind.rows)] / blind.weight,
+        atol=1e-6,
+    )  # fmt: skip
 
 
 def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
