@@ -108,8 +108,8 @@ def forgotten(
     assert best is not None
     left, first = best
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
-    past = {c: _columns(np.column_stack([run[c] for run in runs]), first, FAINT * size[c]) for c in size}
-    return Forgotten(first, left, constant, {c: columns for c, columns in past.items() if columns.shape[1]})
+    traces = {c: _columns(np.column_stack([run[c] for run in runs]), first, FAINT * size[c]) for c in size}
+    return Forgotten(first, left, constant, {c: t for c, t in traces.items() if t.shape[1]})
 
 
 def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:

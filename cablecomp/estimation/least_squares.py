@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -13,6 +13,9 @@ from cablecomp.estimation.limits import HOPELESS, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray
+
+ROUND = 6
+"""Residuals asked for between two derivatives by differences: secants go stale."""
 
 
 @dataclass(frozen=True)
@@ -47,41 +50,85 @@ class Fit:
 def solve(
     problem: Problem, x: FloatArray | None = None, evaluations: int = 20, tolerance: float = 1e-4
 ) -> Fit:
-    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a step lowers the cost
-    by less than `tolerance` of it.
+    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a round of steps lowers
+    the cost by less than `tolerance` of it. The derivative is taken by differences where a round begins, and by secants within.
 
     Raises InputError if the drive cannot follow the recordings where the fit begins and ends.
     """
+    x = _inside(problem, problem.start if x is None else x)
+    residual = problem.residual(x)
+    fit = Fit(problem, x, residual, problem.jacobian(x, residual))
+    left = evaluations
+    while left > 0 and len(x):
+        found, spent = _steps(fit, min(left, ROUND), tolerance)
+        left -= spent
+        won = fit.cost - found.cost
+        if won <= 0.0:
+            break
+        fit = replace(found, J=problem.jacobian(found.x, found.residual))
+        if won < tolerance * fit.cost:
+            break
+    if np.all(fit.residual[: len(fit.residual) - len(fit.x)] == HOPELESS):
+        problem.misfits(fit.x)
+    return fit
+
+
+def approach(
+    problem: Problem, x: FloatArray, beside: Mapping[int, FloatArray], evaluations: int, tolerance: float
+) -> Fit:
+    """A few steps from x with columns of the derivative that are known about there, improved by secants: what comes of it is good
+    for a comparison, and its own derivative is rough. Raises InputError as `solve` does."""
+    x = _inside(problem, x)
+    residual = problem.residual(x)
+    found, _ = _steps(
+        Fit(problem, x, residual, problem.jacobian(x, residual, beside)), evaluations, tolerance
+    )
+    if np.all(found.residual[: len(found.residual) - len(found.x)] == HOPELESS):
+        problem.misfits(found.x)
+    return found
+
+
+def _inside(problem: Problem, x: FloatArray) -> FloatArray:
     low, high = problem.bounds()
-    start = problem.start if x is None else x
     margin = 1e-6 * (high - low)
-    inside = np.clip(start, low + margin, high - margin)
-    if not len(inside):
-        r = problem.residual(inside)
-        return Fit(problem, inside, r, np.empty((len(r), 0)))
-    memory: dict[bytes, FloatArray] = {}
+    return np.asarray(np.clip(x, low + margin, high - margin), dtype=np.float64)
+
+
+def _steps(fit: Fit, evaluations: int, tolerance: float) -> tuple[Fit, int]:
+    """Trust-region steps from a fit whose derivative is known; after each, C. Broyden's rank-one update takes its place
+    (A Class of Methods for Solving Nonlinear Simultaneous Equations, 1965). Also returns how many residuals were asked for."""
+    problem, known = fit.problem, {fit.x.tobytes(): fit.residual}
+    last = fit
 
     def residual(x: FloatArray) -> FloatArray:
         key = x.tobytes()
-        if key not in memory:
-            memory.clear()
-            memory[key] = problem.residual(x)
-        return memory[key]
+        if key not in known:
+            known[key] = problem.residual(x)
+        return known[key]
 
+    def derivative(x: FloatArray) -> FloatArray:
+        nonlocal last
+        step = x - last.x
+        square = float(step @ step)
+        if square > 0.0:
+            r = residual(x)
+            error = r - last.residual - last.J @ step
+            last = Fit(problem, x, r, last.J + np.outer(error, step / square))
+        return last.J
+
+    low, high = problem.bounds()
     found = least_squares(
         residual,
-        inside,
-        jac=lambda x: problem.jacobian(x, residual(x)),
+        fit.x,
+        jac=derivative,
         bounds=(low, high),
         x_scale="jac",
         ftol=tolerance,
         xtol=1e-4,
         gtol=1e-6,
-        max_nfev=evaluations,
+        max_nfev=evaluations + 1,
     )
-    if np.all(found.fun[: len(found.fun) - len(found.x)] == HOPELESS):
-        problem.misfits(found.x)
-    return Fit(problem, found.x, found.fun, found.jac)
+    return Fit(problem, found.x, found.fun, found.jac), len(known) - 1
 
 
 def best_of(problem: Problem, starts: Sequence[FloatArray], rough: int, evaluations: int) -> Fit:

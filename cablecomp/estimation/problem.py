@@ -169,13 +169,18 @@ class Problem:
             for p, v in zip(self.parameters, x, strict=True)
         ])  # fmt: skip
 
-    def jacobian(self, x: FloatArray, base: FloatArray | None = None) -> FloatArray:
-        """d residual / d x by differences, inward at a bound."""
+    def jacobian(
+        self, x: FloatArray, base: FloatArray | None = None, beside: Mapping[int, FloatArray] | None = None
+    ) -> FloatArray:
+        """d residual / d x by differences, inward at a bound; `beside`: columns that are known already."""
         here = self.residual(x) if base is None else base
         high = self.bounds()[1]
         columns = np.empty((len(here), len(x)))
         known = self._known(x)
         for k, p in enumerate(self.parameters):
+            if beside is not None and k in beside:
+                columns[:, k] = beside[k]
+                continue
             step = STEP if x[k] + STEP <= high[k] else -STEP
             moved = x.copy()
             moved[k] += step

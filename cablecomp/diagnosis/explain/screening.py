@@ -16,7 +16,7 @@ from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import INSTANT, PHASE, Hypothesis, Start, at_instants
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.least_squares import Fit, approach, solve
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
@@ -216,14 +216,18 @@ def rough(
     `further`: values to begin from as well (what they do not name, at its start).
     """
     fits = []
-    starts = [(a.problem, a.x) for a in answers]
     problem = answers[0].problem
-    for values in further:
-        starts.append((problem, np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters])))
-    for k, (problem, x) in enumerate(starts):
-        wanted = 3 if problem.fine else evaluations if k < len(answers) else evaluations + 3
+    for a in answers:
+        # of the effect's further parameters the answer tells no derivative
+        known = {int(k): a.J[:, k] for k in np.flatnonzero(np.any(a.J != 0.0, axis=0))}
         try:
-            fits.append(solve(problem, x, wanted, LIMITS.tolerance))
+            fits.append(approach(a.problem, a.x, known, 3 if problem.fine else evaluations, LIMITS.tolerance))
+        except InputError:
+            continue
+    for values in further:
+        x = np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters])
+        try:
+            fits.append(solve(problem, x, 3 if problem.fine else evaluations + 3, LIMITS.tolerance))
         except InputError:
             continue
     return sorted(fits, key=lambda f: f.cost)
