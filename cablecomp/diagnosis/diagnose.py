@@ -40,7 +40,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.diagnosis.unseen import could_be_unseen
 from cablecomp.diagnosis.values import drive_values
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
+from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, rms_left, solve, weighed
 
 
 def diagnose(
@@ -69,7 +69,7 @@ def diagnose(
     pool = hypotheses(config, body.used)
     searched = spread(drive.fit.problem.evidence, LIMITS.searched)
     whole = len(searched) == len(drive.fit.problem.evidence)
-    begin_fit = drive.fit if whole else solve(drive.fit.problem.with_evidence(searched), drive.fit.x, 6)
+    begin_fit = drive.fit if whole else _about(drive.fit, searched)
     nominal = drive.nominal if whole else _at_start(begin_fit)
     groups = make_groups(begin_fit)
     selection = select(begin_fit, nominal, pool, groups, rng, progress)
@@ -152,6 +152,11 @@ def _from_where(body: Body, cut: Sequence[Evidence]) -> tuple[Evidence, ...]:
         return body.final
     first = int(np.median([int(np.argmax(e.counted[JOINT])) for e in cut]))
     return tuple(e.counting_from(min(first, len(e.rows) // 2)) for e in body.final)
+
+
+def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:
+    """The fit about some of its recordings."""
+    return solve(fit.problem.with_evidence(some), fit.x, 6, J=derivative_of_part(fit, some))
 
 
 def _at_start(fit: Fit) -> Fit:

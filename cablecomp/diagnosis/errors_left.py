@@ -13,7 +13,7 @@ from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.result import Errors
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.least_squares import Fit, fitted_to_part
 from cablecomp.signal.smoothing import FloatArray
 
 FOLDS = 5
@@ -27,7 +27,7 @@ def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empir
 
     def left_out(k: int) -> list[FloatArray]:
         train, test = folds[k]
-        again = solve(fit.problem.with_evidence(train), fit.x, 3)
+        again = fitted_to_part(fit, train, 5)
         return _left(again, test, _again(again, laws))
 
     parts = [p for found in side_by_side(left_out, range(len(folds))) for p in found]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.limits import HOPELESS, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
@@ -48,26 +48,32 @@ class Fit:
 
 
 def solve(
-    problem: Problem, x: FloatArray | None = None, evaluations: int = 20, tolerance: float = 1e-4
+    problem: Problem,
+    x: FloatArray | None = None,
+    evaluations: int = 20,
+    tolerance: float = 1e-4,
+    J: FloatArray | None = None,
 ) -> Fit:
-    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a round of steps lowers
-    the cost by less than `tolerance` of it. The derivative is taken by differences where a round begins, and by secants within.
+    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a round of steps would
+    lower the cost by less than `tolerance` of it. The derivative is taken by differences between rounds, and by secants within.
 
-    Raises InputError if the drive cannot follow the recordings where the fit begins and ends.
+    `J`: a derivative that is roughly known at x, for the first round. Raises InputError if the drive cannot follow the recordings
+    where the fit begins and ends.
     """
     x = _inside(problem, problem.start if x is None else x)
     residual = problem.residual(x)
-    fit = Fit(problem, x, residual, problem.jacobian(x, residual))
+    rough = J is not None and J.shape == (len(residual), len(x))
+    fit = Fit(problem, x, residual, J if rough and J is not None else problem.jacobian(x, residual))
     left = evaluations
     while left > 0 and len(x):
         found, spent = _steps(fit, min(left, ROUND), tolerance)
         left -= spent
         won = fit.cost - found.cost
-        if won <= 0.0:
+        if won <= tolerance * fit.cost and not rough:
             break
-        fit = replace(found, J=problem.jacobian(found.x, found.residual))
-        if won < tolerance * fit.cost:
-            break
+        better = found if won > 0.0 else fit
+        fit = replace(better, J=problem.jacobian(better.x, better.residual))
+        rough = False
     if np.all(fit.residual[: len(fit.residual) - len(fit.x)] == HOPELESS):
         problem.misfits(fit.x)
     return fit
@@ -131,11 +137,26 @@ def _steps(fit: Fit, evaluations: int, tolerance: float) -> tuple[Fit, int]:
     return Fit(problem, found.x, found.fun, found.jac), len(known) - 1
 
 
-def best_of(problem: Problem, starts: Sequence[FloatArray], rough: int, evaluations: int) -> Fit:
-    """Rough fits from every start, the best carried on: friction leaves more than one valley in the misfit."""
-    fits = [solve(problem, x, rough) for x in starts]
-    best = min(fits, key=lambda f: f.cost)
-    return solve(problem, best.x, evaluations)
+def derivative_of_part(fit: Fit, part: Sequence[Evidence]) -> FloatArray:
+    """What is known of the derivative about some of a fit's recordings, or about fewer of their rows."""
+    wanted, J = {e.name: e for e in part}, fit.J
+    smaller = fit.problem.with_evidence(part)
+    blocks = []
+    for c, span in fit.problem.spans().items():
+        first = span.start
+        for e in fit.problem.evidence:
+            count = int(e.counted[c].sum()) if c in e.counted else 0
+            if count and e.name in wanted:
+                blocks.append(J[first : first + count][wanted[e.name].counted[c][e.counted[c]]])
+            first += count
+        blocks.append(np.zeros((smaller.bases[c].penalty_rows, J.shape[1])))
+    return np.concatenate([*blocks, J[len(J) - J.shape[1] :]])
+
+
+def fitted_to_part(fit: Fit, part: Sequence[Evidence], evaluations: int) -> Fit:
+    """A fit about some of its rows only, from where it stands, along secants: what is left out is then predicted by it."""
+    J = derivative_of_part(fit, part)
+    return approach(fit.problem.with_evidence(part), fit.x, dict(enumerate(J.T)), evaluations, 1e-4)
 
 
 def weighed(fit: Fit, floor: Weighing) -> Weighing:
@@ -168,7 +189,10 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
 
 def refit(fit: Fit, weighing: Weighing, evaluations: int = 10) -> Fit:
     """The same fit with other weights, from where it stands."""
-    return solve(fit.problem.with_weighing(weighing), fit.x, evaluations)
+    J = fit.J.copy()
+    for c, span in fit.problem.spans().items():
+        J[span] *= fit.problem.weighing.sigma[c] / weighing.sigma[c]
+    return solve(fit.problem.with_weighing(weighing), fit.x, evaluations, J=J)
 
 
 def covariance(fit: Fit) -> FloatArray:

@@ -176,7 +176,7 @@ class Problem:
         here = self.residual(x) if base is None else base
         high = self.bounds()[1]
         columns = np.empty((len(here), len(x)))
-        known = self._known(x)
+        known = self._known(x) if beside is None or len(beside) < len(x) else None
         for k, p in enumerate(self.parameters):
             if beside is not None and k in beside:
                 columns[:, k] = beside[k]

@@ -112,7 +112,7 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
 
 def finely(model: Model, groups: Groups) -> Model:
     """The model run on every sample: what a law with rates is compared with."""
-    fit = solve(model.fit.problem.finely(), model.fit.x, 4)
+    fit = solve(model.fit.problem.finely(), model.fit.x, 4, J=model.fit.J)
     return Model(model.terms, fit, left_out(fit, groups))
 
 
@@ -122,7 +122,7 @@ def without(model: Model, term: Term, groups: Groups) -> Model | None:
     problem = stripped(model.fit.problem, term)
     start = placed(model.fit, problem)
     try:
-        fit = solve(problem, start, 10, LIMITS.tolerance)
+        fit = solve(problem, start, 10, LIMITS.tolerance, _derivative_of_rest(model.fit, problem))
     except InputError:
         return None
     return Model(kept, fit, left_out(fit, groups))
@@ -134,6 +134,16 @@ def stripped(problem: Problem, term: Term) -> Problem:
     entries = tuple(e for e in problem.config.effect if not _is(e.id, e.parameters, term))
     free = tuple(p for p in problem.parameters if not p.name.startswith(f"effect.{term.effect.id}."))
     return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
+
+
+def _derivative_of_rest(fit: Fit, problem: Problem) -> FloatArray | None:
+    """The fit's derivative by the parameters that a smaller problem still has; None where those are others."""
+    names = [p.name for p in fit.problem.parameters]
+    if not all(p.name in names for p in problem.parameters):
+        return None
+    columns = [names.index(p.name) for p in problem.parameters]
+    data = len(fit.J) - len(names)
+    return np.asarray(fit.J[[*range(data), *(data + k for k in columns)]][:, columns], dtype=np.float64)
 
 
 def _is(identifier: str, parameters: Mapping[str, object], term: Hypothesis) -> bool:

@@ -59,6 +59,6 @@ def rivals(
 
 def _tried(fit: Fit) -> Fit | None:
     try:
-        return solve(fit.problem, fit.x, 10, LIMITS.tolerance)
+        return solve(fit.problem, fit.x, 10, LIMITS.tolerance, fit.J)
     except InputError:
         return None

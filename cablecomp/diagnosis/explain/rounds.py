@@ -6,7 +6,7 @@ Besides effects, a round tries dependences: a parameter that is each session's o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,17 @@ from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
 Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A fit that has been begun: its cost so far, what it adds, where it stands, and what is roughly known of its derivative."""
+
+    cost: float
+    terms: tuple[Term, ...]
+    problem: Problem
+    x: FloatArray
+    J: FloatArray | None = None
 
 
 def one_round(
@@ -77,38 +88,38 @@ def one_round(
         return rough(a, LIMITS.rough, further)
 
     roughs = side_by_side(begin, worth)
-    ranked: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
-    second: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    ranked: list[Begun] = []
+    second: list[Begun] = []
     for fits, a in zip(roughs, worth, strict=True):
         for k, f in enumerate(fits[: 2 if trades and a[0].hypothesis.trades else 1]):
-            (second if k else ranked).append((f.cost, (a[0].hypothesis,), f.problem, f.x))
+            (second if k else ranked).append(Begun(f.cost, (a[0].hypothesis,), f.problem, f.x, f.J))
     for found in side_by_side(lambda c: _by_conditions(c), list(ranked)):
         ranked += found
     for d, cost, problem in dependences:
-        ranked.append((cost, (d,), problem, placed(model.fit, problem)))
-    ranked.sort(key=lambda c: c[0])
-    top = ranked[0][0] if ranked else 0.0
+        ranked.append(Begun(cost, (d,), problem, placed(model.fit, problem)))
+    ranked.sort(key=lambda c: c.cost)
+    top = ranked[0].cost if ranked else 0.0
     chosen = [
         c
         for k, c in enumerate(ranked[:promising])
-        if c[0] < before and (k < 2 or c[0] < LIMITS.hopeless * top)
+        if c.cost < before and (k < 2 or c.cost < LIMITS.hopeless * top)
     ]
 
     # what lies lower need not predict better: of two valleys both are fitted to the end
-    taken = [c[1][0].name for c in chosen]
-    chosen += [c for c in second if c[1][0].name in taken and c[0] < LIMITS.hopeless * top]
+    taken = [c.terms[0].name for c in chosen]
+    chosen += [c for c in second if c.terms[0].name in taken and c.cost < LIMITS.hopeless * top]
 
-    def finish(c: tuple[float, tuple[Term, ...], Problem, FloatArray]) -> Model | None:
-        progress(f"fitting {c[1][0].name}", done)
+    def finish(c: Begun) -> Model | None:
+        progress(f"fitting {c.terms[0].name}", done)
         try:
-            fit = solve(c[2], c[3], 15, LIMITS.tolerance)
+            fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
         except InputError:
             return None
         ratio = 1.0
         if fine is not None and fit.problem.fine:
             size = scales(model.left_out, groups)
             ratio = loss(model, size, groups) / max(loss(fine, size, groups), 1e-300)
-        return Model((*model.terms, *c[1]), fit, left_out(fit, groups), ratio)
+        return Model((*model.terms, *c.terms), fit, left_out(fit, groups), ratio)
 
     models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], groups)
     leads = {
@@ -172,13 +183,11 @@ def _wants_rates(a: Answer, model: Model, before: float) -> bool:
     )
 
 
-def _by_conditions(
-    c: tuple[float, tuple[Term, ...], Problem, FloatArray],
-) -> list[tuple[float, tuple[Term, ...], Problem, FloatArray]]:
+def _by_conditions(begun: Begun) -> list[Begun]:
     """The same effect with an amount that grows with a condition, for each condition of three values and more."""
-    cost, (term,), problem, x = c
+    problem, x, term = begun.problem, begun.x, begun.terms[0]
     assert isinstance(term, Hypothesis)
-    found: list[tuple[float, tuple[Term, ...], Problem, FloatArray]] = []
+    found: list[Begun] = []
     for condition in problem.evidence[0].condition:
         values = [e.condition[condition] for e in problem.evidence]
         if len(set(values)) < 3:
@@ -196,6 +205,6 @@ def _by_conditions(
             fit = solve(changed, np.append(x, gain.x(0.3 * here.start / float(np.ptp(values)))), LIMITS.rough)
         except InputError:
             continue
-        if fit.cost < LIMITS.promise * cost:
-            found.append((fit.cost, (term, Dependence(name, condition)), fit.problem, fit.x))
+        if fit.cost < LIMITS.promise * begun.cost:
+            found.append(Begun(fit.cost, (term, Dependence(name, condition)), fit.problem, fit.x, fit.J))
     return found

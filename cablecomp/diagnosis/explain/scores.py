@@ -17,7 +17,7 @@ import numpy as np
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
-from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.least_squares import Fit, fitted_to_part
 from cablecomp.estimation.parameter import DECADE
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
@@ -137,7 +137,7 @@ def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArr
     for k in range(min(EXACT, groups.folds)):
         out = (groups.fold >= 0) & (groups.fold % EXACT == k)
         try:
-            again = solve(fit.problem.with_evidence(_kept(fit.problem, out)), fit.x, evaluations)
+            again = fitted_to_part(fit, _kept(fit.problem, out), evaluations)
         except InputError:
             continue
         found = fit.problem.followed(again.x)
