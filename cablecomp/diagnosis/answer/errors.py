@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.result import Errors
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
 FOLDS = 5
