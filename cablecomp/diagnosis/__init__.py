@@ -1,5 +1,6 @@
 """What a joint's model lacks: where its residual lies, which physics explains it, and what no recording has shown yet.
 
-Imports estimation and everything below, not the runtime. Start reading at `diagnose.py`, the story from top to bottom;
-`result.py` is what comes out, `thresholds.py` every number that decides.
+Imports estimation and everything below, not the runtime. Start reading at `diagnose.py`, the story from top to bottom
+(`calibrate.py` is that of a calibration alone); its rooms, in the order in which they work: `calibration`, `locate`,
+`explain`, `describe`, `answer`. `result.py` is what comes out, `thresholds.py` every number that decides.
 """

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.augmented import augmented_joint
+from cablecomp.diagnosis.answer.augmented import augmented_joint
+from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
-from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
-from cablecomp.diagnosis.every_sample import on_every_sample
+from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
+from cablecomp.diagnosis.calibration.every_sample import on_every_sample
+from cablecomp.diagnosis.calibration.motion import Advice, what_would_tell
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.motion import Advice, what_would_tell
 from cablecomp.diagnosis.result import Value
-from cablecomp.diagnosis.values import drive_values
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve

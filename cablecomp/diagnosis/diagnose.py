@@ -9,22 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.augmented import augmented_joint
-from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, spread
-from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
-from cablecomp.diagnosis.describe_law import empirical_laws
-from cablecomp.diagnosis.errors_left import errors_of
-from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.rounds import Progress
-from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
-from cablecomp.diagnosis.explain.selection import select
-from cablecomp.diagnosis.explain.verdict import Weighed, weigh
-from cablecomp.diagnosis.locate import Location, locate
-from cablecomp.diagnosis.remainders import covariates_of, sensitivities, series_of
-from cablecomp.diagnosis.repeatability import repeatability
-from cablecomp.diagnosis.result import Diagnosis, Law
-from cablecomp.diagnosis.said import (
+from cablecomp.diagnosis.answer.augmented import augmented_joint
+from cablecomp.diagnosis.answer.errors import errors_of
+from cablecomp.diagnosis.answer.said import (
     candidates,
     channel_word,
     named_of,
@@ -35,10 +22,23 @@ from cablecomp.diagnosis.said import (
     tied_of,
     traces,
 )
-from cablecomp.diagnosis.series import Series
+from cablecomp.diagnosis.answer.values import drive_values
+from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, spread
+from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
+from cablecomp.diagnosis.describe.empirical import empirical_laws
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.rounds import Progress
+from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
+from cablecomp.diagnosis.explain.selection import select
+from cablecomp.diagnosis.explain.unseen import could_be_unseen
+from cablecomp.diagnosis.explain.verdict import Weighed, weigh
+from cablecomp.diagnosis.locate.location import Location, locate
+from cablecomp.diagnosis.locate.remainders import covariates_of, sensitivities, series_of
+from cablecomp.diagnosis.locate.repeatability import repeatability
+from cablecomp.diagnosis.locate.series import Series
+from cablecomp.diagnosis.result import Diagnosis, Law
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.diagnosis.unseen import could_be_unseen
-from cablecomp.diagnosis.values import drive_values
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, rms_left, solve, weighed
 

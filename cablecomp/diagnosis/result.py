@@ -13,7 +13,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.config_text import joint_text
-from cablecomp.diagnosis.locate import Location
+from cablecomp.diagnosis.locate.location import Location
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.signal.smoothing import FloatArray
 

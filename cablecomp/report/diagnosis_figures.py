@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from plotly.subplots import make_subplots
 
-from cablecomp.diagnosis.covariates import UNITS
+from cablecomp.diagnosis.locate.covariates import UNITS
 from cablecomp.diagnosis.result import Tested, Traces
 from cablecomp.report import style
 from cablecomp.report.diagnosis_words import covariate as words

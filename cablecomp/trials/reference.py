@@ -13,9 +13,9 @@ from math import nan, sqrt
 import numpy as np
 
 from cablecomp.config import JointConfig
+from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.calibration import Calibrated, calibrate_drive
-from cablecomp.diagnosis.errors_left import errors_of
+from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.explain.model import searching
 from cablecomp.diagnosis.explain.scores import Groups, Lead, lead, left_out, make_groups
 from cablecomp.diagnosis.thresholds import LIMITS

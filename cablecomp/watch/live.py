@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.locate import Location
+from cablecomp.diagnosis.locate.location import Location
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_file

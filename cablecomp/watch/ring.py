@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cablecomp.diagnosis.covariates import covariates
-from cablecomp.diagnosis.locate import Location, locate
-from cablecomp.diagnosis.series import make_series
+from cablecomp.diagnosis.locate.covariates import covariates
+from cablecomp.diagnosis.locate.location import Location, locate
+from cablecomp.diagnosis.locate.series import make_series
 from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
 

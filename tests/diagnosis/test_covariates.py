@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planted import columns
 
-from cablecomp.diagnosis.covariates import NAMES, covariates, join, reversals
+from cablecomp.diagnosis.locate.covariates import NAMES, covariates, join, reversals
 from cablecomp.errors import InputError
 
 

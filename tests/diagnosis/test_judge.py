@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from planted import autoregressive
 
-from cablecomp.diagnosis.blocks import Layout, alternate_blocks, count_reversals
-from cablecomp.diagnosis.judge import compare, effective_size, heldout_gain, judge, predictive_likelihood
+from cablecomp.diagnosis.describe.blocks import Layout, alternate_blocks, count_reversals
+from cablecomp.diagnosis.describe.judge import (
+    compare,
+    effective_size,
+    heldout_gain,
+    judge,
+    predictive_likelihood,
+)
 from cablecomp.errors import InputError
 from cablecomp.signal.autocorrelation import integrated_time, long_run_variance
 

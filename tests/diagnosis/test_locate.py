@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from planted import SIGMA, autoregressive, causes, columns, recording
 
-from cablecomp.diagnosis.covariates import Covariates, covariates
-from cablecomp.diagnosis.locate import locate
-from cablecomp.diagnosis.segments import segment
-from cablecomp.diagnosis.series import make_series, thin
-from cablecomp.diagnosis.views import load_path
+from cablecomp.diagnosis.locate.covariates import Covariates, covariates
+from cablecomp.diagnosis.locate.location import locate
+from cablecomp.diagnosis.locate.segments import segment
+from cablecomp.diagnosis.locate.series import make_series, thin
+from cablecomp.diagnosis.locate.views import load_path
 from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
 

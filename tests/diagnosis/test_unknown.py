@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from planted import SIGMA, autoregressive, recording
 
-from cablecomp.diagnosis.history import lagged, play
-from cablecomp.diagnosis.periodic import Periodicity, which_angle
-from cablecomp.diagnosis.series import make_series
-from cablecomp.diagnosis.unknown import Description, describe
+from cablecomp.diagnosis.describe.history import lagged, play
+from cablecomp.diagnosis.describe.periodic import Periodicity, which_angle
+from cablecomp.diagnosis.describe.unknown import Description, describe
+from cablecomp.diagnosis.locate.series import make_series
 from cablecomp.signal.smoothing import FloatArray
 
 START = np.zeros(1, dtype=np.int64)

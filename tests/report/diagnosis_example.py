@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from cablecomp.config import load_joint
-from cablecomp.diagnosis.covariates import covariates
-from cablecomp.diagnosis.locate import locate
+from cablecomp.diagnosis.locate.covariates import covariates
+from cablecomp.diagnosis.locate.location import locate
+from cablecomp.diagnosis.locate.series import make_series
 from cablecomp.diagnosis.result import Diagnosis, Errors, Law, Named, Tested, Traces, Value
-from cablecomp.diagnosis.series import make_series
 from cablecomp.effects import catalogue
 
 JOINT = Path(__file__).parents[2] / "configs" / "joints" / "snow-closed-rig.toml"

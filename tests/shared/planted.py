@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from cablecomp.diagnosis.covariates import Covariates, covariates
+from cablecomp.diagnosis.locate.covariates import Covariates, covariates
 from cablecomp.signal.smoothing import FloatArray
 
 SIGMA = 2e-5

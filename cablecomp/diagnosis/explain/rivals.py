@@ -18,10 +18,10 @@ from cablecomp.diagnosis.explain.scores import (
     scales,
 )
 from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
-from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.parallel import side_by_side
 
 
 def rivals(

@@ -16,11 +16,11 @@ from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely,
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out, scales, selected_in
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
-from cablecomp.diagnosis.parallel import side_by_side
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import MOTOR
 from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.parameter import DECADE, by_condition
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray

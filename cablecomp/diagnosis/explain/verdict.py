@@ -13,7 +13,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, without
 from cablecomp.diagnosis.explain.rivals import rivals
 from cablecomp.diagnosis.explain.scores import Groups, Lead, halves, lead, scales
-from cablecomp.diagnosis.locate import Location
+from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.config import Empirical
-from cablecomp.diagnosis.describe_law import refitted, value_of
-from cablecomp.diagnosis.parallel import side_by_side
+from cablecomp.diagnosis.describe.empirical import refitted, value_of
 from cablecomp.diagnosis.result import Errors
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
 FOLDS = 5

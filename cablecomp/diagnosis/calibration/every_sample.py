@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.diagnosis.body import Columns
-from cablecomp.diagnosis.calibration import Calibrated
+from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, gather
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed

@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cablecomp.diagnosis.series import Series, blocks_of
-from cablecomp.diagnosis.views import contrasts, hats, load_path
+from cablecomp.diagnosis.locate.series import Series, blocks_of
+from cablecomp.diagnosis.locate.views import contrasts, hats, load_path
 from cablecomp.signal.smoothing import FloatArray
 
 _MOST: Final = 160

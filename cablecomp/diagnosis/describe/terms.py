@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.history import lagged, play
-from cablecomp.diagnosis.periodic import Periodicity
-from cablecomp.diagnosis.series import Series
-from cablecomp.diagnosis.views import elapsed
+from cablecomp.diagnosis.describe.history import lagged, play
+from cablecomp.diagnosis.describe.periodic import Periodicity
+from cablecomp.diagnosis.locate.series import Series
+from cablecomp.diagnosis.locate.views import elapsed
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _LAGS: Final = (0.02, 0.05, 0.15)

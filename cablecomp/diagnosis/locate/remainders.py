@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.covariates import Covariates, covariates, join
-from cablecomp.diagnosis.series import Series, make_series
+from cablecomp.diagnosis.locate.covariates import Covariates, covariates, join
+from cablecomp.diagnosis.locate.series import Series, make_series
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.simulate import load_of

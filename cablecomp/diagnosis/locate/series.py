@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cablecomp.diagnosis.covariates import Covariates
+from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.errors import InputError
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cablecomp.diagnosis.covariates import Covariates
+from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray
 

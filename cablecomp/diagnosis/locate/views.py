@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.series import Series
+from cablecomp.diagnosis.locate.series import Series
 from cablecomp.signal.smoothing import FloatArray
 
 _INSTANTS: Final = 15

@@ -7,21 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from cablecomp.config import JointConfig
+from cablecomp.diagnosis.answer.values import effect_values
 from cablecomp.diagnosis.body import Body
-from cablecomp.diagnosis.calibration import Calibrated
-from cablecomp.diagnosis.covariates import Covariates, join
-from cablecomp.diagnosis.experiment import best_experiment
+from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.experiment import best_experiment
 from cablecomp.diagnosis.explain.model import Model, Selection
+from cablecomp.diagnosis.explain.unseen import Hidden
 from cablecomp.diagnosis.explain.verdict import Weighed
-from cablecomp.diagnosis.locate import Location
-from cablecomp.diagnosis.remainders import sensitivities
+from cablecomp.diagnosis.locate.covariates import Covariates, join
+from cablecomp.diagnosis.locate.location import Location
+from cablecomp.diagnosis.locate.remainders import sensitivities
+from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.result import Named, Tested, Traces, Value
-from cablecomp.diagnosis.series import Series
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.diagnosis.unknown import describe
-from cablecomp.diagnosis.unseen import Hidden
-from cablecomp.diagnosis.values import effect_values
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, load_channel
 from cablecomp.estimation.least_squares import Fit, rms_left

@@ -9,7 +9,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.control.protocol import Protocol, Segment
 from cablecomp.control.standard import calibration_protocol, loops_at_rest, turning_under_load
-from cablecomp.diagnosis.every_sample import trusted
+from cablecomp.diagnosis.calibration.every_sample import trusted
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, covariance

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.config import Empirical
-from cablecomp.diagnosis.describe_law import refitted, value_of
+from cablecomp.diagnosis.describe.empirical import refitted, value_of
 from cablecomp.estimation.evidence import JOINT, Evidence, gather
 from cablecomp.estimation.simulate import simulator
 from tests.diagnosis.test_diagnose import joint, recording

@@ -7,10 +7,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from cablecomp.diagnosis.crossfit import BlockSums, block_sums, coefficients, gains
-from cablecomp.diagnosis.segments import segment
-from cablecomp.diagnosis.series import Series, blocks_of, thin
-from cablecomp.diagnosis.views import View, load_path, views
+from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, coefficients, gains
+from cablecomp.diagnosis.locate.segments import segment
+from cablecomp.diagnosis.locate.series import Series, blocks_of, thin
+from cablecomp.diagnosis.locate.views import View, load_path, views
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _ENERGY_SHARE: Final = 0.8

@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.blocks import Layout
-from cablecomp.diagnosis.crossfit import BlockSums, block_sums, gains
-from cablecomp.diagnosis.judge import judge
-from cablecomp.diagnosis.library import Term
-from cablecomp.diagnosis.series import Series
+from cablecomp.diagnosis.describe.blocks import Layout
+from cablecomp.diagnosis.describe.judge import judge
+from cablecomp.diagnosis.describe.terms import Term
+from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, gains
+from cablecomp.diagnosis.locate.series import Series
 from cablecomp.signal.smoothing import FloatArray
 
 MOST_TERMS: Final = 5

@@ -18,7 +18,7 @@ from cablecomp.control.protocol import (
     Unload,
     Wait,
 )
-from cablecomp.diagnosis.covariates import Covariates
+from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray

@@ -7,15 +7,15 @@ from typing import Final, Literal
 
 import numpy as np
 
-from cablecomp.diagnosis.blocks import alternate_blocks
-from cablecomp.diagnosis.crossfit import block_sums, gains
-from cablecomp.diagnosis.history import lagged, play
-from cablecomp.diagnosis.law import SparseLaw, sparse_law
-from cablecomp.diagnosis.library import terms
-from cablecomp.diagnosis.periodic import Periodicity, periodicity, which_angle
-from cablecomp.diagnosis.segments import segment
-from cablecomp.diagnosis.series import Series, blocks_of, thin
-from cablecomp.diagnosis.views import contrasts, elapsed, hats, load_path, products
+from cablecomp.diagnosis.describe.blocks import alternate_blocks
+from cablecomp.diagnosis.describe.history import lagged, play
+from cablecomp.diagnosis.describe.law import SparseLaw, sparse_law
+from cablecomp.diagnosis.describe.periodic import Periodicity, periodicity, which_angle
+from cablecomp.diagnosis.describe.terms import terms
+from cablecomp.diagnosis.locate.crossfit import block_sums, gains
+from cablecomp.diagnosis.locate.segments import segment
+from cablecomp.diagnosis.locate.series import Series, blocks_of, thin
+from cablecomp.diagnosis.locate.views import contrasts, elapsed, hats, load_path, products
 from cablecomp.signal.smoothing import FloatArray
 
 Memory = Literal["memoryless", "remembers time", "remembers motion", "undecided"]

@@ -1,0 +1,4 @@
+"""What a diagnosis says, out of its fits: values, names, candidates and ties, errors on data left out, the joint it ends with.
+
+Imports every other room of the diagnosis. Start reading at `said.py`.
+"""
