@@ -87,6 +87,7 @@ def diagnose(
     progress("holding each name against its rivals", 0.92)
     weighed_terms = weigh(selection, pool, rest, share_left, rng)
     named = [w for w in weighed_terms if w.confidence >= LIMITS.name]
+    named.sort(key=lambda w: -w.evidence["share_total"])  # what is missing most stands first
     if len(named) < len(weighed_terms) and not named:
         kept = Model((), drive.fit, left_out(drive.fit, groups))
     else:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import INSTANT, Hypothesis
 from cablecomp.diagnosis.explain.model import Model, without
 from cablecomp.diagnosis.explain.scores import (
     Groups,
@@ -15,13 +15,18 @@ from cablecomp.diagnosis.explain.scores import (
     confidence_set,
     lead,
     left_out,
+    left_out_linearly,
     scales,
 )
 from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parallel import side_by_side
+from cablecomp.signal.smoothing import FloatArray
+
+ZERO_STEP = "a step of the joint encoder's zero"
 
 
 def rivals(
@@ -53,8 +58,33 @@ def rivals(
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         leads[a.hypothesis.name] = lead(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
+    if term.has_instant:
+        instant = float(model.fit.values[f"effect.{term.effect.id}.{INSTANT}"])
+        step = lead(model.left_out, _stepped(base, instant, groups), groups)
+        if step.gain < 0.0:
+            leads[ZERO_STEP] = step
     kept = confidence_set(losses, rng)
     return tuple(n for n in kept if n != term.name), leads
+
+
+def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
+    """What is left out with a plain step of the joint's zero in place of an event: what an encoder's hub does when it slips. It
+    speaks against the event only where it predicts better, for an event steps the zero too."""
+    fit, problem = base.fit, base.fit.problem
+    after = [(e.at_rows("time_s") >= instant_s).astype(np.float64) for e in problem.evidence]
+    struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)
+    rows = [
+        (e.weight * a * (e.session == struck))[e.counted[JOINT]] / problem.weighing.sigma[JOINT]
+        for e, a in zip(problem.evidence, after, strict=True)
+        if JOINT in e.counted
+    ]
+    column = np.zeros(len(fit.residual))
+    first = problem.spans()[JOINT].start
+    projected = problem.bases[JOINT].project(np.concatenate(rows))
+    column[first : first + len(projected)] = projected
+    A = np.column_stack((fit.J, column))
+    step = np.linalg.lstsq(A, -fit.residual, rcond=None)[0]
+    return left_out_linearly(fit.residual + A @ step, A, groups)
 
 
 def _tried(fit: Fit) -> Fit | None:

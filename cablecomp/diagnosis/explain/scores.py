@@ -99,16 +99,21 @@ def left_out(fit: Fit, groups: Groups) -> FloatArray:
     where the drive is known by order of magnitude only."""
     if any(p.sd >= DECADE for p in fit.problem.parameters if np.isfinite(p.sd)):
         return left_out_exactly(fit, groups)
+    return left_out_linearly(fit.residual, fit.J[:, _free(fit)], groups)
+
+
+def left_out_linearly(residual: FloatArray, J: FloatArray, groups: Groups) -> FloatArray:
+    """The same by one Gauss-Newton step for each fold, from residual and derivative (priors last) alone."""
     n = len(groups.fold)
-    r, J = fit.residual[:n].copy(), fit.J[:n]
-    free = _free(fit)
-    J, H = J[:, free], fit.J[:, free].T @ fit.J[:, free]
+    r = residual[:n].copy()
+    H = J.T @ J
+    J = J[:n]
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     data = groups.fold >= 0
-    reach = 4.0 * max(len(free), 1) * float(np.mean(r[data] ** 2))
+    reach = 4.0 * max(J.shape[1], 1) * float(np.mean(r[data] ** 2))
     for g in range(groups.folds):
         here = groups.fold == g
-        Jg, rg = J[here] / scale, fit.residual[:n][here]
+        Jg, rg = J[here] / scale, residual[:n][here]
         if not Jg.shape[1] or not len(rg):
             continue
         rest = H / np.outer(scale, scale) - Jg.T @ Jg

@@ -11,7 +11,7 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, without
-from cablecomp.diagnosis.explain.rivals import rivals
+from cablecomp.diagnosis.explain.rivals import ZERO_STEP, rivals
 from cablecomp.diagnosis.explain.scores import Groups, Lead, halves, lead, scales
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -75,7 +75,7 @@ def weigh(
         found.append(
             Weighed(
                 term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, kept, nearest,
-                _against(kept, follows, own, evidence),
+                _against((*kept, *(n for n in leads if n == ZERO_STEP)), follows, own, evidence),
             )
         )  # fmt: skip
     return sorted(found, key=lambda w: -w.confidence)
