@@ -28,6 +28,8 @@ def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
         lines += _table("effect", {"id": effect.id, **effect.parameters}, array=True)
     for law in data["empirical"]:
         lines += _table("empirical", law, array=True)
+    for depends in data["depends"]:
+        lines += _table("depends", depends, array=True)
     for session in data["session"]:
         lines += _table("session", {k: v for k, v in session.items() if v or k == "own"}, array=True)
     return "\n".join(lines) + "\n"

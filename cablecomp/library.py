@@ -7,6 +7,7 @@ with the words of the command line; what hardly fits the drive stands in `doubts
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from cablecomp.diagnosis.calibrate import calibrate as _calibrate
 from cablecomp.diagnosis.diagnose import diagnose as _diagnose
 from cablecomp.diagnosis.result import Diagnosis, report_json
 from cablecomp.estimation.belief import Suspicion, suspicions
+from cablecomp.estimation.standing import as_it_stood
 from cablecomp.observer import Observer
 from cablecomp.recording.arrays import as_recording, columns_of
 from cablecomp.recording.mapping import ColumnMap, load_mapping, mapping_from
@@ -140,6 +142,9 @@ def replay(
 ) -> ReplayResult:
     """Stream a recording through the observer that the controller runs; compare with what was measured."""
     joint, source = _joint(config), as_recording(recording, _mapping(mapping))
+    joint, _, said = as_it_stood(joint, source.path, source.head)
+    for line in said:
+        warnings.warn(line, stacklevel=2)
     rows = _Rows()
     summary = _replay(source, Observer(joint, bounds=bounds), [rows], config=joint, bounds=bounds)
     return ReplayResult(summary, rows.columns(), suspicions(joint, rows.measured()))

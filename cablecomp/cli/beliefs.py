@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from cablecomp.cli.shared import warn
 from cablecomp.config import JointConfig
 from cablecomp.estimation.belief import suspicions
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.table import FloatArray
-
-FIRST_ROWS = 200_000
-"""Rows of a streamed recording that are checked."""
 
 
 def believe(config: JointConfig, name: str, columns: Mapping[str, FloatArray]) -> tuple[str, ...]:
@@ -25,11 +20,5 @@ def believe(config: JointConfig, name: str, columns: Mapping[str, FloatArray]) -
 
 def believe_streamed(config: JointConfig, recording: Recording) -> tuple[str, ...]:
     """The same for a recording's first rows, which are read once more for it."""
-    parts, rows = [], 0
-    for block in recording.blocks():
-        parts.append(block.columns)
-        rows += block.rows
-        if rows >= FIRST_ROWS:
-            break
-    whole = {n: np.concatenate([p[n] for p in parts]) for n in recording.channels} if parts else {}
+    whole = recording.head()
     return believe(config, recording.path.name, whole) if whole else ()

@@ -11,9 +11,17 @@ from rich.table import Table
 
 from cablecomp.cli.beliefs import believe_streamed
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
-from cablecomp.cli.shared import Config, EffectsOption, JsonOption, announce_compilation, console, read_joint
+from cablecomp.cli.shared import (
+    Config,
+    EffectsOption,
+    JsonOption,
+    announce_compilation,
+    console,
+    read_joint,
+    warn,
+)
 from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
-from cablecomp.config import in_session, session_of
+from cablecomp.estimation.standing import as_it_stood
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
 from cablecomp.recording.replay import required_channels
@@ -54,11 +62,11 @@ def replay(
         return
     joint = read_joint(config, effects)
     source = sources(words, link, dbc, which, joint).open(recording)
-    found = session_of(joint, recording, session)
-    joint = in_session(joint, found)
+    joint, stood, said = as_it_stood(joint, recording, source.head, session)
+    warn(said)
     announce_compilation()
     source.require(required_channels(joint), f"with [observer] load = {joint.observer.load!r}")
-    source = dataclasses.replace(source, notes=(*source.notes, *believe_streamed(joint, source)))
+    source = dataclasses.replace(source, notes=(*source.notes, *said, *believe_streamed(joint, source)))
     with progress_bar(f"replay {recording.name}") as told:
         summary = write_replay(
             source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), told
@@ -74,6 +82,6 @@ def replay(
         )
     table.add_row("samples", f"{summary.samples:,}")
     if joint.sessions:
-        table.add_row("session", "none matches: the joint's own values" if found is None else found.name)
+        table.add_row("session", stood or "none matches: the joint's own values")
     console.print(table)
     console.print(f"report: {out / 'report.html'}")

@@ -9,11 +9,12 @@ from cablecomp.config.drive import Drive, Stage
 from cablecomp.config.load import load_joint, parse_joint, validated
 from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Sensors
 from cablecomp.config.schema import JointConfig
-from cablecomp.config.sessions import Empirical, Session
+from cablecomp.config.sessions import Depends, Empirical, Session
 from cablecomp.config.toml_file import TomlTable, read_toml
 from cablecomp.config.values import in_session, session_of, with_values
 
 __all__ = [
+    "Depends",
     "Drive",
     "EffectEntry",
     "Empirical",

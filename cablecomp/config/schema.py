@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from cablecomp.config.base import Frozen, Listed, NonNegative, Text, listed
 from cablecomp.config.drive import Drive, Stage
 from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Sensors
-from cablecomp.config.sessions import ZEROS, Empirical, Session, as_tables, check_names
+from cablecomp.config.sessions import ZEROS, Depends, Empirical, Session, as_tables, check_names
 
 PARAMETERS: Final = (*Stage.model_fields, *Sensors.model_fields)
 """Keys that are parameters: what [tolerance], `own` and `values` may name (also KEY.STAGE and effect.ID.KEY)."""
@@ -36,6 +36,7 @@ class JointConfig(Frozen):
         default_factory=dict,
         description="name -> channel that tells how the drive stood (slow in a recording)",
     )
+    depends: Annotated[tuple[Depends, ...], listed(16)] = ()
 
     @property
     def sessions(self) -> tuple[Session, ...]:
@@ -67,6 +68,13 @@ class JointConfig(Frozen):
         stages = len(self.drive.stage)
         check_names("tolerance", self.tolerance, PARAMETERS, stages)
         check_names("session", self.session_own, PARAMETERS, stages)
+        check_names("depends", (d.parameter for d in self.depends), PARAMETERS, stages)
+        for d in self.depends:
+            if d.on not in self.condition:
+                known = ", ".join(self.condition) or "none"
+                raise ValueError(
+                    f"[[depends]]: on `{d.on}`, which [condition] does not name; it names {known}"
+                )
         held = {f"effect.{e.id}" for e in self.effect}
         for key in self.tolerance:
             if "." in key and key.partition(".")[0] not in PARAMETERS and key.rpartition(".")[0] not in held:

@@ -44,6 +44,20 @@ class Session(Frozen):
         return any(place.match(pattern) for pattern in self.recordings for place in places if place.name)
 
 
+class Depends(Frozen):
+    """One `[[depends]]`: a parameter that grows with a condition, where no session says what it is.
+
+    parameter(c) = parameter + per_unit (c - at), c the median of the condition's channel in the recording, held within
+    `seen`: what the recordings that told it spanned.
+    """
+
+    parameter: Text
+    on: Text
+    per_unit: Finite
+    at: Finite
+    seen: Annotated[tuple[Finite, Finite], Listed]
+
+
 class Empirical(Frozen):
     """One `[[empirical]]`: a law without a physical name, added to the predicted joint position.
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
-from cablecomp.config import JointConfig, with_values
+import numpy as np
+
+from cablecomp.config import JointConfig, in_session, session_of, with_values
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
+from cablecomp.signal.smoothing import FloatArray
 
 PRETENSION = "pretension_N"
 
@@ -35,6 +39,48 @@ def standing(config: JointConfig, values: Mapping[str, float], recording: Eviden
         if tilde:
             gained[base] = gained.get(base, value_of(joint, base)) + value * recording.condition[condition]
     return with_values(joint, _checked(joint, gained)) if gained else joint
+
+
+def as_it_stood(
+    config: JointConfig,
+    recording: Path,
+    head: Callable[[], Mapping[str, FloatArray]],
+    session: str | None = None,
+) -> tuple[JointConfig, str | None, tuple[str, ...]]:
+    """The joint as it stood in a recording: by the session of that name, else by the one that claims the recording, else by its
+    conditions, read off the recording's `head`. Also the session's name, and notes on what had to be assumed."""
+    found = session_of(config, recording, session)
+    if found is not None:
+        return in_session(config, found), found.name, ()
+    if not config.depends:
+        return config, None, ()
+    joint, said = in_condition(config, head())
+    return joint, None, tuple(f"{recording.name}: {line}" for line in said)
+
+
+def in_condition(
+    config: JointConfig, columns: Mapping[str, FloatArray]
+) -> tuple[JointConfig, tuple[str, ...]]:
+    """The joint as it stands in a recording that no session claims, by its `[[depends]]`; a note for each condition that lies
+    beyond what they were told from."""
+    gained: dict[str, float] = {}
+    said = []
+    for law in config.depends:
+        channel = config.condition[law.on]
+        if channel not in columns or not np.isfinite(columns[channel]).any():
+            raise InputError(
+                f"channel `{channel}` is missing, which [condition] `{law.on}` names and `{law.parameter}` depends on; record it"
+            )
+        there = float(np.nanmedian(columns[channel]))
+        inside = min(max(there, law.seen[0]), law.seen[1])
+        if inside != there:
+            said.append(
+                f"{law.on} = {there:.4g} lies beyond {law.seen[0]:.4g} to {law.seen[1]:.4g}, from which `{law.parameter}` was told:"
+                f" taken at {inside:.4g}"
+            )
+        before = gained.get(law.parameter, value_of(config, law.parameter))
+        gained[law.parameter] = before + law.per_unit * (inside - law.at)
+    return with_values(config, _checked(config, gained)), tuple(said)
 
 
 def at_pretension(config: JointConfig, pretension_N: float) -> JointConfig:

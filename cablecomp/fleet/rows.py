@@ -6,9 +6,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from cablecomp.config import in_session, load_joint, session_of
+from cablecomp.config import load_joint
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json
+from cablecomp.estimation.standing import as_it_stood
 from cablecomp.fleet.change import change
 from cablecomp.fleet.places import Night
 from cablecomp.observer import Observer
@@ -89,11 +90,9 @@ def replayed_row(night: Night) -> Row:
     """Replay a night's recordings one by one, in bounded memory, whatever their length."""
     sink, samples, seconds = _Sink(), 0, 0.0
     for path in night.recordings:
-        joint = load_joint(night.config)
-        joint = in_session(joint, session_of(joint, path, None))
-        summary = replay(
-            open_recording(path), Observer(joint, bounds=False), [sink], config=joint, bounds=False
-        )
+        recording = open_recording(path)
+        joint, _, _ = as_it_stood(load_joint(night.config), path, recording.head)
+        summary = replay(recording, Observer(joint, bounds=False), [sink], config=joint, bounds=False)
         samples, seconds = samples + summary.samples, seconds + summary.duration_s
     means = sink.parts.means()
     within = change(means, _scatter(means))

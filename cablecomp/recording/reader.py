@@ -24,7 +24,7 @@ from cablecomp.recording.mapping import (
 )
 from cablecomp.recording.raw import RawRows, RawTable
 from cablecomp.recording.source_file import Messages, open_file
-from cablecomp.recording.table import Block, Table
+from cablecomp.recording.table import Block, FloatArray, Table
 
 _MOST_VALUES: Final = 200_000_000
 
@@ -69,6 +69,16 @@ class Recording:
         """
         checks = Checks(self.path, self.columns, self.line_word, self.gaps)
         return regrouped((checks.block(piece) for piece in some(self.raw(), self.path)), rows)
+
+    def head(self, rows: int = 200_000) -> dict[str, FloatArray]:
+        """Its first rows (that many or some more) by channel, read for themselves; empty if there are none."""
+        parts, read = [], 0
+        for block in self.blocks():
+            parts.append(block.columns)
+            read += block.rows
+            if read >= rows:
+                break
+        return {n: np.concatenate([p[n] for p in parts]) for n in self.channels} if parts else {}
 
 
 def open_recording(

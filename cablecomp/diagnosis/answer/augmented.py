@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cablecomp.config import Empirical, JointConfig, Session
+from cablecomp.config import Depends, Empirical, JointConfig, Session
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
@@ -27,7 +27,11 @@ def augmented_joint(
     first = fit.problem.evidence[0]
     common = standing(fit.problem.config, fit.values, first)
     joint = common.model_copy(
-        update={"empirical": (*config.empirical, *laws), "tolerance": dict(config.tolerance)}
+        update={
+            "empirical": (*config.empirical, *laws),
+            "tolerance": dict(config.tolerance),
+            "depends": (*config.depends, *_depends(model, first)),
+        }
     )
     if len(sessions) == 1 and not tied:
         return _with_zeros(joint, _zeros_of(zeros, sessions[0]))
@@ -49,6 +53,25 @@ def augmented_joint(
                 )
             )
     return joint.model_copy(update={"session": tuple(entries)})
+
+
+def _depends(model: Model, first: Evidence) -> tuple[Depends, ...]:
+    """The laws that tie parameters to conditions; the common values are those of the first recording's."""
+    fit = model.fit
+    found = []
+    for term in model.terms:
+        if isinstance(term, Dependence) and term.on != "session":
+            spanned = [e.condition[term.on] for e in fit.problem.evidence]
+            found.append(
+                Depends(
+                    parameter=term.parameter,
+                    on=term.on,
+                    per_unit=fit.values[f"{term.parameter}~{term.on}"],
+                    at=first.condition[term.on],
+                    seen=(min(spanned), max(spanned)),
+                )
+            )
+    return tuple(found)
 
 
 def _patterns(members: Sequence[Evidence], names: Sequence[str], session: str, tied: bool) -> tuple[str, ...]:
