@@ -87,7 +87,7 @@ def diagnose(
     progress("holding each name against its rivals", 0.92)
     weighed_terms = weigh(selection, pool, rest, share_left, rng)
     named = [w for w in weighed_terms if w.confidence >= LIMITS.name]
-    named.sort(key=lambda w: -w.evidence["share_total"])  # what is missing most stands first
+    named.sort(key=lambda w: -w.evidence["gain"])  # what is missed most stands first
     if len(named) < len(weighed_terms) and not named:
         kept = Model((), drive.fit, left_out(drive.fit, groups))
     else:
@@ -103,7 +103,7 @@ def diagnose(
     augmented = errors_of(kept.fit, body.final, by, empirical) if kept is final and final.terms else baseline
     joint = augmented_joint(config, kept, empirical, body.names)
     unseen, hidden = could_be_unseen(kept.fit, pool, [w.term.name for w in named])
-    tied = (*tied_of(weighed_terms), *(((h.effect,), h.why) for h in hidden))
+    tied = (*tied_of(weighed_terms, selection), *(((h.effect,), h.why) for h in hidden))
     return Diagnosis(
         config=config,
         recordings=body.names,
@@ -189,7 +189,8 @@ def _structured(found: Location, series: Series, repeated: float | None, named: 
     )
     ratio = float(np.mean(series.residual**2)) / yardstick**2
     follows = bool(found.significant(0.01))
-    return ratio > (LIMITS.structured if follows else LIMITS.beyond_noise if named else np.inf)
+    beyond = LIMITS.beyond_noise if named else LIMITS.far_beyond_noise
+    return ratio > (LIMITS.structured if follows else beyond)
 
 
 def _verdict(named: Sequence[Weighed], structured: bool, drive: Calibrated) -> str:

@@ -42,6 +42,11 @@ class Thresholds:
     """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on every sample."""
     tolerance: float = 1e-3
     """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by far more."""
+    told: float = 2.0
+    """Standard deviations by which an effect's amount has to differ from none, or it is not that effect that helps (trials seed
+    602: a mount that yields one way was answered by a guide without friction)."""
+    tie: float = 0.01
+    """Share of the loss on data left out by which a law with more parameters has to be better than one with fewer."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0
@@ -51,6 +56,10 @@ class Thresholds:
     z_first: float = 1.7
     """Standard errors of the paired held-out difference that the first effect must show to enter the model; whether it is named
     is its confidence's matter (what is missing first leaves few, long waves, whose scatter is large)."""
+    z_large: float = 1.0
+    """The same for a first effect that takes off much: a slow drift is one wave, whose z is small whatever its size."""
+    gain_large: float = 0.15
+    """That much (trials seeds 602, 603: four of four such effects were right; where nothing was missing none took 0.07)."""
     z: float = 2.5
     """The same for every further effect: one in 160 by chance, about twenty asked."""
     gain: float = 0.06
@@ -83,6 +92,8 @@ class Thresholds:
     beyond_noise: float = 4.0
     """The same where it follows nothing that can be shown (a single recording of few cycles) and physics is named: twice the
     noise is not noise."""
+    far_beyond_noise: float = 25.0
+    """The same where nothing is named: five times the noise is a mismatch, whether or not it follows anything."""
     recalibrate: float = 0.9
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     name: float = 0.5

@@ -137,7 +137,7 @@ def _targets(rows: Sequence[Row], trust: Trust) -> list[Target]:
         share("single effect named first, catalogue's law, decidable", rate(law("catalogue"), _first), 0.97),
         share("single effect named first, another law, decidable", rate(law("other"), _first), 0.90),
         share("single effect: a wrong name", rate(single, lambda r: r.wrong), None, 0.02),
-        share("nothing missing: a name", rate(clean, lambda r: bool(r.named)), None, 0.01),
+        share("nothing missing: a wrong name", rate(clean, lambda r: r.wrong), None, 0.01),
         share("pairs: both named, decidable", rate(pairs, lambda r: r.all_right), 0.80),
         share("strangers: no wrong name", rate(strange, lambda r: not r.wrong and not r.failed), 0.90),
         share("strangers: located by the residual itself, decidable", rate(unlike, _located), 0.80),

@@ -261,7 +261,7 @@ def test_page_and_table_hold_every_trial_and_json_no_nan() -> None:
     assert "--imperfections some" in text
     assert scoreboard_table(board).row_count == len(board.targets)
     assert json.loads(json.dumps(as_json(board), allow_nan=False))["confusion"]["a pair"] == {"failed": 1}
-    assert target(rows, "nothing missing: a name") == 1.0
+    assert target(rows, "nothing missing: a wrong name") == 1.0
 
 
 def test_the_true_law_is_the_yardstick() -> None:
@@ -344,7 +344,7 @@ def _fake_experiment(log: list[str]) -> Callable[[Path, Path, Path], None]:
 def test_the_whole_way_in_order_and_again_without_work(tmp_path: Path) -> None:
     log: list[str] = []
     blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), Workers(0), _fake_diagnosis(log))
-    wish = Wish(2, 5, "none", "catalogue", "none")
+    wish = Wish(2, 5, "none,confounded", "catalogue", "none")
     board = prove(blind, wish, lambda what, done, of: None, log.append)
     assert log[0] == "concealed"
     assert log[1] == digest(tmp_path / SEALED)

@@ -11,6 +11,8 @@ from cablecomp.diagnosis.answer.values import effect_values
 from cablecomp.diagnosis.body import Body
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.describe.unknown import describe
+from cablecomp.diagnosis.explain.confidence import learnt_level
+from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.experiment import best_experiment
 from cablecomp.diagnosis.explain.model import Model, Selection
@@ -43,7 +45,7 @@ def named_of(w: Weighed, final: Model) -> Named:
         effect.equation,
         parameters,
         _depends(w.depends, final),
-        float(w.evidence["share_total"]),
+        w.removes,
         w.confidence,
         dict(w.evidence),
         effect.acts_through,
@@ -99,13 +101,22 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
     return tuple(rows)
 
 
-def tied_of(found: Sequence[Weighed]) -> tuple[tuple[tuple[str, ...], str], ...]:
-    """Effects that data left out cannot tell apart."""
+def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple[str, ...], str], ...]:
+    """Effects that data left out cannot tell apart, and the first explanations that trials say not to exclude."""
     rows = []
     for w in found:
         if w.rivals:
             why = f"they predict data left out alike: the lead over the nearest is {w.lead.z:.1f} standard errors"
             rows.append(((w.term.name, *w.rivals), why))
+    level, first = learnt_level(), (selection.rounds[0].tried if selection.rounds else ())
+    if level is not None and found:
+        names = conformal_set(deficits({t.term.name: t.lead.z for t in first}), level)
+        if len(names) > 1 and all(set(names) != set(effects) for effects, _ in rows):
+            why = (
+                f"asked alone, each is within {level:.1f} standard errors of the best: sets made so held the truth in nine of "
+                "ten trials"
+            )
+            rows.append((names, why))
     return tuple(rows)
 
 

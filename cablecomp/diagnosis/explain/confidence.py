@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 FEATURES: Final = (
     "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "share_total", "rivals",
@@ -41,8 +41,21 @@ class Logistic:
 @cache
 def learnt() -> Logistic:
     """The model that ships."""
-    data = json.loads(_FILE.read_text())
+    data = _shipped()
     return Logistic(float(data["bias"]), data["weight"], data["centre"], data["scale"])
+
+
+@cache
+def learnt_level() -> float | None:
+    """Standard errors behind the best up to which an explanation is not excluded; None where trials were too few to say."""
+    level = _shipped()["conformal"]["level"]
+    return None if level is None else float(level)
+
+
+@cache
+def _shipped() -> Mapping[str, Any]:
+    found: Mapping[str, Any] = json.loads(_FILE.read_text(encoding="utf-8"))
+    return found
 
 
 def features(

@@ -13,7 +13,7 @@ from cablecomp.diagnosis.explain.scores import Groups, Lead, block_losses, left_
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
+from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -108,6 +108,22 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     """The model refitted with other weights."""
     fit = refit(model.fit, weighing, 6)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
+
+
+def is_told(fit: Fit, term: Term) -> bool:
+    """Whether an effect's own amount is told from none: a guide without friction is free cable, and yields as a mount does."""
+    if not isinstance(term, Hypothesis):
+        return True
+    name = f"effect.{term.effect.id}.{term.amount.name}"
+    k = next((k for k, p in enumerate(fit.problem.parameters) if p.name == name), None)
+    if k is None:
+        return True
+    p, x = fit.problem.parameters[k], float(fit.x[k])
+    low, high = (bound[k] for bound in fit.problem.bounds())
+    if p.log:
+        return bool(x > low + 1e-3 * (high - low))
+    sd = float(np.sqrt(covariance(fit)[k, k])) * abs(p.slope(x))
+    return abs(p.value(x) - term.amount.neutral) > LIMITS.told * sd
 
 
 def finely(model: Model, groups: Groups) -> Model:

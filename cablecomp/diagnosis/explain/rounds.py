@@ -12,7 +12,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, loss, placed
+from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, is_told, loss, placed
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out, scales, selected_in
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
@@ -114,6 +114,8 @@ def one_round(
         try:
             fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
         except InputError:
+            return None
+        if not is_told(fit, c.terms[0]):
             return None
         ratio = 1.0
         if fine is not None and fit.problem.fine:

@@ -265,7 +265,8 @@ def halves(problem: Problem, groups: Groups) -> list[IntArray]:
 def demanded(step: Lead, first: bool = False) -> bool:
     """Whether data left out demand what leads so; `first`: the first effect of all."""
     usual = step.z > (LIMITS.z_first if first else LIMITS.z) and step.gain > LIMITS.gain
-    return usual or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
+    large = first and step.z > LIMITS.z_large and step.gain > LIMITS.gain_large
+    return usual or large or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
 
 
 def selected_in(differences: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:

@@ -14,6 +14,7 @@ from cablecomp.diagnosis.explain.model import (
     Selection,
     Tried,
     common,
+    is_told,
     loss,
     ranked,
     reweighed,
@@ -22,7 +23,7 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.rounds import Progress, cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out
-from cablecomp.diagnosis.explain.screening import Answer
+from cablecomp.diagnosis.explain.screening import Answer, sized
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
 
@@ -55,7 +56,7 @@ def select(
         for model, start in beam:
             known = [t.model for r in rounds for t in r.tried]
             round_, answered = one_round(model, start, pool, groups, rng, progress, number, cold, known)
-            answers = answers or answered
+            answers, pool = answers or answered, sized(pool, answered)
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
         good = [t for _, t in candidates if demanded(t.lead, first=number == 0)]
@@ -64,17 +65,31 @@ def select(
             break
         size = common([fresh[0]], groups)
         most = LIMITS.close * loss(fresh[0], size, groups)
-        kept = [m for m in fresh[: LIMITS.beam] if loss(m, size, groups) < most]
+        kept = [m for m in fresh[: LIMITS.beam + 1] if loss(m, size, groups) < most]
         sharper = searching(fresh[0].fit)
-        carried = ranked([reweighed(m, sharper, groups) for m in kept], groups)
+        again = [reweighed(m, sharper, groups) for m in kept]
+        carried = ranked([m for m in again if all(is_told(m.fit, t) for t in m.terms)], groups)
+        if not carried:
+            break
+        carried = simplest_first(carried, groups)
         rival = best if best.fit.problem.fine == carried[0].fit.problem.fine else None
         if rival is None or not number or _better(carried[0], reweighed(rival, sharper, groups), groups):
             best = carried[0]
         if quiet(best.fit):
             break
-        beam = [(m, None) for m in carried]
+        beam = [(m, None) for m in carried[: LIMITS.beam]]
     final = _pruned(best, groups)
     return Selection(first, tuple(rounds), final, groups, answers)
+
+
+def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
+    """Models, best first, but one with fewer parameters before one that predicts as well: what a law adds to another has to
+    bring something."""
+    size = common(models, groups)
+    most = (1.0 + LIMITS.tie) * loss(models[0], size, groups)
+    alike = [m for m in models if loss(m, size, groups) <= most]
+    first = min(alike, key=lambda m: len(m.fit.problem.parameters))
+    return [first, *(m for m in models if m is not first)]
 
 
 def _better(model: Model, than: Model, groups: Groups) -> bool:

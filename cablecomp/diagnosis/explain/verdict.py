@@ -10,7 +10,7 @@ import numpy as np
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Selection, without
+from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
 from cablecomp.diagnosis.explain.rivals import ZERO_STEP, rivals
 from cablecomp.diagnosis.explain.scores import Groups, Lead, halves, lead, scales
 from cablecomp.diagnosis.locate.location import Location
@@ -20,7 +20,11 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Weighed:
-    """One effect of the final model: its evidence, confidence, rivals that stand in for it, the nearest one's lead."""
+    """One effect of the final model: its evidence, confidence, rivals that stand in for it, the nearest one's lead.
+
+    `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the last to come,
+    whichever is more: effects that trade places take off little as the last, what others hide takes off little alone.
+    """
 
     term: Hypothesis
     depends: Dependence | None
@@ -29,6 +33,7 @@ class Weighed:
     rivals: tuple[str, ...]
     lead: Lead
     why_not: str
+    removes: float
 
 
 def weigh(
@@ -70,12 +75,16 @@ def weigh(
             unsteady=_unsteady(final, term, groups),
             at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in bounds),
         )
-        confidence = learnt().probability(evidence)
+        told = is_told(final.fit, term)
+        confidence = learnt().probability(evidence) if told else 0.0
         depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
         found.append(
             Weighed(
                 term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, kept, nearest,
-                _against((*kept, *(n for n in leads if n == ZERO_STEP)), follows, own, evidence),
+                _against((*kept, *(n for n in leads if n == ZERO_STEP)), follows, own, evidence)
+                if told
+                else "its amount is not told from none",
+                max(evidence["share_total"], _alone(selection, term)),
             )
         )  # fmt: skip
     return sorted(found, key=lambda w: -w.confidence)
@@ -97,9 +106,20 @@ def _share_of_baseline(selection: Selection, bare: Model | None, final: Model) -
     most; single rows far off the rest count as at most `LIMITS.tail` deviations."""
     if bare is None:
         return 1.0
-    before = _mean_squares(selection.baseline, selection.groups)
-    gone = _mean_squares(bare, selection.groups) - _mean_squares(final, selection.groups)
-    return float(np.max(gone / np.maximum(before, 1e-300)))
+    return _gone(selection, bare, final)
+
+
+def _alone(selection: Selection, term: Hypothesis) -> float:
+    """The same for the effect alone beside the calibrated drive; 0 where it was not fitted so."""
+    first = selection.rounds[0].tried if selection.rounds else ()
+    models = [t.model for t in first if t.term.name == term.name]
+    return max((_gone(selection, selection.baseline, m) for m in models), default=0.0)
+
+
+def _gone(selection: Selection, before: Model, after: Model) -> float:
+    whole = _mean_squares(selection.baseline, selection.groups)
+    gone = _mean_squares(before, selection.groups) - _mean_squares(after, selection.groups)
+    return float(np.clip(np.max(gone / np.maximum(whole, 1e-300)), 0.0, 1.0))
 
 
 def _mean_squares(model: Model, groups: Groups) -> FloatArray:
