@@ -16,7 +16,7 @@ from typing import Any, Final
 
 FEATURES: Final = (
     "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "share_total", "rivals",
-    "follows", "unsteady", "at_bound",
+    "follows", "unsteady", "at_bound", "tries", "terms",
 )  # fmt: skip
 _FILE: Final = Path(__file__).with_name("confidence.json")
 
@@ -72,6 +72,8 @@ def features(
     follows: float,
     unsteady: float,
     at_bound: bool,
+    tries: int,
+    terms: int,
 ) -> dict[str, float]:
     """The evidence of one name.
 
@@ -80,7 +82,8 @@ def features(
     `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
     the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`: share of the
     remainder that still follows what the effect acts through. `unsteady`: difference of its amount between halves of the
-    data, in units of it. `at_bound`: one of its parameters is on a bound.
+    data, in units of it. `at_bound`: one of its parameters is on a bound. `tries`: points that it was asked at (an event: many
+    instants), the best of which counts. `terms`: effects in the final model.
     """
     return {
         "log_gain": math.log10(max(gain, 1e-3)),
@@ -95,4 +98,6 @@ def features(
         "follows": follows,
         "unsteady": unsteady,
         "at_bound": float(at_bound),
+        "tries": math.log10(max(tries, 1)),
+        "terms": float(terms),
     }

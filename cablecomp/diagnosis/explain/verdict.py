@@ -74,6 +74,8 @@ def weigh(
             follows=follows,
             unsteady=_unsteady(final, term, groups),
             at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in bounds),
+            tries=len(term.starts),
+            terms=sum(isinstance(t, Hypothesis) for t in final.terms),
         )
         told = is_told(final.fit, term)
         confidence = learnt().probability(evidence) if told else 0.0
