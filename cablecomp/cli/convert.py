@@ -28,11 +28,14 @@ def convert_recording(
         list[str] | None,
         typer.Option(help="CHANNEL=SECONDS: values that come so much later than the others', set right"),
     ] = None,
+    ros: Annotated[
+        bool, typer.Option("--ros2", help="ROS 2's messages in .mcap, which `ros2 bag play` publishes")
+    ] = False,
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
     source = sources(words, link, dbc, joint).open(recording)
     with progress_bar(f"convert {recording.name}") as told:
-        rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())))
+        rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())), ros)
     for note in source.notes:
         console.print(f"note: {note}")
     console.print(f"written: {to} ({rows:,} rows: {', '.join(source.channels)})", soft_wrap=True)
