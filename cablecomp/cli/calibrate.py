@@ -19,16 +19,15 @@ from cablecomp.cli.shared import (
     read_joint,
     share_bar,
 )
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cli.sources import Reading, read_moving, reads_recordings
 from cablecomp.diagnosis.calibrate import calibrate
-from cablecomp.errors import path_text
 from cablecomp.recording.atomic import atomic_directory
-from cablecomp.recording.folder import find_recordings
-from cablecomp.recording.inspection import require_motion
 from cablecomp.report.calibration import calibrated_text, calibration_json, calibration_summary
 
 
+@reads_recordings
 def calibrate_joint(
+    *,
     recordings: Annotated[
         list[Path], typer.Argument(help="recordings of one joint, or folders: all recordings in them")
     ],
@@ -36,20 +35,14 @@ def calibrate_joint(
     out: Annotated[Path, typer.Option(help="folder for joint.calibrated.toml, calibration.json")] = Path(
         "calibration"
     ),
-    seed: Annotated[int, typer.Option(min=0, help="of the noise that the fit is shaken with")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="of the noise replicas")] = 0,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    which: JointOption = None,
+    reading: Reading,
 ) -> None:
     """What the drive's values are, with honest intervals: EA, pretension, friction, ratio, zeros; old -> new."""
     joint = read_joint(config, effects)
-    reading = sources(words, link, dbc, which, joint)
-    data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
-    for name, columns in data.items():
-        require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
+    data = read_moving(recordings, reading(joint))
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:

@@ -9,30 +9,32 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import console
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
 from cablecomp.recording.progress import progress_bar
 
 
+@reads_recordings
 def convert_recording(
+    *,
     recording: Annotated[Path, typer.Argument(help="recording of any accepted kind")],
     to: Annotated[Path, typer.Argument(help="file to write: .csv, .csv.gz, .parquet, .mcap or .npz")],
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    joint: JointOption = None,
+    reading: Reading,
     begin: Annotated[float, typer.Option("--from", help="leave out rows before this time, s")] = -inf,
     end: Annotated[float, typer.Option("--to", help="leave out rows after this time, s")] = inf,
     late: Annotated[
         list[str] | None,
         typer.Option(help="CHANNEL=SECONDS: values that come so much later than the others', set right"),
     ] = None,
+    ros: Annotated[
+        bool, typer.Option("--ros2", help="ROS 2's messages in .mcap, which `ros2 bag play` publishes")
+    ] = False,
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
-    source = sources(words, link, dbc, joint).open(recording)
+    source = reading().open(recording)
     with progress_bar(f"convert {recording.name}") as told:
-        rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())))
+        rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())), ros)
     for note in source.notes:
         console.print(f"note: {note}")
     console.print(f"written: {to} ({rows:,} rows: {', '.join(source.channels)})", soft_wrap=True)

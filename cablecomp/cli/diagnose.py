@@ -21,14 +21,11 @@ from cablecomp.cli.shared import (
     read_joint,
     share_bar,
 )
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cli.sources import Reading, read_moving, reads_recordings
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
-from cablecomp.errors import path_text
 from cablecomp.recording.atomic import atomic_directory
-from cablecomp.recording.folder import find_recordings
-from cablecomp.recording.inspection import require_motion
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 from cablecomp.trials.own import concealed_beside
@@ -42,7 +39,9 @@ class Together(StrEnum):
     one = "one"
 
 
+@reads_recordings
 def diagnose_recordings(
+    *,
     recordings: Annotated[
         list[Path], typer.Argument(help="recordings of one joint, or folders: all recordings in them")
     ],
@@ -59,10 +58,7 @@ def diagnose_recordings(
     seed: Annotated[int, typer.Option(min=0, help="of surrogates and resampling")] = 0,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    which: JointOption = None,
+    reading: Reading,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
 ) -> None:
@@ -76,10 +72,7 @@ def diagnose_recordings(
         work_fleet("diagnose", recordings, config, out, fleet)
         return
     joint = read_joint(config, effects)
-    reading = sources(words, link, dbc, which, joint)
-    data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
-    for name, columns in data.items():
-        require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
+    data = read_moving(recordings, reading(joint))
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:

@@ -9,12 +9,14 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import Config, EffectsOption, JsonOption, console, echo_json, read_joint
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.report.info import bench_table
 from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
 
 
+@reads_recordings
 def identify(
+    *,
     recording: Annotated[Path, typer.Argument(help="bench recording: load ramps with holds")],
     config: Config,
     sensor_stiffness: Annotated[
@@ -25,14 +27,11 @@ def identify(
     ] = False,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    which: JointOption = None,
+    reading: Reading,
 ) -> None:
     """True and acting coefficient of friction from a bench recording, the thesis's way."""
     joint = read_joint(config, effects)
-    bench = bench_recording(sources(words, link, dbc, which, joint).read(recording).columns, joint)
+    bench = bench_recording(reading(joint).read(recording).columns, joint)
     found = evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)
     if as_json:
         echo_json(found)

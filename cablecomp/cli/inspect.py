@@ -6,40 +6,36 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
-from rich.table import Table
 
 from cablecomp.cli.shared import console
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, Sources, sources
+from cablecomp.cli.sources import Reading, Sources, reads_recordings
 from cablecomp.config import load_joint
 from cablecomp.errors import InputError, path_text
-from cablecomp.recording.channels import CANONICAL
-from cablecomp.recording.inspection import ChannelQuality, Inspection, inspect
+from cablecomp.recording.inspection import Inspection, inspect
 from cablecomp.recording.mapping import (
     FOLDER_MAP,
     ColumnMap,
     find_mapping,
     joined_maps,
     load_mapping,
-    mapping_text,
     save_mapping,
 )
-from cablecomp.recording.raw_columns import RawColumns, raw_columns
+from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import read_all
-from cablecomp.recording.suggest import Suggestion, as_mapping, suggest
+from cablecomp.recording.suggest import as_mapping, suggest
 from cablecomp.recording.table import RemarkLog
+from cablecomp.report.inspection import Looked, inspection_json, show
 
 
+@reads_recordings
 def inspect_recording(
+    *,
     recording: Annotated[Path, typer.Argument(help="recording of any accepted kind")],
     config: Annotated[
         Path | None, typer.Option("--config", help="joint configuration: its ratio helps to tell units")
     ] = None,
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    joint: JointOption = None,
+    reading: Reading,
     save: Annotated[
         bool,
         typer.Option("--save", help=f"keep the mapping for this folder ({FOLDER_MAP}), for every command"),
@@ -47,20 +43,20 @@ def inspect_recording(
     as_json: Annotated[bool, typer.Option("--json", help="print everything as JSON instead")] = False,
 ) -> None:
     """What a recording holds: columns and what they may mean, rate, gaps, stuck or clipped sensors, noise."""
-    reading = sources([w for w in words or () if w != "auto"], link, dbc, joint)
-    raw = raw_columns(recording, reading.decode)
-    known = reading.mapping
+    given = reading()
+    raw = raw_columns(recording, given.decode)
+    known = given.mapping
     saved = find_mapping(recording)
     if known is None and saved is not None:
         known = load_mapping(saved)
     ratio = None if config is None else load_joint(config).drive.ratio
     found = suggest(raw.columns, ratio, raw.units)
     mapping = as_mapping(found) if known is None else joined_maps(as_mapping(found), known)
-    seen, notes, why = _looked_at(recording, mapping, reading)
+    looked = Looked(recording, raw, found, mapping, *_looked_at(recording, mapping, given))
     if as_json:
-        typer.echo(json.dumps(_json(recording, raw, found, mapping, seen, notes, why), indent=2))
+        typer.echo(json.dumps(inspection_json(looked), indent=2))
     else:
-        _show(recording, raw, found, mapping, seen, notes, why)
+        show(looked, console)
     if save:
         place = recording.parent / FOLDER_MAP
         save_mapping(
@@ -82,123 +78,3 @@ def _looked_at(
         return inspect(table.columns), (*table.notes, *log.notes()), ""
     except InputError as error:
         return None, (), str(error)
-
-
-def _show(
-    recording: Path,
-    raw: RawColumns,
-    found: list[Suggestion],
-    mapping: ColumnMap,
-    seen: Inspection | None,
-    notes: tuple[str, ...],
-    why: str,
-) -> None:
-    rows = len(next(iter(raw.columns.values())))
-    console.print(f"{recording}: {raw.kind}, {len(raw.columns)} columns of numbers, {rows:,} rows looked at")
-    for topic in raw.topics.values():
-        stamped = ", stamped by its sender" if topic.stamped else ""
-        console.print(
-            f"  {topic.name}: {topic.count:,} messages, every {1e3 * topic.period_s:.4g} ms{stamped}"
-        )
-    console.print(_columns_table(raw, found, mapping))
-    if seen is None:
-        console.print(f"not yet a recording: {why}", style="yellow")
-    else:
-        _show_quality(seen)
-    for note in notes:
-        console.print(f"note: {note}")
-    console.print("\nmapping:\n" + mapping_text(mapping))
-
-
-def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap) -> Table:
-    table = Table(box=None, show_header=True)
-    for name in ("column", "from", "to", "channel", "sure", "because"):
-        table.add_column(
-            name, justify="right" if name in ("from", "to", "sure") else "left", no_wrap=name == "channel"
-        )
-    by_column = {source.column: channel for channel, source in mapping.channel.items()}
-    reasons = {s.source.column: s for s in found}
-    for name, values in raw.columns.items():
-        finite = values[np.isfinite(values)]
-        low, high = (f"{finite.min():.5g}", f"{finite.max():.5g}") if len(finite) else ("–", "–")
-        channel, reason = by_column.get(name, ""), reasons.get(name)
-        told = reason is not None and reason.channel == channel
-        sure = f"{100 * min(reason.sure, 1.0):.0f} %" if told and reason is not None else ""
-        words = "; ".join(reason.why) if told and reason is not None else ("as mapped" if channel else "")
-        table.add_row(name, low, high, channel, sure, words)
-    for name in raw.left_out:
-        table.add_row(name, "text", "", "", "", "")
-    return table
-
-
-def _show_quality(seen: Inspection) -> None:
-    console.print(
-        f"{seen.rows:,} rows over {seen.duration_s:.6g} s, {seen.rate_Hz:.6g} Hz, steps even within "
-        f"{100 * seen.jitter:.2g} %, {len(seen.gaps)} gaps, {seen.duplicates} repeated stamps"
-    )
-    table = Table(box=None)
-    for name in ("channel", "least", "greatest", "noise", "step", "odd"):
-        table.add_column(name, justify="left" if name in ("channel", "odd") else "right")
-    for c in seen.channels:
-        noise = "–" if c.noise is None else f"{'≥ ' if c.coloured else ''}{c.noise:.3g}"
-        step = f"{c.step:.3g}" if c.step else "–"
-        table.add_row(c.name, f"{c.least:.6g}", f"{c.greatest:.6g}", noise, step, "; ".join(_odd(c, seen)))
-    console.print(table)
-    if seen.repeats is not None:
-        r = seen.repeats
-        console.print(
-            f"repeatability: {1e3 * r.joint_rad:.4g} mrad RMS between {r.cycles} cycles of {r.period_s:.4g} s"
-        )
-
-
-def _odd(c: ChannelQuality, seen: Inspection) -> list[str]:
-    found = []
-    if c.least == c.greatest:
-        found.append("constant")
-    elif c.stuck_s > 0.05 * seen.duration_s:
-        found.append(f"rests {c.stuck_s:.3g} s while the motor moves: stuck?")
-    if c.clipped > 0.0:
-        found.append(f"clipped in {100 * c.clipped:.2g} % of the rows")
-    if c.empty:
-        found.append(f"{c.empty} empty")
-    return found
-
-
-def _json(
-    recording: Path,
-    raw: RawColumns,
-    found: list[Suggestion],
-    mapping: ColumnMap,
-    seen: Inspection | None,
-    notes: tuple[str, ...],
-    why: str,
-) -> dict[str, object]:
-    quality = None
-    if seen is not None:
-        quality = {
-            "rows": seen.rows,
-            "duration_s": seen.duration_s,
-            "rate_Hz": seen.rate_Hz,
-            "jitter": seen.jitter,
-            "gaps": [{"row": row, "gap_s": gap} for row, gap in seen.gaps],
-            "duplicates": seen.duplicates,
-            "channels": [_finite(c._asdict() if hasattr(c, "_asdict") else vars(c)) for c in seen.channels],
-            "repeats": None if seen.repeats is None else vars(seen.repeats),
-        }
-    return {
-        "schema": 1,
-        "recording": path_text(recording),
-        "kind": raw.kind,
-        "columns": list(raw.columns),
-        "text_columns": list(raw.left_out),
-        "topics": {t.name: {"messages": t.count, "period_s": t.period_s} for t in raw.topics.values()},
-        "suggested": {s.channel: {"sure": s.sure, "why": s.why} for s in found if s.channel in CANONICAL},
-        "mapping": mapping.model_dump(by_alias=True),
-        "quality": quality,
-        "notes": list(notes),
-        "not_yet": why or None,
-    }
-
-
-def _finite(values: dict[str, object]) -> dict[str, object]:
-    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in values.items()}

@@ -9,7 +9,7 @@ import typer
 
 from cablecomp.cli.concealing import Told, conceal_in, conceal_joints, experiment, trial_bar
 from cablecomp.cli.shared import announce_compilation, console, read_joint
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.cluster import Workers
 from cablecomp.config_text import joint_text
 from cablecomp.errors import InputError, path_text
@@ -23,7 +23,9 @@ from cablecomp.trials.prove import Blind, Wish, prove
 KINDS = "single,single,single,pair,none,stranger,sessions,confounded"
 
 
+@reads_recordings
 def prove_blindly(
+    *,
     recordings: Annotated[
         list[Path] | None,
         typer.Option("--in", help="conceal in these recordings of yours (files or folders; give it again for more)"),
@@ -46,10 +48,7 @@ def prove_blindly(
     scheduler: Annotated[
         str | None, typer.Option(help="address of a Dask scheduler to diagnose on, in place of --workers")
     ] = None,
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    which: JointOption = None,
+    reading: Reading,
 ) -> None:  # fmt: skip
     """Blind trials: conceal physics in simulated joints or in your own recordings, diagnose, open the truth, keep the score."""
     by = Workers(workers, scheduler)
@@ -64,8 +63,8 @@ def prove_blindly(
     if config is None:
         raise InputError("--in needs --config: the joint's configuration, as `cablecomp diagnose` takes it")
     joint = read_joint(resolve(config, "joints"))
-    reading = sources(words, link, dbc, which, joint)
-    data = {path_text(p): reading.read(p, gaps=True).columns for p in find_recordings(recordings)}
+    source = reading(joint)
+    data = {path_text(p): source.read(p, gaps=True).columns for p in find_recordings(recordings)}
     own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
     _in_recordings(own, OwnWish(seed, rounds, seconds, minutes), out)
 

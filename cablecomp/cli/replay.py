@@ -20,7 +20,7 @@ from cablecomp.cli.shared import (
     read_joint,
     warn,
 )
-from cablecomp.cli.sources import DbcOption, JointOption, LinkOption, MapOption, sources
+from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.estimation.standing import as_it_stood
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
@@ -28,7 +28,9 @@ from cablecomp.recording.replay import required_channels
 from cablecomp.report.replay_page import write_replay
 
 
+@reads_recordings
 def replay(
+    *,
     recording: Annotated[
         Path, typer.Argument(help="recording (CSV, Parquet, npz, mat, MCAP, ROS bag, CAN log)")
     ],
@@ -45,10 +47,7 @@ def replay(
     ] = None,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
-    words: MapOption = None,
-    link: LinkOption = None,
-    dbc: DbcOption = None,
-    which: JointOption = None,
+    reading: Reading,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
 ) -> None:
@@ -61,7 +60,7 @@ def replay(
         work_fleet("replay", [recording], config, out, fleet)
         return
     joint = read_joint(config, effects)
-    source = sources(words, link, dbc, which, joint).open(recording)
+    source = reading(joint).open(recording)
     joint, stood, said = as_it_stood(joint, recording, source.head, session)
     warn(said)
     announce_compilation()

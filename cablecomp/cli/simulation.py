@@ -27,6 +27,7 @@ from firmware_sim.errors import SimError
 from firmware_sim.faults import parse_fault
 from firmware_sim.firmware import DriveConfig
 from firmware_sim.hosted import OFF_NOMINAL, HostedJoints, HostedSpec, off_nominal
+from firmware_sim.joint import Timing
 from firmware_sim.plant import LinkSpec, MotorSpec, PlantConfig
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.wire.cia402 import Units
@@ -102,7 +103,14 @@ def _bench(wish: SimulationWish, torque: float, *, one_sided: bool) -> BenchConf
             fault_damping_Nms_per_rad=motor.damping_Nms_per_rad,
             brake_Nm_per_rad=motor.stiffness_Nm_per_rad,
         )
-    return replace(_bench_of(device, ends.motor), joints=wish.joints, drive=drive)
+    made = _bench_of(device, ends.motor)
+    return replace(made, joints=wish.joints, drive=drive, timing=_timing(wish.link.rate_Hz))
+
+
+def _timing(rate_Hz: float) -> Timing:
+    """A sensor node that samples once a period of the link, on plant steps of 0.5 ms at most."""
+    steps = math.ceil(1.0 / (rate_Hz * Timing.step_s) - 1e-9)
+    return Timing(1.0 / (rate_Hz * steps), steps)
 
 
 def _bench_of(device: Device, end: MotorEnd) -> BenchConfig:

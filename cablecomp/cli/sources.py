@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Protocol, get_type_hints
 
 import typer
 
 from cablecomp.cli.shared import console
 from cablecomp.config import JointConfig
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, path_text
 from cablecomp.links.load import load_link
 from cablecomp.links.logged import LinkDecoder
 from cablecomp.recording.can_log import DecodeFrame, by_dbc
+from cablecomp.recording.folder import find_recordings
+from cablecomp.recording.inspection import require_motion
 from cablecomp.recording.mapping import ColumnMap, joined_maps, load_mapping, mapping_from, mapping_text
 from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import Recording, open_recording, read_all
 from cablecomp.recording.suggest import as_mapping, suggest
-from cablecomp.recording.table import Table
+from cablecomp.recording.table import FloatArray, Table
+
+Columns = dict[str, FloatArray]
 
 MapOption = Annotated[
     list[str] | None,
@@ -60,6 +66,43 @@ class Sources:
         found = found if self.mapping is None else joined_maps(found, self.mapping)
         console.print(f"{path} is read so:\n{mapping_text(found)}", style="dim")
         return found
+
+
+class Reading(Protocol):
+    """How the command line says that recordings are read, once the joint is known that their columns may be of."""
+
+    def __call__(self, joint: JointConfig | None = None, /) -> Sources: ...
+
+
+def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options --map, --link, --dbc and --joint in place of its parameter `reading`, a `Reading`."""
+
+    @wraps(command)
+    def with_options(**given: Any) -> None:
+        words, link, dbc, which = (given.pop(name) for name in options)
+        command(reading=lambda joint=None, /: sources(words, link, dbc, which, joint), **given)
+
+    options = {"words": MapOption, "link": LinkOption, "dbc": DbcOption, "which": JointOption}
+    hints = get_type_hints(command, include_extras=True)
+    parameters = []
+    for name, parameter in inspect.signature(command).parameters.items():
+        taken = options if name == "reading" else {name: hints[name]}
+        default = None if name == "reading" else parameter.default
+        parameters += [
+            inspect.Parameter(n, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=a)
+            for n, a in taken.items()
+        ]
+    with_options.__annotations__ = {p.name: p.annotation for p in parameters} | {"return": None}
+    with_options.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # what typer reads
+    return with_options
+
+
+def read_moving(recordings: Sequence[Path], reading: Sources) -> dict[str, Columns]:
+    """Channels of every recording that these files and folders hold, by path; raises InputError for one without motion."""
+    data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
+    for name, columns in data.items():
+        require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
+    return data
 
 
 def sources(

@@ -5,7 +5,7 @@ Imports errors, units and the shipped examples alone. Start reading at `schema.p
 
 from cablecomp.config.base import Finite, NonNegative, Positive
 from cablecomp.config.doubts import doubts
-from cablecomp.config.drive import Drive, Stage
+from cablecomp.config.drive import Drive, Stage, ratios_to_last
 from cablecomp.config.load import load_joint, parse_joint, validated
 from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Sensors
 from cablecomp.config.schema import JointConfig
@@ -32,6 +32,7 @@ __all__ = [
     "in_session",
     "load_joint",
     "parse_joint",
+    "ratios_to_last",
     "read_toml",
     "session_of",
     "validated",

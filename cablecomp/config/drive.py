@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -37,6 +38,14 @@ class Stage(Frozen):
     def ratio(self) -> float:
         """Output angle over input angle, r/R."""
         return self.input_radius_m / self.output_radius_m
+
+
+def ratios_to_last(stages: Sequence[Stage]) -> list[float]:
+    """Ratio from every stage's output axis to the last one's, N_ik = product over j = i+1..k of r_j/R_j (thesis 5-22)."""
+    ratios = [1.0]
+    for stage in reversed(stages[1:]):
+        ratios.insert(0, ratios[0] * stage.input_radius_m / stage.output_radius_m)
+    return ratios
 
 
 class Drive(Frozen):

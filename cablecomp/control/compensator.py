@@ -161,7 +161,8 @@ class Compensator:
     def _position(
         self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate, joint_ok: bool
     ) -> Command:
-        load = self._expected_load(sample, reference)
+        measured = sample.joint_torque_Nm
+        load = self._expected_load(measured if measured == measured else estimate.joint_torque_Nm, reference)
         if not feed.held:
             self.deflection_used_rad = self._deflection(sample, reference, load)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
@@ -173,17 +174,18 @@ class Compensator:
         torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, load)
         return self._command(sample, reference, wanted, velocity, torque, used, estimate)
 
-    def _expected_load(self, sample: Sample, reference: Reference) -> float:
+    def _expected_load(self, measured_Nm: float, reference: Reference) -> float:
+        """Load of the next instant; `measured_Nm`: the sensor's, or where there is none the observer's."""
         stated = reference.joint_torque_Nm
         if not self._from_sensor:
             return stated if isfinite(stated) else 0.0
         if self.options.load == "sensor" or not isfinite(stated):
-            return self.load.step(sample.joint_torque_Nm)
+            return self.load.step(measured_Nm)
         before = self._reference
         expected_now = stated if before is None else before.joint_torque_Nm
         if not isfinite(expected_now):
             expected_now = stated
-        return stated + self.load.step(sample.joint_torque_Nm - expected_now)
+        return stated + self.load.step(measured_Nm - expected_now)
 
     def _deflection(self, sample: Sample, reference: Reference, load: float) -> float:
         if self._linear is not None and self.options.feed_forward is FeedForward.LINEAR:

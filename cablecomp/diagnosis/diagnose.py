@@ -127,7 +127,9 @@ def diagnose(
         named=tuple(named_of(w, final) for w in named),
         candidates=candidates(weighed_terms, selection, final),
         not_excluded=tied,
-        empirical=tuple(Law(f.law.id, channel_word(f.law.of), f.lead.gain, f.lead.z) for f in laws),
+        empirical=tuple(
+            Law(f.law.id, channel_word(f.law.of), f.difference.gain, f.difference.z) for f in laws
+        ),
         next_experiment=next_experiment(selection, weighed_terms, kept, hidden, drive, seen),
         could_be_unseen=tuple(unseen),
         remainder=remainder(

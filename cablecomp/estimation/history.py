@@ -63,7 +63,7 @@ def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
         np.asarray(load_of(problem.config, recording.columns), dtype=np.float64),
         recording.columns["time_s"].shape,
     )[recording.rows]
-    ratio = np.prod([s.input_radius_m / s.output_radius_m for s in problem.config.drive.stage])
+    ratio = problem.config.drive.ratio
     moves = np.ptp(motor) * ratio > 0.3 * np.ptp(recording.at_rows(JOINT))
     driver = motor if moves else load
     away = np.abs(driver - driver[0])

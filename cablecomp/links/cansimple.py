@@ -30,7 +30,6 @@ _II: Final = Struct("<II")
 _I: Final = Struct("<I4x")
 _COUNT: Final = Struct("<i4x")
 _HEARTBEAT: Final = Struct("<IB3s")
-_SDO: Final = Struct("<BHB4s")
 
 
 class Cmd(IntEnum):
@@ -185,11 +184,6 @@ def set_absolute_position(node: int, position_turns: float) -> Frame:
 def set_linear_count(node: int, count: int) -> Frame:
     """Make the present position read `count` encoder counts (firmware 0.5)."""
     return Frame(identifier(node, Cmd05.SET_LINEAR_COUNT), _COUNT.pack(count))
-
-
-def read_endpoint(node: int, endpoint: int) -> Frame:
-    """Ask for a parameter by its endpoint number (firmware 0.6), which TxSdo answers."""
-    return Frame(identifier(node, Cmd06.RX_SDO), _SDO.pack(0, endpoint, 0, bytes(4)))
 
 
 def set_input_pos(

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from functools import cache
 from math import isfinite
 from pathlib import Path
-from struct import pack, unpack
+from struct import pack
 from typing import Any, NamedTuple
 
 import cantools
@@ -129,19 +129,6 @@ def counts_in(field: Field, little: int, big: int) -> int:
     """Raw counts of an integer field in a frame that has been read as one integer, both ways."""
     n = (big if field.big else little) >> field.shift & field.mask
     return n - (field.sign << 1) if n & field.sign else n
-
-
-def physical(field: Field, data: bytes) -> float:
-    """Physical value of a field in a frame: `scale counts + offset`, or the float that the bits are."""
-    word = int.from_bytes(data, "big" if field.big else "little")
-    n = word >> field.shift & field.mask
-    if field.real:
-        size = {"e": 2, "f": 4, "d": 8}[field.real]
-        x: float = unpack(">" + field.real, n.to_bytes(size, "big"))[0]
-        return field.scale * x + field.offset
-    if n & field.sign:
-        n -= field.sign << 1
-    return field.scale * n + field.offset
 
 
 def encode(message: Layout, values: Mapping[str, float]) -> Payload:

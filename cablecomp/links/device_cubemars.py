@@ -7,7 +7,7 @@ from math import pi
 from cablecomp.errors import InputError
 from cablecomp.links import cubemars
 from cablecomp.links.cubemars import MODELS, Function
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, chain, grid
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, chain, grid, impedance
 from cablecomp.links.mit import P_TOP, V_TOP, MitRange
 from cablecomp.links.mit_profiles import error_text
 from cablecomp.links.readings import JointReadings, MessageStats
@@ -122,17 +122,12 @@ class CubeMarsDrive:
         values[MOTOR_TORQUE] = self._torque * amperes
         values[MOTOR_CURRENT] = self._current * amperes
         values[self._temperature] = float(temperature)
-        for place in (MOTOR_POSITION, MOTOR_VELOCITY, MOTOR_TORQUE, MOTOR_CURRENT, self._temperature):
-            readings.arrived_s[place] = now_s
-            readings.updates[place] += 1
         readings.saturated = CLIP_POSITION if abs(degrees) >= MOST_DEGREES else 0
         readings.state = DriveState.FAULT if error else self._asked
         readings.error = error
-        readings.replies += 1
-        readings.unanswered = 0
-        stats.received += 1
-        stats.last_s = now_s
-        return 5
+        places = (MOTOR_POSITION, MOTOR_VELOCITY, MOTOR_TORQUE, MOTOR_CURRENT, self._temperature)
+        readings.take_reply(places, stats, now_s)
+        return len(places)
 
     def command(self, command: MotorCommand) -> Outgoing:
         """See `Drive.command`; servo mode takes no gains with a command."""
@@ -152,17 +147,8 @@ class CubeMarsDrive:
         return Outgoing((frame,), bit if clipped else 0)
 
     def _force_command(self, command: MotorCommand) -> Outgoing:
-        position, velocity, torque, stiffness, damping = command
-        kp = (self._kp if stiffness is None else stiffness * self._gain) * self._share
-        kd = self._kd if damping is None else damping * self._gain
-        if self._mode in (Mode.TORQUE, Mode.VELOCITY):
-            kp = 0.0
-        if self._mode is Mode.TORQUE:
-            kd = 0.0
-        p, v, t = (
-            line.gain * x + line.offset
-            for line, x in zip(self._to, (position, velocity, torque), strict=True)
-        )
+        kp, kd = impedance(command, self._mode, (self._kp, self._kd), self._gain, self._share)
+        p, v, t = (line.gain * x + line.offset for line, x in zip(self._to, command[:3], strict=True))
         data, clipped = cubemars.force_control(self._scale, self._node, p, v, kp, kd, t)
         return Outgoing((Frame(cubemars.identifier(Function.FORCE_CONTROL, self._node), data),), clipped)
 

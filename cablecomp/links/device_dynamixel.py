@@ -197,16 +197,11 @@ class DynamixelDrive:
             return 0
         for (place, gain, offset), value in zip(self._lines, (current, current, *values), strict=True):
             readings.values[place] = gain * value + offset
-            readings.arrived_s[place] = now_s
-            readings.updates[place] += 1
         readings.saturated = CLIP_POSITION if abs(values[1]) >= dynamixel.POSITION_TOP else 0
         readings.error = hardware or (SILENCED if watchdog == dynamixel.WATCHDOG_ERROR else 0)
         state = DriveState.ENABLED if torque else DriveState.DISABLED
         readings.state = DriveState.FAULT if readings.error else state
-        readings.replies += 1
-        readings.unanswered = 0
-        stats.received += 1
-        stats.last_s = now_s
+        readings.take_reply((place for place, _, _ in self._lines), stats, now_s)
         return len(self._lines)
 
     # ---- what goes -------------------------------------------------------------------------------

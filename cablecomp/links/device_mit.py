@@ -7,7 +7,7 @@ from typing import get_args
 from cablecomp.errors import InputError
 from cablecomp.links import mit
 from cablecomp.links.damiao_registers import REGISTERS
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid, impedance
 from cablecomp.links.mit import MitRange, reply_counts, saturation
 from cablecomp.links.mit_profiles import Family, error_text, profile, status_of
 from cablecomp.links.readings import JointReadings, MessageStats
@@ -148,17 +148,11 @@ class MitDrive:
         values[MOTOR_POSITION] = n_p * self._p[0] + self._p[1]
         values[MOTOR_VELOCITY] = n_v * self._v[0] + self._v[1]
         values[MOTOR_TORQUE] = n_t * self._t[0] + self._t[1]
-        for place in (MOTOR_POSITION, MOTOR_VELOCITY, MOTOR_TORQUE):
-            arrived[place] = now_s
-            updates[place] += 1
         readings.saturated = saturation(n_p, n_v, n_t)
         _, state, error = status_of(self._family, data[0], data[7] if self._length == 8 else None)
         readings.state = self._asked if state is DriveState.UNKNOWN else state
         readings.error = error
-        readings.replies += 1
-        readings.unanswered = 0
-        stats.received += 1
-        stats.last_s = now_s
+        readings.take_reply((MOTOR_POSITION, MOTOR_VELOCITY, MOTOR_TORQUE), stats, now_s)
         return 4 if self._length > 6 else 3
 
     def _degrees(self, data: bytes) -> float:
@@ -183,14 +177,8 @@ class MitDrive:
 
     def command(self, command: MotorCommand) -> Outgoing:
         """See `Drive.command`."""
-        position_rad, velocity_rad_s, torque_Nm, stiffness, damping = command
-        mode = self._mode
-        kp = (self._kp if stiffness is None else stiffness * self._to_gain) * self._share
-        kd = self._kd if damping is None else damping * self._to_gain
-        if mode == Mode.TORQUE:
-            kp = kd = 0.0
-        elif mode == Mode.VELOCITY:
-            kp = 0.0
+        position_rad, velocity_rad_s, torque_Nm, _, _ = command
+        kp, kd = impedance(command, self._mode, (self._kp, self._kd), self._to_gain, self._share)
         gain, offset = self._to_position
         data, clipped = mit.pack_command(
             self._scale,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cablecomp.errors import InputError
 from cablecomp.links import robstride
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid, impedance
 from cablecomp.links.mit import P_TOP, MitRange
 from cablecomp.links.mit_profiles import profile
 from cablecomp.links.readings import JointReadings, MessageStats
@@ -94,33 +94,18 @@ class RobStrideDrive:
             for place, line, n in zip(places, lines, (p, v, t), strict=False):
                 readings.values[place] = line.gain * n + line.offset
             readings.values[self._temperature] = temperature
-            for place in places:
-                readings.arrived_s[place] = now_s
-                readings.updates[place] += 1
             ends = zip((p, v, t), (CLIP_POSITION, CLIP_VELOCITY, CLIP_TORQUE), strict=True)
             readings.saturated = sum(bit for n, bit in ends if n in (0, P_TOP))
             readings.state, readings.error = state, faults
-            readings.replies += 1
-            readings.unanswered = 0
-            stats.received += 1
-            stats.last_s = now_s
-            return 4
+            readings.take_reply(places, stats, now_s)
+            return len(places)
 
         return take
 
     def command(self, command: MotorCommand) -> Outgoing:
         """See `Drive.command`."""
-        position, velocity, torque, stiffness, damping = command
-        kp = (self._kp if stiffness is None else stiffness * self._gain) * self._share
-        kd = self._kd if damping is None else damping * self._gain
-        if self._mode in (Mode.TORQUE, Mode.VELOCITY):
-            kp = 0.0
-        if self._mode is Mode.TORQUE:
-            kd = 0.0
-        p, v, t = (
-            line.gain * x + line.offset
-            for line, x in zip(self._to, (position, velocity, torque), strict=True)
-        )
+        kp, kd = impedance(command, self._mode, (self._kp, self._kd), self._gain, self._share)
+        p, v, t = (line.gain * x + line.offset for line, x in zip(self._to, command[:3], strict=True))
         frame, clipped = robstride.control(self._scale, self._node, p, v, kp, kd, t)
         return Outgoing((frame,), clipped)
 

@@ -113,6 +113,19 @@ class Gear:
         return 1.0 / self._ratio**2
 
 
+def impedance(
+    command: MotorCommand, mode: Mode, own: tuple[float, float], to_shaft: float, share: float
+) -> tuple[float, float]:
+    """Stiffness and damping at the shaft that go with a command of a drive which takes them with every command: the
+    command's, else the drive's `own` (at the shaft); stiffness at its `share` (`Drive.ease`). No stiffness without a
+    position to hold, no damping without a speed."""
+    kp = (own[0] if command.stiffness_Nm_per_rad is None else command.stiffness_Nm_per_rad * to_shaft) * share
+    kd = own[1] if command.damping_Nms_per_rad is None else command.damping_Nms_per_rad * to_shaft
+    if mode == Mode.TORQUE:
+        return 0.0, 0.0
+    return (0.0 if mode == Mode.VELOCITY else kp), kd
+
+
 def calibration(end: MotorEnd | SensorEnd, channel: str) -> Linear:
     """How a channel at the joint comes from what the device reports in SI units."""
     if isinstance(end, MotorEnd):

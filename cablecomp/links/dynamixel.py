@@ -83,15 +83,6 @@ HARDWARE_ERRORS: Final[dict[int, str]] = {
     1 << 5: "overload",
 }
 """Bits of the hardware error status."""
-STATUS_ERRORS: Final[dict[int, str]] = {
-    1: "result fail",
-    2: "instruction error",
-    3: "CRC error",
-    4: "data range error",
-    5: "data length error",
-    6: "data limit error",
-    7: "access error",
-}
 
 
 def _crc_table() -> tuple[int, ...]:

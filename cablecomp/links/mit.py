@@ -47,33 +47,6 @@ class MitRange(NamedTuple):
     kd_Nms_per_rad: float = 5.0
 
 
-class MitReply(NamedTuple):
-    """A drive's answer, at the shaft that it reports; bytes 6 and 7 are None in the 6-byte form.
-
-    `first_byte` carries the drive number (CubeMars: the whole byte) and, with Damiao, the
-    state. `saturated`: bits CLIP_POSITION, CLIP_VELOCITY, CLIP_TORQUE, set where the count stands at an end
-    of its range.
-    """
-
-    first_byte: int
-    position_rad: float
-    velocity_rad_s: float
-    torque_Nm: float
-    byte_6: int | None
-    byte_7: int | None
-    saturated: int
-
-
-class MitCommand(NamedTuple):
-    """What a command frame says, at the shaft that the drive reports."""
-
-    position_rad: float
-    velocity_rad_s: float
-    kp_Nm_per_rad: float
-    kd_Nms_per_rad: float
-    torque_Nm: float
-
-
 class Packed(NamedTuple):
     """A command's bytes, and the CLIP_* bits of what had to be saturated to fit."""
 
@@ -151,48 +124,6 @@ def pack_command(
         | count(torque_Nm, -t, t, V_TOP)
     )
     return Packed(word.to_bytes(8, "big"), clipped)
-
-
-def unpack_command(scale: MitRange, data: bytes) -> MitCommand:
-    """What a command frame of 8 bytes says; raises InputError for another length."""
-    if len(data) != 8:
-        raise InputError(f"MIT command: {len(data)} bytes; 8 are accepted")
-    word = int.from_bytes(data, "big")
-    p, v, t, kp, kd = scale
-    return MitCommand(
-        value_of(word >> 48, -p, p, P_TOP),
-        value_of(word >> 36 & 0xFFF, -v, v, V_TOP),
-        value_of(word >> 24 & 0xFFF, 0.0, kp, V_TOP),
-        value_of(word >> 12 & 0xFFF, 0.0, kd, V_TOP),
-        value_of(word & 0xFFF, -t, t, V_TOP),
-    )
-
-
-def unpack_reply(scale: MitRange, data: bytes) -> MitReply:
-    """A drive's answer of 6 or 8 bytes: byte 0, position 16, velocity 12, torque 12 bits, two more bytes in
-    the long form.
-
-    Raises InputError for another length (CubeMars manual p. 49; Damiao manual, feedback frame).
-    """
-    length = len(data)
-    if length == 8:
-        word = int.from_bytes(data, "big")
-        tail: tuple[int | None, int | None] = (word >> 8 & 0xFF, word & 0xFF)
-        word >>= 16
-    elif length == 6:
-        word, tail = int.from_bytes(data, "big"), (None, None)
-    else:
-        raise InputError(f"MIT reply: {length} bytes; 6 or 8 are accepted")
-    n_p, n_v, n_t = reply_counts(word)
-    p, v, t, _, _ = scale
-    return MitReply(
-        word >> 40,
-        value_of(n_p, -p, p, P_TOP),
-        value_of(n_v, -v, v, V_TOP),
-        value_of(n_t, -t, t, V_TOP),
-        *tail,
-        saturation(n_p, n_v, n_t),
-    )
 
 
 def reply_counts(word: int) -> tuple[int, int, int]:

@@ -65,6 +65,14 @@ def _extra(device: Device) -> tuple[str, ...]:
     return device_dbc.extra_channels(device)
 
 
+def tells(config: LinkConfig, ends: JointEnds, channel: str) -> bool:
+    """Whether some device of a joint measures this channel at the joint."""
+    ways = [config.device_of(end) for end in (ends.motor, ends.sensor) if end is not None]
+    if any(isinstance(d, DbcDevice) and any(channel in m.channels for m in d.message) for d in ways):
+        return True
+    return channel == "joint_position_rad" and second_encoder(config, ends) is not None
+
+
 def second_encoder(config: LinkConfig, ends: JointEnds) -> SensorEnd | None:
     """The joint's sensor, if it is the encoder on the second input of its own drive; raises InputError where it
     would be another drive's."""

@@ -3,6 +3,7 @@ written in place."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import nan
 from typing import Final, NamedTuple
 
@@ -160,6 +161,16 @@ class JointReadings:
         self.replies = 0
         self.unanswered = 0
         self.messages: list[MessageStats] = []
+
+    def take_reply(self, places: Iterable[int], stats: MessageStats, now_s: float) -> None:
+        """Note that a reply of the drive has just brought the values at these places."""
+        for place in places:
+            self.arrived_s[place] = now_s
+            self.updates[place] += 1
+        self.replies += 1
+        self.unanswered = 0
+        stats.received += 1
+        stats.last_s = now_s
 
     @property
     def channels(self) -> tuple[str, ...]:

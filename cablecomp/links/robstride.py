@@ -16,8 +16,6 @@ from cablecomp.links.records import EXTENDED, Frame
 _FOUR: Final = Struct(">4H")
 _PARAMETER: Final = Struct("<HHI")
 RUN_MODE: Final = 0x7005
-HOST: Final = 0xFD
-"""Number of the host in the maker's sample program."""
 
 
 class Kind(IntEnum):

@@ -12,7 +12,7 @@ import numpy as np
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.recording.channels import order
-from cablecomp.recording.mcap_writer import write_mcap
+from cablecomp.recording.mcap_writer import write_mcap, write_ros_mcap
 from cablecomp.recording.parquet_file import write_parquet
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.table import Block
@@ -27,11 +27,12 @@ def convert(
     between_s: tuple[float, float] = (-inf, inf),
     progress: Callable[[float, int], None] | None = None,
     late_s: Mapping[str, float] | None = None,
+    ros: bool = False,
 ) -> int:
     """Write the rows of `source` with times within `between_s` to `to`, by its ending; returns how many.
 
     `late_s`: channels whose values come so much later than the others', set right by interpolation; rows at the ends that
-    have no value then are left out, and all of the recording is held in memory.
+    have no value then are left out, and all of the recording is held in memory. `ros`: ROS 2's messages, in MCAP.
 
     The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
     reading does.
@@ -39,13 +40,15 @@ def convert(
     ending = next((e for e in _ENDINGS if to.name.endswith(e)), None)
     if ending is None:
         raise InputError(f"{to}: {', '.join(_ENDINGS)} are accepted endings")
+    if ros and ending != ".mcap":
+        raise InputError(f"{to}: ROS 2's messages go into .mcap; give that ending")
     blocks = _set_right(source, late_s) if late_s else source.blocks()
     counted = _Counted(blocks, between_s, progress)
     names = order(source.channels)
     with atomic_file(to) as temporary:
         part = temporary.with_name(f"{temporary.name}{ending}")
         try:
-            _write(part, ending, names, counted)
+            _write(part, ending, names, counted, ros)
             if not counted.rows:
                 raise InputError(
                     f"{source.path}: has no row between {between_s[0]:g} s and {between_s[1]:g} s"
@@ -97,13 +100,13 @@ class _Counted:
                 return
 
 
-def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Block]) -> None:
+def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Block], ros: bool) -> None:
     if ending in (".csv", ".csv.gz"):
         with CsvWriter(path, names) as writer:
             for block in blocks:
                 writer.write(block.columns)
     elif ending == ".mcap":
-        write_mcap(path, blocks)
+        (write_ros_mcap if ros else write_mcap)(path, blocks)
     else:
         parts = list(blocks)
         whole = {n: np.concatenate([b.columns[n] for b in parts]) for n in names} if parts else {}

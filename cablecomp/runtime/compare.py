@@ -24,6 +24,7 @@ from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, Watch, run_joints
 from cablecomp.runtime.setup import Contestant, same_joint
 from cablecomp.runtime.simulated import Simulation, SimulationFactory, SimulationWish
+from cablecomp.signal.noise import reading_sigma
 
 Columns = Mapping[str, NDArray[np.float64]]
 MOTOR_ALONE, LINEAR, OBSERVER = "motor-side-alone", "linear-stiffness", "observer"
@@ -75,11 +76,9 @@ class Comparison:
 
     @property
     def encoder_noise_rad(self) -> float:
-        """RMS of the joint encoder's noise and of its rounding: sqrt(noise² + resolution²/12)."""
+        """RMS of the joint encoder's noise and of its rounding."""
         s = self.nominal.sensors
-        return float(
-            np.hypot(s.joint_position_noise_rad or 0.0, (s.joint_position_resolution_rad or 0.0) / 12.0**0.5)
-        )
+        return reading_sigma(s.joint_position_noise_rad, s.joint_position_resolution_rad)
 
     @property
     def force_share(self) -> float:

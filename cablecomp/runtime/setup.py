@@ -16,6 +16,7 @@ from cablecomp.control.options import CompensatorOptions, ControlConfig, Control
 from cablecomp.control.protocol import Protocol
 from cablecomp.errors import InputError
 from cablecomp.links.link import Link
+from cablecomp.links.protocols import tells
 from cablecomp.links.readings import JointReadings
 from cablecomp.links.schema import JointEnds, LinkConfig
 from cablecomp.observer import Observer
@@ -122,6 +123,7 @@ def joint_setup(
     force = mode is not ControlMode.POSITION
     both = force and chosen.torque_from == "encoders"
     config = observed(c.config, chosen)
+    _check_measured(link, c.place, config.observer.load)
     observer = Observer(config, bounds=bounds)
     if resume is not None:
         observer.load(resume)
@@ -140,6 +142,18 @@ def joint_setup(
     )
     limits = GateLimits.of(c.config.limits, bus.wire(c.place), age_s=times.motor_stop_s)
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
+
+
+def _check_measured(link: LinkConfig, place: int, load: str) -> None:
+    """Raise InputError where the observer's load is to come from a sensor that the link has not."""
+    needed = {"joint_torque": "joint_torque_Nm", "both_encoders": "joint_position_rad"}.get(load)
+    ends = link.joint[place]
+    if needed is not None and not tells(link, ends, needed):
+        raise InputError(
+            f"joint `{ends.name}`: nothing on link `{link.name}` measures {needed}, where observer.load = "
+            f'"{load}" takes the load from; set it to "motor_torque" or "none" in the joint\'s file, or add '
+            "[joint.sensor] to the link"
+        )
 
 
 def resumed_at_s(setup: JointSetup) -> float:

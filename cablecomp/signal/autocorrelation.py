@@ -1,4 +1,7 @@
-"""How long a series remembers: integrated autocorrelation time and effective sample size."""
+"""How long a series remembers: integrated autocorrelation time, by Geyer's sequence; own code, as statsmodels has none.
+
+Newey and West's variance of a mean stands beside it, out of the same autocovariance.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise floor of a channel out of the recording itself."""
+"""Noise floor of a channel out of the recording itself; own code: libraries do not tell white noise from rounding."""
 
 from __future__ import annotations
 

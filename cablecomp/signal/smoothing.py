@@ -1,4 +1,7 @@
-"""Zero-phase local fits of noisy, quantised, unevenly sampled channels: value, rate and second rate."""
+"""Zero-phase local fits of a channel: value, rate and second rate; own code: SciPy's Savitzky-Golay wants even steps.
+
+Here time stamps are uneven, and a window ends at gaps and, where asked, at corners.
+"""
 
 from __future__ import annotations
 

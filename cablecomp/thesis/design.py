@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cablecomp.config import Drive, JointConfig, Limits, Stage
+from cablecomp.config import Drive, JointConfig, Limits, Stage, ratios_to_last
 from cablecomp.errors import InputError
 from cablecomp.thesis.closed_forms import closed
 from cablecomp.thesis.closed_forms import open as open_
@@ -19,7 +19,6 @@ from cablecomp.thesis.closed_forms.stage import (
     equivalent_of,
     is_series,
     settled_pretensions_N,
-    stage_ratios,
 )
 from cablecomp.thesis.design_types import DesignSheet, Pretension, StageSheet, WrapUse
 
@@ -159,7 +158,7 @@ def _pretension(drive: Drive, stage: EquivalentStage, load: float) -> Pretension
 def _stage_sheets(config: JointConfig, load: float, parts: tuple[GearedStage, ...]) -> tuple[StageSheet, ...]:
     drive = config.drive
     sheets = []
-    for index, (stage, n) in enumerate(zip(drive.stage, stage_ratios(drive), strict=True)):
+    for index, (stage, n) in enumerate(zip(drive.stage, ratios_to_last(drive.stage), strict=True)):
         acting = parts[index] if is_series(drive) else parts[0]
         high, low = _extreme_tensions(drive, acting, load)
         own = equivalent_of(stage)

@@ -17,7 +17,13 @@ from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.explain.model import searching
-from cablecomp.diagnosis.explain.scores import Groups, Lead, lead, left_out, make_groups
+from cablecomp.diagnosis.explain.scores import (
+    Groups,
+    ScoreDifference,
+    left_out,
+    make_groups,
+    score_difference,
+)
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
@@ -136,12 +142,12 @@ def _sharper(fit: Fit, drive: Calibrated) -> Weighing:
     return Weighing(sigma, mine.zero_sd)
 
 
-def _step(whole: Fit, drive: Calibrated, evidence: Sequence[Evidence], groups: Groups) -> Lead:
-    """The lead of the whole truth over the drive on this evidence, under the same weights."""
+def _step(whole: Fit, drive: Calibrated, evidence: Sequence[Evidence], groups: Groups) -> ScoreDifference:
+    """The score of the whole truth against the drive on this evidence, under the same weights."""
     problem = whole.problem.with_evidence(list(evidence))
     less = solve(problem, drive.fit.x, EVALUATIONS)
-    return lead(left_out(whole, groups), left_out(less, groups), groups)
+    return score_difference(left_out(whole, groups), left_out(less, groups), groups)
 
 
-def _enough(step: Lead) -> bool:
+def _enough(step: ScoreDifference) -> bool:
     return step.z > LIMITS.z and step.gain > LIMITS.gain

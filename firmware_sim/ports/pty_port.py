@@ -180,44 +180,39 @@ class SlcanPort(PtyPort):
         return self.adapter.encode(frame, now_s)
 
 
-class SerialPort(PtyPort):
-    """A device on a serial line that speaks COBS records."""
+class LinePort(PtyPort):
+    """A device on a serial line: whole pieces out of a byte stream."""
 
     interface = "serial"
+    reader: RecordReader | InstructionReader
+
+    def forget(self) -> None:
+        """Half a piece is none."""
+        self.reader.reset()
+
+    def frames(self, data: bytes, now_s: float) -> list[Frame]:
+        """Whole pieces in these bytes."""
+        return self.reader.feed(data) if data else []
+
+
+class SerialPort(LinePort):
+    """A device that speaks COBS records."""
 
     def __init__(self, link: Path | None = None) -> None:
         self.reader = RecordReader()
         super().__init__(link)
-
-    def forget(self) -> None:
-        """Half a record is no record."""
-        self.reader.reset()
-
-    def frames(self, data: bytes, now_s: float) -> list[Frame]:
-        """Whole records in these bytes."""
-        return self.reader.feed(data) if data else []
 
     def bytes_of(self, frame: Frame, now_s: float) -> bytes:
         """One record."""
         return encode_record(frame)
 
 
-class DynamixelPort(PtyPort):
+class DynamixelPort(LinePort):
     """A line of Dynamixels; frames of other numbers than theirs have no place on it."""
-
-    interface = "serial"
 
     def __init__(self, link: Path | None = None) -> None:
         self.reader = InstructionReader()
         super().__init__(link)
-
-    def forget(self) -> None:
-        """Half a packet is no packet."""
-        self.reader.reset()
-
-    def frames(self, data: bytes, now_s: float) -> list[Frame]:
-        """Whole instructions in these bytes."""
-        return self.reader.feed(data) if data else []
 
     def bytes_of(self, frame: Frame, now_s: float) -> bytes:
         """One status packet."""

@@ -6,18 +6,13 @@ import resource
 
 import numpy as np
 import pytest
+from joints import SMALL, SMALL_NOISE, SMALL_TRUE
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.diagnose import diagnose
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
-STAGE = {
-    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0,
-    "pretension_N": 60.0, "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
-}  # fmt: skip
-TRUE = {**STAGE, "EA_N": 20500.0, "pretension_N": 57.5, "mu_output": 0.135, "mu_input": 0.125}
-NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 3e-3, "motor_position_rad": 2e-5}
 CONCEALED = {
     "routing friction": EffectSpec("routing_friction", {"mu_angle": 0.3, "arc_length_m": 0.01}),
     "nothing": None,
@@ -34,17 +29,17 @@ def test_diagnosis_of_100_000_samples(benchmark: BenchmarkFixture, what: str) ->
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(0.9 * time) + 0.5 * np.sin(1.7 * time))
     load = soft * (0.9 * np.sin(2.3 * time) + 0.6 * np.sin(1.1 * time))
-    drive = {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [TRUE]}}
+    drive = {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [SMALL_TRUE]}}
     run = simulate(PlantConfig.from_dict(drive), time, motor, load, effects=[effect] if effect else [])
     rng = np.random.default_rng(1)
     columns = {"time_s": time}
-    for name, sigma in NOISE.items():
+    for name, sigma in SMALL_NOISE.items():
         columns[name] = run.channels()[name] + sigma * rng.standard_normal(len(time))
     joint = parse_joint(
         {
             "schema": 1,
             "name": "bench",
-            "drive": {"circuit": "closed", "stage": [STAGE]},
+            "drive": {"circuit": "closed", "stage": [SMALL]},
             "tolerance": {"EA_N": 0.04, "pretension_N": 0.06, "mu_output": 0.25, "mu_input": 0.25},
             "sensors": {
                 "joint_position_noise_rad": 1e-5, "joint_torque_noise_Nm": 3e-3,

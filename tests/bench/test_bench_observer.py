@@ -10,18 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from joints import WIDE, closed
 
 from cablecomp.config import parse_joint
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
 
-STAGE = {
-    "output_radius_m": 0.04, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 25000.0, "pretension_N": 60.0,
-    "mu_output": 0.12, "mu_input": 0.18, "wrap_output_rad": 10.0, "wrap_input_rad": 12.0,
-}  # fmt: skip
-CONFIG = parse_joint(
-    {"schema": 1, "name": "bench", "drive": {"circuit": "closed", "stage": [STAGE]}}, "bench"
-)
+CONFIG = parse_joint(closed(WIDE, "bench"), "bench")
 SAMPLES = 200_000
 
 

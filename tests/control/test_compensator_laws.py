@@ -60,6 +60,21 @@ def test_a_steady_load_is_made_up_for_exactly() -> None:
     assert command.motor_torque_Nm == pytest.approx(-N * 1.5, abs=1e-9)
 
 
+def test_without_a_torque_sensor_the_load_is_the_one_that_the_observer_found() -> None:
+    """An observer that reads the load off the motor's torque, tau = -N M."""
+
+    class MotorSide(Spring):
+        def step(self, sample: Sample) -> Estimate:
+            return self._at(sample, -sample.motor_torque_Nm / N)
+
+    chosen = CompensatorOptions.model_validate({"blend_s": 0.05})
+    c = Compensator(JOINT, chosen, T, MotorSide(), gains=GAINS, motor=MotorModel(coulomb_Nm=0.0))
+    for k in range(400):
+        command = c.step(sample(k, load=1.5)._replace(joint_torque_Nm=nan), Reference(0.3))
+    assert command.motor_position_rad == pytest.approx((0.3 - 1.5 / K) / N, abs=1e-12)
+    assert command.motor_torque_Nm == pytest.approx(-N * 1.5, abs=1e-9)
+
+
 def test_with_the_motor_there_the_joint_stands_where_it_is_wanted() -> None:
     c = controller()
     for k in range(400):

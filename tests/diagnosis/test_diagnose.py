@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from joints import SMALL, SMALL_NOISE, SMALL_TOLERANCE, closed
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.config_text import joint_text
@@ -15,26 +16,13 @@ from cablecomp.diagnosis.result import Diagnosis, report_json
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
-STAGE = {
-    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0,
-    "pretension_N": 60.0, "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
-}  # fmt: skip
-NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 3e-3, "motor_position_rad": 2e-5}
 BEARING = EffectSpec("bearing_friction", {"torque_Nm": 0.03, "load_coefficient": 0.0, "presliding_rad": 2e-4})
 ROUTING = EffectSpec("routing_friction", {"mu_angle": 0.3, "arc_length_m": 0.01})
 
 
 def joint() -> JointConfig:
     """The nominal joint; what is known of it, and how well."""
-    return parse_joint(
-        {
-            "schema": 1,
-            "name": "small",
-            "drive": {"circuit": "closed", "stage": [STAGE]},
-            "tolerance": {"EA_N": 0.04, "pretension_N": 0.06, "mu_output": 0.25, "mu_input": 0.25},
-        },
-        "small",
-    )
+    return parse_joint({**closed(SMALL, "small"), "tolerance": SMALL_TOLERANCE}, "small")
 
 
 def recording(effects: list[EffectSpec], seed: int = 3) -> dict[str, FloatArray]:
@@ -44,12 +32,10 @@ def recording(effects: list[EffectSpec], seed: int = 3) -> dict[str, FloatArray]
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
     load = soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
-    config = PlantConfig.from_dict(
-        {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [STAGE]}}
-    )
+    config = PlantConfig.from_dict(closed(SMALL))
     found = simulate(config, time, motor, load, effects=effects).channels()
     columns = {"time_s": time}
-    for name, sigma in NOISE.items():
+    for name, sigma in SMALL_NOISE.items():
         columns[name] = found[name] + sigma * rng.standard_normal(len(time))
     return columns
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planted import autoregressive
 
-from cablecomp.diagnosis.describe.blocks import Layout, alternate_blocks, count_reversals
+from cablecomp.diagnosis.describe.blocks import Layout, alternate_blocks
 from cablecomp.diagnosis.describe.judge import (
     compare,
     effective_size,
@@ -30,7 +30,9 @@ def test_blocks_alternate_and_each_half_sees_reversals() -> None:
     plan = alternate_blocks(START, N, DIRECTION, guard=5)
     assert not np.any(plan.heldout & plan.training)
     assert np.mean(plan.heldout) == pytest.approx(0.5, abs=0.1)
-    assert np.all(count_reversals(plan, DIRECTION, plan.heldout_blocks) >= 1)
+    turns = np.flatnonzero(np.diff(DIRECTION))
+    inside = plan.block[turns[plan.block[turns] == plan.block[turns + 1]]]
+    assert set(plan.heldout_blocks) <= set(inside)
     assert np.all(np.diff(plan.block) >= 0)
     near = np.flatnonzero(np.diff(plan.block)) + 1
     assert not np.any((plan.heldout | plan.training)[near])
@@ -39,7 +41,6 @@ def test_blocks_alternate_and_each_half_sees_reversals() -> None:
 def test_blocks_never_cross_recordings() -> None:
     plan = alternate_blocks(np.array([0, 1_000], dtype=np.int64), N, DIRECTION)
     assert plan.block[999] != plan.block[1_000]
-    assert plan.swapped().heldout[0]
 
 
 def test_too_short_a_recording_is_refused() -> None:

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cablecomp.diagnosis.explain.scores import Groups, confidence_set, huber, lead, left_out, selected_in
+from cablecomp.diagnosis.explain.scores import (
+    Groups,
+    confidence_set,
+    huber,
+    left_out,
+    score_difference,
+    selected_in,
+)
 from cablecomp.signal.smoothing import FloatArray
 
 BLOCKS, ROWS = 30, 20
@@ -63,7 +70,7 @@ def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:
     steps = (g.block[:, None] == np.arange(BLOCKS)).astype(np.float64)
     plain = linear(y, np.ones((len(y), 1)), 1.5)
     fitted = linear(y, np.column_stack([np.ones(len(y)), steps]), 1.0)
-    step = lead(left_out(fitted, g), left_out(plain, g), g)  # type: ignore[arg-type]
+    step = score_difference(left_out(fitted, g), left_out(plain, g), g)  # type: ignore[arg-type]
     assert np.mean(fitted.residual[: len(y)] ** 2) < np.mean(plain.residual[: len(y)] ** 2)
     assert step.gain < 0.02
 
@@ -73,12 +80,12 @@ def test_the_better_model_leads_by_what_it_takes_off() -> None:
     g = groups()
     better = rng.standard_normal(BLOCKS * ROWS)
     worse = better + 0.8 * np.sin(np.arange(len(better)) * 0.37)
-    forth, back = lead(better, worse, g), lead(worse, better, g)
+    forth, back = score_difference(better, worse, g), score_difference(worse, better, g)
     assert forth.gain == pytest.approx(0.32 / 1.32, abs=0.05)
     assert forth.z > 3.0
     assert back.gain < 0.0
     assert back.z < 0.0
-    same = lead(better, better, g)
+    same = score_difference(better, better, g)
     assert (same.gain, same.z) == (0.0, 0.0)
 
 
@@ -88,7 +95,12 @@ def test_chance_does_not_lead_far() -> None:
     g = groups()
     common = rng.standard_normal((200, BLOCKS * ROWS))
     far = sum(
-        abs(lead(r + 0.3 * rng.standard_normal(r.size), r + 0.3 * rng.standard_normal(r.size), g).z) > 3.0
+        abs(
+            score_difference(
+                r + 0.3 * rng.standard_normal(r.size), r + 0.3 * rng.standard_normal(r.size), g
+            ).z
+        )
+        > 3.0
         for r in common
     )
     assert far <= 6
@@ -127,7 +139,7 @@ def test_models_are_chosen_in_shares_that_add_up() -> None:
 
 
 def test_a_channels_unit_decides_nothing() -> None:
-    """Each channel has its own yardstick: a torque in N mm leads as far as the same torque in N m."""
+    """Each channel has its own yardstick: a torque in N mm differences as far as the same torque in N m."""
     rng = np.random.default_rng(6)
     block = np.tile(np.repeat(np.arange(BLOCKS), ROWS // 2), 2)
     channel = np.repeat(np.arange(2), BLOCKS * ROWS // 2)
@@ -135,6 +147,6 @@ def test_a_channels_unit_decides_nothing() -> None:
     better = rng.standard_normal(block.size)
     worse = better + np.where(channel == 1, 1.0, 0.1) * rng.standard_normal(block.size)
     unit = np.where(channel == 1, 1000.0, 1.0)
-    plain, scaled = lead(better, worse, g), lead(unit * better, unit * worse, g)
+    plain, scaled = score_difference(better, worse, g), score_difference(unit * better, unit * worse, g)
     assert scaled.gain == pytest.approx(plain.gain, rel=1e-9)
     assert scaled.z == pytest.approx(plain.z, rel=1e-9)

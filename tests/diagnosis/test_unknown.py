@@ -21,12 +21,11 @@ START = np.zeros(1, dtype=np.int64)
 
 def described(kind: str, cause: str) -> Description:
     found = recording(kind)[1]
-    series = make_series(np.zeros(found.samples), SIGMA, found)
     rng = np.random.default_rng(7)
     shape = shapes(kind)[cause]
     noise = SIGMA * rng.standard_normal(found.samples) + autoregressive(rng, found.samples, 60.0, 0.4 * SIGMA)
     residual = 3.0 * SIGMA * (shape - shape.mean()) / np.std(shape) + noise
-    return describe(series.with_residual(residual), np.random.default_rng(1), ratio=1.0)
+    return describe(make_series(residual, SIGMA, found), np.random.default_rng(1), ratio=1.0)
 
 
 @cache

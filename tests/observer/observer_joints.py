@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from joints import WIDE
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig, parse_joint
@@ -13,27 +14,15 @@ from cablecomp.observer import Observer
 
 Array = NDArray[np.float64]
 
-STAGE: dict[str, Any] = {
-    "output_radius_m": 0.04,
-    "input_radius_m": 0.015,
-    "free_length_m": 0.08,
-    "EA_N": 25000.0,
-    "pretension_N": 60.0,
-    "mu_output": 0.12,
-    "mu_input": 0.18,
-    "wrap_output_rad": 10.0,
-    "wrap_input_rad": 12.0,
-}
-
 
 def joint(circuit: str = "closed", *stages: dict[str, Any], **sections: Any) -> JointConfig:
-    """A joint of these stages, each given as what differs from `STAGE`; merging below 1e-13."""
+    """A joint of these stages, each given as what differs from `WIDE`; merging below 1e-13."""
     arrangement = sections.pop("arrangement", "series")
     observer = {"merge_tolerance": 1e-13, "max_pieces": 1024, **sections.pop("observer", {})}
     drive = {
         "circuit": circuit,
         "arrangement": arrangement,
-        "stage": [{**STAGE, **s} for s in stages or ({},)],
+        "stage": [{**WIDE, **s} for s in stages or ({},)],
     }
     return parse_joint(
         {"schema": 1, "name": "test joint", "drive": drive, "observer": observer, **sections}, "test"

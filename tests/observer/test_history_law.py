@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from observer_joints import joint, pull_unit
+from series_forms import series_loading_deflection_rad, series_unloading_deflection_rad
 
 from cablecomp.observer import Observer
 from cablecomp.thesis.closed_forms.closed import (
@@ -15,10 +16,6 @@ from cablecomp.thesis.closed_forms.closed import (
     closed_unloading_deflection_rad,
 )
 from cablecomp.thesis.closed_forms.open import open_loading_deflection_rad, open_unloading_deflection_rad
-from cablecomp.thesis.closed_forms.series import (
-    series_loading_deflection_rad,
-    series_unloading_deflection_rad,
-)
 from cablecomp.thesis.closed_forms.stage import equivalent_stage
 
 Array = NDArray[np.float64]

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from observer_joints import STAGE, joint, pull_unit
+from joints import WIDE
+from observer_joints import joint, pull_unit
 
 from cablecomp.config import Limits, parse_joint
 from cablecomp.errors import InputError
@@ -114,7 +115,7 @@ def test_the_planned_swing_erases_and_a_smaller_one_does_not() -> None:
 
 def test_erasing_says_what_it_needs() -> None:
     config = parse_joint(
-        {"schema": 1, "name": "bare", "drive": {"circuit": "closed", "stage": [STAGE]}}, "test"
+        {"schema": 1, "name": "bare", "drive": {"circuit": "closed", "stage": [WIDE]}}, "test"
     )
     with pytest.raises(InputError, match="joint_torque_max_Nm"):
         plan_erase(Observer(config), 0.0, 0.0, 0.0)

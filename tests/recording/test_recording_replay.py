@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joints import EQUAL, closed
 from rich.console import Console
 
 from cablecomp.config import JointConfig, parse_joint
@@ -20,22 +21,9 @@ from cablecomp.recording.recorder import Recorder
 from cablecomp.recording.replay import PredictionCsv, Replayed, replay
 from cablecomp.recording.writer import write_canonical
 
-STAGE = {
-    "output_radius_m": 0.06,
-    "input_radius_m": 0.06,
-    "free_length_m": 0.01,
-    "EA_N": 16000.0,
-    "pretension_N": 33.0,
-    "mu_output": 0.1,
-    "mu_input": 0.1,
-    "wrap_output_rad": 6.0,
-    "wrap_input_rad": 6.0,
-}
-
 
 def joint(**sections: object) -> JointConfig:
-    drive = {"circuit": "closed", "stage": [STAGE]}
-    return parse_joint({"schema": 1, "name": "rig", "drive": drive} | sections, "test")
+    return parse_joint({**closed(EQUAL, "rig"), **sections}, "test")
 
 
 class PlayObserver:

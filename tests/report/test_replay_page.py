@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joints import EQUAL, closed
 from rendering import figures_of
 
 from cablecomp.config import JointConfig, parse_joint
@@ -21,27 +22,7 @@ from cablecomp.recording.writer import write_canonical
 from cablecomp.report import page
 from cablecomp.report.replay_page import write_replay
 
-JOINT = {
-    "schema": 1,
-    "name": "rig <one>",
-    "drive": {
-        "circuit": "closed",
-        "stage": [
-            {
-                "output_radius_m": 0.06,
-                "input_radius_m": 0.06,
-                "free_length_m": 0.01,
-                "EA_N": 16000.0,
-                "pretension_N": 33.0,
-                "mu_output": 0.1,
-                "mu_input": 0.1,
-                "wrap_output_rad": 6.0,
-                "wrap_input_rad": 6.0,
-            }
-        ],
-    },
-    "tolerance": {"mu_input": 0.3, "EA_N": 2.0},
-}
+JOINT = {**closed(EQUAL, "rig <one>"), "tolerance": {"mu_input": 0.3, "EA_N": 2.0}}
 
 
 class Spring:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from joints import SMALL, SMALL_NOISE, SMALL_TRUE, closed
 
 from cablecomp.cli import main
 from cablecomp.config import load_joint
@@ -17,18 +18,11 @@ from cablecomp.recording.reader import read_all
 from cablecomp.recording.writer import write_canonical
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
-STAGE = {
-    "output_radius_m": 0.03, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 20000.0,
-    "pretension_N": 60.0, "mu_output": 0.12, "mu_input": 0.14, "wrap_output_rad": 9.0, "wrap_input_rad": 12.0,
-}  # fmt: skip
-TRUE = {**STAGE, "EA_N": 20500.0, "pretension_N": 57.5, "mu_output": 0.135, "mu_input": 0.125}
-NOISE = {"joint_position_rad": 1e-5, "joint_torque_Nm": 3e-3, "motor_position_rad": 2e-5}
-
 
 def joint_file(folder: Path) -> Path:
     """The nominal joint, tolerances and sensors stated."""
     lines = ["schema = 1", 'name = "blind"', "[drive]", 'circuit = "closed"', "[[drive.stage]]"]
-    lines += [f"{key} = {value!r}" for key, value in STAGE.items()]
+    lines += [f"{key} = {value!r}" for key, value in SMALL.items()]
     lines += [
         "[tolerance]",
         "EA_N = 0.04",
@@ -59,12 +53,10 @@ def recordings(folder: Path, effects: list[EffectSpec], seed: int) -> list[Path]
         soft = 1.0 - np.exp(-time)
         motor = soft * (0.8 * np.sin(w[0] * time) + 0.5 * np.sin(w[1] * time))
         load = soft * (0.9 * np.sin(1.7 * w[2] * time) + 0.6 * np.sin(1.7 * w[3] * time))
-        config = PlantConfig.from_dict(
-            {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [TRUE]}}
-        )
+        config = PlantConfig.from_dict(closed(SMALL_TRUE))
         run = simulate(config, time, motor, load, effects=effects)
-        columns = {name: run.channels()[name] for name in ("time_s", *NOISE)}
-        for name, sigma in NOISE.items():
+        columns = {name: run.channels()[name] for name in ("time_s", *SMALL_NOISE)}
+        for name, sigma in SMALL_NOISE.items():
             columns[name] = columns[name] + sigma * rng.standard_normal(len(time))
         path = folder / f"recording-{number}.csv.gz"
         write_canonical(path, columns)
@@ -96,8 +88,8 @@ def test_concealed_bearing_friction_is_named_measured_and_modelled(tmp_path: Pat
     assert (tmp_path / "out/report.html").stat().st_size > 1_000_000
     # the augmented joint runs as it is, and predicts as well as the true drive with its true effect
     truth = joint_file(tmp_path).read_text()
-    for key, value in STAGE.items():
-        truth = truth.replace(f"{key} = {value!r}", f"{key} = {TRUE[key]!r}")
+    for key, value in SMALL.items():
+        truth = truth.replace(f"{key} = {value!r}", f"{key} = {SMALL_TRUE[key]!r}")
     truth += '[[effect]]\nid = "bearing_friction"\n' + "\n".join(
         f"{k} = {v!r}" for k, v in spec.parameters.items()
     )
@@ -120,7 +112,7 @@ def test_parameters_off_their_nominal_values_are_no_missing_physics(tmp_path: Pa
     calibration = result["calibration"]
     for name in ("EA_N", "mu_output", "mu_input"):
         value = calibration[name]
-        assert abs(value["value"] - TRUE[name]) < 4.0 * value["sd"] + 0.01 * TRUE[name]
+        assert abs(value["value"] - SMALL_TRUE[name]) < 4.0 * value["sd"] + 0.01 * SMALL_TRUE[name]
     unseen = {entry["effect"] for entry in result["could_be_unseen"]}
     assert {"bearing_friction", "series_compliance", "routing_friction"} <= unseen
 
@@ -145,11 +137,11 @@ def behind_stiffness(tmp_path_factory: pytest.TempPathFactory) -> Path:
     time = np.arange(0.0, 40.0, 0.01)
     load = 0.12 * np.sin(2.0 * np.pi * time / 10.0)
     config = PlantConfig.from_dict(
-        {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [{**STAGE, "EA_N": 20300.0}]}}
+        {"schema": 1, "name": "true", "drive": {"circuit": "closed", "stage": [{**SMALL, "EA_N": 20300.0}]}}
     )
     soft = EffectSpec("series_compliance", {"compliance_rad_per_Nm": 6e-5})
     run = simulate(config, time, np.zeros_like(time), load, effects=[soft])
-    columns = {name: run.channels()[name] for name in ("time_s", *NOISE)}
+    columns = {name: run.channels()[name] for name in ("time_s", *SMALL_NOISE)}
     rng = np.random.default_rng(13)
     for name, sigma in (("joint_position_rad", 1e-6), ("joint_torque_Nm", 3e-4)):
         columns[name] = columns[name] + sigma * rng.standard_normal(len(time))

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from joints import WIDE, closed
 
 from cablecomp.config import parse_joint
 from cablecomp.observer import Observer
 from firmware_sim.plant import PlantConfig, simulate
 
-STAGE = {
-    "output_radius_m": 0.04, "input_radius_m": 0.015, "free_length_m": 0.08, "EA_N": 25000.0, "pretension_N": 60.0,
-    "mu_output": 0.12, "mu_input": 0.18, "wrap_output_rad": 10.0, "wrap_input_rad": 12.0,
-}  # fmt: skip
 JOINT_NOISE_RAD = 2e-5
 
 
 @pytest.mark.parametrize(("filter_Hz", "most"), [(0.0, 1.5), (40.0, 1.3)])
 def test_prediction_error_over_the_noise_floor(filter_Hz: float, most: float) -> None:
-    data = {"schema": 1, "name": "wide", "drive": {"circuit": "closed", "stage": [STAGE]}}
+    data = closed(WIDE, "wide")
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 20.0, 0.001)
     motor = 1.5 * np.sin(0.9 * time) + 0.3 * np.sin(2.3 * time)

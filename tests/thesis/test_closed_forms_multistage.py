@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from series_forms import series_loading_deflection_rad, series_unloading_deflection_rad
 
-from cablecomp.config import Drive, Stage
+from cablecomp.config import Drive, Stage, ratios_to_last
 from cablecomp.errors import InputError
-from cablecomp.thesis.closed_forms import closed, series
+from cablecomp.thesis.closed_forms import closed
 from cablecomp.thesis.closed_forms import open as open_
 from cablecomp.thesis.closed_forms.stage import (
     equivalent_of,
     equivalent_stage,
     settled_pretensions_N,
-    stage_ratios,
 )
 
 lengths = st.floats(0.005, 0.2)
@@ -59,7 +59,7 @@ def test_open_equivalent_is_the_explicit_sum(parts: list[Stage], peak: float, no
     one = equivalent_stage(drive)
     M, M_peak = now * one.moment_scale_Nm, peak * one.moment_scale_Nm
     loading, unloading = 0.0, 0.0
-    for n, stage in zip(stage_ratios(drive), drive.stage, strict=True):
+    for n, stage in zip(ratios_to_last(drive.stage), drive.stage, strict=True):
         single = equivalent_of(stage)
         loading += n * open_.open_loading_deflection_rad(n * M_peak, single)
         unloading += n * open_.open_unloading_deflection_rad(n * M, n * M_peak, single)
@@ -85,7 +85,7 @@ def test_antagonistic_chains_share_their_tensions(parts: list[Stage], m: float) 
     angles = []
     for t in tau:
         angle = 0.0
-        for n, stage in zip(stage_ratios(drive), drive.stage, strict=True):
+        for n, stage in zip(ratios_to_last(drive.stage), drive.stage, strict=True):
             single = equivalent_of(stage)
             angle += n * open_.open_loading_deflection_rad((t - 1.0) * single.moment_scale_Nm, single)
         angles.append(angle)
@@ -111,9 +111,9 @@ def test_equal_series_stages_reduce_to_one_solution(part: Stage, count: int, m: 
     shape = closed.closed_loading_normalised(m, last)
     factor = sum(
         n * part.pretension_N / (part.EA_N * last.mu_eff)
-        for n, part in zip(stage_ratios(drive), drive.stage, strict=True)
+        for n, part in zip(ratios_to_last(drive.stage), drive.stage, strict=True)
     )
-    assert series.series_loading_deflection_rad(M, drive) == pytest.approx(float(factor * shape), rel=1e-9)
+    assert series_loading_deflection_rad(M, drive) == pytest.approx(float(factor * shape), rel=1e-9)
 
 
 def test_series_ratios_and_reversal() -> None:
@@ -125,11 +125,11 @@ def test_series_ratios_and_reversal() -> None:
     )  # fmt: skip
     drive = Drive(circuit="closed", arrangement="series", stage=parts)
     np.testing.assert_allclose(
-        series.series_unloading_deflection_rad(6.0, 6.0, drive),
-        series.series_loading_deflection_rad(6.0, drive),
+        series_unloading_deflection_rad(6.0, 6.0, drive),
+        series_loading_deflection_rad(6.0, drive),
         rtol=1e-12,
     )
-    assert stage_ratios(drive) == pytest.approx([0.2, 1.0])
+    assert ratios_to_last(drive.stage) == pytest.approx([0.2, 1.0])
     assert drive.ratio == pytest.approx(0.2 / 3.0)
     with pytest.raises(InputError, match="series"):
         equivalent_stage(drive)

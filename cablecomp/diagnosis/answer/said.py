@@ -75,15 +75,15 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
         for t in r.tried:
             if (
                 t.term.name in known
-                or t.lead.gain < LIMITS.gain
-                or t.lead.z < 2.0
+                or t.difference.gain < LIMITS.gain
+                or t.difference.z < 2.0
                 or isinstance(t.term, Dependence)
             ):
                 continue
             known.add(t.term.name)
             effect = t.term.effect
             why = f"beside {r.base.name}, {r.tried[0].term.name} takes off more; with it known, this one is not missed"
-            evidence = {"z": t.lead.z, "selected_in": t.selected_in, "gain": t.lead.gain}
+            evidence = {"z": t.difference.z, "selected_in": t.selected_in, "gain": t.difference.gain}
             rows.append(
                 Named(
                     effect.id,
@@ -91,7 +91,7 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
                     effect.equation,
                     {},
                     None,
-                    t.lead.gain,
+                    t.difference.gain,
                     0.0,
                     evidence,
                     (),
@@ -106,11 +106,11 @@ def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple
     rows = []
     for w in found:
         if w.rivals:
-            why = f"they predict data left out alike: the lead over the nearest is {w.lead.z:.1f} standard errors"
+            why = f"they predict data left out alike: the lead over the nearest is {w.difference.z:.1f} standard errors"
             rows.append(((w.term.name, *w.rivals), why))
     level, first = learnt_level(), (selection.rounds[0].tried if selection.rounds else ())
     if level is not None and found:
-        names = conformal_set(deficits({t.term.name: t.lead.z for t in first}), level)
+        names = conformal_set(deficits({t.term.name: t.difference.z for t in first}), level)
         if len(names) > 1 and all(set(names) != set(effects) for effects, _ in rows):
             why = (
                 f"asked alone, each is within {level:.1f} standard errors of the best: sets made so held the truth in nine of "
@@ -129,7 +129,9 @@ def tested(selection: Selection, named: Sequence[str]) -> tuple[Tested, ...]:
             outcome = (
                 "named" if t.term.name in named and accepted else "candidate" if accepted else "not needed"
             )
-            rows.append(Tested(t.term.name, r.base.name, t.lead.gain, t.lead.z, t.selected_in, outcome))
+            rows.append(
+                Tested(t.term.name, r.base.name, t.difference.gain, t.difference.z, t.selected_in, outcome)
+            )
     return tuple(rows)
 
 
@@ -173,9 +175,8 @@ def remainder(
     left = rms_left(kept.fit)
     text, equation = "noise", None
     if structured:
-        stages = kept.fit.problem.config.drive.stage
-        ratio = float(np.prod([s.output_radius_m / s.input_radius_m for s in stages]))
-        description = describe(series, rng, sensitivities(kept.fit), ratio)
+        turns = 1.0 / kept.fit.problem.config.drive.ratio
+        description = describe(series, rng, sensitivities(kept.fit), turns)
         first = found.significant(0.01)
         text = (
             f"follows {first[0].covariate}: {first[0].how}; {description.text}" if first else description.text
@@ -210,8 +211,7 @@ def channel_word(channel: str) -> str:
 
 def traces(before: Fit, after: Fit, seen: Sequence[Covariates]) -> list[Traces]:
     """What was measured, and what the drive predicts before and after, recording by recording."""
-    stages = before.problem.config.drive.stage
-    ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in stages]))
+    ratio = before.problem.config.drive.ratio
     rows = []
     lefts = (before.problem.left(before.x, own_zero=False), after.problem.left(after.x, own_zero=False))
     for k, (e, c) in enumerate(zip(before.problem.evidence, seen, strict=True)):

@@ -109,7 +109,9 @@ def noise_floor(fit: Fit, rng: np.random.Generator) -> float:
     base = problem.misfits(fit.x)[JOINT]
     for _ in range(REPLICAS):
         try:
-            other = problem.with_evidence([_shaken(e, rng) for e in problem.evidence]).misfits(fit.x)[JOINT]
+            other = problem.with_evidence([_noise_replica(e, rng) for e in problem.evidence]).misfits(fit.x)[
+                JOINT
+            ]
         except InputError:
             continue
         moved += [np.std(a - b) ** 2 for a, b in zip(base, other, strict=True)]
@@ -121,7 +123,7 @@ def noise_floor(fit: Fit, rng: np.random.Generator) -> float:
     return float(np.sqrt(own + (float(np.mean(moved)) if moved else 0.0)))
 
 
-def _shaken(e: Evidence, rng: np.random.Generator) -> Evidence:
+def _noise_replica(e: Evidence, rng: np.random.Generator) -> Evidence:
     columns = dict(e.columns)
     group = max(1.0, e.samples / len(e.columns["time_s"]))
     for name in ("motor_position_rad", "joint_torque_Nm", MOTOR):

@@ -5,7 +5,6 @@ half.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,10 +28,6 @@ class Layout:
     training: np.ndarray[tuple[int], np.dtype[np.bool_]]
     heldout_blocks: IntArray
     training_blocks: IntArray
-
-    def swapped(self) -> Layout:
-        """Return the layout with the roles exchanged, for a second fold."""
-        return Layout(self.block, self.training, self.heldout, self.training_blocks, self.heldout_blocks)
 
 
 def alternate_blocks(
@@ -70,20 +65,3 @@ def alternate_blocks(
     held = block % 2 == 1
     numbers = np.arange(first, dtype=np.int64)
     return Layout(block, held & kept, ~held & kept, numbers[1::2], numbers[0::2])
-
-
-def block_means(values: FloatArray, layout: Layout) -> tuple[FloatArray, FloatArray]:
-    """Return the mean of `values` in each held-out block, and how many samples count there."""
-    block = layout.block[layout.heldout]
-    counts = np.bincount(block, minlength=int(layout.block[-1]) + 1).astype(np.float64)
-    sums = np.bincount(block, values[layout.heldout], minlength=len(counts))
-    used = counts > 0.0
-    return np.asarray(sums[used] / counts[used], dtype=np.float64), counts[used]
-
-
-def count_reversals(layout: Layout, direction: FloatArray, blocks: Sequence[int] | IntArray) -> IntArray:
-    """Return how many changes of `direction` happen inside each of the given blocks."""
-    turns = np.flatnonzero(np.diff(direction) != 0.0)
-    turns = turns[layout.block[turns] == layout.block[turns + 1]]
-    counts = np.bincount(layout.block[turns], minlength=int(layout.block[-1]) + 1)
-    return np.asarray(counts[np.asarray(blocks)], dtype=np.int64)

@@ -9,7 +9,7 @@ import numpy as np
 
 from cablecomp.config import Empirical
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.scores import Groups, Lead, lead
+from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, score_difference
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -22,10 +22,10 @@ CHANNELS = ("motor_position_rad", "joint_torque_Nm")
 
 @dataclass(frozen=True)
 class Found:
-    """A law that holds, as the configuration has it, and its lead over the model without it."""
+    """A law that holds, as the configuration has it, and its score against the model without it."""
 
     law: Empirical
-    lead: Lead
+    difference: ScoreDifference
 
 
 def empirical_laws(model: Model, groups: Groups) -> list[Found]:
@@ -54,8 +54,12 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
                 continue
             T = _basis(x, centre, half) * (weight / sigma)[:, None]
             predicted = _crossed(T, left, fold)
-            step = lead(left - predicted, left, here)
-            if step.z > LIMITS.z and step.gain > LIMITS.gain and (best is None or step.gain > best.lead.gain):
+            step = score_difference(left - predicted, left, here)
+            if (
+                step.z > LIMITS.z
+                and step.gain > LIMITS.gain
+                and (best is None or step.gain > best.difference.gain)
+            ):
                 coefficients = _ridge(T, left)
                 name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace(
                     "position", "angle"

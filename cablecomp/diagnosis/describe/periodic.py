@@ -1,4 +1,8 @@
-"""Is a residual periodic in an angle? A least-squares periodogram against the angle, with honest p-values."""
+"""Is a residual periodic in an angle? Own code: the periodograms of SciPy and astropy know no surrogates by blocks.
+
+A least-squares periodogram against the angle, after a smooth dependence on load and angle is taken off. Noise
+remembers, so a p-value comes from surrogates that flip the sign of whole blocks.
+"""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def _top_speed(config: JointConfig, seen: Covariates) -> float:
     limit = config.limits.motor_velocity_max_rad_s
     if limit is None:
         return max(float(np.max(np.abs(seen.values["velocity"]))), 1e-3)
-    return 0.8 * limit * float(np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage]))
+    return 0.8 * limit * config.drive.ratio
 
 
 def best_experiment(
@@ -140,8 +140,7 @@ def _readings(
 ) -> list[FloatArray] | None:
     time = np.linspace(0.0, protocol.duration_s, STEPS)
     references = [protocol.reference(float(t)) for t in time]
-    stages = models[0].drive.stage
-    ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in stages]))
+    ratio = models[0].drive.ratio
     columns = {
         "time_s": time,
         "motor_position_rad": np.array([r.joint_position_rad for r in references]) / ratio,

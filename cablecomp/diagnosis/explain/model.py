@@ -9,7 +9,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.scores import Groups, Lead, block_losses, left_out, scales
+from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -39,11 +39,11 @@ class Model:
 
 @dataclass(frozen=True)
 class Tried:
-    """One hypothesis of a round: its model, its lead over the model before, share of resampled data in which it was best."""
+    """One hypothesis of a round: its model, its score against the model before, share of resampled data in which it was best."""
 
     term: Term
     model: Model
-    lead: Lead
+    difference: ScoreDifference
     selected_in: float
 
 

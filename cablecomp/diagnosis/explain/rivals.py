@@ -10,13 +10,13 @@ from cablecomp.diagnosis.explain.hypotheses import INSTANT, Hypothesis
 from cablecomp.diagnosis.explain.model import Model, without
 from cablecomp.diagnosis.explain.scores import (
     Groups,
-    Lead,
+    ScoreDifference,
     block_losses,
     confidence_set,
-    lead,
     left_out,
     left_out_linearly,
     scales,
+    score_difference,
 )
 from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -31,8 +31,8 @@ ZERO_STEP = "a step of the joint encoder's zero"
 
 def rivals(
     model: Model, term: Hypothesis, pool: Sequence[Hypothesis], groups: Groups, rng: np.random.Generator
-) -> tuple[tuple[str, ...], dict[str, Lead]]:
-    """Effects that stand in for a term as well (its model confidence set, itself left out), and the term's lead over each
+) -> tuple[tuple[str, ...], dict[str, ScoreDifference]]:
+    """Effects that stand in for a term as well (its model confidence set, itself left out), and the term's score against each
     that was tried in its place."""
     base = without(model, term, groups)
     if base is None:
@@ -49,22 +49,22 @@ def rivals(
     )
     size = scales(model.left_out, groups)
     losses = {term.name: block_losses(model.left_out, size, groups)}
-    leads: dict[str, Lead] = {}
+    differences: dict[str, ScoreDifference] = {}
     chosen = roughs[: LIMITS.promising // 2]
     fits = side_by_side(lambda p: _tried(p[0]), chosen)
     for fit, (_, a) in zip(fits, chosen, strict=True):
         if fit is None:
             continue
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
-        leads[a.hypothesis.name] = lead(model.left_out, other.left_out, groups)
+        differences[a.hypothesis.name] = score_difference(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
     if term.has_instant:
         instant = float(model.fit.values[f"effect.{term.effect.id}.{INSTANT}"])
-        step = lead(model.left_out, _stepped(base, instant, groups), groups)
+        step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
         if step.gain < 0.0:
-            leads[ZERO_STEP] = step
+            differences[ZERO_STEP] = step
     kept = confidence_set(losses, rng)
-    return tuple(n for n in kept if n != term.name), leads
+    return tuple(n for n in kept if n != term.name), differences
 
 
 def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:

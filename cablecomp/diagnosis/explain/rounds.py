@@ -14,7 +14,14 @@ from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, is_told, loss, placed
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
-from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out, scales, selected_in
+from cablecomp.diagnosis.explain.scores import (
+    Groups,
+    demanded,
+    left_out,
+    scales,
+    score_difference,
+    selected_in,
+)
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -124,17 +131,17 @@ def one_round(
         return Model((*model.terms, *c.terms), fit, left_out(fit, groups), ratio)
 
     models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], groups)
-    leads = {
-        m.name: lead(
+    differences = {
+        m.name: score_difference(
             m.left_out, fine.left_out if fine is not None and m.fit.problem.fine else model.left_out, groups
         )
         for m in models
     }
-    shares = selected_in({n: v.by_block for n, v in leads.items()}, rng)
+    shares = selected_in({n: v.by_block for n, v in differences.items()}, rng)
     first = len(model.terms)
-    tried = [Tried(m.terms[first], m, leads[m.name], shares[m.name]) for m in models]
-    tried.sort(key=lambda t: -t.lead.gain)
-    good = [t for t in tried if demanded(t.lead, first=number == 0)]
+    tried = [Tried(m.terms[first], m, differences[m.name], shares[m.name]) for m in models]
+    tried.sort(key=lambda t: -t.difference.gain)
+    good = [t for t in tried if demanded(t.difference, first=number == 0)]
     return Round(model, promised, tuple(tried), good[0] if good else None), tuple(
         x for a in answers for x in a
     )

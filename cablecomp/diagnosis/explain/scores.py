@@ -201,7 +201,7 @@ def block_losses(r: FloatArray, scale: FloatArray, groups: Groups) -> FloatArray
 
 
 @dataclass(frozen=True)
-class Lead:
+class ScoreDifference:
     """How much better one model predicts than another.
 
     `gain`: share of the worse one's loss that it takes off. `z`: the difference over what the better one's own remainder
@@ -214,7 +214,7 @@ class Lead:
     by_block: FloatArray
 
 
-def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
+def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> ScoreDifference:
     """Paired comparison on left-out residuals.
 
     With d the difference of the two residuals and r the better one's, the losses differ by sum d^2 + 2 sum r d: the first
@@ -232,7 +232,7 @@ def lead(better: FloatArray, worse: FloatArray, groups: Groups) -> Lead:
     r, d = np.clip(a, -LIMITS.tail, LIMITS.tail), np.clip(b - a, -30.0, 30.0)
     chance = np.bincount(block, r * d, minlength=groups.blocks)
     noise = 2.0 * sqrt(float(np.sum(chance**2)) * len(chance) / max(len(chance) - 1, 1))
-    return Lead(
+    return ScoreDifference(
         total / max(float(np.sum(lb)), 1e-300),
         total / max(noise, 1e-300),
         total / max(error, 1e-300),
@@ -262,8 +262,8 @@ def halves(problem: Problem, groups: Groups) -> list[IntArray]:
     return [np.concatenate(p) for p in parts]
 
 
-def demanded(step: Lead, first: bool = False) -> bool:
-    """Whether data left out demand what leads so; `first`: the first effect of all."""
+def demanded(step: ScoreDifference, first: bool = False) -> bool:
+    """Whether data left out demand what differences so; `first`: the first effect of all."""
     usual = step.z > (LIMITS.z_first if first else LIMITS.z) and step.gain > LIMITS.gain
     large = first and step.z > LIMITS.z_large and step.gain > LIMITS.gain_large
     return usual or large or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)

@@ -22,7 +22,7 @@ from cablecomp.diagnosis.explain.model import (
     without,
 )
 from cablecomp.diagnosis.explain.rounds import Progress, cold_starts, one_round
-from cablecomp.diagnosis.explain.scores import Groups, demanded, lead, left_out
+from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.screening import Answer, sized
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
@@ -59,7 +59,7 @@ def select(
             answers, pool = answers or answered, sized(pool, answered)
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
-        good = [t for _, t in candidates if demanded(t.lead, first=number == 0)]
+        good = [t for _, t in candidates if demanded(t.difference, first=number == 0)]
         fresh = ranked([t.model for t in good], groups)
         if not fresh:
             break
@@ -94,7 +94,7 @@ def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
 
 def _better(model: Model, than: Model, groups: Groups) -> bool:
     """Whether a model is worth its further terms."""
-    return demanded(lead(model.left_out, than.left_out, groups))
+    return demanded(score_difference(model.left_out, than.left_out, groups))
 
 
 def quiet(fit: Fit) -> bool:
@@ -117,7 +117,7 @@ def _pruned(model: Model, groups: Groups) -> Model:
             smaller = without(model, term, groups)
             if smaller is None:
                 continue
-            step = lead(model.left_out, smaller.left_out, groups)
+            step = score_difference(model.left_out, smaller.left_out, groups)
             if not demanded(step) and (weakest is None or step.gain < weakest[0]):
                 weakest = (step.gain, smaller)
         if weakest is None:

@@ -12,7 +12,7 @@ from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
 from cablecomp.diagnosis.explain.rivals import ZERO_STEP, rivals
-from cablecomp.diagnosis.explain.scores import Groups, Lead, halves, lead, scales
+from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray
@@ -20,7 +20,7 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Weighed:
-    """One effect of the final model: its evidence, confidence, rivals that stand in for it, the nearest one's lead.
+    """One effect of the final model: its evidence, confidence, rivals that stand in for it, its score against the nearest one.
 
     `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the last to come,
     whichever is more: effects that trade places take off little as the last, what others hide takes off little alone.
@@ -31,7 +31,7 @@ class Weighed:
     evidence: Mapping[str, float]
     confidence: float
     rivals: tuple[str, ...]
-    lead: Lead
+    difference: ScoreDifference
     why_not: str
     removes: float
 
@@ -47,19 +47,21 @@ def weigh(
     final, groups = selection.final, selection.groups
     bounds = final.fit.at_bound()
     # whoever took nothing off in any round stands in for nobody
-    able = {t.term.name for r in selection.rounds for t in r.tried if t.lead.gain > 0.0}
+    able = {t.term.name for r in selection.rounds for t in r.tried if t.difference.gain > 0.0}
     found = []
     for term in final.terms:
         if not isinstance(term, Hypothesis):
             continue
         bare = without(final, term, groups)
         own = (
-            lead(final.left_out, bare.left_out, groups)
+            score_difference(final.left_out, bare.left_out, groups)
             if bare is not None
-            else Lead(1.0, 99.0, 10.0, np.zeros(1))
+            else ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
         )
-        kept, leads = rivals(final, term, [h for h in pool if h.name in able], groups, rng)
-        nearest = min(leads.values(), key=lambda v: v.z, default=Lead(1.0, 10.0, 10.0, np.zeros(1)))
+        kept, differences = rivals(final, term, [h for h in pool if h.name in able], groups, rng)
+        nearest = min(
+            differences.values(), key=lambda v: v.z, default=ScoreDifference(1.0, 10.0, 10.0, np.zeros(1))
+        )
         follows = _follows(term, remainder)
         evidence = features(
             gain=own.gain,
@@ -83,7 +85,7 @@ def weigh(
         found.append(
             Weighed(
                 term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, kept, nearest,
-                _against((*kept, *(n for n in leads if n == ZERO_STEP)), follows, own, evidence)
+                _against((*kept, *(n for n in differences if n == ZERO_STEP)), follows, own, evidence)
                 if told
                 else "its amount is not told from none",
                 max(evidence["share_total"], _alone(selection, term)),
@@ -98,7 +100,7 @@ def _selected(selection: Selection, term: Hypothesis) -> float:
         t.selected_in
         for r in selection.rounds
         for t in r.tried
-        if t.term.name == term.name and t.lead.gain > 0.0
+        if t.term.name == term.name and t.difference.gain > 0.0
     ]
     return max(shares, default=0.0)
 
@@ -171,7 +173,7 @@ def _follows(term: Hypothesis, remainder: Location) -> float:
     return max(shares, default=0.0)
 
 
-def _against(kept: Sequence[str], follows: float, own: Lead, evidence: Mapping[str, float]) -> str:
+def _against(kept: Sequence[str], follows: float, own: ScoreDifference, evidence: Mapping[str, float]) -> str:
     reasons = []
     if kept:
         reasons.append(f"{', '.join(kept)} in its place explains data left out as well")

@@ -1,4 +1,8 @@
-"""Instants at which a residual's dependence on the load path changes (Bai–Perron by dynamic programming)."""
+"""Instants at which a residual's dependence on the load path changes; own code, for its costs come out of running sums.
+
+Bai and Perron's problem by dynamic programming. `ruptures` would solve a regression for every pair of ends; here the
+normal equations of any piece are a difference of two sums.
+"""
 
 from __future__ import annotations
 

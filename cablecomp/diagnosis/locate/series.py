@@ -41,10 +41,6 @@ class Series:
         """Return the residual of each recording."""
         return [self.residual[span] for span in self.spans()]
 
-    def with_residual(self, residual: FloatArray) -> Series:
-        """Return the same series with another residual."""
-        return Series(residual, self.sigma, self.covariates)
-
 
 @dataclass(frozen=True)
 class Thinned:

@@ -41,18 +41,6 @@ def narrow_tensions_unloading(m: Number, m_peak: Number) -> Tensions:
     return Tensions(tight**2, easy**2)
 
 
-def wide_hysteresis_normalised(m_peak: Number) -> Array:
-    """theta EA mu_eff/T0 left after a full unload for GF -> infinity, |m_pk| < 2.
-
-    [g(1 + m_pk/2) + g(1 - m_pk/2)]/2, g(tau) = 2 sqrt(tau) - 2 - ln tau. Own derivation: the bumps and dips
-    settle the tension at tau = 1 + O(1/GF), and GF (tau - 1) in (4-24) therefore stays finite. The thesis's
-    (4-39), which drops it, keeps the h cable's g alone: the same to first order in m_pk^2, but 42 % too low
-    at m_pk = 1.
-    """
-    half = np.abs(np.asarray(m_peak, dtype=float)) / 2.0
-    return (_left_over(half) + _left_over(-half)) / 2.0
-
-
 def model_i_normalised(m: Number, GF: Number) -> Array:
     """theta EA mu_eff/T0 = GF m/2: model I, the free spans alone (4-49); for |m| <= 2."""
     return np.asarray(np.asarray(GF) * np.asarray(m, dtype=float) / 2.0)
@@ -127,10 +115,3 @@ def pretension_rule(moment_max_Nm: float, radius_m: float) -> PretensionRule:
     """
     force = abs(moment_max_Nm) / radius_m
     return PretensionRule(force / 4.0, force / 2.0)
-
-
-def _left_over(excess: Number) -> Array:
-    """2 sqrt(1 + x) - 2 - ln(1 + x), without cancellation."""
-    x = np.asarray(excess, dtype=float)
-    root = x / (np.sqrt(1.0 + x) + 1.0)  # sqrt(1 + x) - 1
-    return 2.0 * gap(root)

@@ -4,16 +4,11 @@ add.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
-from cablecomp.config import Drive
-from cablecomp.thesis.closed_forms import closed
-from cablecomp.thesis.closed_forms.stage import EquivalentStage, equivalent_of, is_series, stage_ratios
+from cablecomp.config import Drive, ratios_to_last
+from cablecomp.thesis.closed_forms.stage import EquivalentStage, equivalent_of, is_series
 from cablecomp.thesis.closed_forms.stage import equivalent_stage as single
-from cablecomp.thesis.closed_forms.wrap import Array, Number
 
 
 class GearedStage(NamedTuple):
@@ -29,34 +24,5 @@ def acting_stages(drive: Drive) -> tuple[GearedStage, ...]:
     """
     if not is_series(drive):
         return (GearedStage(1.0, single(drive)),)
-    pairs = zip(stage_ratios(drive), drive.stage, strict=True)
+    pairs = zip(ratios_to_last(drive.stage), drive.stage, strict=True)
     return tuple(GearedStage(float(ratio), equivalent_of(stage)) for ratio, stage in pairs)
-
-
-def series_loading_deflection_rad(moment_Nm: Number, drive: Drive) -> Array:
-    """Deflection of closed stages in series during loading, theta_k = sum N_ik theta_i(N_ik M) (5-27..5-30);
-    rad.
-    """
-    return _sum(
-        drive, lambda ratio, stage: closed.closed_loading_deflection_rad(ratio * _a(moment_Nm), stage)
-    )
-
-
-def series_unloading_deflection_rad(moment_Nm: Number, peak_Nm: Number, drive: Drive) -> Array:
-    """As `series_loading_deflection_rad`, after a reversal at `peak_Nm`; rad."""
-    return _sum(
-        drive,
-        lambda ratio, stage: closed.closed_unloading_deflection_rad(
-            ratio * _a(moment_Nm), ratio * _a(peak_Nm), stage
-        ),
-    )
-
-
-def _sum(drive: Drive, deflection: Callable[[float, EquivalentStage], Array]) -> Array:
-    return np.asarray(
-        sum(geared.ratio * deflection(geared.ratio, geared.stage) for geared in acting_stages(drive))
-    )
-
-
-def _a(value: Number) -> Array:
-    return np.asarray(value, dtype=float)

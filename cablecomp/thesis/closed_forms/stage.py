@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cablecomp.config import Drive, Stage
+from cablecomp.config import Drive, Stage, ratios_to_last
 from cablecomp.errors import InputError
 from cablecomp.thesis.closed_forms.wrap import (
     Array,
@@ -81,19 +81,13 @@ def effective_mu(output_radius_m: float, input_radius_m: float, mu_output: float
     return 1.0 / (1.0 / mu_output + input_radius_m / output_radius_m / mu_input)
 
 
-def stage_ratios(drive: Drive) -> Array:
-    """Ratios N_ik from every stage's output axis to the last stage's, N_ik = prod_{j>i} r_j/R_j, N_kk = 1
-    (5-22).
-    """
-    steps = np.array([stage.ratio for stage in drive.stage])
-    return np.append(np.cumprod(steps[:0:-1])[::-1], 1.0)
-
-
 def settled_pretensions_N(drive: Drive) -> Array:
     """Pretension of every stage of one continuous circuit, T0_i = T0_k N_ik R_k/R_i (5-1); N."""
     last = drive.stage[-1]
     radii = np.array([stage.output_radius_m for stage in drive.stage])
-    return np.asarray(last.pretension_N * stage_ratios(drive) * last.output_radius_m / radii)
+    return np.asarray(
+        last.pretension_N * np.array(ratios_to_last(drive.stage)) * last.output_radius_m / radii
+    )
 
 
 def equivalent_of(stage: Stage) -> EquivalentStage:
@@ -129,7 +123,7 @@ def equivalent_stage(drive: Drive) -> EquivalentStage:
     parts = [equivalent_of(stage) for stage in drive.stage]
     weights = [
         float(n) ** 2 * last.output_radius_m / part.radius_m * last.EA_N / part.EA_N
-        for n, part in zip(stage_ratios(drive), parts, strict=True)
+        for n, part in zip(ratios_to_last(drive.stage), parts, strict=True)
     ]
     mu = 1.0 / sum(weight / part.mu_eff for weight, part in zip(weights, parts, strict=True))
     length = sum(

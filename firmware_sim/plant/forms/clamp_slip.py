@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import RELEASED_H, RELEASED_L, TIME
+from firmware_sim.plant.columns import RELEASED_H, RELEASED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import ramp, stairs
-from firmware_sim.plant.records import Floats
+from firmware_sim.plant.forms.courses import ramp, schedule, stairs
 
 _SLIP = Parameter("slip_m", "length released in all", low=0.0, high=0.1, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -20,10 +19,7 @@ def _column(p: Mapping[str, float]) -> int:
 
 
 def _gradual(build: Build, p: Mapping[str, float]) -> None:
-    def fill(inputs: Floats) -> None:
-        inputs[:, _column(p)] += p["slip_m"] * ramp(inputs[:, TIME], p["time_s"], p["duration_s"])
-
-    build.schedules.append(fill)
+    schedule(build, _column(p), p["slip_m"], lambda t: ramp(t, p["time_s"], p["duration_s"]))
 
 
 GRADUAL = form(
@@ -37,12 +33,7 @@ GRADUAL = form(
 
 
 def _stepwise(build: Build, p: Mapping[str, float]) -> None:
-    def fill(inputs: Floats) -> None:
-        inputs[:, _column(p)] += p["slip_m"] * stairs(
-            inputs[:, TIME], p["time_s"], p["duration_s"], p["steps"]
-        )
-
-    build.schedules.append(fill)
+    schedule(build, _column(p), p["slip_m"], lambda t: stairs(t, p["time_s"], p["duration_s"], p["steps"]))
 
 
 IN_STEPS = form(
@@ -62,10 +53,7 @@ IN_STEPS = form(
 
 
 def _other(build: Build, p: Mapping[str, float]) -> None:
-    def fill(inputs: Floats) -> None:
-        inputs[:, RELEASED_L] += p["slip_m"] * ramp(inputs[:, TIME], p["time_s"], 0.0)
-
-    build.schedules.append(fill)
+    schedule(build, RELEASED_L, p["slip_m"], lambda t: ramp(t, p["time_s"], 0.0))
 
 
 OTHER_CABLE = form(

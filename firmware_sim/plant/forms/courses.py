@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.columns import TIME
 from firmware_sim.plant.records import Floats
 
 
@@ -37,3 +40,12 @@ def stairs(time_s: Floats, start_s: float, duration_s: float, steps: float) -> F
     count = max(round(steps), 1)
     at = start_s + duration_s * np.arange(count) / max(count - 1, 1)
     return np.searchsorted(at, time_s, side="right") / count
+
+
+def schedule(build: Build, column: int, size: float, course: Callable[[Floats], Floats]) -> None:
+    """Let every run add `size` times a course over its time [s] to an input column."""
+
+    def fill(inputs: Floats) -> None:
+        inputs[:, column] += size * course(inputs[:, TIME])
+
+    build.schedules.append(fill)

@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L, TIME
+from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import ramp, stairs
-from firmware_sim.plant.records import Floats
+from firmware_sim.plant.forms.courses import ramp, schedule, stairs
 
 _LOST = Parameter("fraction", "share of EA lost in the end", low=0.0, high=0.95, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
 _WHICH = Parameter("cable_l", "1: wires of cable l", 0.0, 0.0, 1.0)
 
 
-def _stepwise(build: Build, p: Mapping[str, float]) -> None:
-    def fill(inputs: Floats) -> None:
-        column = SOFTENED_L if p["cable_l"] >= 0.5 else SOFTENED_H
-        inputs[:, column] += p["fraction"] * stairs(inputs[:, TIME], p["time_s"], p["duration_s"], p["steps"])
+def _column(p: Mapping[str, float]) -> int:
+    return SOFTENED_L if p["cable_l"] >= 0.5 else SOFTENED_H
 
-    build.schedules.append(fill)
+
+def _stepwise(build: Build, p: Mapping[str, float]) -> None:
+    schedule(build, _column(p), p["fraction"], lambda t: stairs(t, p["time_s"], p["duration_s"], p["steps"]))
 
 
 IN_STEPS = form(
@@ -40,11 +39,7 @@ IN_STEPS = form(
 
 
 def _fraying(build: Build, p: Mapping[str, float]) -> None:
-    def fill(inputs: Floats) -> None:
-        column = SOFTENED_L if p["cable_l"] >= 0.5 else SOFTENED_H
-        inputs[:, column] += p["fraction"] * ramp(inputs[:, TIME], p["time_s"], p["duration_s"])
-
-    build.schedules.append(fill)
+    schedule(build, _column(p), p["fraction"], lambda t: ramp(t, p["time_s"], p["duration_s"]))
 
 
 FRAYING = form(
@@ -58,10 +53,7 @@ FRAYING = form(
 
 
 def _other(build: Build, p: Mapping[str, float]) -> None:
-    def fill(inputs: Floats) -> None:
-        inputs[:, SOFTENED_L] += p["fraction"] * ramp(inputs[:, TIME], p["time_s"], 0.0)
-
-    build.schedules.append(fill)
+    schedule(build, SOFTENED_L, p["fraction"], lambda t: ramp(t, p["time_s"], 0.0))
 
 
 OTHER_CABLE = form(

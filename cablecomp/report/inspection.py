@@ -1,0 +1,142 @@
+"""What `cablecomp inspect` found in a recording, for the terminal and as plain data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from cablecomp.errors import path_text
+from cablecomp.recording.channels import CANONICAL
+from cablecomp.recording.inspection import ChannelQuality, Inspection
+from cablecomp.recording.mapping import ColumnMap, mapping_text
+from cablecomp.recording.raw_columns import RawColumns
+from cablecomp.recording.suggest import Suggestion
+
+
+class Looked(NamedTuple):
+    """A recording looked at: its columns, what they may mean and are taken for; the quality of its channels and the
+    reader's remarks, or why there are none."""
+
+    recording: Path
+    raw: RawColumns
+    suggested: list[Suggestion]
+    mapping: ColumnMap
+    seen: Inspection | None
+    notes: tuple[str, ...]
+    why: str
+
+
+def show(looked: Looked, console: Console) -> None:
+    """Print what was found: columns and what they may mean, quality, remarks, the mapping."""
+    raw, mapping, seen = looked.raw, looked.mapping, looked.seen
+    rows = len(next(iter(raw.columns.values())))
+    console.print(
+        f"{looked.recording}: {raw.kind}, {len(raw.columns)} columns of numbers, {rows:,} rows looked at"
+    )
+    for topic in raw.topics.values():
+        stamped = ", stamped by its sender" if topic.stamped else ""
+        console.print(
+            f"  {topic.name}: {topic.count:,} messages, every {1e3 * topic.period_s:.4g} ms{stamped}"
+        )
+    console.print(_columns_table(raw, looked.suggested, mapping))
+    if seen is None:
+        console.print(f"not yet a recording: {looked.why}", style="yellow")
+    else:
+        _show_quality(seen, console)
+    for note in looked.notes:
+        console.print(f"note: {note}")
+    console.print("\nmapping:\n" + mapping_text(mapping))
+
+
+def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap) -> Table:
+    table = Table(box=None, show_header=True)
+    for name in ("column", "from", "to", "channel", "sure", "because"):
+        table.add_column(
+            name, justify="right" if name in ("from", "to", "sure") else "left", no_wrap=name == "channel"
+        )
+    by_column = {source.column: channel for channel, source in mapping.channel.items()}
+    reasons = {s.source.column: s for s in found}
+    for name, values in raw.columns.items():
+        finite = values[np.isfinite(values)]
+        low, high = (f"{finite.min():.5g}", f"{finite.max():.5g}") if len(finite) else ("–", "–")
+        channel, reason = by_column.get(name, ""), reasons.get(name)
+        told = reason is not None and reason.channel == channel
+        sure = f"{100 * min(reason.sure, 1.0):.0f} %" if told and reason is not None else ""
+        words = "; ".join(reason.why) if told and reason is not None else ("as mapped" if channel else "")
+        table.add_row(name, low, high, channel, sure, words)
+    for name in raw.left_out:
+        table.add_row(name, "text", "", "", "", "")
+    return table
+
+
+def _show_quality(seen: Inspection, console: Console) -> None:
+    console.print(
+        f"{seen.rows:,} rows over {seen.duration_s:.6g} s, {seen.rate_Hz:.6g} Hz, steps even within "
+        f"{100 * seen.jitter:.2g} %, {len(seen.gaps)} gaps, {seen.duplicates} repeated stamps"
+    )
+    table = Table(box=None)
+    for name in ("channel", "least", "greatest", "noise", "step", "odd"):
+        table.add_column(name, justify="left" if name in ("channel", "odd") else "right")
+    for c in seen.channels:
+        noise = "–" if c.noise is None else f"{'≥ ' if c.coloured else ''}{c.noise:.3g}"
+        step = f"{c.step:.3g}" if c.step else "–"
+        table.add_row(c.name, f"{c.least:.6g}", f"{c.greatest:.6g}", noise, step, "; ".join(_odd(c, seen)))
+    console.print(table)
+    if seen.repeats is not None:
+        r = seen.repeats
+        console.print(
+            f"repeatability: {1e3 * r.joint_rad:.4g} mrad RMS between {r.cycles} cycles of {r.period_s:.4g} s"
+        )
+
+
+def _odd(c: ChannelQuality, seen: Inspection) -> list[str]:
+    found = []
+    if c.least == c.greatest:
+        found.append("constant")
+    elif c.stuck_s > 0.05 * seen.duration_s:
+        found.append(f"rests {c.stuck_s:.3g} s while the motor moves: stuck?")
+    if c.clipped > 0.0:
+        found.append(f"clipped in {100 * c.clipped:.2g} % of the rows")
+    if c.empty:
+        found.append(f"{c.empty} empty")
+    return found
+
+
+def inspection_json(looked: Looked) -> dict[str, object]:
+    """The same as plain data."""
+    raw, seen = looked.raw, looked.seen
+    quality = None
+    if seen is not None:
+        quality = {
+            "rows": seen.rows,
+            "duration_s": seen.duration_s,
+            "rate_Hz": seen.rate_Hz,
+            "jitter": seen.jitter,
+            "gaps": [{"row": row, "gap_s": gap} for row, gap in seen.gaps],
+            "duplicates": seen.duplicates,
+            "channels": [_finite(c._asdict() if hasattr(c, "_asdict") else vars(c)) for c in seen.channels],
+            "repeats": None if seen.repeats is None else vars(seen.repeats),
+        }
+    return {
+        "schema": 1,
+        "recording": path_text(looked.recording),
+        "kind": raw.kind,
+        "columns": list(raw.columns),
+        "text_columns": list(raw.left_out),
+        "topics": {t.name: {"messages": t.count, "period_s": t.period_s} for t in raw.topics.values()},
+        "suggested": {
+            s.channel: {"sure": s.sure, "why": s.why} for s in looked.suggested if s.channel in CANONICAL
+        },
+        "mapping": looked.mapping.model_dump(by_alias=True),
+        "quality": quality,
+        "notes": list(looked.notes),
+        "not_yet": looked.why or None,
+    }
+
+
+def _finite(values: dict[str, object]) -> dict[str, object]:
+    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in values.items()}

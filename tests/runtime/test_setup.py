@@ -1,0 +1,45 @@
+"""What has to be measured for a joint to be run, and whether its link measures it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cablecomp.cli.simulation import _timing
+from cablecomp.errors import InputError
+from cablecomp.links.load import load_link
+from cablecomp.links.protocols import tells
+from cablecomp.runtime.setup import _check_measured
+
+LINKS = Path(__file__).parents[2] / "configs/links"
+TORQUE, POSITION = "joint_torque_Nm", "joint_position_rad"
+
+
+@pytest.mark.parametrize(
+    ("name", "measured"),
+    [
+        ("mit-virtual", {TORQUE, POSITION}),
+        ("dynamixel-serial", set()),
+        ("moteus-dual-encoder", {POSITION}),
+        ("cia402-dual-encoder", {POSITION}),
+    ],
+)
+def test_a_link_is_asked_for_what_the_load_is_to_come_from(name: str, measured: set[str]) -> None:
+    link = load_link(LINKS / f"{name}.toml")
+    assert {c for c in (TORQUE, POSITION) if tells(link, link.joint[0], c)} == measured
+    for load, channel in (("joint_torque", TORQUE), ("both_encoders", POSITION)):
+        if channel in measured:
+            _check_measured(link, 0, load)
+        else:
+            with pytest.raises(InputError, match=f'measures {channel}.*observer.load = "{load}"'):
+                _check_measured(link, 0, load)
+    for load in ("motor_torque", "none"):
+        _check_measured(link, 0, load)
+
+
+@pytest.mark.parametrize("rate_Hz", [1.0, 200.0, 333.0, 500.0, 1000.0, 20_000.0])
+def test_a_simulated_joint_goes_at_the_link_s_rate(rate_Hz: float) -> None:
+    timing = _timing(rate_Hz)
+    assert timing.sample_s == pytest.approx(1.0 / rate_Hz, rel=1e-12)
+    assert timing.step_s <= 5e-4 * (1.0 + 1e-9)
