@@ -30,3 +30,13 @@ def test_an_effect_that_reads_a_channel_is_asked_once_for_each_channel_that_vari
     names = [h.name for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used)]
     assert "crosstalk:other_wrist_Nm" in names
     assert "crosstalk:other_still_Nm" not in names
+
+
+def test_every_hypothesis_is_free_in_its_amount() -> None:
+    """What says how much is fitted, whatever else is held."""
+    columns = recorded()
+    columns["other_wrist_Nm"] = np.sin(columns["time_s"])
+    columns["temperature_degC"] = 20.0 + np.sin(0.1 * columns["time_s"])
+    for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used):
+        free = [p.name for p in h.free(h.starts[0].values, JOINT)]
+        assert f"effect.{h.effect.id}.{h.amount.name}" in free, h.name

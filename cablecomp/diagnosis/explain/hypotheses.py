@@ -186,7 +186,8 @@ def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
 def _held(effect: Effect) -> tuple[str, ...]:
     """Parameters that a diagnosis leaves where they start: a bearing's growth with load (the load's own friction grows
     with it already), the reference of a temperature (the pretension's other half)."""
-    return tuple(p.name for p in effect.parameters if p.name in ("load_coefficient", "reference_degC"))
+    further = [p for p in effect.parameters if not p.shape][1:] + [p for p in effect.parameters if p.shape]
+    return tuple(p.name for p in further if p.name in ("load_coefficient", "reference_degC"))
 
 
 def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
