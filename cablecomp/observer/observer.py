@@ -202,12 +202,13 @@ class Observer:
     # --- what can be asked ----------------------------------------------------------------------------------------
 
     def compile(self) -> None:
-        """Have what `step`, `peek` and the bounds need compiled (or read from the cache) before a loop is armed; the state
-        stays as it is."""
+        """Have what a loop calls (step, peek, inverse, bounds) compiled, or read from the cache, before it is armed; the
+        state stays as it is."""
         twin = Observer(self.config, bounds=self._bounds is not None)
         still = Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(self.channels))
         twin.step(still)
         twin.peek(still)
+        twin.inverse(still)
 
     def stiffness(self) -> float:
         """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
