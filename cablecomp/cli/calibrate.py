@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -36,6 +37,9 @@ def calibrate_joint(
         "calibration"
     ),
     seed: Annotated[int, typer.Option(min=0, help="of the noise replicas")] = 0,
+    budget: Annotated[
+        float, typer.Option(min=0.0, help="seconds after which no further step begins: the best so far")
+    ] = inf,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
     reading: Reading,
@@ -46,7 +50,7 @@ def calibrate_joint(
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:
-        found = calibrate(joint, data, seed, progress=told)
+        found = calibrate(joint, data, seed, progress=told, budget_s=budget)
     found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         (folder / "joint.calibrated.toml").write_text(calibrated_text(found), encoding="utf-8")

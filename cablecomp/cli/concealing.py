@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from cablecomp.cli.shared import console
+from cablecomp.cli.shared import console, plain_counts
 from cablecomp.errors import InputError
 from cablecomp.trials.prove import Wish
 
@@ -87,7 +87,11 @@ def trial_bar() -> Iterator[Callable[[str, int, int], None]]:
         MofNCompleteColumn(),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    errors = Console(stderr=True, markup=False, highlight=False)
+    if not errors.is_terminal:
+        yield plain_counts(errors)
+        return
+    with Progress(*columns, console=errors, transient=True) as bar:
         tasks: dict[str, TaskID] = {}
 
         def tell(what: str, done: int, of: int) -> None:

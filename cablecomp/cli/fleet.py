@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
-from cablecomp.cli.shared import announce_compilation, console
+from cablecomp.cli.shared import announce_compilation, console, plain_counts
 from cablecomp.cluster import Workers
 from cablecomp.errors import InputError
 from cablecomp.fleet.fleet import Work, run_fleet
@@ -44,11 +44,17 @@ def work_fleet(work: Work, folders: Sequence[Path], config: Path | None, out: Pa
     places = nights(folders, config)
     announce_compilation()
     columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    errors = Console(stderr=True, markup=False, highlight=False)
+    plain = plain_counts(errors)
+    with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bar:
         task = bar.add_task(work, total=len(places))
-        found = run_fleet(
-            work, places, out, workers, lambda done, of: bar.update(task, completed=done, total=of)
-        )
+
+        def told(done: int, of: int) -> None:
+            bar.update(task, completed=done, total=of)
+            if not errors.is_terminal:
+                plain(f"{work}: nights", done, of)
+
+        found = run_fleet(work, places, out, workers, told)
     with atomic_file(out / "fleet.html") as path:
         path.write_text(fleet_page(found, " ".join(["cablecomp", *sys.argv[1:]])), encoding="utf-8")
     console.print(fleet_table(found))

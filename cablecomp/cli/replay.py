@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from pathlib import Path
+from threading import Event
 from typing import Annotated
 
 import typer
@@ -21,10 +23,16 @@ from cablecomp.cli.shared import (
     warn,
 )
 from cablecomp.cli.sources import Reading, reads_recordings
+from cablecomp.config import JointConfig
 from cablecomp.estimation.standing import as_it_stood
+from cablecomp.monitor.played import played
+from cablecomp.monitor.server import PageServer
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
+from cablecomp.recording.reader import Recording
 from cablecomp.recording.replay import required_channels
+from cablecomp.recording.replay_summary import ReplaySummary
+from cablecomp.report.page import CSS
 from cablecomp.report.replay_page import write_replay
 
 
@@ -48,6 +56,9 @@ def replay(
     effects: EffectsOption = None,
     as_json: JsonOption = False,
     reading: Reading,
+    view: Annotated[
+        bool, typer.Option("--view", help="afterwards a page on this machine that plays the recording")
+    ] = False,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
 ) -> None:
@@ -72,7 +83,15 @@ def replay(
         )
     if as_json:
         typer.echo(summary.to_json(), nl=False)
-        return
+    else:
+        _show(summary, joint, stood)
+        console.print(f"report: {out / 'report.html'}")
+    if view:
+        _play(source, joint, summary.duration_s, bounds)
+
+
+def _show(summary: ReplaySummary, joint: JointConfig, stood: str | None) -> None:
+    """What came of it, on the terminal."""
     table = Table(show_header=False, box=None)
     if summary.rmse_rad is not None:
         table.add_row("prediction error, RMS", f"{1e3 * summary.rmse_rad:.5g} mrad")
@@ -83,4 +102,17 @@ def replay(
     if joint.sessions:
         table.add_row("session", stood or "none matches: the joint's own values")
     console.print(table)
-    console.print(f"report: {out / 'report.html'}")
+
+
+def _play(source: Recording, joint: JointConfig, duration_s: float, bounds: bool) -> None:
+    """Serve the page until the user has seen enough."""
+    server = PageServer(f"{source.path.name}, {joint.name}", CSS)
+    try:
+        typer.echo(f"on view: {server.address} (Ctrl-C ends it)", err=True)
+        for frame in played(source, joint, duration_s, bounds):
+            server.take(frame)
+        server.finish()
+        with suppress(KeyboardInterrupt):
+            Event().wait()
+    finally:
+        server.close()

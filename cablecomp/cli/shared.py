@@ -106,6 +106,19 @@ def announce_compilation() -> None:
         )
 
 
+def plain_counts(console: Console) -> Callable[[str, int, int], None]:
+    """Function to be told (what, done, of how much) where there is no terminal: a line for every tenth that is full."""
+    said: dict[str, int] = {}
+
+    def told(what: str, done: int, of: int) -> None:
+        tenth = 10 * done // max(of, 1)
+        if tenth > said.get(what, 0):
+            said[what] = tenth
+            console.print(f"{what}: {done} of {of}", soft_wrap=True)
+
+    return told
+
+
 @contextmanager
 def share_bar() -> Iterator[Callable[[str, float], None]]:
     """Give a function to be told (what is being tried, share done); the bar never runs backwards, and goes when it is

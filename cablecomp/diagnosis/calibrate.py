@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import inf
+from time import monotonic
 
 import numpy as np
 
@@ -30,6 +32,8 @@ UNTOLD = 0.9
 """Share of its prior's sd from which a parameter's own sd says that the recordings told nothing of it."""
 TIED = 0.9
 """Correlation from which on two values are said to be known only together."""
+
+OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure than the recordings allow"
 
 Progress = Callable[[str, float], None]
 
@@ -73,17 +77,26 @@ def calibrate(
     seed: int = 0,
     sessions: Sessions | None = None,
     progress: Progress = lambda what, share: None,
+    budget_s: float = inf,
 ) -> Calibration:
     """Fit what `[tolerance]` frees, and the zeros, to all rows of the recordings (name or path -> canonical channels).
 
+    After `budget_s` no further step begins: the best so far is given, and a warning says what it lacks.
+
     Raises InputError for recordings that lack a channel or that the nominal joint cannot follow.
     """
+    end = monotonic() + budget_s
+
+    def in_time() -> bool:
+        return monotonic() < end
+
     progress("cleaning the recordings", 0.0)
     body = gather_body(config, recordings, sessions)
     progress("a quick fit on thinned rows", 0.1)
     drive = calibrate_drive(config, _everything(body), np.random.default_rng(seed))
     progress("the fit on every sample", 0.3)
-    fit = on_every_sample(drive, recordings)
+    fit = on_every_sample(drive, recordings, in_time)
+    cut = () if in_time() else (OUT_OF_TIME.format(budget_s),)
     progress("what could not be told", 0.9)
     unknown = _not_told(fit)
     spread, tied = _spread(fit), _tied(fit)
@@ -97,7 +110,7 @@ def calibrate(
         rms_left(fit),
         rms_left(replace(fit, x=fit.problem.start)),
         float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])),
-        _warnings(drive, fit),
+        (*cut, *_warnings(drive, fit)),
         fit,
     )
 

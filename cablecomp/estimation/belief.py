@@ -35,6 +35,8 @@ LATE_GAIN: Final = 0.75
 MOST_LATE_S: Final = 0.25
 DELAY_ROWS: Final = 1500
 """Rows on which delays are looked for."""
+LOST: Final = np.array((0.004, 0.012, 0.035, 0.1))
+"""Half widths of lost motion, as shares of a channel's range, that are tried in a delay's place."""
 GAP: Final = 10.0
 """Usual steps that make a gap."""
 MOVED: Final = 0.05
@@ -175,7 +177,11 @@ class _View:
 
     def delays(self) -> list[Suspicion]:
         """Whether the load, or the joint angle, comes late or early: the nominal drive, which knows its own hysteresis, is
-        run with each of them shifted."""
+        run with each of them shifted.
+
+        Lost motion trails by an angle, whatever the speed; a delay by a time. So both may explain what is left, and a
+        delay is believed only for what it takes beyond lost motion of any width.
+        """
         found = []
         wanted = [JOINT, *([self.channel] if self.channel and np.ptp(self.M) > 0.0 else [])]
         step = float(np.median(np.diff(self.time)))
@@ -221,9 +227,19 @@ class _View:
             ]
         except CablecompError:  # such a load the nominal drive cannot bear
             return float("inf")
-        A = np.column_stack((np.ones_like(q), q - q.mean(), M - M.mean(), bent))
+        lost = (_trailing(q), _trailing(M)) if np.ptp(M) > 0.0 else (_trailing(q),)
+        A = np.column_stack((np.ones_like(q), q - q.mean(), M - M.mean(), bent, *lost))
         later = slice(len(q) // 4, None)  # what went before is not known
         return _rms((y - A @ np.linalg.lstsq(A[later], y[later], rcond=None)[0])[later])
+
+
+def _trailing(x: FloatArray) -> FloatArray:
+    """x behind lost motion of several widths (play operators), one column each."""
+    half = LOST * float(np.ptp(x))
+    z = np.full((len(x), len(half)), x[0])
+    for k in range(1, len(x)):
+        z[k] = np.minimum(np.maximum(z[k - 1], x[k] - half), x[k] + half)
+    return z
 
 
 def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[Suspicion]:

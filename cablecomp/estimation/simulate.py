@@ -62,7 +62,7 @@ class Simulator:
         S, J = model.S.copy(), model.J.copy()
         joint_start(model.P, model.I, S, J, model.L, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
         outs = np.empty((len(rows), st.OUT_WIDTH))
-        done, status = st.run_block(model.P, model.I, S, J, model.L, rows, outs)
+        done, status = st.walk(model.P, model.I, S, J, model.L, rows, outs, True)
         if status != STATUS_OK:
             at = rows[min(done, len(rows) - 1), st.IN_TIME]
             raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")

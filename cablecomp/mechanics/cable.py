@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.guide import guide_commit, guide_split
-from cablecomp.mechanics.jit import inlined_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, B, Floats, set_pending, wrap_commit, wrap_eval
 from cablecomp.mechanics.records import IN, OUT
 from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
@@ -97,7 +97,7 @@ def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
     return z, 0.0
 
 
-@kernel
+@inner_kernel
 def cable_commit(d: Drive, L: Floats, c: int) -> None:
     """Make the last evaluation of cable c its state, and renew the bound on what merging has done to its stretch.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from cablecomp.mechanics.cable import cable_commit, cable_eval
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import inlined_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
 from cablecomp.mechanics.nudge import SMALL, cable_nudge
 from cablecomp.mechanics.profile import Floats
 from cablecomp.mechanics.records import OUT
@@ -42,7 +42,7 @@ def chain_eval(
     return theta, compliance, turn
 
 
-@kernel
+@inner_kernel
 def circuit_solve(
     d: Drive, L: Floats, ic: int, moment: float, x_in: float, x_guess: float
 ) -> tuple[float, float, int]:
@@ -118,7 +118,7 @@ def circuit_solve(
     return x, 0.0, STATUS_DIVERGED
 
 
-@kernel
+@inner_kernel
 def circuit_commit(d: Drive, L: Floats, ic: int) -> None:
     """Make the last solution of circuit `ic` its state."""
     circuit = d.circuits[ic]

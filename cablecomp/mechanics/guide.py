@@ -11,13 +11,13 @@ import math
 
 from cablecomp.mechanics.arc import arc_commit, arc_eval
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import kernel
+from cablecomp.mechanics.jit import inner_kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, set_pending, wrap_eval
 from cablecomp.mechanics.records import IN
 from cablecomp.mechanics.tables import strain_of_tau, tau_of_v
 
 
-@kernel
+@inner_kernel
 def guide_split(
     d: Drive, L: Floats, c: int, v2: float, x_in: float, w_in: float
 ) -> tuple[float, float, float]:
@@ -78,7 +78,7 @@ def guide_split(
     return side + per_turn * e_arc, slope, math.exp(v1)
 
 
-@kernel
+@inner_kernel
 def guide_commit(d: Drive, c: int) -> None:
     """Make the last split the state of cable c's guide."""
     state = d.states[c]

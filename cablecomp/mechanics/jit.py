@@ -93,6 +93,23 @@ def leaf_kernel(function: F) -> F:
     return cached(lambda: compile_(function))
 
 
+def inner_kernel(function: F) -> F:
+    """As `kernel`, for what takes a joint's records and kernels alone call.
+
+    An entry from Python, which would have to take a dozen arrays apart, is left out: it took longer to compile than the
+    function. Python must not call it.
+    """
+    compile_ = numba.njit(
+        cache=True,
+        error_model="numpy",
+        nogil=True,
+        _nrt=False,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+    )
+    return cached(lambda: compile_(function))
+
+
 def inlined_kernel(function: F) -> F:
     """As `kernel`, for functions with one caller or with a view as result: their text becomes part of the caller's.
 

@@ -6,14 +6,14 @@ import math
 
 from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
 from cablecomp.mechanics.drive import Drive, Terms
-from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
 from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
 
 
-@kernel
+@inner_kernel
 def run_terms(d: Drive, terms: Terms) -> None:
     """Let every term add its part to the context."""
     x = d.context
@@ -28,7 +28,7 @@ def run_terms(d: Drive, terms: Terms) -> None:
         )
 
 
-@kernel
+@inner_kernel
 def _distribute(d: Drive) -> None:
     """Hand the terms' lengths and stiffness factors to the cables at the joint (pretension factors: at commits)."""
     x = d.context
@@ -120,7 +120,7 @@ def joint_solve(d: Drive, terms: Terms, L: Floats) -> int:
     return status
 
 
-@kernel
+@inner_kernel
 def advance(d: Drive, time: float, motor: float, load: float, temperature: float) -> None:
     """Write one sample's readings into the context."""
     x = d.context
@@ -134,7 +134,7 @@ def advance(d: Drive, time: float, motor: float, load: float, temperature: float
     x.commit = 0.0
 
 
-@kernel
+@inner_kernel
 def _follow_pretension(d: Drive, L: Floats) -> None:
     """Let the pretension of all cables follow the terms' factors; the next sample finds it."""
     x = d.context
@@ -145,7 +145,7 @@ def _follow_pretension(d: Drive, L: Floats) -> None:
                 retension(d, L, circuit.first[chain] + j, x.pretension_h if chain == 0 else x.pretension_l)
 
 
-@kernel
+@inner_kernel
 def terms_sane(d: Drive) -> bool:
     """True if the terms' answers are finite and all factors positive."""
     x = d.context
@@ -155,7 +155,7 @@ def terms_sane(d: Drive) -> bool:
     return positive and math.isfinite(sums) and math.isfinite(factors)
 
 
-@leaf_kernel
+@inner_kernel
 def joint_ready(d: Drive) -> int:
     """Whether the pending solution may become the state: cable left on every drum, every number finite, tensions positive.
 
@@ -170,7 +170,7 @@ def joint_ready(d: Drive) -> int:
     return STATUS_OK if abs(d.context.joint) < 1e300 else STATUS_DIVERGED
 
 
-@leaf_kernel
+@inner_kernel
 def strength_used(d: Drive) -> float:
     """Greatest share of its breaking force that any cable bears in the pending solution; 0 where none is stated."""
     worst = 0.0
@@ -180,7 +180,7 @@ def strength_used(d: Drive) -> float:
     return worst
 
 
-@kernel
+@inner_kernel
 def joint_commit(d: Drive, terms: Terms, L: Floats) -> int:
     """Make the solved sample the state, unless a term's last word forbids it (the status says so)."""
     x = d.context

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import kernel, leaf_kernel
+from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.profile import D, Floats, V, Y, piece_plain
 from cablecomp.mechanics.records import IN, OUT
 
@@ -23,7 +23,7 @@ def grown(value: float, d: float) -> float:
     return value * (1.0 + d * (1.0 + 0.5 * d))
 
 
-@kernel
+@inner_kernel
 def wrap_nudge(step: Any, G: Floats, i: int, n: int, mu: float, dv: float, dw: float) -> bool:
     """Shift the pending step of plain wrap i by dv in its end value and dw in its wrap angle, if that is simple."""
     k = int(step.k)
@@ -59,7 +59,7 @@ def wrap_nudge(step: Any, G: Floats, i: int, n: int, mu: float, dv: float, dw: f
     return True
 
 
-@kernel
+@inner_kernel
 def cable_nudge(d: Drive, c: int, change: float, turn: float) -> bool:
     """Shift the pending evaluation of plain cable c by `change` [N] of tension and `turn` [rad] of its output shaft."""
     cable, state = d.cables[c], d.states[c]

@@ -1,4 +1,4 @@
-"""Call a compiled term by its address, so that a new effect never recompiles the kernel."""
+"""Call compiled code by its address: a new effect never recompiles the kernel, and no caller compiles it again."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 from llvmlite import ir
-from numba.core import types
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 TERM_SIGNATURE = types.void(types.voidptr, types.voidptr, types.voidptr)
@@ -30,3 +30,34 @@ def _call(typing: Any, address: Any, data: Any, parameters: Any, state: Any) -> 
 def call_term(address: int, context: Any, parameters: Any, state: Any) -> None:
     """Run the compiled term at `address` on three float64 arrays (context, its parameters, its state)."""
     _call(address, context.ctypes.data, parameters.ctypes.data, state.ctypes.data)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call_walk(
+    typing: Any, address: Any, P: Any, I: Any, S: Any, J: Any, L: Any, rows: Any, outs: Any, commit: Any
+) -> Any:
+    """Run the kernel `walk` whose machine code lies at `address` (`kernel_address`): rows done, status.
+
+    An ordinary call would link the callee's code into the caller's and compile all of it once more.
+    """
+    kinds = (P, I, S, J, L, rows, outs, commit)
+    result = types.UniTuple(types.int64, 2)
+
+    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        convention = context.call_conv
+        function = convention.get_function_type(result, kinds)
+        target = builder.inttoptr(args[0], function.as_pointer())
+        status, value = convention.call_function(builder, target, result, kinds, args[1:])
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return value
+
+    return result(types.int64, *kinds), generate
+
+
+def kernel_address(kernel: Any, *arguments: Any) -> int:
+    """Address of a kernel's machine code for arguments of these types, compiled or read from the cache if need be."""
+    kinds = tuple(numba.typeof(argument) for argument in arguments)
+    kernel.compile(kinds)
+    compiled = kernel.overloads[kinds]
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

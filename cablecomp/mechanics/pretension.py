@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import kernel
+from cablecomp.mechanics.jit import inner_kernel, kernel
 from cablecomp.mechanics.profile import D, Floats, Ints, V, Y, accumulate
-from cablecomp.mechanics.records import WET_NODES
+from cablecomp.mechanics.records import IN, WET_NODES
 from cablecomp.mechanics.tables import between, groove, tau_of_v, v_of_tau
 
 LEAST_TAU = 1e-6
@@ -26,7 +26,7 @@ LONGEST = 0.06  # rise of a straight piece that still stays straight enough when
 TOUCH = 1e-12
 
 
-@kernel
+@inner_kernel
 def retension(d: Drive, L: Floats, c: int, factor: float) -> None:
     """Bring cable c's profiles to pretension T0 * factor."""
     cable, state, G = d.cables[c], d.states[c], d.profiles
@@ -45,7 +45,7 @@ def retension(d: Drive, L: Floats, c: int, factor: float) -> None:
         _shift(G, d.heights, L, cable.law[end], 2 * c + end, cable.mu[end], g)
     if d.size.stacks > 2 * d.size.cables:
         arc = 2 * d.size.cables + c
-        _shift(G, d.heights, L, 2, arc, 1.0, g)
+        _shift(G, d.heights, L, cable.law[IN], arc, 1.0, g)  # the law of what is no output drum
         state.guide_end = G[arc, V, 0]
 
 
@@ -89,13 +89,13 @@ def _split(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
 @kernel
 def _let_slip(G: Floats, L: Floats, law: int, i: int, n: int, mu: float) -> None:
     """Let every zone slide that is steeper than friction holds."""
-    k = 1
-    while k < n:
+    k = 0
+    while k < n - 1:
+        k += 1
         rise = G[i, V, k] - G[i, V, k - 1]
         hold = mu * (groove(L, law, G[i, Y, k]) - groove(L, law, G[i, Y, k - 1]))
         if abs(rise) - hold > TOUCH:
             k = _slide(G, L, law, i, k, n, mu if rise > 0.0 else -mu)
-        k += 1
 
 
 @kernel

@@ -10,14 +10,14 @@ from __future__ import annotations
 from typing import Any
 
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import kernel
+from cablecomp.mechanics.jit import inner_kernel, kernel
 from cablecomp.mechanics.profile import Floats, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
 STIFFEST = 1e3  # diffusion number per step beyond which slip is as good as quasi-static
 
 
-@kernel
+@inner_kernel
 def viscous_fill(grid: Any, w: float, reach: float) -> None:
     """Start a wrap, a record `GRID`, at uniform tension T0 with wrap angle w; the grid covers `reach` [rad]."""
     grid.step = reach / (WET_NODES - 1)
@@ -37,7 +37,7 @@ def _free_nodes(w: float, h: float) -> int:
     return min(max(int((w - 0.3 * h) / h) + 1, 1), WET_NODES)
 
 
-@kernel
+@inner_kernel
 def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> tuple[float, float, float]:
     """Integral of tau - 1 over the wrap at end value tau, its derivatives by ln tau and by the wrap angle; kept as pending."""
     cable, state, context, grid = d.cables[c], d.states[c], d.context, d.grids[2 * c + end]
@@ -165,7 +165,7 @@ def _newton(
     return largest
 
 
-@kernel
+@inner_kernel
 def viscous_commit(grid: Any) -> None:
     """Make the pending profile of a wrap its state."""
     grid.count, grid.angle, grid.end = grid.count_try, grid.angle_try, grid.end_try

@@ -51,11 +51,15 @@ class PageServer:
             self._frames.append((self._count, text))
             self._news.notify_all()
 
-    def close(self) -> None:
-        """End every stream and the server."""
+    def finish(self) -> None:
+        """Say that no more frames come; the page stays."""
         with self._news:
             self._over = True
             self._news.notify_all()
+
+    def close(self) -> None:
+        """End every stream and the server."""
+        self.finish()
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()

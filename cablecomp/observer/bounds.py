@@ -55,11 +55,11 @@ class BoundPair:
         return float(low), float(high)
 
     def run(
-        self, kernel: Kernel, rows: Floats, outs: Floats, inverse: bool, interval: Floats
+        self, walk_at: int, kernel: Kernel, rows: Floats, outs: Floats, interval: Floats
     ) -> tuple[int, int]:
-        """Step the observer's own state and the bounds through rows of readings; `interval` gets lowest and highest joint
-        angle. With `inverse` each load is found from both encoders. Returns rows done and the status that stopped it."""
-        return run_bounded(*kernel, rows, outs, inverse, self.numbers, *self._low, *self._up, interval)
+        """Step the observer's own state (by `walk`, whose machine code lies at `walk_at`) and the bounds through rows of
+        readings; `interval` gets lowest and highest joint angle. Returns rows done and the status that stopped it."""
+        return run_bounded(walk_at, *kernel, rows, outs, self.numbers, *self._low, *self._up, interval)
 
     def states(self) -> list[tuple[Floats, Ints]]:
         """The two histories, for a snapshot (with `numbers`)."""

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from cablecomp.mechanics.drive import Drive, drive
-from cablecomp.mechanics.jit import kernel
+from cablecomp.mechanics.jit import inner_kernel, kernel
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.records import OUT
 from cablecomp.observer.bounds_kernel import (
@@ -41,7 +41,7 @@ class Shafts(NamedTuple):
     x_out: float
 
 
-@kernel
+@inner_kernel
 def pair_gap(
     b: Bounds, nominal: Drive, L: Floats, ic: int, high: Side, low: Side, tension: float, pull: float, x: Shafts, safe: float
 ) -> tuple[float, float, float, float]:  # fmt: skip
@@ -60,7 +60,7 @@ def pair_gap(
     return theta_h + theta_l, a_h + a_l, theta_h, theta_l
 
 
-@kernel
+@inner_kernel
 def pair_root(
     b: Bounds, nominal: Drive, L: Floats, ic: int, high: Side, low: Side, lowest: float, guess: float, pull: float,
     x: Shafts, safe: float, target: float,
@@ -93,7 +93,7 @@ def pair_root(
     return tension
 
 
-@kernel
+@inner_kernel
 def tension_interval(
     b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, lowest: float, pull: float, x: Shafts
 ) -> tuple[float, float]:
@@ -133,14 +133,14 @@ def tension_interval(
     return t_low, max(t_high, t_low)
 
 
-@kernel
+@inner_kernel
 def floor_tension(nominal: Drive, ic: int, pull: float) -> float:
     """The tension of cable l at which it, or cable h, is slack."""
     floor = nominal.circuits[ic].slack
     return floor if pull >= 0.0 else floor - pull
 
 
-@kernel
+@inner_kernel
 def _comparable(b: Bounds, nominal: Drive, ic: int, low: Side) -> bool:
     """True where surplus and deficit carry over from the last step: same factors, less cable wound on than is free."""
     circuit = nominal.circuits[ic]
@@ -155,7 +155,7 @@ def _comparable(b: Bounds, nominal: Drive, ic: int, low: Side) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def closed_interval(
     b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, pull: float, x: Shafts
 ) -> tuple[float, float]:
@@ -189,7 +189,7 @@ def _part(mixed: float, least: float, most: float, pull: float, by_h: float, by_
     return by_h if pull >= 0.0 else by_l
 
 
-@kernel
+@inner_kernel
 def circuit_interval(
     b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, moment: float, x: Shafts
 ) -> tuple[float, float]:
@@ -220,7 +220,7 @@ def circuit_interval(
     return math.nan, math.nan
 
 
-@kernel
+@inner_kernel
 def _eps_hold(
     b: Bounds, nominal: Drive, ic: int, low: Side, up: Side, theta_low: float, theta_high: float, x: Shafts
 ) -> bool:
@@ -252,7 +252,7 @@ def _eps_hold(
     return held
 
 
-@kernel
+@inner_kernel
 def circuit_keep(
     b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, pull: float, x_in: float
 ) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from cablecomp.mechanics.assemble import Model
 from cablecomp.mechanics.drive import Drive, drive
-from cablecomp.mechanics.jit import inlined_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import (
     LEAST_WRAP,
@@ -134,7 +134,7 @@ def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, 
         b.circuits[ic].first = 1.0
 
 
-@kernel
+@inner_kernel
 def _fill(d: Drive, L: Floats, past: float) -> None:
     G = d.profiles
     for c in range(d.size.cables):
@@ -144,7 +144,7 @@ def _fill(d: Drive, L: Floats, past: float) -> None:
             d.heights[wrap] = wrap_fill(G, L, law, wrap, w, v_of_tau(L, law, math.exp(past)), 0.0)
 
 
-@kernel
+@inner_kernel
 def side_follow(d: Drive, nominal: Drive, first: bool) -> None:
     """Take over stiffness factors and lengths of the nominal state, at the first step its pretension factors too."""
     for c in range(d.size.cables):
@@ -154,14 +154,14 @@ def side_follow(d: Drive, nominal: Drive, first: bool) -> None:
             state.pretension = its.pretension
 
 
-@kernel
+@inner_kernel
 def side_retension(d: Drive, nominal: Drive, L: Floats) -> None:
     """Bring one bound to the pretension that the nominal state took on when it committed."""
     for c in range(d.size.cables):
         retension(d, L, c, nominal.states[c].pretension)
 
 
-@kernel
+@inner_kernel
 def _cable(
     b: Bounds, L: Floats, side: Side, c: int, tension: float, x_in: float, x_out: float, eps_in: float
 ) -> tuple[float, float, float]:
@@ -199,7 +199,7 @@ def _cable(
     return total * unit - state.offset, slope * unit / t0, margin * unit
 
 
-@kernel
+@inner_kernel
 def chain_bound(
     b: Bounds, nominal: Drive, L: Floats, side: Side, first: int, count: int, tension: float, x_in: float, x_out: float,
     eps_in: float,
@@ -223,7 +223,7 @@ def chain_bound(
     return theta, slope, margin
 
 
-@kernel
+@inner_kernel
 def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> tuple[float, float, float]:
     """Out of a state's pending evaluation: rotation [rad] of the chain's output per rad by which output wraps are turned,
     at most; the same for a shift of all end values by mu per rad; and its greatest compliance [rad/N]."""
@@ -244,7 +244,7 @@ def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> tuple[float, f
     return turning, shifting, compliance
 
 
-@kernel
+@inner_kernel
 def chain_commit(d: Drive, L: Floats, first: int, count: int) -> None:
     """Make the last evaluation of a chain its bound's state."""
     for c in range(first, first + count):

@@ -17,6 +17,7 @@ from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError, InternalError
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.invariants import heights_fit, profile_violations, violations
+from cablecomp.mechanics.pointer import kernel_address
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.start import joint_start
 from cablecomp.mechanics.status import STATUS_OK
@@ -47,8 +48,11 @@ class Observer:
         self._S, self._J = self.model.S.copy(), self.model.J.copy()
         # every array is written in place for good, so one tuple serves all calls
         self._arrays: Kernel = (self.model.P, self.model.I, self._S, self._J, self.model.L)
-        self._row = np.zeros(st.IN_OTHER + len(self.channels))
-        self._out = np.zeros(st.OUT_WIDTH)
+        self._rows_of_one = np.zeros((1, st.IN_OTHER + len(self.channels)))
+        self._outs_of_one = np.zeros((1, st.OUT_WIDTH))
+        self._row, self._out = self._rows_of_one[0], self._outs_of_one[0]
+        self._one = (*self._arrays, self._rows_of_one, self._outs_of_one)
+        self._address = 0
         self._ratio = config.drive.ratio
         self._named = self.model.named(self._S, self._J)
         self._spare = int(self._named.size.spare_at)
@@ -63,23 +67,20 @@ class Observer:
     def step(self, sample: Sample) -> Estimate:
         """Commit one sample and say what the joint does."""
         fresh = self._read(sample)
-        status = STATUS_OK
         if self._source == "both_encoders":
-            status = st.find_load(*self._arrays, self._row, self._out)
-        if status == STATUS_OK:
-            status = st.step_one(*self._arrays, self._row, self._out)
-        return self._taken(sample, status, fresh)
+            return self._taken(sample, self._walk_inverse(True), fresh)
+        return self._taken(sample, st.walk(*self._one, True)[1], fresh)
 
     def peek(self, sample: Sample) -> Estimate:
         """Predict the joint for a sample (for instance the load expected next) and commit nothing."""
         fresh = self._read(sample)
-        return self._peeked(sample, st.peek_one(*self._arrays, self._row, self._out), fresh)
+        return self._peeked(sample, st.walk(*self._one, False)[1], fresh)
 
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the last sample."""
         row = self._row
         row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_LOAD] = time_s, motor_position_rad, joint_torque_Nm
-        status = st.peek_one(*self._arrays, row, self._out)
+        _, status = st.walk(*self._one, False)
         if status != STATUS_OK:
             self._refuse(status, time_s, False)
         return float(self._out[st.OUT_JOINT]) - self._ratio * motor_position_rad
@@ -122,18 +123,12 @@ class Observer:
     def inverse(self, sample: Sample) -> Estimate:
         """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
         fresh = self._read(sample)
-        status = st.find_load(*self._arrays, self._row, self._out)
-        if status == STATUS_OK:
-            status = st.peek_one(*self._arrays, self._row, self._out)
-        return self._peeked(sample, status, fresh)
+        return self._peeked(sample, self._walk_inverse(False), fresh)
 
     def step_inverse(self, sample: Sample) -> Estimate:
         """As `inverse`, and commits the sample with the torque found."""
         fresh = self._read(sample)
-        status = st.find_load(*self._arrays, self._row, self._out)
-        if status == STATUS_OK:
-            status = st.step_one(*self._arrays, self._row, self._out)
-        return self._taken(sample, status, fresh)
+        return self._taken(sample, self._walk_inverse(True), fresh)
 
     # --- state ----------------------------------------------------------------------------------------------------
 
@@ -207,23 +202,13 @@ class Observer:
     # --- what can be asked ----------------------------------------------------------------------------------------
 
     def compile(self) -> None:
-        """Have every kernel compiled (or read from the cache) before a loop is armed; the state stays as it is."""
+        """Have what a loop calls (step, peek, inverse, bounds) compiled, or read from the cache, before it is armed; the
+        state stays as it is."""
         twin = Observer(self.config, bounds=self._bounds is not None)
         still = Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(self.channels))
         twin.step(still)
         twin.peek(still)
         twin.inverse(still)
-        columns = {
-            "time_s": np.array([1.0]),
-            "motor_position_rad": np.zeros(1),
-            "joint_torque_Nm": np.zeros(1),
-        }
-        columns |= {
-            "joint_position_rad": np.zeros(1),
-            "temperature_degC": np.zeros(1),
-            "motor_torque_Nm": np.zeros(1),
-        }
-        twin.run(columns | {name: np.zeros(1) for name in self.channels})
 
     def stiffness(self) -> float:
         """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
@@ -323,16 +308,30 @@ class Observer:
 
     def _run_rows(self, rows: Floats, outs: Floats, low: Floats, high: Floats) -> tuple[int, int]:
         """Run a block by the compiled loop that does what is wanted; returns rows done and the last status."""
-        inverse = self.config.observer.load == "both_encoders"
+        known = len(rows), STATUS_OK
+        if self.config.observer.load == "both_encoders":
+            before = self._S.copy(), self._J.copy()
+            known = st.walk_inverse(self._walk_at(), *self._arrays, rows, outs, True)
+            if self._bounds is None:
+                return known
+            self._S[:], self._J[:] = before  # every row's load is known by now: once more, with the bounds
         if self._bounds is None:
-            if inverse:
-                return st.run_inverse(*self._arrays, rows, outs)
-            return st.run_block(*self._arrays, rows, outs)
+            return st.walk(*self._arrays, rows, outs, True)
         interval = np.empty((len(rows), 2))
-        answer = self._bounds.run(self._arrays, rows, outs, inverse, interval)
+        answer = self._bounds.run(self._walk_at(), self._arrays, rows[: known[0]], outs, interval)
         shift = outs[:, st.OUT_JOINT] - outs[:, st.OUT_DRIVE] - self._ratio * rows[:, st.IN_MOTOR]
         low[:], high[:] = interval[:, 0] + shift, interval[:, 1] + shift
-        return answer
+        return answer if answer[1] != STATUS_OK else known
+
+    def _walk_inverse(self, commit: bool) -> int:
+        """`walk` for the sample that was read, its load found from both encoders: the status."""
+        return int(st.walk_inverse(self._walk_at(), *self._one, commit)[1])
+
+    def _walk_at(self) -> int:
+        """Where the machine code of `walk` lies for this observer's arrays."""
+        if self._address == 0:
+            self._address = kernel_address(st.walk, *self._one, True)
+        return self._address
 
     def _taken(self, sample: Sample, status: int, fresh: bool) -> Estimate:
         """What a step ends with: the estimate, or the refusal."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics.drive import Drive, Terms, drive, terms_of
-from cablecomp.mechanics.jit import inlined_kernel, kernel, leaf_kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.joint import (
     advance,
     joint_commit,
@@ -14,6 +14,7 @@ from cablecomp.mechanics.joint import (
     strength_used,
     terms_sane,
 )
+from cablecomp.mechanics.pointer import call_walk
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 from cablecomp.mechanics.records import IN
 from cablecomp.mechanics.status import (
@@ -38,7 +39,7 @@ IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
 ) = range(11)  # fmt: skip
 
 
-@leaf_kernel
+@inner_kernel
 def smooth(d: Drive, dt: float, motor: float, load: float) -> tuple[float, float]:
     """Causal input filter: an alpha-beta tracker of value and slope, critically damped; it follows ramps without lag.
 
@@ -63,7 +64,7 @@ def smooth(d: Drive, dt: float, motor: float, load: float) -> tuple[float, float
     return f.motor, f.load
 
 
-@leaf_kernel
+@inner_kernel
 def admissible(d: Drive, row: Floats) -> int:
     """Whether a row of readings can be taken at all: started state, finite readings, time that does not run backwards."""
     if d.heights[0] < 2:
@@ -127,68 +128,55 @@ def predict(d: Drive, terms: Terms, L: Floats, row: Floats, out: Floats) -> int:
     return status
 
 
-@kernel
+@inner_kernel
 def keep(d: Drive, S: Floats) -> None:
     """Copy everything but the profiles (which nothing but a commit touches) aside."""
     copy_floats(S, 0, S, d.size.spare_at, d.size.steps_at)
 
 
-@kernel
+@inner_kernel
 def put_back(d: Drive, S: Floats) -> None:
     """Undo what happened since `keep`, bit for bit."""
     copy_floats(S, d.size.spare_at, S, 0, d.size.steps_at)
 
 
-@inlined_kernel
-def take(d: Drive, terms: Terms, L: Floats, row: Floats, out: Floats) -> int:
-    """One sample, committed; or refused (the status says why), and the state is what it was, bit for bit."""
-    keep(d, terms.memory)
-    status = predict(d, terms, L, row, out)
-    if status == STATUS_OK:
-        out[OUT_STRENGTH] = strength_used(d)
-        status = joint_commit(d, terms, L) if out[OUT_STRENGTH] <= 1.0 else STATUS_BREAKS
-    if status != STATUS_OK:
-        put_back(d, terms.memory)
-    return status
-
-
 @kernel
-def step_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
-    """One sample, committed or refused."""
-    return take(drive(P, I, S, J), terms_of(P, I, S), L, row, out)
-
-
-@kernel
-def peek_one(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
-    """One sample, nothing committed. A cable that would break is no reason to refuse a prediction."""
-    d = drive(P, I, S, J)
-    keep(d, S)
-    status = predict(d, terms_of(P, I, S), L, row, out)
-    put_back(d, S)
-    return status
-
-
-@kernel
-def run_block(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
+def walk(
+    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats, commit: bool
 ) -> tuple[int, int]:
-    """Step through a block of rows; returns how many were done and the status of the row that stopped it."""
+    """Step through a block of rows; returns how many were done and the status of the row that stopped it.
+
+    With `commit` every row becomes the state, or is refused, and the state is what it was before that row, bit for bit;
+    without, nothing is kept of any (and a cable that would break is no reason to refuse a prediction). All that steps
+    the observer goes through this one function, as it is long to compile.
+    """
     d, terms = drive(P, I, S, J), terms_of(P, I, S)
     for k in range(rows.shape[0]):
-        status = take(d, terms, L, rows[k], outs[k])
+        out = outs[k]
+        keep(d, S)
+        status = predict(d, terms, L, rows[k], out)
+        if commit and status == STATUS_OK:
+            out[OUT_STRENGTH] = strength_used(d)
+            status = joint_commit(d, terms, L) if out[OUT_STRENGTH] <= 1.0 else STATUS_BREAKS
+        if status != STATUS_OK or not commit:
+            put_back(d, S)
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK
 
 
 @kernel
-def find_load(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, out: Floats) -> int:
-    """The load [N m] under which the joint encoder would read row[IN_JOINT], by Newton's method; written to row[IN_LOAD].
+def find_load(
+    walk_at: int, P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
+) -> int:
+    """The load [N m] under which the joint encoder would read the only row's IN_JOINT, by Newton's method; written to its
+    IN_LOAD. `walk_at`: where the machine code of `walk` lies.
 
     Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
     are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a load that the joint
     cannot take (an open circuit's cable slack, a drum unwound): if that is what the angle asks for, it is refused.
     """
+    row, out = rows[0], outs[0]
     if not math.isfinite(row[IN_JOINT]):
         return STATUS_NAN
     d = drive(P, I, S, J)
@@ -199,7 +187,7 @@ def find_load(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, ou
     taken = 0.0  # the last load that the joint could take
     for _ in range(200):
         row[IN_LOAD] = load
-        status = peek_one(P, I, S, J, L, row, out)
+        _, status = call_walk(walk_at, P, I, S, J, L, rows, outs, False)
         if status in (STATUS_SLACK, STATUS_UNWOUND, STATUS_DIVERGED):
             reach *= 2.0
             if status == STATUS_SLACK or load < taken:
@@ -231,14 +219,15 @@ def find_load(P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, row: Floats, ou
 
 
 @kernel
-def run_inverse(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
+def walk_inverse(
+    walk_at: int, P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats, commit: bool
 ) -> tuple[int, int]:
-    """As `run_block`, with every row's load found from both encoders."""
+    """As `walk`, with every row's load found from both encoders."""
     for k in range(rows.shape[0]):
-        status = find_load(P, I, S, J, L, rows[k], outs[k])
+        row, out = rows[k : k + 1], outs[k : k + 1]
+        status = find_load(walk_at, P, I, S, J, L, row, out)
         if status == STATUS_OK:
-            status = step_one(P, I, S, J, L, rows[k], outs[k])
+            _, status = call_walk(walk_at, P, I, S, J, L, row, out, commit)
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK

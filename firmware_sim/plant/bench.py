@@ -38,7 +38,7 @@ from firmware_sim.plant.columns import (
 from firmware_sim.plant.config import EffectSpec, PlantConfig
 from firmware_sim.plant.effects import apply_effects
 from firmware_sim.plant.errors import PlantError
-from firmware_sim.plant.jit import njit
+from firmware_sim.plant.jit import njit, part
 from firmware_sim.plant.mesh import NORMAL, Resolution
 from firmware_sim.plant.readout import read_out
 from firmware_sim.plant.records import Drive, Floats
@@ -228,11 +228,12 @@ def _play(
 
     Inertia takes a kink in the motor's angle for a blow: with it the angle is on parabolas between samples.
     """
-    u0 = inputs[0].copy()
-    heavy = np.any(drive.shafts["inertia"] > 0.0)
+    heavy = False
+    for k in range(len(drive.shafts)):
+        heavy = heavy or drive.shafts[k].inertia > 0.0
     bend, speed = 0.0, 0.0
     for k in range(len(inputs)):
-        u1 = inputs[k]
+        u0, u1 = inputs[max(k - 1, 0)], inputs[k]
         if k > 0:
             h = u1[TIME] - u0[TIME]
             parts = math.ceil(abs(u1[MOTOR_ANGLE] - u0[MOTOR_ANGLE]) * steps_per_rad)
@@ -242,16 +243,23 @@ def _play(
                 speed = now
             if not advance(drive, u0, u1, h, parts, bend):
                 return -2 - k
-            u0[:] = u1
         else:
             h = 1e-3
-        if wrap_exhausted(drive):
+        if not look(drive, readout, output, u1, h, outputs[k]):
             return k
-        observe(drive, readout, output, u1, h, outputs[k])
     return -1
 
 
 @njit
+def look(drive: Drive, readout: Any, output: int, u: Floats, h: float, row: Floats) -> bool:
+    """Fill one row of outputs from the present state; False if too little cable is left on a drum."""
+    if wrap_exhausted(drive):
+        return False
+    observe(drive, readout, output, u, h, row)
+    return True
+
+
+@part
 def wrap_exhausted(drive: Drive) -> bool:
     """Whether less than 0.1 rad of cable is left on any drum."""
     for k in range(len(drive.cables)):
@@ -262,7 +270,7 @@ def wrap_exhausted(drive: Drive) -> bool:
     return False
 
 
-@njit
+@part
 def observe(drive: Drive, readout: Any, output: int, u: Floats, h: float, row: Floats) -> None:
     """Fill one row of outputs from the present state."""
     s, m = drive.shafts[output], drive.shafts[0]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from firmware_sim.plant.jit import njit
+from firmware_sim.plant.jit import part
 from firmware_sim.plant.records import (
     FREE,
     GROOVE_LOW,
@@ -31,7 +31,7 @@ from firmware_sim.plant.records import (
 STIFFEST = math.log(6.0)  # a stiffening cable gets no stiffer than six times EA
 
 
-@njit
+@part
 def guess_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
     """Tension at the first guess of a step: a taut element counts as taut even if the guess presses it
     together."""
@@ -46,7 +46,7 @@ def guess_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
         slope[e] = rate / l0[e]
 
 
-@njit
+@part
 def refresh_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
     """Tension and tangent stiffness of every element: T = EA ε, or with stiffening b: dT/dε = EA (1 + b
     (T/T0 − 1)), or by a table.
@@ -82,7 +82,7 @@ def refresh_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
             slope[e] = weak / l0[e]
 
 
-@njit
+@part
 def look_up_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
     """Tension and stiffness of every element out of a table over the strain: cubic between its points, straight
     beyond its end."""
@@ -108,7 +108,7 @@ def look_up_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
         slope[e] = c.EA * rate / l0[e]
 
 
-@njit
+@part
 def _grip(x: float) -> float:
     """2 tanh(x/2), to 1e-7 for x below 0.5."""
     if x > 0.5:
@@ -117,7 +117,7 @@ def _grip(x: float) -> float:
     return x * (1.0 - s / 12.0 + s * s / 120.0)
 
 
-@njit
+@part
 def pressure_factor(c: Any, tau: float) -> float:
     """mu/mu0 at T/T0: τ^−n, or floor + (1 − floor) τ^−n, or e^(−n (τ − 1)), or a fall from 1 to the floor around
     τ = 1 + n."""
@@ -134,7 +134,7 @@ def pressure_factor(c: Any, tau: float) -> float:
     return plain
 
 
-@njit
+@part
 def pressure_slope(c: Any, tau: float) -> float:
     """d ln(mu)/d ln(T) of `pressure_factor`."""
     n, floor = c.pressure_exponent, c.pressure_floor
@@ -153,7 +153,7 @@ def pressure_slope(c: Any, tau: float) -> float:
     return plain
 
 
-@njit
+@part
 def groove_factor(table: Floats, angle: float) -> float:
     """Factor of mu at a place of the groove, by the angle at which the cable departs there."""
     place = min(max((angle - GROOVE_LOW) / GROOVE_STEP, 0.0), GROOVE_POINTS - 1.001)
@@ -162,7 +162,7 @@ def groove_factor(table: Floats, angle: float) -> float:
     return factor
 
 
-@njit
+@part
 def guide_contact(c: Any, left: float, right: float) -> float:
     """Length of a node's share of the cable that lies on a guide, m.
 
@@ -181,7 +181,7 @@ def guide_contact(c: Any, left: float, right: float) -> float:
     return touched
 
 
-@njit
+@part
 def find_contacts(c: Any, nodes: Nodes, grooves: Floats, h: float) -> None:
     """Lay each node's share of the cable on what it touches; sets `where`, `grip`, `burr` and `drag`."""
     y, where, grip, drag, tension = nodes.y, nodes.where, nodes.grip, nodes.drag, nodes.tension
@@ -238,7 +238,7 @@ def find_contacts(c: Any, nodes: Nodes, grooves: Floats, h: float) -> None:
         grip[i] = _grip(x)
 
 
-@njit
+@part
 def viscous_force(c: Any, drag: float, slip: float, h: float) -> tuple[float, float]:
     """Force of a viscous film on a sliding node and its derivative by the slip of this step: drag · slip, or with
     the power p of the slip speed v: drag · slip (v/v0)^(p − 1)."""
@@ -250,7 +250,7 @@ def viscous_force(c: Any, drag: float, slip: float, h: float) -> tuple[float, fl
     return force, drag * size ** (0.5 * (p - 3.0)) * (p * x * x + 4e-4)
 
 
-@njit
+@part
 def solve_cable(c: Any, nodes: Nodes, h: float) -> float:
     """Linear solve under the present sticking set; returns the largest unbalanced force over T0, or 0 where friction
     is linear, so that one solve balances it.
@@ -318,7 +318,7 @@ def solve_cable(c: Any, nodes: Nodes, h: float) -> float:
     return worst / c.T0 if special else 0.0
 
 
-@njit
+@part
 def move_nodes(c: Any, nodes: Nodes, dY: float, dA: float, share: float) -> None:
     """Apply the solved change, or a share of it, for given changes of path length and of arc on the output
     drum."""
@@ -327,7 +327,7 @@ def move_nodes(c: Any, nodes: Nodes, dY: float, dA: float, share: float) -> None
         y[i] += share * al[i] + be[i] * dY + ga[i] * dA
 
 
-@njit
+@part
 def carry_along(c: Any, nodes: Nodes, dY: float, dA: float) -> None:
     """First guess of a step: each node moves with what it touches, those between in proportion."""
     y = nodes.y
@@ -340,7 +340,7 @@ def carry_along(c: Any, nodes: Nodes, dY: float, dA: float) -> None:
             y[i] += share * dY
 
 
-@njit
+@part
 def update_modes(c: Any, nodes: Nodes, tolerance: float, rush: bool) -> int:
     """Let overloaded nodes slide and nodes that slide backwards stick; returns how many changed.
 
@@ -367,7 +367,7 @@ def update_modes(c: Any, nodes: Nodes, tolerance: float, rush: bool) -> int:
     return changed
 
 
-@njit
+@part
 def _sweep(nodes: Nodes, start: int, end: int, step: int, shift: float, tolerance: float, rush: bool) -> int:
     """Modes from a free end inwards: a drum from its departure point, a guide from either end to its
     middle."""
@@ -393,7 +393,7 @@ def _sweep(nodes: Nodes, start: int, end: int, step: int, shift: float, toleranc
     return changed
 
 
-@njit
+@part
 def _set_mode(nodes: Nodes, i: int, low: float, high: float, shift: float, tolerance: float) -> int:
     mode = nodes.mode[i]
     if mode == 0:
@@ -414,7 +414,7 @@ def _set_mode(nodes: Nodes, i: int, low: float, high: float, shift: float, toler
     return 0
 
 
-@njit
+@part
 def play_at(p: Any, T: float, h: float) -> float:
     """Where a play stands at the end of a step that ends at tension T, N: within its radius, r + share · T, of T,
     or on its way there in its time."""
@@ -425,7 +425,7 @@ def play_at(p: Any, T: float, h: float) -> float:
     return value
 
 
-@njit
+@part
 def lumped_extension(c: Any, plays: Any, T: float, h: float) -> float:
     """Extra length of the free span at tension T: strand friction as plays in the tension, and what was let go.
 
@@ -438,7 +438,7 @@ def lumped_extension(c: Any, plays: Any, T: float, h: float) -> float:
     return extension
 
 
-@njit
+@part
 def lumped_slope(c: Any, plays: Any, T: float, h: float) -> float:
     """Derivative of `lumped_extension` by T, m/N."""
     slope = 0.0
@@ -453,7 +453,7 @@ def lumped_slope(c: Any, plays: Any, T: float, h: float) -> float:
     return slope
 
 
-@njit
+@part
 def settle_cable(c: Any, plays: Any, h: float) -> None:
     """End of a step: plays stay where they came to, and a clamp under too much tension has crept."""
     for k in range(c.plays):

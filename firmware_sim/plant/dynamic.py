@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware_sim.plant.assembly import Build, Joint, Tail, assemble_joint, joint_effects, start_build
-from firmware_sim.plant.bench import ROOM_TEMPERATURE_DEGC, load_slowly, observe, rest, wrap_exhausted
+from firmware_sim.plant.bench import ROOM_TEMPERATURE_DEGC, load_slowly, look, rest
 from firmware_sim.plant.columns import (
     JOINT_NM,
     JOINT_TORQUE,
@@ -256,11 +256,10 @@ class Plant:
             if not advance(drive, u0, u1, h, 1, 0.0):
                 raise PlantError(f"no equilibrium found at {self.time_s:.4f} s")
             u0[:] = u1
-        if wrap_exhausted(drive):
+        if not look(drive, self._joint.readout[0], self._joint.output, u1, dt_s, self._row):
             raise PlantError(
                 f"at {self.time_s:.4f} s less than 0.1 rad of cable is left on a drum; turn less"
             )
-        observe(drive, self._joint.readout[0], self._joint.output, u1, dt_s, self._row)
         return self._read(dt_s, temperature_degC)
 
     def _read(self, dt_s: float, temperature: float) -> PlantReadings:

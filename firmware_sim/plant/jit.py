@@ -42,11 +42,22 @@ def is_compiled() -> bool:
 
 
 def njit(function: F) -> F:
-    """Compile to machine code on first call and keep it; IEEE arithmetic, no reordering."""
+    """Compile to machine code on first call and keep it; IEEE arithmetic, no reordering; for what makes no arrays,
+    so that no references need to be counted."""
+    return _compiled(function)
+
+
+def part(function: F) -> F:
+    """As `njit`, for what compiled code alone calls: an entry from Python, which takes a joint's fifty arrays apart,
+    is more to compile than the function."""
+    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def _compiled(function: F, **options: bool) -> F:
     usual = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(CODE_FOLDER)
     try:
-        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, **options)(function)
     finally:
         numba.config.CACHE_DIR = usual
     return compiled

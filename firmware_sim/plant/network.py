@@ -23,7 +23,7 @@ from firmware_sim.plant.columns import (
     TIME,
     UNSEEN_TORQUE,
 )
-from firmware_sim.plant.jit import njit
+from firmware_sim.plant.jit import part
 from firmware_sim.plant.records import Drive, Floats
 from firmware_sim.plant.shafts import (
     bearing_slope,
@@ -55,11 +55,18 @@ def winding_in_of(c: Any, q: float) -> float:
     return arc
 
 
-winding_out = njit(winding_out_of)
-winding_in = njit(winding_in_of)
+winding_out = part(winding_out_of)
+winding_in = part(winding_in_of)
 
 
-@njit
+@part
+def clear(row: Floats) -> None:
+    """Set a row to zero."""
+    for k in range(len(row)):
+        row[k] = 0.0
+
+
+@part
 def place_cable(c: Any, q_out: float, q_in: float) -> None:
     """Set arc, path length and lever arms of a cable from the angles of its shafts."""
     c.A = winding_out(c, q_out)
@@ -70,7 +77,7 @@ def place_cable(c: Any, q_out: float, q_in: float) -> None:
     c.lead_in = -c.sign * (c.r + c.in_runout_m * math.cos(q_in + c.in_runout_phase))
 
 
-@njit
+@part
 def pretension_factor(surround: Any, u: Floats) -> float:
     """T0(t)/T0 = 1 − a ln(1 + t/t_c) + k (ϑ − ϑ_ref)."""
     factor: float = 1.0 + surround.thermal_per_K * (u[TEMPERATURE] - surround.thermal_ref)
@@ -80,7 +87,7 @@ def pretension_factor(surround: Any, u: Floats) -> float:
     return factor
 
 
-@njit
+@part
 def apply_surroundings(drive: Drive, u: Floats) -> float:
     """Let time, temperature and other channels act; returns the factor of the preload (open circuit)."""
     p = drive.surround[0]
@@ -103,7 +110,7 @@ def apply_surroundings(drive: Drive, u: Floats) -> float:
     return preload
 
 
-@njit
+@part
 def change_cable(p: Any, c: Any, y: Floats, output: int, u: Floats, factor: float) -> None:
     """Pretension, wires and clamps of one cable at this time; events concern the output stage."""
     if p.is_open == 0:
@@ -124,11 +131,12 @@ def change_cable(p: Any, c: Any, y: Floats, output: int, u: Floats, factor: floa
     c.EA = c.EA_whole * (1.0 - lost)
 
 
-@njit
+@part
 def assemble(drive: Drive, h: float, b0: float, b1: float, b2: float, factor: float) -> None:
     """Torque balance of every shaft and its derivatives, cables condensed to their end forces."""
     J, g = drive.matrix, drive.rhs
-    J[:, :] = 0.0
+    for k in range(len(g)):
+        clear(J[k])
     rate = b0 / h
     for k in range(len(drive.shafts)):
         s = drive.shafts[k]
@@ -151,7 +159,7 @@ def assemble(drive: Drive, h: float, b0: float, b1: float, b2: float, factor: fl
         add_cable(drive.cables[k], drive.shafts, drive.plays, J, g, h)
 
 
-@njit
+@part
 def add_cable(c: Any, shafts: Any, plays: Any, J: Floats, g: Floats, h: float) -> None:
     """Add one cable's end forces, linear in the angles, to the balance of its two shafts."""
     o, i = c.shaft_out, c.shaft_in
@@ -182,7 +190,7 @@ def add_cable(c: Any, shafts: Any, plays: Any, J: Floats, g: Floats, h: float) -
     J[i, i] += c.lead_in * in_i
 
 
-@njit
+@part
 def solve_small(J: Floats, g: Floats, n: int) -> None:
     """Gaussian elimination with partial pivoting, in place; the solution is left in g."""
     for k in range(n):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware_sim.plant.jit import njit
+from firmware_sim.plant.jit import part
 
 READOUT = np.dtype(
     [
@@ -44,7 +44,7 @@ READOUT = np.dtype(
 )
 
 
-@njit
+@part
 def read_out(
     r: Any,
     h: float,

@@ -7,8 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from firmware_sim.plant.columns import N_INPUTS
+
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
+Words = NDArray[np.int64]
 
 FREE, OUT, IN, GUIDE = 0, 1, 2, 3  # where a node lies: span, output drum, input drum, fixed guide
 
@@ -234,13 +237,11 @@ class Drive(NamedTuple):
     plays: Any  # (cables, PLAYS)
     grooves: Floats  # (2 cables, GROOVE_POINTS): factor of mu on the output drum, then on the input drum
     tensile: Floats  # (2, TENSILE_POINTS): T/T0 and its slope over strain · EA/T0
-    saved_plays: Any
-    saved_cables: Any
-    saved_shafts: Any
-    saved_couplings: Any
-    saved_surround: Any
+    words: tuple[Words, ...]  # all records and the nodes' y, word by word: copied as they lie
+    saved: tuple[Words, ...]
     matrix: Floats
     rhs: Floats
+    between: Floats  # inputs between two samples
 
 
 def allocate_nodes(total: int) -> Nodes:
@@ -262,6 +263,9 @@ def make_drive(
 ) -> Drive:
     """Bind records, tables and nodes, with room to step back to the start of a step."""
     n = len(shafts)
+    words = tuple(
+        part.view(np.int64).ravel() for part in (plays, cables, shafts, couplings, surround, nodes.y)
+    )
     return Drive(
         cables,
         shafts,
@@ -271,11 +275,9 @@ def make_drive(
         plays,
         grooves,
         tensile,
-        plays.copy(),
-        cables.copy(),
-        shafts.copy(),
-        couplings.copy(),
-        surround.copy(),
+        words,
+        tuple(part.copy() for part in words),
         np.zeros((n, n)),
         np.zeros(n),
+        np.zeros(N_INPUTS),
     )

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from firmware_sim.plant.jit import njit
+from firmware_sim.plant.jit import part
 
 
-@njit
+@part
 def bdf(h: float, h_prev: float) -> tuple[float, float, float]:
     """Weights b0, b1, b2 of the variable-step two-step formula; one-step where the step grew too fast or is
     the first."""
@@ -22,14 +22,14 @@ def bdf(h: float, h_prev: float) -> tuple[float, float, float]:
     return (1.0 + 2.0 * w) / (1.0 + w), -(1.0 + w), w * w / (1.0 + w)
 
 
-@njit
+@part
 def set_rates(s: Any, h: float, b0: float, b1: float, b2: float) -> None:
     """Velocity and acceleration of a shaft from its angle."""
     s.v = (b0 * s.q + b1 * s.q_1 + b2 * s.q_2) / h
     s.a = (b0 * s.v + b1 * s.v_1 + b2 * s.v_2) / h
 
 
-@njit
+@part
 def shaft_torque(s: Any, preload_factor: float) -> float:
     """Torque on a shaft without cables, couplings and bearing: τ_ext − J a − D v − m g l sin(q + φ) −
     spring − wall, J = J0 (1 + w cos(q − ψ)) with the torque ½ J′ v² besides.
@@ -58,7 +58,7 @@ def shaft_torque(s: Any, preload_factor: float) -> float:
     return torque
 
 
-@njit
+@part
 def shaft_slope(s: Any, rate: float) -> float:
     """−dτ/dq of `shaft_torque`, with rate = dv/dq; gravity counts only where it stabilises."""
     inertia = s.inertia * (1.0 + s.inertia_swing * math.cos(s.q - s.inertia_phase))
@@ -74,14 +74,14 @@ def shaft_slope(s: Any, rate: float) -> float:
     return slope
 
 
-@njit
+@part
 def bearing_limit(s: Any, way: float) -> float:
     """τ_b = (coulomb + load_coefficient Σ R T) (1 + skew · way), way the sign of turning."""
     limit: float = (s.coulomb_Nm + s.load_coefficient * max(s.radial_Nm, 0.0)) * (1.0 + s.coulomb_skew * way)
     return limit
 
 
-@njit
+@part
 def bristle_stretch(s: Any) -> float:
     """Where the bristles of Dahl's and LuGre's law stand at the end of the step, rad; s.bristle is their stretch at
     its beginning.
@@ -99,7 +99,7 @@ def bristle_stretch(s: Any) -> float:
     return lugre
 
 
-@njit
+@part
 def bearing_torque(s: Any, h: float) -> float:
     """Bearing friction on the shaft: a spring that yields at τ_b (presliding), or bristles stretched by z: τ_b z/z0
     + damping · ż."""
@@ -118,7 +118,7 @@ def bearing_torque(s: Any, h: float) -> float:
     return -float(limit * s.bearing_mode)
 
 
-@njit
+@part
 def bearing_slope(s: Any, h: float) -> float:
     """−dτ/dq of `bearing_torque`; what LuGre's law loses with speed is left out."""
     if s.bearing_limit <= 0.0:
@@ -140,7 +140,7 @@ def bearing_slope(s: Any, h: float) -> float:
     return slope
 
 
-@njit
+@part
 def update_bearing(s: Any) -> int:
     """Let the presliding spring yield or take hold; returns 1 if that changed."""
     if s.bearing_limit <= 0.0 or s.friction_kind != 0:
@@ -157,7 +157,7 @@ def update_bearing(s: Any) -> int:
     return 1 if s.bearing_mode != mode else 0
 
 
-@njit
+@part
 def settle_bearing(s: Any) -> None:
     """End of a step: drag the spring's anchor along where it yielded; keep the bristles' stretch."""
     if s.friction_kind != 0:
@@ -168,7 +168,7 @@ def settle_bearing(s: Any) -> None:
         s.bristle = s.q
 
 
-@njit
+@part
 def coupling_torque(k: Any, twist: float, rate: float) -> float:
     """Torque on shaft a of a spring and damper that b turns by `twist`.
 
@@ -186,7 +186,7 @@ def coupling_torque(k: Any, twist: float, rate: float) -> float:
     return pressed
 
 
-@njit
+@part
 def coupling_slope(k: Any, twist: float, rate: float, turn: float) -> float:
     """Derivative of `coupling_torque` by the twist, with turn = dv/dq."""
     if k.gap <= 0.0:

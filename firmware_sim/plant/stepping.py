@@ -19,10 +19,11 @@ from firmware_sim.plant.cable import (
     update_modes,
 )
 from firmware_sim.plant.columns import MOTOR_ANGLE, PRETENSION_H
-from firmware_sim.plant.jit import njit
+from firmware_sim.plant.jit import njit, part
 from firmware_sim.plant.network import (
     apply_surroundings,
     assemble,
+    clear,
     place_cable,
     pretension_factor,
     solve_small,
@@ -39,11 +40,18 @@ LOOSE = 1e-3
 UNBALANCED = 1e-6  # of T0, what a law of friction that is not linear may leave at a node
 
 
-@njit
+@part
+def copy(source: Any, target: Any) -> None:
+    """Copy an array into another of its length."""
+    for k in range(len(source)):
+        target[k] = source[k]
+
+
+@part
 def begin_step(drive: Drive, u: Floats, h: float) -> None:
     """Shift the histories, predict the free shafts, and carry the cables along."""
     nodes = drive.nodes
-    nodes.old[:] = nodes.y
+    copy(nodes.y, nodes.old)
     for k in range(len(drive.shafts)):
         s = drive.shafts[k]
         s.q_2, s.q_1, s.v_2, s.v_1 = s.q_1, s.q, s.v_1, s.v
@@ -57,13 +65,13 @@ def begin_step(drive: Drive, u: Floats, h: float) -> None:
         guess_tension(c, nodes, drive.tensile)
 
 
-@njit
+@part
 def predict_turn(drive: Drive, u: Floats) -> None:
     """Where the motor's angle is given: hand its unforeseen turn on as if rigid, which keeps cables taut."""
     if drive.shafts[0].prescribed == 0:
         return
     ahead = drive.rhs
-    ahead[:] = 0.0
+    clear(ahead)
     ahead[0] = u[MOTOR_ANGLE] - drive.shafts[0].q
     for k in range(len(drive.cables) - 1, -1, -1):
         c = drive.cables[k]
@@ -74,7 +82,7 @@ def predict_turn(drive: Drive, u: Floats) -> None:
         drive.shafts[k].q += ahead[k]
 
 
-@njit
+@part
 def all_finite(g: Floats, n: int) -> bool:
     """Whether the first n values are finite."""
     total = 0.0
@@ -83,7 +91,7 @@ def all_finite(g: Floats, n: int) -> bool:
     return total < 1e12
 
 
-@njit
+@part
 def advance_cable(
     c: Any,
     shafts: Any,
@@ -112,7 +120,7 @@ def advance_cable(
     return max(abs(c.T_out - T_out), abs(c.T_in - T_in)) / (c.T0 * share), changed
 
 
-@njit
+@part
 def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
     """One implicit step of length h to the inputs u; False if the iteration did not settle.
 
@@ -135,7 +143,7 @@ def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
         assemble(drive, h, b0, b1, b2, factor)
         for k in range(n):
             if drive.shafts[k].prescribed == 1:
-                J[k, :] = 0.0
+                clear(J[k])
                 J[k, k], g[k] = 1.0, 0.0
         solve_small(J, g, n)
         share = 1.0 if (iteration // WHOLE_ITERATIONS) % 2 == 0 else 0.6
@@ -171,7 +179,7 @@ def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
     return False
 
 
-@njit
+@part
 def finish_step(drive: Drive, u: Floats, h: float) -> None:
     """Commit what depends on the step's end: rates, bearing anchors, cable plays, count of load reversals."""
     p = drive.surround[0]
@@ -193,29 +201,21 @@ def finish_step(drive: Drive, u: Floats, h: float) -> None:
     p.h_prev = h
 
 
-@njit
-def save_state(drive: Drive, nodes_y: Floats) -> None:
+@part
+def save_state(drive: Drive) -> None:
     """Keep the state for a second try."""
-    nodes_y[:] = drive.nodes.y
-    drive.nodes.saved_mode[:] = drive.nodes.mode
-    drive.saved_plays[:] = drive.plays
-    drive.saved_cables[:] = drive.cables
-    drive.saved_shafts[:] = drive.shafts
-    drive.saved_couplings[:] = drive.couplings
-    drive.saved_surround[:] = drive.surround
+    copy(drive.nodes.mode, drive.nodes.saved_mode)
+    for k in range(len(drive.words)):
+        copy(drive.words[k], drive.saved[k])
 
 
-@njit
-def restore_state(drive: Drive, nodes_y: Floats) -> None:
+@part
+def restore_state(drive: Drive) -> None:
     """Back to what `save_state` kept, but for the counters."""
     iterations, failures = drive.surround[0].iterations, drive.surround[0].failures
-    drive.nodes.y[:] = nodes_y
-    drive.nodes.mode[:] = drive.nodes.saved_mode
-    drive.plays[:] = drive.saved_plays
-    drive.cables[:] = drive.saved_cables
-    drive.shafts[:] = drive.saved_shafts
-    drive.couplings[:] = drive.saved_couplings
-    drive.surround[:] = drive.saved_surround
+    copy(drive.nodes.saved_mode, drive.nodes.mode)
+    for k in range(len(drive.words)):
+        copy(drive.saved[k], drive.words[k])
     drive.surround[0].iterations, drive.surround[0].failures = iterations, failures
     for k in range(len(drive.cables)):
         refresh_tension(drive.cables[k], drive.nodes, drive.tensile)
@@ -227,16 +227,16 @@ def advance(drive: Drive, u0: Floats, u1: Floats, h: float, parts: int, bend: fl
 
     In between, inputs are on a line, and the motor's angle on a parabola with second difference `bend`.
     """
-    y_kept = np.empty_like(drive.nodes.y)
-    save_state(drive, y_kept)
-    u = np.empty_like(u1)
+    save_state(drive)
+    u = drive.between
     pieces = max(parts, 1)
     for attempt in range(TRIES):
         loose = LOOSE if attempt == TRIES - 1 else 0.0
         done = True
         for j in range(pieces):
             share = (j + 1.0) / pieces
-            u[:] = u0 + share * (u1 - u0)
+            for k in range(len(u)):
+                u[k] = u0[k] + share * (u1[k] - u0[k])
             u[MOTOR_ANGLE] -= 0.5 * share * (1.0 - share) * bend
             done = solve_step(drive, u, h / pieces, loose)
             if not done:
@@ -244,6 +244,6 @@ def advance(drive: Drive, u0: Floats, u1: Floats, h: float, parts: int, bend: fl
             finish_step(drive, u, h / pieces)
         if done:
             return True
-        restore_state(drive, y_kept)
+        restore_state(drive)
         pieces *= 2
     return False

@@ -92,6 +92,14 @@ def test_without_information_the_prior_stays_and_that_is_said() -> None:
     assert advice.sd < 0.7 * NOMINAL.tolerance["mu_output"]
 
 
+def test_without_time_left_the_quick_fit_is_given_and_that_is_said(fitted: Calibration) -> None:
+    found = calibrate(NOMINAL, {"one": recording(with_values(NOMINAL, TRUE), 1)}, budget_s=0.0)
+    assert "best so far" in found.warnings[0]
+    assert not any("best so far" in line for line in fitted.warnings)
+    for name, true in TRUE.items():
+        assert abs(found[name].value - true) < 4.0 * found[name].sd + 0.02 * true, found[name]
+
+
 def test_a_missing_channel_is_named() -> None:
     columns = recording(NOMINAL, 1)
     del columns["joint_position_rad"]

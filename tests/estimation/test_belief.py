@@ -51,6 +51,16 @@ def test_delays(name: str, late_s: float) -> None:
     assert said.numbers["late_s"] == pytest.approx(late_s, abs=0.02)
 
 
+@pytest.mark.parametrize("gap_share", [0.01, 0.03, 0.08])
+def test_lost_motion_is_no_delay(gap_share: float) -> None:
+    """A joint that trails its motor by an angle, whatever the speed (a backlash of that share of the way)."""
+    joint, gap = COLUMNS["joint_position_rad"], gap_share * np.ptp(COLUMNS["joint_position_rad"])
+    behind = joint.copy()
+    for k in range(1, len(joint)):
+        behind[k] = min(max(behind[k - 1], joint[k] - 0.5 * gap), joint[k] + 0.5 * gap)
+    assert not [k for k in kinds(joint_position_rad=behind) if k[0] == "delay"]
+
+
 def test_a_gap_over_which_the_joint_moved() -> None:
     kept = (COLUMNS["time_s"] < 8.0) | (COLUMNS["time_s"] > 10.0)
     (said,) = suspicions(JOINT, {n: v[kept] for n, v in COLUMNS.items()})

@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 from browser import PHONE, SIDEWAYS, browser, needs_browser, opened
 
+from cablecomp import load_joint
 from cablecomp.monitor.frames import Frame, frame, unpacked
 from cablecomp.monitor.instrument import Instrument, packed
+from cablecomp.monitor.played import played
 from cablecomp.monitor.server import PageServer
 from cablecomp.monitor.sinks import Foxglove, Mcap, PlotJuggler
-from cablecomp.observer import WrapProfile
+from cablecomp.observer import Observer, WrapProfile
+from cablecomp.recording.reader import open_recording
+from cablecomp.recording.writer import write_canonical
 from cablecomp.report.page import CSS
 
 WRAP = WrapProfile(
@@ -150,3 +154,27 @@ def test_the_page_draws_plays_and_scrubs(width: int) -> None:
         page.wait_for_function("document.getElementById('words').textContent.includes('over')")
         page.click("#play")
         page.wait_for_function("at > 5")
+
+
+@needs_browser
+def test_a_recording_is_played(tmp_path: Path) -> None:
+    """All frames at once, then play from the start; what a recording does not know has no panel."""
+    joint = load_joint("wrist-capstan")
+    columns = {"time_s": np.arange(0.0, 4.0, 0.01), "motor_position_rad": np.zeros(400)}
+    columns["joint_torque_Nm"] = np.sin(columns["time_s"])
+    columns["joint_position_rad"] = Observer(joint).run(columns)["joint_position_rad"]
+    write_canonical(tmp_path / "swing.csv", columns)
+    frames = list(played(open_recording(tmp_path / "swing.csv"), joint, 4.0, bounds=False))
+    assert [f["time_s"] for f in frames] == pytest.approx(np.arange(0.0, 4.0, 0.04))
+    assert all(abs(f["residual_rad"]) < 1e-9 and len(f["wraps"]) == 4 for f in frames)
+    server = PageServer("swing", CSS)
+    for found in frames:
+        server.take(found)
+    server.finish()
+    with browser() as chromium, opened(chromium, server.address) as page:
+        page.wait_for_function("over && document.getElementById('play').textContent === 'play'")
+        assert "a recording, 100 frames" in page.inner_text("#words")
+        assert not page.is_visible("text=Timing")
+        page.click("#play")
+        page.wait_for_function("at > 0 && at < 99")
+    server.close()

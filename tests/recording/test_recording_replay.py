@@ -216,6 +216,15 @@ def test_the_bar_shows_only_when_it_takes_long() -> None:
         assert ("replay" in console.export_text()) is shown
 
 
+def test_without_a_terminal_every_tenth_is_a_line_and_none_goes_back() -> None:
+    console = Console(force_terminal=False, width=80, file=StringIO())
+    with progress_bar("replay", console, 0.0, lambda: 0.0) as told:
+        for share in (0.05, 0.31, 0.2, 0.35, 1.0):
+            told(share, int(1000 * share))
+    assert isinstance(console.file, StringIO)
+    assert console.file.getvalue() == "replay: 30 %, 310 samples\nreplay: 100 %, 1,000 samples\n"
+
+
 def test_speed_is_samples_over_the_clock_given(tmp_path: Path) -> None:
     ticks = iter(np.arange(0.0, 1000.0).tolist())
     summary = replay(

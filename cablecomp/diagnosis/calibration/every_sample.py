@@ -9,7 +9,7 @@ such an error lasts as long as the deflection does, and is counted so, beside wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -33,16 +33,23 @@ SPIKE: Final = 8.0
 """Sensor noises beyond which a raw reading is left cleaned."""
 
 
-def on_every_sample(drive: Calibrated, recordings: Mapping[str, Columns]) -> Fit:
-    """The drive's fit, carried on from where it is on all samples (canonical channels, by name)."""
+def on_every_sample(
+    drive: Calibrated, recordings: Mapping[str, Columns], in_time: Callable[[], bool] = lambda: True
+) -> Fit:
+    """The drive's fit, carried on from where it is on all samples (canonical channels, by name), or as far as `in_time`
+    lets it: it is asked before each of the steps."""
+    floor = Weighing(dict.fromkeys(drive.fit.problem.channels, 1e-12), drive.floor.zero_sd)
+    if not in_time():
+        return settled(drive.fit, floor)
     total = sum(len(c["time_s"]) for c in recordings.values())
     group = max(1, -(-total // MOST))
     thin = drive.fit.problem
     cleaned = [_all_rows(thin, e, recordings[e.name], group) for e in thin.evidence]
     raw = [_with_raw_inputs(e, recordings[e.name], group) for e in cleaned]
-    floor = Weighing(dict.fromkeys(thin.channels, 1e-12), drive.floor.zero_sd)
     best: Fit | None = None
     for evidence in (cleaned, raw):
+        if best is not None and not in_time():
+            break
         try:
             fit = solve(thin.with_evidence(evidence).finely(), drive.fit.x, 6)
         except InputError:
@@ -51,7 +58,7 @@ def on_every_sample(drive: Calibrated, recordings: Mapping[str, Columns]) -> Fit
             best = fit
     if best is None:
         return drive.fit
-    return settled(best, floor, 2)
+    return settled(best, floor, 2 if in_time() else 1)
 
 
 def settled(fit: Fit, floor: Weighing, times: int = 1) -> Fit:
