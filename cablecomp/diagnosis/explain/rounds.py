@@ -86,7 +86,8 @@ def one_round(
     trades = cold is not None and number > 0
     worth = [a for a in answers if a[0].cost < LIMITS.promise * before or (trades and a[0].hypothesis.trades)]
     if number > 0:
-        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later]
+        dear = 2 if model.fit.problem.fine else 1
+        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later // dear]
     promising = max(LIMITS.promising - 2 * number, LIMITS.promising // 2)
 
     def begin(a: list[Answer]) -> list[Fit]:
