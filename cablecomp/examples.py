@@ -33,9 +33,9 @@ def example(kind: str, name: str) -> Path:
 
 
 def resolve(path: Path | str, kind: str) -> Path:
-    """The path itself, or the example that a bare name (no folder, no suffix, no such file here) stands for."""
+    """The path itself, or the example that a bare name (no suffix, no such file here) stands for."""
     path = Path(path)
-    bare = path.name == str(path) and not path.suffix and not path.exists()
+    bare = path.name == str(path) and not path.suffix and not path.is_file()
     return example(kind, path.name) if bare and path.name in names(kind) else path
 
 
