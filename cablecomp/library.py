@@ -1,8 +1,8 @@
 """The commands as calls: a recording, or several, and a joint in; results with `.to_frame()` and `.figure()` out.
 
 A recording is a path, arrays by name (`{"time_s": ..., "motor_position_deg": ...}`: names and units as in a file), or a
-frame of pandas or polars. A joint is a `JointConfig`, a path, or the name of an example. What is wrong raises InputError,
-with the words of the command line; what hardly fits the drive stands in `doubts`.
+frame of pandas or polars. A joint is a `JointConfig`, a path, or the name of an example. What is wrong raises
+InputError, with the words of the command line; what hardly fits the drive stands in `doubts`.
 """
 
 from __future__ import annotations

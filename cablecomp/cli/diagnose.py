@@ -64,8 +64,8 @@ def diagnose_recordings(
 ) -> None:
     """Find the physics that the configuration lacks: locate, name, model, show on held-out data.
 
-    Recordings are one body of evidence. With --workers or --scheduler they are folders of a fleet, JOINT/NIGHT, and every
-    night is diagnosed by itself.
+    Recordings are one body of evidence. With --workers or --scheduler they are folders of a fleet, JOINT/NIGHT,
+    and every night is diagnosed by itself.
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:

@@ -1,4 +1,5 @@
-"""What `replay` and `diagnose` do when they are given `--workers` or `--scheduler`: a fleet, each joint and night by itself."""
+"""What `replay` and `diagnose` do when they are given `--workers` or `--scheduler`: a fleet, each joint and
+night by itself."""
 
 from __future__ import annotations
 

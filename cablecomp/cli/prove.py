@@ -50,7 +50,8 @@ def prove_blindly(
     ] = None,
     reading: Reading,
 ) -> None:  # fmt: skip
-    """Blind trials: conceal physics in simulated joints or in your own recordings, diagnose, open the truth, keep the score."""
+    """Blind trials: conceal physics in simulated joints or in your own recordings, diagnose, open the truth,
+    keep the score."""
     by = Workers(workers, scheduler)
     announce_compilation()
     if recordings is None:

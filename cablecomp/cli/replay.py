@@ -64,7 +64,8 @@ def replay(
 ) -> None:
     """Stream a recording through the observer that the controller runs; compare with what was measured.
 
-    With --workers or --scheduler RECORDING is a folder of a fleet, JOINT/NIGHT: one row for each, and which joints change.
+    With --workers or --scheduler RECORDING is a folder of a fleet, JOINT/NIGHT: one row for each, and which
+    joints change.
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:

@@ -98,7 +98,8 @@ def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def read_moving(recordings: Sequence[Path], reading: Sources) -> dict[str, Columns]:
-    """Channels of every recording that these files and folders hold, by path; raises InputError for one without motion."""
+    """Channels of every recording that these files and folders hold, by path; raises InputError for one without
+    motion."""
     data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
     for name, columns in data.items():
         require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)

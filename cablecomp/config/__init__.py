@@ -1,6 +1,7 @@
 """Joint configuration: TOML to frozen objects; an unknown key fails.
 
-Imports errors, units and the shipped examples alone. Start reading at `schema.py` (the whole file), then `drive.py`; `load.py` reads it.
+Imports errors, units and the shipped examples alone. Start reading at `schema.py` (the whole file), then
+`drive.py`; `load.py` reads it.
 """
 
 from cablecomp.config.base import Finite, NonNegative, Positive

@@ -1,7 +1,7 @@
 """A small catalogue of cables: what diameter makes of EA, how far that may be off, how rough the cable is on a pulley.
 
-EA = modulus x circle of the cable's diameter (no metal area has to be known). The spreads are wide, since construction, lay
-and bedding-in matter more than the material: `cablecomp calibrate` narrows them.
+EA = modulus x circle of the cable's diameter (no metal area has to be known). The spreads are wide, since
+construction, lay and bedding-in matter more than the material: `cablecomp calibrate` narrows them.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 
 class Cable(NamedTuple):
-    """`modulus_Pa` over the circle of the diameter, its relative spread (1 sigma); coefficient of friction on a metal pulley
-    and its spread; where both come from."""
+    """`modulus_Pa` over the circle of the diameter, its relative spread (1 sigma); coefficient of friction on a
+    metal pulley and its spread; where both come from."""
 
     modulus_Pa: float
     EA_spread: float

@@ -84,8 +84,8 @@ class _Line(NamedTuple):
 
 
 def draft_text(draft: Draft) -> str:
-    """`joint.toml` with a comment beside every value: where it comes from. It has been read back once: what is wrong with it
-    is said as for any joint file (ConfigError)."""
+    """`joint.toml` with a comment beside every value: where it comes from. It has been read back once: what is
+    wrong with it is said as for any joint file (ConfigError)."""
     lines = [f"# Written by `cablecomp init`; {CABLES[draft.cable].source}.", "schema = 1"]
     lines += [
         f"name = {json.dumps(draft.name)}",

@@ -41,7 +41,8 @@ class Stage(Frozen):
 
 
 def ratios_to_last(stages: Sequence[Stage]) -> list[float]:
-    """Ratio from every stage's output axis to the last one's, N_ik = product over j = i+1..k of r_j/R_j (thesis 5-22)."""
+    """Ratio from every stage's output axis to the last one's, N_ik = product over j = i+1..k of r_j/R_j (thesis
+    5-22)."""
     ratios = [1.0]
     for stage in reversed(stages[1:]):
         ratios.insert(0, ratios[0] * stage.input_radius_m / stage.output_radius_m)

@@ -24,10 +24,11 @@ TENSIONS = ["tension_h_N", "tension_l_N"]
 
 
 class Plays(NamedTuple):
-    """The drive with its motor held, in few states: deflection = a M + b M² + sum w_i z_i, z_i+ = min(max(z_i, M − r_i), M + r_i).
+    """The drive with its motor held, in few states: deflection = a M + b M² + sum w_i z_i, z_i+ = min(max(z_i,
+    M − r_i), M + r_i).
 
-    `weights`: a [rad/Nm], b [rad/Nm²], then w_i [rad/Nm]; `radii_Nm`: r_i; `rms_rad`: error on the loops that it was fitted to;
-    `most_Nm`: the greatest load of those.
+    `weights`: a [rad/Nm], b [rad/Nm²], then w_i [rad/Nm]; `radii_Nm`: r_i; `rms_rad`: error on the loops that
+    it was fitted to; `most_Nm`: the greatest load of those.
     """
 
     weights: Floats
@@ -94,8 +95,8 @@ def _exact(config: JointConfig, period_s: float, name: str) -> Any:
 
 
 def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None = None) -> Plays:
-    """Fit play operators to nested loops of the observer: w_i >= 0 and a >= 0 by least squares, r_i evenly over the loads up
-    to `load_max_Nm` (None = the joint's limit, else R T0)."""
+    """Fit play operators to nested loops of the observer: w_i >= 0 and a >= 0 by least squares, r_i evenly over
+    the loads up to `load_max_Nm` (None = the joint's limit, else R T0)."""
     most_Nm = greatest_load(config, load_max_Nm)
     radii = most_Nm * (np.arange(states) + 0.5) / states
     loads = _loops(most_Nm, config.drive.circuit == "closed")

@@ -42,7 +42,8 @@ class Body:
 
 
 def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | None = None) -> dict[str, str]:
-    """The session of each recording: as `[[session]]` claims it, else its folder (`each`: its own, `one`: all together)."""
+    """The session of each recording: as `[[session]]` claims it, else its folder (`each`: its own, `one`: all
+    together)."""
     found = {}
     for name in names:
         claimed = [s.name for s in config.sessions if s.matches(Path(name))] if mode is None else []

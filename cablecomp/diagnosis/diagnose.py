@@ -53,8 +53,8 @@ def diagnose(
     """Find out what physics the configuration lacks to explain the recordings (name or path -> canonical channels).
 
     `sessions`: how recordings belong together ("folder", "each", "one"; None = as `[[session]]` says, else by folder).
-    `progress` is told what is being done and the share done. Raises InputError for recordings that lack a channel or that the
-    nominal joint cannot follow.
+    `progress` is told what is being done and the share done. Raises InputError for recordings that lack a
+    channel or that the nominal joint cannot follow.
     """
     begin = time.monotonic()
     rng = np.random.default_rng(seed)

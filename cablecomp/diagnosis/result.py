@@ -69,7 +69,8 @@ class Law:
 
 @dataclass(frozen=True)
 class Errors:
-    """RMS errors of the joint angle [rad]: on what was fitted, on what was left out in turn, on what nobody had seen."""
+    """RMS errors of the joint angle [rad]: on what was fitted, on what was left out in turn, on what nobody had
+    seen."""
 
     rmse_rad: float
     heldout_rmse_rad: float
@@ -78,7 +79,8 @@ class Errors:
 
 @dataclass(frozen=True)
 class Traces:
-    """One recording before and after: judged rows, predictions with the session's zeros in them; `counted`: rows that count."""
+    """One recording before and after: judged rows, predictions with the session's zeros in them; `counted`:
+    rows that count."""
 
     name: str
     session: str

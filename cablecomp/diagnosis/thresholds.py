@@ -19,14 +19,16 @@ class Thresholds:
     rows_each: int = 120
     """Judged rows that a recording has at least, however many recordings there are: six strokes of twenty."""
     searched: int = 9
-    """Recordings among which hypotheses are compared, spread over sessions and order; the final model is fitted to all."""
+    """Recordings among which hypotheses are compared, spread over sessions and order; the final model is fitted
+    to all."""
     search_weight: float = 0.5
-    """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so that the priors of
-    the calibration do not stand in the way of a better law."""
+    """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so
+    that the priors of the calibration do not stand in the way of a better law."""
     rounds: int = 4
     """Effects and dependences that are added at most; nobody has named five from one body of recordings."""
     zero: float = 0.7
-    """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row counts for."""
+    """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row
+    counts for."""
     promise: float = 0.98
     """Cost after a linear step over the cost before, above which a hypothesis is not tried at all."""
     rough: int = 5
@@ -39,12 +41,14 @@ class Thresholds:
     beam: int = 2
     """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
     worth_rates: float = 1.08
-    """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on every sample."""
+    """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on
+    every sample."""
     tolerance: float = 1e-3
-    """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by far more."""
+    """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by
+    far more."""
     told: float = 2.0
-    """Standard deviations by which an effect's amount has to differ from none, or it is not that effect that helps (trials seed
-    602: a mount that yields one way was answered by a guide without friction)."""
+    """Standard deviations by which an effect's amount has to differ from none, or it is not that effect that
+    helps (trials seed 602: a mount that yields one way was answered by a guide without friction)."""
     tie: float = 0.01
     """Share of the loss on data left out by which a law with more parameters has to be better than one with fewer."""
     hopeless: float = 2.5
@@ -54,17 +58,19 @@ class Thresholds:
     quiet: float = 1.15
     """Mean square over the sensors' noise at which nothing further is asked: what is left is noise."""
     z_first: float = 1.7
-    """Standard errors of the paired held-out difference that the first effect must show to enter the model; whether it is named
-    is its confidence's matter (what is missing first leaves few, long waves, whose scatter is large)."""
+    """Standard errors of the paired held-out difference that the first effect must show to enter the model;
+    whether it is named is its confidence's matter (what is missing first leaves few, long waves, whose scatter
+    is large)."""
     z_large: float = 1.0
     """The same for a first effect that takes off much: a slow drift is one wave, whose z is small whatever its size."""
     gain_large: float = 0.15
-    """That much (trials seeds 602, 603: four of four such effects were right; where nothing was missing none took 0.07)."""
+    """That much (trials seeds 602, 603: four of four such effects were right; where nothing was missing none
+    took 0.07)."""
     z: float = 2.5
     """The same for every further effect: one in 160 by chance, about twenty asked."""
     gain: float = 0.06
-    """Share of the held-out square of what is left that an effect must take off to be looked at as a name: below it, laws of
-    another form and calibration trade places."""
+    """Share of the held-out square of what is left that an effect must take off to be looked at as a name:
+    below it, laws of another form and calibration trade places."""
     z_sure: float = 5.0
     """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
     gain_sure: float = 0.03
@@ -90,8 +96,8 @@ class Thresholds:
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
     beyond_noise: float = 4.0
-    """The same where it follows nothing that can be shown (a single recording of few cycles) and physics is named: twice the
-    noise is not noise."""
+    """The same where it follows nothing that can be shown (a single recording of few cycles) and physics is
+    named: twice the noise is not noise."""
     far_beyond_noise: float = 25.0
     """The same where nothing is named: five times the noise is a mismatch, whether or not it follows anything."""
     recalibrate: float = 0.9

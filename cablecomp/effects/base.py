@@ -191,7 +191,8 @@ class CompiledTerm:
         return self._address
 
     def __call__(self, **values: float | Sequence[float]) -> tuple[Term, ...]:
-        """The term with these values of its parameters, as the `terms` of a `Change`; raises InputError for other names."""
+        """The term with these values of its parameters, as the `terms` of a `Change`; raises InputError for
+        other names."""
         names = [name for name in self._parameters.names or () if name != NOTHING]
         if set(values) != set(names):
             raise InputError(
@@ -212,9 +213,10 @@ def _record(names: Names) -> np.dtype[Any]:
 
 
 def term(parameters: Names, state: Names = ()) -> Callable[[TermFunction], CompiledTerm]:
-    """Make a function f(c, p, s) a term: c context (`mechanics.records.CONTEXT`), p its parameters, s its own state, by name.
+    """Make a function f(c, p, s) a term: c context (`mechanics.records.CONTEXT`), p its parameters, s its own
+    state, by name.
 
-    A name with a length, `("readings", 256)`, is an array. The function must add to the context only, and change `s` only
-    when `c.commit` is set: the solver calls it several times a step. State starts at zero.
+    A name with a length, `("readings", 256)`, is an array. The function must add to the context only, and
+    change `s` only when `c.commit` is set: the solver calls it several times a step. State starts at zero.
     """
     return lambda function: CompiledTerm(function, parameters, state)

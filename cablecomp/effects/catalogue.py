@@ -190,7 +190,8 @@ def _place(channel: str, config: JointConfig) -> int:
 
 
 def other_channels(config: JointConfig) -> list[str]:
-    """The further channels that effects and empirical laws of this joint read, in the order in which the kernel gets them."""
+    """The further channels that effects and empirical laws of this joint read, in the order in which the kernel
+    gets them."""
     names: list[str] = []
     for entry in config.effect:
         for key in _look_up(entry.id).texts:

@@ -1,7 +1,7 @@
 """A check before belief: do signs, ratio, units, timing of a recording agree with what the drive allows?
 
-Straight lines, joint angle on motor angle and load; for delays alone the nominal drive, so that its hysteresis does not pass
-for one. What is said is a suspicion with its numbers; nothing is changed.
+Straight lines, joint angle on motor angle and load; for delays alone the nominal drive, so that its hysteresis
+does not pass for one. What is said is a suspicion with its numbers; nothing is changed.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ _TORQUES: Final = {
 
 @dataclass(frozen=True)
 class Suspicion:
-    """`kind`: sign, ratio, unit, scale, delay or gap; `channel`: which one is meant first; `text`: one line with the numbers;
-    `numbers`: those."""
+    """`kind`: sign, ratio, unit, scale, delay or gap; `channel`: which one is meant first; `text`: one line
+    with the numbers; `numbers`: those."""
 
     kind: str
     channel: str
@@ -176,8 +176,8 @@ class _View:
         return found
 
     def delays(self) -> list[Suspicion]:
-        """Whether the load, or the joint angle, comes late or early: the nominal drive, which knows its own hysteresis, is
-        run with each of them shifted.
+        """Whether the load, or the joint angle, comes late or early: the nominal drive, which knows its own
+        hysteresis, is run with each of them shifted.
 
         Lost motion trails by an angle, whatever the speed; a delay by a time. So both may explain what is left, and a
         delay is believed only for what it takes beyond lost motion of any width.

@@ -43,11 +43,11 @@ SPIKE: Final = 8.0
 class Evidence:
     """One recording, ready to be fitted.
 
-    `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are judged, thinned
-    by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time that a judged row stands
-    for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside;
-    `shift_s`: what was added to the recording's own clock; `past`: by output channel, what pasts that nobody recorded would
-    add to the judged rows, a column each.
+    `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are
+    judged, thinned by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time
+    that a judged row stands for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it;
+    `outliers`: readings set aside; `shift_s`: what was added to the recording's own clock; `past`: by output
+    channel, what pasts that nobody recorded would add to the judged rows, a column each.
     """
 
     name: str
@@ -80,7 +80,8 @@ class Evidence:
 
 
 def load_channel(config: JointConfig, columns: Mapping[str, FloatArray]) -> str | None:
-    """Channel that holds the load: `joint_torque_Nm`, else the motor's torque where the configuration says so, else none."""
+    """Channel that holds the load: `joint_torque_Nm`, else the motor's torque where the configuration says so,
+    else none."""
     if config.observer.load == "motor_torque" and MOTOR in columns:
         return MOTOR
     return "joint_torque_Nm" if "joint_torque_Nm" in columns else None
@@ -118,7 +119,8 @@ def gather(
         outliers += int(spikes.sum())
         good[key] &= ~spikes
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
-    # the drive goes from reading to reading: where an input has none, a bridged value would be an error of the prediction
+    # the drive goes from reading to reading: where an input has none, a bridged value would be an error of the
+    # prediction
     kept = np.ones(len(raw["time_s"]), dtype=np.bool_)
     for key in ("motor_position_rad", *([load] if load else [])):
         if good[key].mean() > SPARSE:
@@ -165,8 +167,8 @@ def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]
 
 
 def thinned(columns: Mapping[str, FloatArray], load: str | None, count: int) -> IntArray:
-    """About `count` rows, even in travel (motor, joint and load over their ranges, and a share of time), and every turning
-    point of motor and load in between."""
+    """About `count` rows, even in travel (motor, joint and load over their ranges, and a share of time), and
+    every turning point of motor and load in between."""
     time = columns["time_s"]
     n = len(time)
     if n <= count:

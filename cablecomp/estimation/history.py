@@ -1,8 +1,9 @@
 """What the history before the first sample, which nobody recorded, may still do to a prediction.
 
-The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke); rows count
-from where these runs agree but for a constant, and how far the constants differ is how far a recording's zero may
-depart from its session's. What they still differ by from there on is estimated with the zeros, each with a prior.
+The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke);
+rows count from where these runs agree but for a constant, and how far the constants differ is how far a
+recording's zero may depart from its session's. What they still differ by from there on is estimated with the
+zeros, each with a prior.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ FAINT = 0.02
 
 @dataclass(frozen=True)
 class Forgotten:
-    """From which judged row on a recording's past no longer matters, how far it may still move the joint from there (RMS,
-    rad, a constant apart), how far the constants differ (rad), and what the assumed pasts add by channel (columns)."""
+    """From which judged row on a recording's past no longer matters, how far it may still move the joint from
+    there (RMS, rad, a constant apart), how far the constants differ (rad), and what the assumed pasts add by
+    channel (columns)."""
 
     first: int
     left_rad: float
@@ -38,7 +40,8 @@ class Forgotten:
 
 
 def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
-    """Assumed pasts (motor angle, load): to the greatest load seen and back either way, in from either end of the stroke."""
+    """Assumed pasts (motor angle, load): to the greatest load seen and back either way, in from either end of
+    the stroke."""
     motor = recording.columns["motor_position_rad"]
     load = np.broadcast_to(
         np.asarray(load_of(problem.config, recording.columns), dtype=np.float64), motor.shape
@@ -55,9 +58,9 @@ def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
 
 
 def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
-    """First judged row after a swing over nine tenths of the range and a turn: friction on the path, too, has by then slid one
-    way through and begun to slide the other. The motor's swing where it moves, else the load's; 0 where there is none
-    within the share `most` of the recording."""
+    """First judged row after a swing over nine tenths of the range and a turn: friction on the path, too, has
+    by then slid one way through and begun to slide the other. The motor's swing where it moves, else the
+    load's; 0 where there is none within the share `most` of the recording."""
     motor = recording.at_rows("motor_position_rad")
     load = np.broadcast_to(
         np.asarray(load_of(problem.config, recording.columns), dtype=np.float64),
@@ -78,8 +81,8 @@ def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
 def forgotten(
     problem: Problem, x: FloatArray, recording: Evidence, size: Mapping[str, float], share: float
 ) -> Forgotten:
-    """Where the past is forgotten to within `share` of what is usually left over of each channel (`size`); the best cut there
-    is if it is nowhere."""
+    """Where the past is forgotten to within `share` of what is usually left over of each channel (`size`); the
+    best cut there is if it is nowhere."""
     made = simulator(problem.joint(x, recording))
     try:
         base = made.predict(recording)
@@ -113,7 +116,8 @@ def forgotten(
 
 
 def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:
-    """Principal columns of what the pasts add from row `first` on, a constant apart; rotated, so that one prior does for all."""
+    """Principal columns of what the pasts add from row `first` on, a constant apart; rotated, so that one prior
+    does for all."""
     centred = runs - runs[first:].mean(axis=0)
     _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)
     kept = s > faint * np.sqrt(len(centred) - first)

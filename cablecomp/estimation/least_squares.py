@@ -54,11 +54,12 @@ def solve(
     tolerance: float = 1e-4,
     J: FloatArray | None = None,
 ) -> Fit:
-    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a round of steps would
-    lower the cost by less than `tolerance` of it. The derivative is taken by differences between rounds, and by secants within.
+    """Least squares from x (default: the parameters' starts) by SciPy's trust region, bounds kept, until a
+    round of steps would lower the cost by less than `tolerance` of it. The derivative is taken by differences
+    between rounds, and by secants within.
 
-    `J`: a derivative that is roughly known at x, for the first round. Raises InputError if the drive cannot follow the recordings
-    where the fit begins and ends.
+    `J`: a derivative that is roughly known at x, for the first round. Raises InputError if the drive cannot
+    follow the recordings where the fit begins and ends.
     """
     x = _inside(problem, problem.start if x is None else x)
     residual = problem.residual(x)
@@ -82,8 +83,8 @@ def solve(
 def approach(
     problem: Problem, x: FloatArray, beside: Mapping[int, FloatArray], evaluations: int, tolerance: float
 ) -> Fit:
-    """A few steps from x with columns of the derivative that are known about there, improved by secants: what comes of it is good
-    for a comparison, and its own derivative is rough. Raises InputError as `solve` does."""
+    """A few steps from x with columns of the derivative that are known about there, improved by secants: what
+    comes of it is good for a comparison, and its own derivative is rough. Raises InputError as `solve` does."""
     x = _inside(problem, x)
     residual = problem.residual(x)
     found, _ = _steps(
@@ -102,7 +103,8 @@ def _inside(problem: Problem, x: FloatArray) -> FloatArray:
 
 def _steps(fit: Fit, evaluations: int, tolerance: float) -> tuple[Fit, int]:
     """Trust-region steps from a fit whose derivative is known; after each, C. Broyden's rank-one update takes its place
-    (A Class of Methods for Solving Nonlinear Simultaneous Equations, 1965). Also returns how many residuals were asked for."""
+    (A Class of Methods for Solving Nonlinear Simultaneous Equations, 1965). Also returns how many residuals
+    were asked for."""
     problem, known = fit.problem, {fit.x.tobytes(): fit.residual}
     last = fit
 
@@ -154,7 +156,8 @@ def derivative_of_part(fit: Fit, part: Sequence[Evidence]) -> FloatArray:
 
 
 def fitted_to_part(fit: Fit, part: Sequence[Evidence], evaluations: int) -> Fit:
-    """A fit about some of its rows only, from where it stands, along secants: what is left out is then predicted by it."""
+    """A fit about some of its rows only, from where it stands, along secants: what is left out is then
+    predicted by it."""
     J = derivative_of_part(fit, part)
     return approach(fit.problem.with_evidence(part), fit.x, dict(enumerate(J.T)), evaluations, 1e-4)
 

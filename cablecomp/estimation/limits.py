@@ -5,21 +5,25 @@ from __future__ import annotations
 from typing import Final
 
 DECADES: Final = 2.3
-"""Decades either way that a quantity known by order of magnitude may go: two on either side hold what labs call that."""
+"""Decades either way that a quantity known by order of magnitude may go: two on either side hold what labs call
+that."""
 OWN_SD: Final = 1.0
 """Prior sd of a session's own value about the common one, in units of the common one's own prior."""
 STEP: Final = 1e-3
-"""Step of the difference quotients in x: large against round-off and the kinks of friction, small against what matters."""
+"""Step of the difference quotients in x: large against round-off and the kinks of friction, small against what
+matters."""
 INSTANT_STEP_S: Final = 0.05
 """Step of the difference quotient by an event's instant: it has to move over rows that are thinned by travel."""
 INSTANT_REACH_S: Final = 3.0
 """How far an event's instant may move from where it was found by asking."""
 ZERO: Final = 0.5
-"""How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up what compliances do."""
+"""How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up
+what compliances do."""
 PAST: Final = 0.5
-"""Prior sd of what went before a recording, in pasts that go to the greatest load, or to the end of the stroke, and back."""
+"""Prior sd of what went before a recording, in pasts that go to the greatest load, or to the end of the stroke,
+and back."""
 EXACT: Final = 0.003
-"""Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without it, calibration
-would answer a slightly wrong ratio by physics."""
+"""Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without
+it, calibration would answer a slightly wrong ratio by physics."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

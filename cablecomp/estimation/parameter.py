@@ -1,7 +1,8 @@
 """Free parameters of a fit: how each enters the drive, where it may lie, and where it likely does.
 
 Names are those of the configuration (`cablecomp.config.with_values`): a key of `[[drive.stage]]`, of `[sensors]`, or
-`effect.ID.KEY`. `NAME@SESSION` is that session's own value; `NAME~CONDITION` is what NAME gains per unit of a condition.
+`effect.ID.KEY`. `NAME@SESSION` is that session's own value; `NAME~CONDITION` is what NAME gains per unit of a
+condition.
 """
 
 from __future__ import annotations

@@ -48,8 +48,8 @@ class Zeros:
 
 @dataclass(frozen=True)
 class Weighing:
-    """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero departs from
-    its session's."""
+    """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero
+    departs from its session's."""
 
     sigma: Mapping[str, float]
     zero_sd: Mapping[str, float]
@@ -115,8 +115,8 @@ class Problem:
     def misfits(
         self, x: FloatArray, beside: Mapping[str, list[FloatArray]] | None = None, session: str | None = None
     ) -> dict[str, list[FloatArray]]:
-        """Measured less predicted, zeros still in it, on all judged rows, by channel and recording; NaN where the recording
-        lacks the channel. Raises InputError where the drive cannot follow.
+        """Measured less predicted, zeros still in it, on all judged rows, by channel and recording; NaN where
+        the recording lacks the channel. Raises InputError where the drive cannot follow.
 
         `beside`, `session`: misfits known already, of which only that session's recordings are run again.
         """
@@ -208,8 +208,8 @@ class Problem:
             return self.residual(x)
 
     def zeros(self, x: FloatArray) -> dict[str, dict[str, FloatArray]]:
-        """By channel: the zero (and slope, for the motor torque) of each session, and of each recording, in the channel's
-        unit."""
+        """By channel: the zero (and slope, for the motor torque) of each session, and of each recording, in the
+        channel's unit."""
         misfits = self.misfits(x)
         found: dict[str, dict[str, FloatArray]] = {}
         for c in self.channels:
@@ -256,8 +256,8 @@ class Problem:
 
     @property
     def _departs(self) -> bool:
-        """Whether recordings have zeros beside their sessions': one alone in its session has none, and whether there are
-        penalties must not hang on weights."""
+        """Whether recordings have zeros beside their sessions': one alone in its session has none, and whether
+        there are penalties must not hang on weights."""
         return len(self.evidence) > len(self.sessions)
 
     @property

@@ -40,8 +40,8 @@ class Simulator:
     def predict(self, recording: Evidence, history: FloatArray | None = None) -> dict[str, FloatArray]:
         """Every output channel [rad, N m, N] on the recording's judged rows, encoder zeros not added.
 
-        `history` (k x 2): motor angle [rad] and load [N m] that went before the first row. Raises InputError where the drive
-        cannot follow (slack in an open circuit, a drum run out of cable).
+        `history` (k x 2): motor angle [rad] and load [N m] that went before the first row. Raises InputError
+        where the drive cannot follow (slack in an open circuit, a drum run out of cable).
         """
         kept = recording.rated if self.fine else recording.rows
         outs = self.run(recording, kept, history)
@@ -103,5 +103,6 @@ def knows_rates(joint: JointConfig) -> bool:
 
 
 def simulator(joint: JointConfig, fine: bool = False) -> Simulator:
-    """Set the joint up, to run on judged rows or on all fine ones; raises InputError for values that its laws cannot take."""
+    """Set the joint up, to run on judged rows or on all fine ones; raises InputError for values that its laws
+    cannot take."""
     return Simulator(joint, assemble(joint, extend(joint)), tuple(other_channels(joint)), fine)

@@ -47,8 +47,9 @@ def as_it_stood(
     head: Callable[[], Mapping[str, FloatArray]],
     session: str | None = None,
 ) -> tuple[JointConfig, str | None, tuple[str, ...]]:
-    """The joint as it stood in a recording: by the session of that name, else by the one that claims the recording, else by its
-    conditions, read off the recording's `head`. Also the session's name, and notes on what had to be assumed."""
+    """The joint as it stood in a recording: by the session of that name, else by the one that claims the
+    recording, else by its conditions, read off the recording's `head`. Also the session's name, and notes on
+    what had to be assumed."""
     found = session_of(config, recording, session)
     if found is not None:
         return in_session(config, found), found.name, ()
@@ -61,8 +62,8 @@ def as_it_stood(
 def in_condition(
     config: JointConfig, columns: Mapping[str, FloatArray]
 ) -> tuple[JointConfig, tuple[str, ...]]:
-    """The joint as it stands in a recording that no session claims, by its `[[depends]]`; a note for each condition that lies
-    beyond what they were told from."""
+    """The joint as it stands in a recording that no session claims, by its `[[depends]]`; a note for each
+    condition that lies beyond what they were told from."""
     gained: dict[str, float] = {}
     said = []
     for law in config.depends:

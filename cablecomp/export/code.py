@@ -96,7 +96,8 @@ def c_source(config: JointConfig, found: Plays) -> str:
 
 
 def write_fmu(config: JointConfig, found: Plays, out: Path) -> Path:
-    """Write `out`/NAME.fmu, FMI 2.0 for co-simulation; who runs it needs Python. Raises InputError without `pythonfmu`."""
+    """Write `out`/NAME.fmu, FMI 2.0 for co-simulation; who runs it needs Python. Raises InputError without
+    `pythonfmu`."""
     try:
         from pythonfmu import FmuBuilder
     except ImportError:

@@ -1,4 +1,5 @@
-"""What a simulator can take of a joint: one stiffness, one dry friction, an equivalent backlash; and what that leaves out."""
+"""What a simulator can take of a joint: one stiffness, one dry friction, an equivalent backlash; and what that
+leaves out."""
 
 from __future__ import annotations
 
@@ -13,10 +14,11 @@ from cablecomp.control.stiffness import greatest_load, stiffness_range
 class Equivalent(NamedTuple):
     """A joint as a spring with dry friction beside it, q_out = ratio q_in + deflection.
 
-    The load cycle 0, +most, −most, 0 Nm of the observer (history and effects in it, motor held) gives: `stiffness_Nm_per_rad`
-    = load over deflection between the loop's ends; `backlash_rad` = the loop's greatest width, what a joint whose play is
-    that wide would show; `friction_Nm` = stiffness times half that width, which gives spring and friction side by side the
-    same width. `rms_rad`: what this leaves of the loop, of `reach_rad` in all.
+    The load cycle 0, +most, −most, 0 Nm of the observer (history and effects in it, motor held) gives:
+    `stiffness_Nm_per_rad` = load over deflection between the loop's ends; `backlash_rad` = the loop's greatest
+    width, what a joint whose play is that wide would show; `friction_Nm` = stiffness times half that width,
+    which gives spring and friction side by side the same width. `rms_rad`: what this leaves of the loop, of
+    `reach_rad` in all.
     """
 
     ratio: float

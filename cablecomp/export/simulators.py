@@ -11,10 +11,11 @@ from cablecomp.export.equivalent import Equivalent
 
 
 def mujoco_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> str:
-    """MJCF: motor and joint as hinges, between them a fixed tendon q_out − ratio q_in with stiffness, damping and dry friction.
+    """MJCF: motor and joint as hinges, between them a fixed tendon q_out − ratio q_in with stiffness, damping
+    and dry friction.
 
-    A tendon's spring and friction act side by side: load over deflection is a loop of the drive's slope and width. Inertias are
-    those of the control file; the actuator is the drive's own position loop.
+    A tendon's spring and friction act side by side: load over deflection is a loop of the drive's slope and
+    width. Inertias are those of the control file; the actuator is the drive's own position loop.
     """
     damping = 2.0 * motor.structural_damping * sqrt(found.stiffness_Nm_per_rad * motor.output_inertia_kgm2)
     kp, kv = motor.stiffness_Nm_per_rad, motor.damping_Nms_per_rad
@@ -49,8 +50,8 @@ def mujoco_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> s
 def urdf_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> str:
     """URDF: the joint alone, with dry friction and damping; motor angle as a joint that it follows (`mimic`).
 
-    The format knows neither stiffness nor play nor friction between two joints: the drive is rigid here, and its friction is
-    the joint's.
+    The format knows neither stiffness nor play nor friction between two joints: the drive is rigid here, and
+    its friction is the joint's.
     """
     low, high = config.limits.joint_position_min_rad, config.limits.joint_position_max_rad
     bounds = "" if low is None or high is None else f'lower="{low:.6g}" upper="{high:.6g}" '

@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike
 FEWEST: Final = 5
 """Values below which nothing is said: a step has three parameters."""
 EVIDENCE: Final = 10.0
-"""Difference of the Bayesian information criterion that is called very strong (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)."""
+"""Difference of the Bayesian information criterion that is called very strong (Kass and Raftery, J. Am. Stat.
+Assoc. 90, 1995)."""
 
 
 class Change(NamedTuple):
-    """`how`: nothing, a trend or a step; `size`: last less first of the trend, or height of the step; `at`: first index after
-    the step; `evidence`: difference of the information criterion to no change."""
+    """`how`: nothing, a trend or a step; `size`: last less first of the trend, or height of the step; `at`:
+    first index after the step; `evidence`: difference of the information criterion to no change."""
 
     how: Literal["", "trend", "step"]
     size: float = 0.0
@@ -26,8 +27,8 @@ class Change(NamedTuple):
 def change(values: ArrayLike, known_sd: float) -> Change:
     """Describe `values`, in order, by a constant, a straight line or one step.
 
-    Gaussian scatter of unknown size, not below `known_sd` (what one value is known to); n ln(RSS/n + known_sd²) + k ln n with
-    k = 1, 2, 3 is least for the description that is taken.
+    Gaussian scatter of unknown size, not below `known_sd` (what one value is known to); n ln(RSS/n + known_sd²)
+    + k ln n with k = 1, 2, 3 is least for the description that is taken.
     """
     y = np.asarray(values, dtype=np.float64)
     n = len(y)

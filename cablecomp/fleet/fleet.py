@@ -50,8 +50,8 @@ class Fleet:
 def run_fleet(work: Work, places: Sequence[Night], out: Path, workers: Workers, tell: Tell) -> Fleet:
     """Work through all nights; writes `rows/*.json` as they come, then `fleet.csv`.
 
-    A row that is there and was made from the same files is taken as it is: what was interrupted goes on where it stopped. A
-    night that fails is a row that says why, and is tried again the next time.
+    A row that is there and was made from the same files is taken as it is: what was interrupted goes on where
+    it stopped. A night that fails is a row that says why, and is tried again the next time.
     """
     out.mkdir(parents=True, exist_ok=True)
     prints = [night.fingerprint(work) for night in places]

@@ -25,7 +25,8 @@ class Night:
     config: Path
 
     def fingerprint(self, what: str) -> str:
-        """Digest of what a row is made from: the work, version, configuration, and each recording's path, size and date."""
+        """Digest of what a row is made from: the work, version, configuration, and each recording's path, size
+        and date."""
         found = hashlib.sha256(f"{what} {__version__}\n".encode() + self.config.read_bytes())
         for path in self.recordings:
             stat = path.stat()

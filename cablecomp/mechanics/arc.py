@@ -72,9 +72,9 @@ def _far_meet(G: Floats, i: int, n: int, v: float, steep: float, s: float) -> fl
 def arc_eval(G: Floats, i: int, n: int, v1: float, v2: float, mu: float) -> ArcMeet:
     """The arc at end values v1 (near) and v2 (far), |v1 - v2| <= mu width, without committing it.
 
-    Returns (integral of exp(v) - 1, its change between the near end and the point that does not slip, its derivatives by
-    v1 and v2, near and far meeting points (equal where the slip zones touch), and what a unit rise of v1 or fall of v2
-    adds to that change by moving the point where they touch).
+    Returns (integral of exp(v) - 1, its change between the near end and the point that does not slip, its
+    derivatives by v1 and v2, near and far meeting points (equal where the slip zones touch), and what a unit
+    rise of v1 or fall of v2 adds to that change by moving the point where they touch).
     """
     width = G[i, Y, n - 1]
     s1 = 0.0 if v1 == G[i, V, 0] else (1.0 if v1 > G[i, V, 0] else -1.0)
@@ -160,7 +160,8 @@ def _copy(G: Floats, i: int, source: int, target: int) -> None:
 
 @kernel
 def _tidy(G: Floats, i: int, n: int) -> int:
-    """Join pieces that lie on one line (and, when memory runs out, those that nearly do); renew the running integrals."""
+    """Join pieces that lie on one line (and, when memory runs out, those that nearly do); renew the running
+    integrals."""
     limit = 1e-13
     while True:
         m = 1

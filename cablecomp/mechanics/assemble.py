@@ -57,8 +57,8 @@ class Extension:
 
 @dataclass(frozen=True)
 class Model:
-    """The kernel's arrays for one joint: parameters P and sizes I never change; S (all numbers) and J (points in use of every
-    profile) are the initial state; L the law tables (None = plain). `named` says what lies in them."""
+    """The kernel's arrays for one joint: parameters P and sizes I never change; S (all numbers) and J (points
+    in use of every profile) are the initial state; L the law tables (None = plain). `named` says what lies in them."""
 
     P: Floats
     I: Ints
@@ -80,7 +80,8 @@ def stage_ratios(stages: Sequence[Stage]) -> list[float]:
 
 
 def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
-    """Arrays of the joint in `config` with the physics of `extension`; raises InputError for pretensions that cannot settle."""
+    """Arrays of the joint in `config` with the physics of `extension`; raises InputError for pretensions that
+    cannot settle."""
     extra = extension or Extension()
     stages = config.drive.stage
     closed = int(config.drive.circuit == "closed")

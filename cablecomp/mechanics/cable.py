@@ -1,4 +1,5 @@
-"""One cable of a stage: output drum, free span (with a guide, if any), input drum; stretch as a function of its tension."""
+"""One cable of a stage: output drum, free span (with a guide, if any), input drum; stretch as a function of its
+tension."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 def drum_eval(
     d: Drive, L: Floats, c: int, end: int, tau: float, v: float, w: float
 ) -> tuple[float, float, float]:
-    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap angle; kept as pending.
+    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap
+    angle; kept as pending.
 
     A solver's trial may unwind the drum: it is then taken to keep `LEAST_WRAP`, and `joint_ready` refuses it.
     """
@@ -40,8 +42,8 @@ def drum_eval(
 def cable_eval(
     d: Drive, L: Floats, c: int, tension: float, x_in: float, x_out: float
 ) -> tuple[float, float, float]:
-    """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and its derivatives
-    by the tension [m/N] and by the output shaft's angle [m/rad].
+    """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and
+    its derivatives by the tension [m/N] and by the output shaft's angle [m/rad].
 
     With a guide in the path the input-side tension follows from the guide's friction and the material passed over it.
     """
@@ -87,7 +89,8 @@ def cable_eval(
 
 @kernel
 def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
-    """Play operator of the given radius: output follows the input x once it leaves the play; (output, derivative by x)."""
+    """Play operator of the given radius: output follows the input x once it leaves the play; (output,
+    derivative by x)."""
     if radius <= 0.0:
         return 0.0, 0.0
     if x - radius > z:
@@ -101,7 +104,8 @@ def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
 def cable_commit(d: Drive, L: Floats, c: int) -> None:
     """Make the last evaluation of cable c its state, and renew the bound on what merging has done to its stretch.
 
-    In a closed circuit an error of the stretch moves the tensions against it, so the errors of later cable do not add to it.
+    In a closed circuit an error of the stretch moves the tensions against it, so the errors of later cable do
+    not add to it.
     """
     cable, state = d.cables[c], d.states[c]
     first = OUT

@@ -1,8 +1,9 @@
-"""One circuit: a chain of cables (open), or two antagonistic chains (closed), solved for its tensions and its deflection.
+"""One circuit: a chain of cables (open), or two antagonistic chains (closed), solved for its tensions and its
+deflection.
 
-Closed: the two chains' stretches cancel, theta_h(T_h) + theta_l(T_l) = 0 (4-1), and T_h - T_l = M/R (4-4); every stretch
-rises with its tension, so one safeguarded Newton iteration on T_l finds both. The wraps turn with the unknown joint
-angle; that coupling is weak (strain, about 1e-3), so the angle is updated in the same iteration.
+Closed: the two chains' stretches cancel, theta_h(T_h) + theta_l(T_l) = 0 (4-1), and T_h - T_l = M/R (4-4);
+every stretch rises with its tension, so one safeguarded Newton iteration on T_l finds both. The wraps turn with
+the unknown joint angle; that coupling is weak (strain, about 1e-3), so the angle is updated in the same iteration.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK, STATUS_SLACK
 def chain_eval(
     d: Drive, L: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
 ) -> tuple[float, float, float]:
-    """Rotation [rad] of the chain's output shaft out of its stretch, and its derivatives by the output cable's tension and by
-    that shaft's angle.
+    """Rotation [rad] of the chain's output shaft out of its stretch, and its derivatives by the output cable's
+    tension and by that shaft's angle.
 
-    The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their ratios (5-2).
+    The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their
+    ratios (5-2).
     """
     theta = 0.0
     compliance = 0.0
@@ -46,7 +48,8 @@ def chain_eval(
 def circuit_solve(
     d: Drive, L: Floats, ic: int, moment: float, x_in: float, x_guess: float
 ) -> tuple[float, float, int]:
-    """Output angle [rad] of circuit `ic` under `moment` [N m] at input angle x_in, its compliance [rad/(N m)], and a status."""
+    """Output angle [rad] of circuit `ic` under `moment` [N m] at input angle x_in, its compliance [rad/(N m)],
+    and a status."""
     circuit = d.circuits[ic]
     first_h, first_l, count = circuit.first[0], circuit.first[1], circuit.count
     closed = circuit.chains == 2

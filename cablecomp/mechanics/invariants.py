@@ -1,4 +1,5 @@
-"""What every state of a joint obeys: the laws that a committed step may never break, verified by other code than the kernel's.
+"""What every state of a joint obeys: the laws that a committed step may never break, verified by other code
+than the kernel's.
 
 For tests, for a snapshot that is taken up, and for whoever doubts a state; far too slow for the loop.
 """
@@ -32,7 +33,8 @@ def heights_fit(model: Model, heights: NDArray[np.float64] | Ints) -> bool:
 def violations(model: Model, S: Floats, J: Ints) -> list[str]:
     """Every invariant of a joint's committed state that S, J break, in words; empty = sound.
 
-    Profiles (`profile_violations`); wrap angles that agree with the shafts; finite scalars; positive tensions and factors.
+    Profiles (`profile_violations`); wrap angles that agree with the shafts; finite scalars; positive tensions
+    and factors.
     """
     found = profile_violations(model, S, J)
     if not heights_fit(model, J):
@@ -44,8 +46,8 @@ def violations(model: Model, S: Floats, J: Ints) -> list[str]:
 def profile_violations(model: Model, S: Floats, J: Ints) -> list[str]:
     """The same for the profiles alone.
 
-    Count between 2 and capacity - 4; angles from 0 on, rising; |dv| <= mu dsigma between neighbours (thesis 2-11); finite
-    tensions; running integrals C = int e dy and B that belong to the points; error bounds D >= 0.
+    Count between 2 and capacity - 4; angles from 0 on, rising; |dv| <= mu dsigma between neighbours (thesis
+    2-11); finite tensions; running integrals C = int e dy and B that belong to the points; error bounds D >= 0.
     """
     d = model.named(S, J)
     if not heights_fit(model, J):
@@ -85,7 +87,8 @@ def _profile(model: Model, d: Drive, stack: int) -> list[str]:
 
 
 def _integrals(model: Model, law: int, y: Floats, v: Floats) -> Floats:
-    """Integral of e over every piece: in closed form for the plain law, else by the kernel's own quadrature, which defines it."""
+    """Integral of e over every piece: in closed form for the plain law, else by the kernel's own quadrature,
+    which defines it."""
     dy, d = np.diff(y), np.diff(v)
     if model.L is None or model.L[0, 0, 0] == 0.0:
         small = np.abs(d) < 1e-9

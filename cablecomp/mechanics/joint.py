@@ -74,7 +74,8 @@ def _show_tensions(d: Drive) -> None:
 
 @inlined_kernel
 def joint_solve(d: Drive, terms: Terms, L: Floats) -> int:
-    """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved together."""
+    """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved
+    together."""
     x = d.context
     load = x.load
     if d.size.terms == 0:
@@ -157,7 +158,8 @@ def terms_sane(d: Drive) -> bool:
 
 @inner_kernel
 def joint_ready(d: Drive) -> int:
-    """Whether the pending solution may become the state: cable left on every drum, every number finite, tensions positive.
+    """Whether the pending solution may become the state: cable left on every drum, every number finite,
+    tensions positive.
 
     What commits write through (places along the profiles) is bounded by just these.
     """

@@ -76,7 +76,8 @@ def copy_floats(source: Floats, i: int, target: Floats, j: int, n: int) -> None:
 def piece(
     L: Floats, law: int, y1: float, v1: float, t1: float, y2: float, v2: float, t2: float
 ) -> tuple[float, float]:
-    """Integral of e(v) over y1..y2 and of de/dv; e = strain * EA/T0 = tau - 1 for the plain cable, whose tau are t1, t2."""
+    """Integral of e(v) over y1..y2 and of de/dv; e = strain * EA/T0 = tau - 1 for the plain cable, whose tau
+    are t1, t2."""
     dy = y2 - y1
     d = v2 - v1
     if L is None:
@@ -119,7 +120,8 @@ def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float
 
 @kernel
 def piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
-    """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no place."""
+    """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no
+    place."""
     dy = y2 - y1
     d = v2 - v1
     total = 0.0
@@ -229,7 +231,8 @@ def wrap_commit(G: Floats, L: Floats, law: int, i: int, n: int, step: Any, toler
     """Make an evaluated step, a record `STEP`, the state; returns the new number of points.
 
     `tolerance` bounds the error of v that merging of neighbours may leave in a piece; a merged piece's integral is that
-    of the straight piece, so that the stretch stays a continuous function of the tension. The stack never outgrows its array.
+    of the straight piece, so that the stretch stays a continuous function of the tension. The stack never
+    outgrows its array.
     """
     total, k, w, v, tau = step.total, int(step.k), step.w, step.end, step.tau
     below = G[i, D, k + 1] if 0 <= k < n - 1 else 0.0

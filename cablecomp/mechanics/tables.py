@@ -1,10 +1,10 @@
 """Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
 
-`L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low, u_step, u_count, stiffening,
-1 if friction depends on the place].
+`L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low,
+u_step, u_count, stiffening, 1 if friction depends on the place].
 Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `L` is None for the plain drive without any
-extension: the compiler then leaves out all code that a plain drive does not need. Mode 2 is the plain friction of mode 0
-with the stiffening law of the head. In mode 1 row 1 holds u = ln tau
+extension: the compiler then leaves out all code that a plain drive does not need. Mode 2 is the plain friction
+of mode 0 with the stiffening law of the head. In mode 1 row 1 holds u = ln tau
 on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) =
 int m_g dy on an even grid of y, row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
@@ -49,8 +49,8 @@ def law_table(
     wrap_max_rad: float,
     stiffening: float = 0.0,
 ) -> Floats:
-    """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the termination) and the
-    tangent stiffness EA (1 + stiffening (tau - 1)); both factors are vectorised and positive."""
+    """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
+    termination) and the tangent stiffness EA (1 + stiffening (tau - 1)); both factors are vectorised and positive."""
     table = np.zeros((4, SIZE))
     u = np.linspace(U_LOW, U_HIGH, SIZE)
     v = _integral(u, 1.0 / tension_factor(np.exp(u)))

@@ -1,8 +1,9 @@
 """Viscous slip: where cable slides on a drum, friction takes mu T + c v per radian (v slip speed) instead of mu T.
 
 The stretch then diffuses through the sliding zone: with displacement rate v(y), conservation gives
-(R/EA) dT/dt = dv/dy and the slip law c v = shrink(dT/dy, mu T). Solved implicitly on a grid fixed to the drum by Newton's
-method on a tridiagonal system; only the part that can move is solved. c = 0 is the plain law (other code: `profile.py`).
+(R/EA) dT/dt = dv/dy and the slip law c v = shrink(dT/dy, mu T). Solved implicitly on a grid fixed to the drum
+by Newton's method on a tridiagonal system; only the part that can move is solved. c = 0 is the plain law (other
+code: `profile.py`).
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ def _free_nodes(w: float, h: float) -> int:
 
 @inner_kernel
 def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> tuple[float, float, float]:
-    """Integral of tau - 1 over the wrap at end value tau, its derivatives by ln tau and by the wrap angle; kept as pending."""
+    """Integral of tau - 1 over the wrap at end value tau, its derivatives by ln tau and by the wrap angle; kept
+    as pending."""
     cable, state, context, grid = d.cables[c], d.states[c], d.context, d.grids[2 * c + end]
     old, new = grid.tau, grid.tau_try
     h = grid.step
@@ -97,7 +99,8 @@ def _relax(
 
 @kernel
 def _front(old: Floats, new: Floats, n: int, h: float, gap: float, tau: float, mu: float) -> int:
-    """The deepest node that moves, or n if none does; deep cable may still creep while the cable outside of it sticks."""
+    """The deepest node that moves, or n if none does; deep cable may still creep while the cable outside of it
+    sticks."""
     for j in range(n):
         right = tau if j == n - 1 else new[j + 1]
         slip, _, _ = _face(new[j], right, gap if j == n - 1 else h, mu)

@@ -29,7 +29,8 @@ def packed(scalars: Mapping[str, Any], state: NDArray[Any] | None) -> bytes:
 class Instrument:
     """Sends the first joint's last cycle to a viewer on this machine; `watch` is handed to the run.
 
-    The socket does not block and its buffer is bounded: what does not go out at once is dropped, and `dropped` says how often.
+    The socket does not block and its buffer is bounded: what does not go out at once is dropped, and `dropped`
+    says how often.
     """
 
     def __init__(self, port: int, per_second: float = PER_SECOND) -> None:

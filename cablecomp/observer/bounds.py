@@ -57,8 +57,9 @@ class BoundPair:
     def run(
         self, walk_at: int, kernel: Kernel, rows: Floats, outs: Floats, interval: Floats
     ) -> tuple[int, int]:
-        """Step the observer's own state (by `walk`, whose machine code lies at `walk_at`) and the bounds through rows of
-        readings; `interval` gets lowest and highest joint angle. Returns rows done and the status that stopped it."""
+        """Step the observer's own state (by `walk`, whose machine code lies at `walk_at`) and the bounds
+        through rows of readings; `interval` gets lowest and highest joint angle. Returns rows done and the
+        status that stopped it."""
         return run_bounded(walk_at, *kernel, rows, outs, self.numbers, *self._low, *self._up, interval)
 
     def states(self) -> list[tuple[Floats, Ints]]:

@@ -45,8 +45,8 @@ class Shafts(NamedTuple):
 def pair_gap(
     b: Bounds, nominal: Drive, L: Floats, ic: int, high: Side, low: Side, tension: float, pull: float, x: Shafts, safe: float
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """Stretch of both chains together [rad] with chain h in state `high` and chain l in state `low`, its slope, and either
-    chain's part. Margins count `safe` times, outward."""
+    """Stretch of both chains together [rad] with chain h in state `high` and chain l in state `low`, its slope,
+    and either chain's part. Margins count `safe` times, outward."""
     circuit = nominal.circuits[ic]
     count = circuit.count
     theta_h, a_h, m_h = chain_bound(
@@ -181,7 +181,8 @@ def closed_interval(
 
 @kernel
 def _part(mixed: float, least: float, most: float, pull: float, by_h: float, by_l: float) -> float:
-    """Which chain's stretch bounds the deflection; where the tension is none of the ends, either does unless one is slack."""
+    """Which chain's stretch bounds the deflection; where the tension is none of the ends, either does unless
+    one is slack."""
     if mixed < least:
         return by_l
     if mixed > most:
@@ -277,7 +278,8 @@ def circuit_keep(
 def bounds_step(
     P: Floats, I: Ints, L: Floats, N: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints
 ) -> tuple[float, float]:
-    """Follow the nominal state's (N) last committed step; lowest and highest possible joint angle [rad] of the drive."""
+    """Follow the nominal state's (N) last committed step; lowest and highest possible joint angle [rad] of the
+    drive."""
     nominal = drive(P, I, N, JL)  # its profiles' lengths are not looked at
     low, up = Side(drive(P, I, SL, JL), -1.0), Side(drive(P, I, SU, JU), 1.0)
     b = bounds_of(nominal.size.circuits, W)

@@ -110,7 +110,8 @@ def bounds_numbers(model: Model, past_low: float, past_high: float) -> Floats:
 
 
 def steepest(L: Floats | None) -> float:
-    """Greatest factor by which a law table (None = plain) raises friction over mu, by place and by tension (e^-2..e^2)."""
+    """Greatest factor by which a law table (None = plain) raises friction over mu, by place and by tension
+    (e^-2..e^2)."""
     if L is None or L[0, 0, 0] != TABLED:
         return 1.0
     place = float(np.max(np.diff(L[:, 2]) / L[:, 0, 5:6]))
@@ -121,8 +122,8 @@ def steepest(L: Floats | None) -> float:
 
 @kernel
 def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints) -> None:
-    """Fill all wraps of two started joints with the least and the greatest tension of the past; the first step cuts them
-    to what friction admits."""
+    """Fill all wraps of two started joints with the least and the greatest tension of the past; the first step
+    cuts them to what friction admits."""
     low, up = drive(P, I, SL, JL), drive(P, I, SU, JU)
     b = bounds_of(low.size.circuits, W)
     W[N_BOUNDS:] = 0.0
@@ -165,8 +166,8 @@ def side_retension(d: Drive, nominal: Drive, L: Floats) -> None:
 def _cable(
     b: Bounds, L: Floats, side: Side, c: int, tension: float, x_in: float, x_out: float, eps_in: float
 ) -> tuple[float, float, float]:
-    """Stretch [m] of cable c and its derivative by the tension, kept as pending; and the margin [m] that covers the cable
-    between the possible departure points and what merging of pieces did."""
+    """Stretch [m] of cable c and its derivative by the tension, kept as pending; and the margin [m] that covers
+    the cable between the possible departure points and what merging of pieces did."""
     d, sign = side.drive, side.sign
     cable, state, G = d.cables[c], d.states[c], d.profiles
     t0 = cable.T0 * state.pretension * state.stiffness
@@ -206,7 +207,8 @@ def chain_bound(
 ) -> tuple[float, float, float]:  # fmt: skip
     """Rotation [rad] of a chain's output shaft in one bound's state, its derivative by the output tension, its margin.
 
-    All wraps stand at the nominal state's shaft angles; the side's `shaft` gets what its state adds to each shaft's angle.
+    All wraps stand at the nominal state's shaft angles; the side's `shaft` gets what its state adds to each
+    shaft's angle.
     """
     theta = slope = margin = own = 0.0
     x, eps = x_in, eps_in
@@ -225,8 +227,8 @@ def chain_bound(
 
 @inner_kernel
 def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> tuple[float, float, float]:
-    """Out of a state's pending evaluation: rotation [rad] of the chain's output per rad by which output wraps are turned,
-    at most; the same for a shift of all end values by mu per rad; and its greatest compliance [rad/N]."""
+    """Out of a state's pending evaluation: rotation [rad] of the chain's output per rad by which output wraps
+    are turned, at most; the same for a shift of all end values by mu per rad; and its greatest compliance [rad/N]."""
     turning = shifting = compliance = 0.0
     for c in range(first, first + count):
         cable, state = d.cables[c], d.states[c]

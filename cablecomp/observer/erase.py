@@ -22,9 +22,9 @@ Columns = dict[str, NDArray[np.float64]]
 class ErasePlan:
     """What erases the present history.
 
-    `load_swing_Nm`: smallest amplitude A of a swing of the joint torque from its present value to `first` A, to -A and back;
-    `motor_turn_rad`: smallest travel of the motor there and back at the present load; each is infinite if none within the
-    limits does it. `load_limit_Nm`, `turn_limit_rad`: how far the search could go.
+    `load_swing_Nm`: smallest amplitude A of a swing of the joint torque from its present value to `first` A, to
+    -A and back; `motor_turn_rad`: smallest travel of the motor there and back at the present load; each is
+    infinite if none within the limits does it. `load_limit_Nm`, `turn_limit_rad`: how far the search could go.
     """
 
     load_swing_Nm: float
@@ -48,9 +48,9 @@ def plan_erase(
 ) -> ErasePlan:
     """Plan how to erase the history that `observer` holds at this time (s), motor angle (rad) and joint torque (N m).
 
-    Erased means: an observer that started from uniform tension and goes through the same excitation predicts the same from
-    then on. Found by bisection on copies; the observer itself stays as it is. Limits: those given, else the configuration's;
-    a load limit must be stated in one of them. Raises InputError without one.
+    Erased means: an observer that started from uniform tension and goes through the same excitation predicts
+    the same from then on. Found by bisection on copies; the observer itself stays as it is. Limits: those
+    given, else the configuration's; a load limit must be stated in one of them. Raises InputError without one.
     """
     limits = observer.config.limits if limits is None else limits
     most = limits.joint_torque_max_Nm

@@ -77,7 +77,8 @@ class Observer:
         return self._peeked(sample, st.walk(*self._one, False)[1], fresh)
 
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
-        """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the last sample."""
+        """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the
+        last sample."""
         row = self._row
         row[st.IN_TIME], row[st.IN_MOTOR], row[st.IN_LOAD] = time_s, motor_position_rad, joint_torque_Nm
         _, status = st.walk(*self._one, False)
@@ -90,8 +91,8 @@ class Observer:
     ) -> dict[str, NDArray[np.float64]]:
         """Step through a block of samples given as canonical channels; returns the estimates as columns.
 
-        Raises SampleRefused naming the sample (counted from 0 within the block) that cannot be taken; those before it are
-        committed.
+        Raises SampleRefused naming the sample (counted from 0 within the block) that cannot be taken; those
+        before it are committed.
         """
         rows = self._rows(columns)
         outs = np.empty((len(rows), st.OUT_WIDTH))
@@ -137,8 +138,8 @@ class Observer:
         return pack(self.config, self.model, *self._parts(), self._last_time)
 
     def restore(self, data: bytes) -> None:
-        """Take up a state from `snapshot`; raises InputError, and changes nothing, if it is damaged, belongs to another joint or
-        holds what no joint can be in."""
+        """Take up a state from `snapshot`; raises InputError, and changes nothing, if it is damaged, belongs to
+        another joint or holds what no joint can be in."""
         before = [part.copy() for part in self._all_arrays()], self._last_time
         try:
             self._last_time = unpack(data, self.config, self.model, *self._parts())
@@ -166,7 +167,8 @@ class Observer:
         self.restore(data)
 
     def vector(self) -> Floats:
-        """The state as one vector of floats, bounds left out; `set_vector` takes it up (for solvers that own the state)."""
+        """The state as one vector of floats, bounds left out; `set_vector` takes it up (for solvers that own
+        the state)."""
         return np.concatenate([self._S[: self._spare], self._J.astype(np.float64), [self._last_time]])
 
     def set_vector(self, vector: Floats) -> None:
@@ -188,7 +190,8 @@ class Observer:
         self._last_time = float(vector[-1])
 
     def check_state(self) -> None:
-        """Verify every invariant of the state (`mechanics.invariants`); raises InternalError that names the first broken one."""
+        """Verify every invariant of the state (`mechanics.invariants`); raises InternalError that names the
+        first broken one."""
         found = self._violations()
         if found:
             raise InternalError(f"{self.config.name}: the observer's state is broken: {found[0]}")
@@ -202,8 +205,8 @@ class Observer:
     # --- what can be asked ----------------------------------------------------------------------------------------
 
     def compile(self) -> None:
-        """Have what a loop calls (step, peek, inverse, bounds) compiled, or read from the cache, before it is armed; the
-        state stays as it is."""
+        """Have what a loop calls (step, peek, inverse, bounds) compiled, or read from the cache, before it is
+        armed; the state stays as it is."""
         twin = Observer(self.config, bounds=self._bounds is not None)
         still = Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(self.channels))
         twin.step(still)

@@ -50,7 +50,8 @@ class SampleRefused(InputError):
 def refused(
     status: int, time_s: float, last_s: float, strength: float, index: int | None = None
 ) -> SampleRefused:
-    """The error for a kernel's status; `last_s` = time of the sample before, `strength` = share of breaking force used."""
+    """The error for a kernel's status; `last_s` = time of the sample before, `strength` = share of breaking
+    force used."""
     reason, words = Refusal(status), ""
     if reason is Refusal.BACKWARD:
         words = f"comes after one at {last_s:g} s; time must not run backwards"

@@ -40,7 +40,8 @@ def pack(
 def unpack(
     data: bytes, config: JointConfig, model: Model, states: Sequence[State], numbers: Sequence[Floats]
 ) -> float:
-    """Fill the states from a snapshot and return the time of its last sample; after an InputError they may be half filled."""
+    """Fill the states from a snapshot and return the time of its last sample; after an InputError they may be
+    half filled."""
     body, digest = data[:-32], data[-32:]
     if len(data) < 60 or not body.startswith(MAGIC):
         raise InputError(

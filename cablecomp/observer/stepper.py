@@ -66,7 +66,8 @@ def smooth(d: Drive, dt: float, motor: float, load: float) -> tuple[float, float
 
 @inner_kernel
 def admissible(d: Drive, row: Floats) -> int:
-    """Whether a row of readings can be taken at all: started state, finite readings, time that does not run backwards."""
+    """Whether a row of readings can be taken at all: started state, finite readings, time that does not run
+    backwards."""
     if d.heights[0] < 2:
         return STATUS_UNKNOWN
     if not (math.isfinite(row[IN_MOTOR]) and math.isfinite(row[IN_LOAD]) and math.isfinite(row[IN_TIME])):
@@ -169,8 +170,8 @@ def walk(
 def find_load(
     walk_at: int, P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
 ) -> int:
-    """The load [N m] under which the joint encoder would read the only row's IN_JOINT, by Newton's method; written to its
-    IN_LOAD. `walk_at`: where the machine code of `walk` lies.
+    """The load [N m] under which the joint encoder would read the only row's IN_JOINT, by Newton's method;
+    written to its IN_LOAD. `walk_at`: where the machine code of `walk` lies.
 
     Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
     are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a load that the joint

@@ -22,8 +22,8 @@ BLOCK = 65_536
 def as_recording(source: Any, mapping: ColumnMap | None = None, name: str = "recording") -> Recording:
     """A path opened, or columns in memory taken as a recording: the same names, units and checks as in a file.
 
-    `source`: a path; or columns by name, such as `{"time_ms": ..., "motor_position_deg": ...}`; or a frame with `columns`
-    and `[name]`. Raises InputError for columns that are not channels, not numbers, or of unequal length.
+    `source`: a path; or columns by name, such as `{"time_ms": ..., "motor_position_deg": ...}`; or a frame with
+    `columns` and `[name]`. Raises InputError for columns that are not channels, not numbers, or of unequal length.
     """
     if isinstance(source, str | Path):
         return open_recording(source, mapping)

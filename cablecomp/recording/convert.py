@@ -31,8 +31,9 @@ def convert(
 ) -> int:
     """Write the rows of `source` with times within `between_s` to `to`, by its ending; returns how many.
 
-    `late_s`: channels whose values come so much later than the others', set right by interpolation; rows at the ends that
-    have no value then are left out, and all of the recording is held in memory. `ros`: ROS 2's messages, in MCAP.
+    `late_s`: channels whose values come so much later than the others', set right by interpolation; rows at the
+    ends that have no value then are left out, and all of the recording is held in memory. `ros`: ROS 2's
+    messages, in MCAP.
 
     The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
     reading does.

@@ -18,8 +18,8 @@ _BAG: Final = "metadata.yaml"
 def find_recordings(places: Iterable[Path]) -> list[Path]:
     """All recordings of these places, each once, a folder's in the order of their paths.
 
-    A folder is searched to its last subfolder; what is hidden (`.name`) is left alone. Raises InputError for a folder that
-    holds no recording.
+    A folder is searched to its last subfolder; what is hidden (`.name`) is left alone. Raises InputError for a
+    folder that holds no recording.
     """
     found: dict[Path, None] = {}
     for place in places:

@@ -77,7 +77,8 @@ def feedback_words(found: Comparison) -> str:
 
 
 _AT_NOISE: Final = 1.6
-"""Times the encoder's noise below which an error says nothing of the compensator: feedback adds some to what it reads."""
+"""Times the encoder's noise below which an error says nothing of the compensator: feedback adds some to what it
+reads."""
 HEADERS = ("controller", "RMS error / mrad", "over ours", "with joint feedback / mrad", "over ours")
 
 

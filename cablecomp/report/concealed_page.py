@@ -1,4 +1,5 @@
-"""What was found of physics concealed in somebody's own recordings: a page, a table, and a section of the diagnosis page."""
+"""What was found of physics concealed in somebody's own recordings: a page, a table, and a section of the
+diagnosis page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The diagnosis page: the answer, what was missing, what remains, where, before and after, what was rejected and why."""
+"""The diagnosis page: the answer, what was missing, what remains, where, before and after, what was rejected
+and why."""
 
 from __future__ import annotations
 
@@ -41,8 +42,8 @@ _DRAWN: Final = 6
 
 
 def diagnosis_page(d: Diagnosis, augmented_toml: str = "", concealed: Mapping[str, Any] | None = None) -> str:
-    """Return the page of one diagnosis as HTML that opens offline; `augmented_toml` is shown folded, `concealed` is what
-    `cablecomp prove --in` found of physics concealed in the same recordings."""
+    """Return the page of one diagnosis as HTML that opens offline; `augmented_toml` is shown folded,
+    `concealed` is what `cablecomp prove --in` found of physics concealed in the same recordings."""
     many = len(d.sessions) > 1
     count = f"{len(d.recordings)} recording{'s' if len(d.recordings) > 1 else ''}"
     lead = f"{count}{f' in {len(d.sessions)} sessions' if many else ''}; {d.runtime_s:.0f} s."

@@ -75,7 +75,8 @@ def depends(law: Mapping[str, Any]) -> str:
 
 
 def dependences(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Every dependence found, effects' and drive's: `parameter`, `on`, and `values` by session or `per_unit` of a condition."""
+    """Every dependence found, effects' and drive's: `parameter`, `on`, and `values` by session or `per_unit` of
+    a condition."""
     found = {
         (d["parameter"], d["on"]): dict(d)
         for m in result["missing_physics"]

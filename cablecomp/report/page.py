@@ -89,7 +89,8 @@ def code(text: str) -> str:
 
 
 def figure(fig: Any, caption: str = "") -> str:
-    """Return a plotly figure as HTML; the page around it draws it where it stands, one folded away once it is opened."""
+    """Return a plotly figure as HTML; the page around it draws it where it stands, one folded away once it is
+    opened."""
     data = _figure_data(fig)
     height = int(fig.layout.height or 450)
     note = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
@@ -156,7 +157,8 @@ def _plotly() -> str:
 
 
 def _packed(text: str) -> str:
-    """Text in zlib and base 85: plotly.js takes 1.8 MB in place of 4.8, a figure a fifth; nothing in it ends a script."""
+    """Text in zlib and base 85: plotly.js takes 1.8 MB in place of 4.8, a figure a fifth; nothing in it ends a
+    script."""
     return base64.b85encode(zlib.compress(text.encode(), 9)).decode()
 
 

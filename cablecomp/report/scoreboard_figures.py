@@ -61,7 +61,8 @@ def reliability(board: Scoreboard) -> Any:
 
 
 def risk(board: Scoreboard) -> Any:
-    """Share of wrong names among those with the highest confidence, or the highest z, against how many of all they are."""
+    """Share of wrong names among those with the highest confidence, or the highest z, against how many of all
+    they are."""
     fig, trust = style.figure(360), board.trust
     coverage = [100.0 * c for c in trust.coverage]
     for label, colour, values in (

@@ -16,8 +16,8 @@ BINS = 10
 def calibration_error(probability: Sequence[float], right: Sequence[bool], bins: int = BINS) -> float:
     """Expected calibration error: sum over bins of n_b/n |share right - mean probability|, bins of equal counts.
 
-    Equal counts because names cluster near 0 and 1 (M. Naeini, G. Cooper, M. Hauskrecht, AAAI 2015, with the adaptive bins
-    of K. Nguyen and B. O'Connor, EMNLP 2015). NaN for none.
+    Equal counts because names cluster near 0 and 1 (M. Naeini, G. Cooper, M. Hauskrecht, AAAI 2015, with the
+    adaptive bins of K. Nguyen and B. O'Connor, EMNLP 2015). NaN for none.
     """
     p, y = _sorted(probability, right)
     if not len(p):
@@ -41,7 +41,8 @@ def risk_coverage(score: Sequence[float], right: Sequence[bool]) -> tuple[Floats
 
 
 def risk_area(score: Sequence[float], right: Sequence[bool]) -> float:
-    """Area under risk against coverage, the less the better (Y. Geifman and R. El-Yaniv, NeurIPS 2017); NaN for none."""
+    """Area under risk against coverage, the less the better (Y. Geifman and R. El-Yaniv, NeurIPS 2017); NaN for
+    none."""
     return float(np.mean(risk_coverage(score, right)[1])) if len(score) else nan
 
 

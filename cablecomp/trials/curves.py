@@ -20,9 +20,10 @@ MOVED = 3.0
 class Concealed:
     """One trial beside its twin, which differs by nothing but what is concealed.
 
-    `physics`: its id ("twin" for the twin itself); `accepted`: names that are right; `size` in `unit`; `share`: the same as
-    it was drawn; `new`: names that its twin was not given; `already`: a right name that its twin was given; `located`: the
-    residual's first covariate is the right one, and not the twin's; `moved`: calibrated values that left the twin's.
+    `physics`: its id ("twin" for the twin itself); `accepted`: names that are right; `size` in `unit`; `share`:
+    the same as it was drawn; `new`: names that its twin was not given; `already`: a right name that its twin
+    was given; `located`: the residual's first covariate is the right one, and not the twin's; `moved`:
+    calibrated values that left the twin's.
     """
 
     number: int
@@ -45,7 +46,8 @@ class Concealed:
 
     @property
     def found(self) -> bool:
-        """Whether what was put was found: a right name is new; where there is none, it is located, or calibrated away."""
+        """Whether what was put was found: a right name is new; where there is none, it is located, or
+        calibrated away."""
         if self.accepted:
             return any(n in self.accepted for n in self.new)
         return bool(self.moved) if self.calibrates else self.located
@@ -118,9 +120,9 @@ class Point:
 
 @dataclass(frozen=True)
 class Curve:
-    """All sizes of one physics, smallest first. `in_twins`: twins that were given its name although nothing was put, and what is
-    named without being put cannot be found anew (`already` counts such trials; they are in no point). `from_size`: smallest
-    size from which on all were found; NaN where not even the largest."""
+    """All sizes of one physics, smallest first. `in_twins`: twins that were given its name although nothing was
+    put, and what is named without being put cannot be found anew (`already` counts such trials; they are in no
+    point). `from_size`: smallest size from which on all were found; NaN where not even the largest."""
 
     physics: str
     words: str

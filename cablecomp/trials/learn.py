@@ -1,8 +1,10 @@
-"""`python -m cablecomp.trials.learn RUN…`: learn confidence from judged trials, and check it on laws that it was not learnt on.
+"""`python -m cablecomp.trials.learn RUN…`: learn confidence from judged trials, and check it on laws that it
+was not learnt on.
 
-Each RUN is the folder of a `cablecomp prove` that has ended: its scoreboard holds the evidence of every effect that was weighed,
-and whether it was right. The model is logistic regression with a ridge (weights of standardised features; the bias is free).
-What is said of it comes from folds that leave out whole laws: `bearing_friction:dahl` is judged by what other laws taught.
+Each RUN is the folder of a `cablecomp prove` that has ended: its scoreboard holds the evidence of every effect
+that was weighed, and whether it was right. The model is logistic regression with a ridge (weights of
+standardised features; the bias is free). What is said of it comes from folds that leave out whole laws:
+`bearing_friction:dahl` is judged by what other laws taught.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ Floats = NDArray[np.float64]
 SHIPPED = Path(confidence.__file__).with_name("confidence.json")
 FOLDS, LEAST, MISS = 5, 30, 0.1
 RIDGES = (0.3, 1.0, 3.0, 10.0, 30.0)
-"""Standard deviations of a weight's prior to the minus two; the one with the best Brier score on laws left out is taken."""
+"""Standard deviations of a weight's prior to the minus two; the one with the best Brier score on laws left out
+is taken."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,9 @@ class Judged:
 
 @dataclass(frozen=True)
 class Checked:
-    """How a way to learn does on laws left out: expected calibration error, Brier score, area under risk against coverage
-    by confidence and by z alone; `probability` of each effect, from the fold that had not seen its law."""
+    """How a way to learn does on laws left out: expected calibration error, Brier score, area under risk
+    against coverage by confidence and by z alone; `probability` of each effect, from the fold that had not seen
+    its law."""
 
     probability: tuple[float, ...]
     error: float
@@ -133,7 +137,8 @@ def judged_in(board: Mapping[str, Any]) -> list[Judged]:
 
 
 def learnt_from(boards: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
-    """The contents of `confidence.json`: the model, what it was learnt on, how it does on laws left out, the conformal level."""
+    """The contents of `confidence.json`: the model, what it was learnt on, how it does on laws left out, the
+    conformal level."""
     judged = [j for board in boards for j in judged_in(board)]
     tried = {ridge: check(judged, ridge) for ridge in RIDGES}
     ridge = min(tried, key=lambda r: tried[r].brier)

@@ -1,4 +1,5 @@
-"""Blind trials in somebody's own recordings: known physics concealed in pieces of them, and what of it would have been found."""
+"""Blind trials in somebody's own recordings: known physics concealed in pieces of them, and what of it would
+have been found."""
 
 from __future__ import annotations
 
@@ -33,13 +34,14 @@ from cablecomp.trials.shares import write_json
 PIECES, ANSWER = "pieces", "concealed.json"
 Columns = Mapping[str, FloatArray]
 Conceal = Callable[[Path, int, Path, Callable[[int, int], None]], str]
-"""Reads pieces of recordings, writes public trials and sealed truths into a folder; returns the SHA-256 of the seals."""
+"""Reads pieces of recordings, writes public trials and sealed truths into a folder; returns the SHA-256 of the
+seals."""
 
 
 @dataclass(frozen=True)
 class OwnWish:
-    """How much: `rounds` pieces of at most `seconds` of recordings each (one twin and one trial of every physics in each),
-    begun for at most `minutes` (None: until all are done)."""
+    """How much: `rounds` pieces of at most `seconds` of recordings each (one twin and one trial of every
+    physics in each), begun for at most `minutes` (None: until all are done)."""
 
     seed: int
     rounds: int
@@ -62,8 +64,8 @@ class Own:
 def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
     """Conceal, diagnose each trial blindly, open the truth, and say what size of each physics would have been found.
 
-    Writes `concealed.json`. With the same folder again (and more minutes), it goes on where it stopped. Raises InputError for
-    recordings that cannot be used, or a folder that holds another run.
+    Writes `concealed.json`. With the same folder again (and more minutes), it goes on where it stopped. Raises
+    InputError for recordings that cannot be used, or a folder that holds another run.
     """
     out = own.out
     wanted = {

@@ -1,7 +1,7 @@
 """The yardstick of a blind trial: what the true law itself, whatever its form, takes off the recalibrated drive.
 
-The plant's own noise-free contribution of an effect is taken off the recorded angle and the drive is calibrated again: that
-is what a catalogue that held the very law could reach.
+The plant's own noise-free contribution of an effect is taken off the recorded angle and the drive is calibrated
+again: that is what a catalogue that held the very law could reach.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ EVALUATIONS = 8
 class Yardstick:
     """What the truth reaches.
 
-    `true_rmse_rad`: RMS of the recorded angle about the true one (noise alone); `baseline_rmse_rad`: held-out RMSE of the
-    recalibrated drive; `decidable`: the true laws beat the recalibrated drive on data left out by what an effect has to
-    bring (in a pair: each of them beats the drive with the other one as well); `gain`: share of the baseline's square on
-    data left out that they take off, with its `z`.
+    `true_rmse_rad`: RMS of the recorded angle about the true one (noise alone); `baseline_rmse_rad`: held-out
+    RMSE of the recalibrated drive; `decidable`: the true laws beat the recalibrated drive on data left out by
+    what an effect has to bring (in a pair: each of them beats the drive with the other one as well); `gain`:
+    share of the baseline's square on data left out that they take off, with its `z`.
     """
 
     true_rmse_rad: float = nan
@@ -61,8 +61,8 @@ def measure_truth(
 ) -> Yardstick:
     """Compare the drive with and without its true effects, on data left out.
 
-    `angles`: `time_s_k`, `joint_rad_k` (as it is), `plain_rad_k` (without any effect), `without_<id>_rad_k` of recordings
-    k = 1, 2, … in order. Raises InputError if the joint cannot follow the recordings.
+    `angles`: `time_s_k`, `joint_rad_k` (as it is), `plain_rad_k` (without any effect), `without_<id>_rad_k` of
+    recordings k = 1, 2, … in order. Raises InputError if the joint cannot follow the recordings.
     """
     rng = np.random.default_rng(seed)
     body = gather_body(config, recordings)

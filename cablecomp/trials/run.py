@@ -1,4 +1,5 @@
-"""What every blind run does: commit to a sealed truth, diagnose public folders elsewhere, keep verdicts, go on after a stop."""
+"""What every blind run does: commit to a sealed truth, diagnose public folders elsewhere, keep verdicts, go on
+after a stop."""
 
 from __future__ import annotations
 

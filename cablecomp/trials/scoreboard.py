@@ -20,8 +20,8 @@ CONFIDENCE_EDGES = (0.0, 0.2, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0001)
 
 @dataclass(frozen=True)
 class Target:
-    """A figure with its 95 % interval, against `least` or `most` (both None: told, not judged); `ok` None if there were no
-    trials, or nothing is asked."""
+    """A figure with its 95 % interval, against `least` or `most` (both None: told, not judged); `ok` None if
+    there were no trials, or nothing is asked."""
 
     what: str
     reached: float
@@ -43,7 +43,8 @@ class Target:
 
 @dataclass(frozen=True)
 class Part:
-    """Trials of one sort (a law, an imperfection, a size): named first and located where decidable, wrong names of all."""
+    """Trials of one sort (a law, an imperfection, a size): named first and located where decidable, wrong names
+    of all."""
 
     name: str
     trials: int
@@ -56,8 +57,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Trust:
-    """Whether confidence can be trusted, over all effects that were weighed: expected calibration error, Brier score, area under
-    risk against coverage by confidence and by z alone, the curve itself, and by bins (low, high, mean confidence, true)."""
+    """Whether confidence can be trusted, over all effects that were weighed: expected calibration error, Brier
+    score, area under risk against coverage by confidence and by z alone, the curve itself, and by bins (low,
+    high, mean confidence, true)."""
 
     of: int
     error: float

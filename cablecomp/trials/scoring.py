@@ -20,7 +20,8 @@ SURE = 0.5  # confidence from which a name is given
 
 @dataclass(frozen=True)
 class Named:
-    """An effect that was weighed: its confidence and evidence, and whether it is true. It is a name given from `SURE` on."""
+    """An effect that was weighed: its confidence and evidence, and whether it is true. It is a name given from
+    `SURE` on."""
 
     effect: str
     confidence: float
@@ -45,7 +46,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Bound:
-    """How large an effect that was concealed and not named could be, as stated (None: any size), against what is true."""
+    """How large an effect that was concealed and not named could be, as stated (None: any size), against what
+    is true."""
 
     what: str
     true: float
@@ -62,13 +64,14 @@ class Row:
     """The score of one trial.
 
     `laws`, `forms`: whose laws the concealed effects follow, and each effect's `id:form`; `imperfections` by name;
-    `named`: names given, `weighed`: all effects of the final model, named or not, with their evidence; `decidable`: the true
-    laws beat the recalibrated drive beyond what an effect has to bring; `located`: the first covariate of the calibrated
-    drive's residual, before any name, or an interval, is what the concealed effect acts through (None if nothing is
-    concealed); `bounds`: of what was concealed and not named; `depends`: true dependences found, of all (None: there are
-    none to be found), `depends_wrongly`: those stated that are not true; `final_rad`: RMSE after modelling on data kept for
-    the end; `empirical`: laws without a name; `said_tied`, `proposed`, `settled`: of confounded trials (None otherwise);
-    `heldout_rad`, `baseline_rad`, `true_rad`, `floor_rad`: RMSE after modelling, of the recalibrated drive, of the true angle
+    `named`: names given, `weighed`: all effects of the final model, named or not, with their evidence;
+    `decidable`: the true laws beat the recalibrated drive beyond what an effect has to bring; `located`: the
+    first covariate of the calibrated drive's residual, before any name, or an interval, is what the concealed
+    effect acts through (None if nothing is concealed); `bounds`: of what was concealed and not named;
+    `depends`: true dependences found, of all (None: there are none to be found), `depends_wrongly`: those
+    stated that are not true; `final_rad`: RMSE after modelling on data kept for the end; `empirical`: laws
+    without a name; `said_tied`, `proposed`, `settled`: of confounded trials (None otherwise); `heldout_rad`,
+    `baseline_rad`, `true_rad`, `floor_rad`: RMSE after modelling, of the recalibrated drive, of the true angle
     (the recording's own noise), of noise as the verdict states it; `failed`: why there is no verdict.
     """
 
@@ -261,7 +264,8 @@ def _settled(truth: Truth, second: Mapping[str, Any] | None) -> bool:
 
 
 def _dependences(verdict: Mapping[str, Any]) -> set[tuple[str, str]]:
-    """(parameter, on) of all dependences that were stated, effects' and drive's; zeros are each session's own anyway."""
+    """(parameter, on) of all dependences that were stated, effects' and drive's; zeros are each session's own
+    anyway."""
     found = {
         (d["parameter"].removeprefix("effect."), d["on"])
         for m in verdict["missing_physics"]

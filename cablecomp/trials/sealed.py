@@ -57,8 +57,8 @@ class TrueEffect:
     """One concealed effect.
 
     `id`: of the catalogue, or a stranger's; `form`: "catalogue", another law's name, or "stranger"; `role`: "main" or
-    "companion" (far smaller); `parameters` as a joint configuration states them; `size`: RMS contribution over the plain
-    loop's width; `covariates` in which it shows, best first; `nearest`: names that are right for it.
+    "companion" (far smaller); `parameters` as a joint configuration states them; `size`: RMS contribution over
+    the plain loop's width; `covariates` in which it shows, best first; `nearest`: names that are right for it.
     """
 
     id: str
@@ -84,9 +84,9 @@ class TrueEffect:
 class Truth:
     """What is true of one trial.
 
-    `kind`: single, pair, none, stranger, sessions or confounded; `partner`: the other explanation of a confounded trial;
-    `depends_on`: (parameter, on) pairs; `imperfections`: by name, with what each was drawn to be; `true` drive values by
-    name; `zeros_rad`: the joint encoder's zero in each recording.
+    `kind`: single, pair, none, stranger, sessions or confounded; `partner`: the other explanation of a
+    confounded trial; `depends_on`: (parameter, on) pairs; `imperfections`: by name, with what each was drawn to
+    be; `true` drive values by name; `zeros_rad`: the joint encoder's zero in each recording.
     """
 
     number: int

@@ -1,8 +1,9 @@
-"""`python -m firmware_sim.conceal --in PIECES --seed S --out DIR`: conceal physics in pieces of recordings, seal the truth.
+"""`python -m firmware_sim.conceal --in PIECES --seed S --out DIR`: conceal physics in pieces of recordings,
+seal the truth.
 
-PIECES/00000 holds `recording-1.npz`, … (canonical channels) of the first round, and so on; `PIECES/joint.toml` goes along
-into every trial's folder DIR/trials/00000; its truth is sealed in DIR/sealed/00000.zip. Prints `written K of N`, then
-`sha256 HEX` of all seals.
+PIECES/00000 holds `recording-1.npz`, … (canonical channels) of the first round, and so on; `PIECES/joint.toml`
+goes along into every trial's folder DIR/trials/00000; its truth is sealed in DIR/sealed/00000.zip. Prints
+`written K of N`, then `sha256 HEX` of all seals.
 """
 
 from __future__ import annotations

@@ -31,10 +31,10 @@ class Change:
 class Physics:
     """One physics that can be concealed.
 
-    `named`: ids under which the effects catalogue of a diagnosis may rightly name it; `shows_in`: covariates in which it
-    shows; `calibrates`: it is no missing physics but a constant that is off. `shares`: sizes, of the span that `of` says
-    (the joint's travel, the torque's scatter), or seconds. `unit`, `per_unit`: the unit in which a size is shown, and how many
-    of it a unit of `Change.numbers["size"]` is.
+    `named`: ids under which the effects catalogue of a diagnosis may rightly name it; `shows_in`: covariates in
+    which it shows; `calibrates`: it is no missing physics but a constant that is off. `shares`: sizes, of the
+    span that `of` says (the joint's travel, the torque's scatter), or seconds. `unit`, `per_unit`: the unit in
+    which a size is shown, and how many of it a unit of `Change.numbers["size"]` is.
     """
 
     id: str

@@ -1,4 +1,5 @@
-"""Which trials: pieces of the recordings, of each one twin with nothing concealed and one trial of every physics, sizes in turn."""
+"""Which trials: pieces of the recordings, of each one twin with nothing concealed and one trial of every
+physics, sizes in turn."""
 
 from __future__ import annotations
 
@@ -55,8 +56,8 @@ class Trial:
 def trials_of(pieces: Sequence[Sequence[Table]], seed: int) -> tuple[list[Trial], dict[str, str]]:
     """All trials of these pieces (one round each), and why a physics cannot be concealed in them, by its id.
 
-    A trial depends on seed, round and piece, not on the others. In every round each physics has another of its sizes, so that
-    as many rounds as there are sizes hold every one once; first comes the third.
+    A trial depends on seed, round and piece, not on the others. In every round each physics has another of its
+    sizes, so that as many rounds as there are sizes hold every one once; first comes the third.
     """
     found: list[Trial] = []
     missing: dict[str, str] = {}

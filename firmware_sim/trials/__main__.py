@@ -1,8 +1,8 @@
 """`python -m firmware_sim.trials`: write blind trials with sealed truths, or run an experiment on a sealed joint.
 
-Trials: `--trials N --seed S --out DIR [--kinds K,…] [--laws L] [--imperfections I] [--workers W]`; progress is printed as
-`written K of N`, then `sha256 HEX`. Experiment: `experiment --sealed FILE --protocol FILE --out FILE [--seed S]`.
-`python -m firmware_sim.trials.make` makes the same trials with their truth beside them, to learn on.
+Trials: `--trials N --seed S --out DIR [--kinds K,…] [--laws L] [--imperfections I] [--workers W]`; progress is
+printed as `written K of N`, then `sha256 HEX`. Experiment: `experiment --sealed FILE --protocol FILE --out FILE
+[--seed S]`. `python -m firmware_sim.trials.make` makes the same trials with their truth beside them, to learn on.
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ def run_experiment(sealed: Path, protocol: Path, out: Path, seed: int = 0) -> Pa
 
     The position reference is followed by the motor as if the drive were rigid. Temperature and neighbour go
     their own way meanwhile, as they do from day to day. The clock goes on from the trial's recordings.
-    Raises PlantError for a trial with nothing to settle, a protocol that is none or too long, or one that the joint cannot
-    follow.
+    Raises PlantError for a trial with nothing to settle, a protocol that is none or too long, or one that the
+    joint cannot follow.
     """
     truth = open_truth(sealed)
     if not truth["partner"]:

@@ -41,9 +41,9 @@ def generate(
 ) -> str:
     """Write `trials` trials under `out` with their seals; returns the SHA-256 of all seals.
 
-    Those whose seal is there already are kept. What is written depends on what is wanted and on each trial's number, not on
-    how many there are nor on the number of worker processes. Raises PlantError for fewer than one trial, or a place that
-    cannot be written.
+    Those whose seal is there already are kept. What is written depends on what is wanted and on each trial's
+    number, not on how many there are nor on the number of worker processes. Raises PlantError for fewer than
+    one trial, or a place that cannot be written.
     """
     if trials < 1 or workers < 1:
         raise PlantError(f"{trials} trials by {workers} workers; at least one of each is accepted")

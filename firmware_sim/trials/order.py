@@ -53,8 +53,8 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Order:
-    """What one trial is to hold; `suspects` in no order of size, `case` of one of several sessions, `tie` of one in which two
-    explanations coincide."""
+    """What one trial is to hold; `suspects` in no order of size, `case` of one of several sessions, `tie` of
+    one in which two explanations coincide."""
 
     number: int
     kind: str
@@ -64,8 +64,8 @@ class Order:
 
 
 def order(wanted: Wanted, number: int) -> Order:
-    """What trial `number` (from 0) is to hold: kinds in turn as they were given (one given twice comes twice as often), and
-    each kind's effects in turn."""
+    """What trial `number` (from 0) is to hold: kinds in turn as they were given (one given twice comes twice as
+    often), and each kind's effects in turn."""
     turn, within = divmod(number, len(wanted.kinds))
     kind = wanted.kinds[within]
     place = turn * wanted.kinds.count(kind) + wanted.kinds[:within].count(kind)

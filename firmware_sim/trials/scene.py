@@ -1,4 +1,5 @@
-"""The scene of a trial: what its courses may use, its plain drive's run and measures, and whether a cable goes slack."""
+"""The scene of a trial: what its courses may use, its plain drive's run and measures, and whether a cable goes
+slack."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Effects outside of any catalogue: physics that a diagnosis must locate and describe, and not name.
 
-Some lie far from the catalogue, some near it (a neighbour that bends the frame, a cable climbing its groove, play at the
-motor): every kind of the plant says which names are the nearest to it. What is a further form of one of the catalogue's
-laws is not here.
+Some lie far from the catalogue, some near it (a neighbour that bends the frame, a cable climbing its groove,
+play at the motor): every kind of the plant says which names are the nearest to it. What is a further form of
+one of the catalogue's laws is not here.
 """
 
 from __future__ import annotations

@@ -61,8 +61,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class World:
-    """A trial with all its truth; `joint` holds the true drive of the first session and the nominal one, `partner` is the other
-    explanation of a trial that is confounded by design."""
+    """A trial with all its truth; `joint` holds the true drive of the first session and the nominal one,
+    `partner` is the other explanation of a trial that is confounded by design."""
 
     order: Order
     joint: DrawnJoint

@@ -4,9 +4,9 @@ control; identifier = function << 8 | drive id, big-endian.
 Commands: 1 current (int32 mA), 3 velocity (int32 ERPM), 4 position (int32 1e-4 deg of the output shaft), 5 origin
 (0 until power-off, 1 for good), 6 position with limits (int32 1e-4 deg, int16 10 ERPM, int16 10 ERPM/s), 8 force
 control (kp 12, kd 12, position 16, velocity 12, torque 12 bits), 15 leave the mode (V3.2). Any but the last enables;
-none for the command timeout, and the drive lets go without an error. Status (0x29), by itself at every n-th sample: int16
-0.1 deg, int16 10 ERPM, int16 0.01 A, int8 degC, error code. Sources: CubeMars, AK Series Module Product Manual V3.0.1
-and V3.2.0, 4.1 to 4.3; the maker's AK-V3.ino.
+none for the command timeout, and the drive lets go without an error. Status (0x29), by itself at every n-th
+sample: int16 0.1 deg, int16 10 ERPM, int16 0.01 A, int8 degC, error code. Sources: CubeMars, AK Series Module
+Product Manual V3.0.1 and V3.2.0, 4.1 to 4.3; the maker's AK-V3.ino.
 """
 
 from __future__ import annotations

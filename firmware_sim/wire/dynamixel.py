@@ -3,7 +3,8 @@
 Items are written whole, those of the EEPROM (below 64) only without torque, goals within their limits and not after
 a bus watchdog error; indirect data stand for what their addresses name. The bus watchdog (20 ms a count) stops the
 drive when no instruction comes, and then reads -1. A hardware error takes torque away until a reboot. Status return
-level: 0 answers ping alone, 1 reads too, 2 everything. Sources: Robotis e-Manual, "DYNAMIXEL Protocol 2.0", "XM430-W350".
+level: 0 answers ping alone, 1 reads too, 2 everything. Sources: Robotis e-Manual, "DYNAMIXEL Protocol 2.0",
+"XM430-W350".
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The message tables (DBC) that ship in `configs/links`; `python -m firmware_sim.wire.shipped DIRECTORY` writes them."""
+"""The message tables (DBC) that ship in `configs/links`; `python -m firmware_sim.wire.shipped DIRECTORY` writes
+them."""
 
 from __future__ import annotations
 

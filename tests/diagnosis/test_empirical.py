@@ -1,4 +1,5 @@
-"""Laws without a name: what the diagnosis counts is what the observer runs, and a series fitted again finds what is there."""
+"""Laws without a name: what the diagnosis counts is what the observer runs, and a series fitted again finds
+what is there."""
 
 from __future__ import annotations
 

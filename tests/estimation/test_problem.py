@@ -157,7 +157,8 @@ def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_a
 
 
 def test_a_past_that_nobody_recorded_is_estimated_with_the_zeros() -> None:
-    """Half of the way to the greatest load and back went before; small swings keep its bump, a constant does not hide it."""
+    """Half of the way to the greatest load and back went before; small swings keep its bump, a constant does
+    not hide it."""
     ramp = np.linspace(0.0, 1.0, 60)
     before = np.concatenate([2.0 * ramp, 2.0 - 2.0 * ramp])
     small = np.concatenate([0.8 * ramp, 0.8 - 1.2 * ramp, -0.4 + 1.8 * ramp])

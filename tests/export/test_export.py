@@ -99,7 +99,8 @@ def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_mujoco_shows_stiffness_and_width_of_the_loop() -> None:
-    """Motor held, load slowly up, down, up: the load less the friction over the stiffness, either way; then the joint follows."""
+    """Motor held, load slowly up, down, up: the load less the friction over the stiffness, either way; then the
+    joint follows."""
     mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
     hold = (
         '<equality><joint joint1="motor" solref="0.001 1" solimp="0.9999 0.9999 0.001"/></equality></mujoco>'

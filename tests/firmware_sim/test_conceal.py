@@ -1,4 +1,5 @@
-"""Physics concealed in recordings: what the drive felt stays what was measured, sizes are as stated, twins hold nothing."""
+"""Physics concealed in recordings: what the drive felt stays what was measured, sizes are as stated, twins hold
+nothing."""
 
 from __future__ import annotations
 

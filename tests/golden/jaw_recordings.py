@@ -36,7 +36,8 @@ def load_of(path: Path) -> str:
 
 
 def pitch_split(session: str) -> tuple[list[Path], list[Path]]:
-    """What is learnt from when a wrist pitch is left out (the two others, and its own lightest load), and what is judged."""
+    """What is learnt from when a wrist pitch is left out (the two others, and its own lightest load), and what
+    is judged."""
     mine = of_session(session)
     return [*(n for p in PITCHES if p != session for n in of_session(p)), mine[0]], mine[1:]
 
@@ -44,8 +45,8 @@ def pitch_split(session: str) -> tuple[list[Path], list[Path]]:
 def baseline(
     kind: str, train: Sequence[Path], test: Sequence[Path], motor_torque: bool = False
 ) -> dict[str, FloatArray]:
-    """Misfit on `test` of a baseline fitted to `train`, with one encoder zero per session; that of a session of which only
-    one recording was learnt from is its mean misfit."""
+    """Misfit on `test` of a baseline fitted to `train`, with one encoder zero per session; that of a session of
+    which only one recording was learnt from is its mean misfit."""
     sessions = sorted({p.parent.name for p in train})
 
     def given(path: Path) -> dict[str, FloatArray]:

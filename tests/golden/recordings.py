@@ -1,4 +1,5 @@
-"""Where the recordings of real hardware lie: `CABLECOMP_RECORDINGS` names their folder; nothing of them is kept here."""
+"""Where the recordings of real hardware lie: `CABLECOMP_RECORDINGS` names their folder; nothing of them is kept
+here."""
 
 from __future__ import annotations
 
@@ -48,8 +49,8 @@ def diagnosed(config: JointConfig, paths: Sequence[Path]) -> Diagnosis:
 
 @cache
 def coarse(path: Path, group: int) -> dict[str, FloatArray]:
-    """A recording's channels, means of `group` samples, from the motor's first reversal on (a return by 2 % of its range
-    after nine tenths of it): what lies before depends on a history that nobody recorded."""
+    """A recording's channels, means of `group` samples, from the motor's first reversal on (a return by 2 % of
+    its range after nine tenths of it): what lies before depends on a history that nobody recorded."""
     columns = {k: group_means(v, group) for k, v in read_all(path).columns.items()}
     away = np.abs(columns["motor_position_rad"] - columns["motor_position_rad"][0])
     farthest, span = np.maximum.accumulate(away), float(away.max())

@@ -23,8 +23,8 @@ def path(bend_deg: int) -> Path:
 
 
 def baseline(kind: str, train: Sequence[int], test: Sequence[int]) -> dict[str, FloatArray]:
-    """Misfit of a baseline that sees motor angle and sheath angle; the encoder starts at zero wherever friction holds the
-    tip, so each recording has a zero of its own."""
+    """Misfit of a baseline that sees motor angle and sheath angle; the encoder starts at zero wherever friction
+    holds the tip, so each recording has a zero of its own."""
 
     def given(bend: int) -> dict[str, FloatArray]:
         columns = read_all(path(bend)).columns

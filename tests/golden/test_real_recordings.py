@@ -1,7 +1,7 @@
 """Verdicts of the diagnosis on recordings of real hardware.
 
-Set CABLECOMP_RECORDINGS to the folder of the recordings; without it these tests are skipped. `pytest -s` shows the figures;
-`python tests/golden/real_recordings.py` goes through all recordings, with baselines.
+Set CABLECOMP_RECORDINGS to the folder of the recordings; without it these tests are skipped. `pytest -s` shows
+the figures; `python tests/golden/real_recordings.py` goes through all recordings, with baselines.
 """
 
 from __future__ import annotations

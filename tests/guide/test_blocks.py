@@ -1,8 +1,8 @@
 """Every block of code in the README and in the guide runs as it stands, or says in the source why not.
 
-A document's blocks run one after the other in a folder of their own. Commands of cablecomp and Python run in this process,
-anything else in a shell. A Python or TOML block whose first line is a comment that names a file is that file, too. A block
-after `<!-- not run: REASON -->` (which no reader sees) is not run.
+A document's blocks run one after the other in a folder of their own. Commands of cablecomp and Python run in
+this process, anything else in a shell. A Python or TOML block whose first line is a comment that names a file
+is that file, too. A block after `<!-- not run: REASON -->` (which no reader sees) is not run.
 """
 
 from __future__ import annotations

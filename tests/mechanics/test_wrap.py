@@ -1,4 +1,5 @@
-"""One wrap by itself: unwinding, a pulley that turns steadily, and energy, against the thesis and against the profile."""
+"""One wrap by itself: unwinding, a pulley that turns steadily, and energy, against the thesis and against the
+profile."""
 
 from __future__ import annotations
 

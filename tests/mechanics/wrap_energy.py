@@ -24,8 +24,8 @@ def stored_J(angle_rad: Array, tension_N: Array, radius_m: float, EA_N: float) -
 def slip_m(
     before: tuple[Array, Array], after: tuple[Array, Array], grid_rad: Array, radius_m: float, EA_N: float
 ) -> Array:
-    """How far the cable slid towards the departure point [m] at each angle of the grid, between two profiles (angle, tension):
-    s(y) = R/EA int_0^y (T_after - T_before) dy."""
+    """How far the cable slid towards the departure point [m] at each angle of the grid, between two profiles
+    (angle, tension): s(y) = R/EA int_0^y (T_after - T_before) dy."""
     change = _tension(grid_rad, after) - _tension(grid_rad, before)
     steps = 0.5 * (change[1:] + change[:-1]) * np.diff(grid_rad)
     return np.concatenate(([0.0], np.cumsum(steps))) * radius_m / EA_N

@@ -1,4 +1,5 @@
-"""Against an independent finite-element plant: noise-free runs of four joints (tests/data/reference, see its README)."""
+"""Against an independent finite-element plant: noise-free runs of four joints (tests/data/reference, see its
+README)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Recordings of messages for tests: bytes worked out from the formats' own specifications, not by our reader's packages."""
+"""Recordings of messages for tests: bytes worked out from the formats' own specifications, not by our reader's
+packages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Deflection of closed stages in series in closed form (thesis, 5.2.2): what the kernel and the equivalent stage are held to."""
+"""Deflection of closed stages in series in closed form (thesis, 5.2.2): what the kernel and the equivalent
+stage are held to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""With true parameters and noisy sensors the prediction stands at the joint encoder's noise floor (sheet, section 1.2)."""
+"""With true parameters and noisy sensors the prediction stands at the joint encoder's noise floor (sheet,
+section 1.2)."""
 
 from __future__ import annotations
 

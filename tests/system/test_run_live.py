@@ -1,4 +1,5 @@
-"""`cablecomp run --live` on the simulated joint: a change in mid-run is raised, located and kept; without one nothing is."""
+"""`cablecomp run --live` on the simulated joint: a change in mid-run is raised, located and kept; without one
+nothing is."""
 
 from __future__ import annotations
 

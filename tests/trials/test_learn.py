@@ -1,4 +1,5 @@
-"""Confidence learnt from judged trials: the fit is the optimum, what is said of it holds on laws that it had not seen."""
+"""Confidence learnt from judged trials: the fit is the optimum, what is said of it holds on laws that it had
+not seen."""
 
 from __future__ import annotations
 

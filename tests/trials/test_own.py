@@ -1,4 +1,5 @@
-"""Physics concealed in somebody's own recordings: scored beside the twin, resumed where it stopped, nothing told beforehand."""
+"""Physics concealed in somebody's own recordings: scored beside the twin, resumed where it stopped, nothing
+told beforehand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A blind run on a Dask cluster of processes: one worker killed in mid-run costs nothing, and the run goes on where it stopped."""
+"""A blind run on a Dask cluster of processes: one worker killed in mid-run costs nothing, and the run goes on
+where it stopped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The joint that a diagnosis ends with: common values, each session's own, laws without a name; replay and controller run it."""
+"""The joint that a diagnosis ends with: common values, each session's own, laws without a name; replay and
+controller run it."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
 def augmented_joint(
     config: JointConfig, model: Model, laws: Sequence[Empirical], names: Sequence[str]
 ) -> JointConfig:
-    """The configuration with what was fitted. Several sessions, or a parameter that depends on something: a `[[session]]`
-    for each way in which the drive stood, which claims its recordings."""
+    """The configuration with what was fitted. Several sessions, or a parameter that depends on something: a
+    `[[session]]` for each way in which the drive stood, which claims its recordings."""
     fit = model.fit
     zeros = fit.problem.zeros(fit.x)
     tied = any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)

@@ -1,4 +1,5 @@
-"""Errors of a model in the joint angle: on what it was fitted to, on what was left out in turn, on what nobody had seen."""
+"""Errors of a model in the joint angle: on what it was fitted to, on what was left out in turn, on what nobody
+had seen."""
 
 from __future__ import annotations
 
@@ -64,8 +65,8 @@ def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], 
 
 
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
-    """Weighted misfit of the joint angle [rad] on counted rows, laws and the session's zero (the mean of what is there, for a
-    session that the fit has not seen) taken off."""
+    """Weighted misfit of the joint angle [rad] on counted rows, laws and the session's zero (the mean of what
+    is there, for a session that the fit has not seen) taken off."""
     problem = fit.problem
     zeros = problem.zeros(fit.x)[JOINT]
     try:

@@ -1,4 +1,5 @@
-"""The drive as it is, calibrated within its tolerances: weights, zeros, where histories are forgotten, what noise alone leaves."""
+"""The drive as it is, calibrated within its tolerances: weights, zeros, where histories are forgotten, what
+noise alone leaves."""
 
 from __future__ import annotations
 
@@ -24,8 +25,8 @@ REPLICAS = 2
 
 @dataclass(frozen=True)
 class Calibrated:
-    """`fit`: the calibrated drive. `nominal`: the drive as configured, evaluated. `lost_rows`: judged rows given up to unknown
-    histories. `floor_rad`: RMS that the sensors' noise alone leaves. `floor`: least weights."""
+    """`fit`: the calibrated drive. `nominal`: the drive as configured, evaluated. `lost_rows`: judged rows
+    given up to unknown histories. `floor_rad`: RMS that the sensors' noise alone leaves. `floor`: least weights."""
 
     fit: Fit
     nominal: Fit
@@ -82,7 +83,8 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[Para
 
 
 def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing:
-    """Weights before anything is known: a third of what a straight line by motor angle leaves of each output channel."""
+    """Weights before anything is known: a third of what a straight line by motor angle leaves of each output
+    channel."""
     load = load_channel(config, evidence[0].columns)
     sigma = {}
     for c in OUTPUTS:

@@ -1,4 +1,5 @@
-"""Laws without a physical name: what is left of the joint angle as a series in one channel, kept if it holds on data left out."""
+"""Laws without a physical name: what is left of the joint angle as a series in one channel, kept if it holds on
+data left out."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 TERMS = 10
-"""Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a drum is."""
+"""Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a
+drum is."""
 RIDGE = 1e-3
 CHANNELS = ("motor_position_rad", "joint_torque_Nm")
 
@@ -86,7 +88,8 @@ def value_of(law: Empirical, recording: Evidence) -> FloatArray:
 def refitted(
     laws: Sequence[Empirical], recordings: Sequence[Evidence], left: Sequence[FloatArray]
 ) -> list[Empirical]:
-    """The same series fitted to other data: `left`, each recording's misfit [rad] on counted rows, one law after the other."""
+    """The same series fitted to other data: `left`, each recording's misfit [rad] on counted rows, one law
+    after the other."""
     weight = np.concatenate([e.weight[e.counted[JOINT]] for e in recordings])
     rest = np.concatenate(left)
     found = []

@@ -1,7 +1,7 @@
 """How probable it is that a name is right: a logistic model of the evidence of the case.
 
-p = 1/(1 + exp(-(b + sum_k w_k (f_k - centre_k)/scale_k))). The features are those below; weights, centres and scales are in
-`confidence.json` beside this file, with the trials that set them.
+p = 1/(1 + exp(-(b + sum_k w_k (f_k - centre_k)/scale_k))). The features are those below; weights, centres and
+scales are in `confidence.json` beside this file, with the trials that set them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ def learnt() -> Logistic:
 
 @cache
 def learnt_level() -> float | None:
-    """Standard errors behind the best up to which an explanation is not excluded; None where trials were too few to say."""
+    """Standard errors behind the best up to which an explanation is not excluded; None where trials were too
+    few to say."""
     level = _shipped()["conformal"]["level"]
     return None if level is None else float(level)
 
@@ -80,10 +81,10 @@ def features(
     `gain`, `z`, `z_blocks`: of the model over the one without the effect, on data left out. `selected_in`: share of
     resampled data in which it is the best of its round. `lead_gain`, `lead_z`: over the nearest rival in its place.
     `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
-    the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`: share of the
-    remainder that still follows what the effect acts through. `unsteady`: difference of its amount between halves of the
-    data, in units of it. `at_bound`: one of its parameters is on a bound. `tries`: points that it was asked at (an event: many
-    instants), the best of which counts. `terms`: effects in the final model.
+    the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`:
+    share of the remainder that still follows what the effect acts through. `unsteady`: difference of its amount
+    between halves of the data, in units of it. `at_bound`: one of its parameters is on a bound. `tries`: points
+    that it was asked at (an event: many instants), the best of which counts. `terms`: effects in the final model.
     """
     return {
         "log_gain": math.log10(max(gain, 1e-3)),

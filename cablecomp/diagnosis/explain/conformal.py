@@ -1,7 +1,8 @@
 """Explanations that cannot be excluded, with a level that trials have set: split conformal prediction.
 
-V. Vovk, A. Gammerman and G. Shafer, Algorithmic Learning in a Random World, 2005; J. Lei et al., Distribution-free predictive
-inference for regression, JASA 113, 2018. What it promises holds for trials to come that are like those that set the level.
+V. Vovk, A. Gammerman and G. Shafer, Algorithmic Learning in a Random World, 2005; J. Lei et al.,
+Distribution-free predictive inference for regression, JASA 113, 2018. What it promises holds for trials to come
+that are like those that set the level.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from math import ceil, inf
 
 
 def deficits(z: Mapping[str, float]) -> dict[str, float]:
-    """By how many standard errors each explanation falls short of the best: max z - z, by name; `z` of each over the same
-    model without any of them."""
+    """By how many standard errors each explanation falls short of the best: max z - z, by name; `z` of each
+    over the same model without any of them."""
     best = max(z.values(), default=0.0)
     return {name: best - value for name, value in z.items()}
 

@@ -57,8 +57,8 @@ class Dependence:
 
 
 def may_depend(parameter: str, condition: str) -> bool:
-    """Whether a parameter may change with a condition: with a posture, the pretension and what acts along the path; with
-    anything else (a temperature, an age), every amount."""
+    """Whether a parameter may change with a condition: with a posture, the pretension and what acts along the
+    path; with anything else (a temperature, an age), every amount."""
     if not condition.endswith(POSTURES):
         return not parameter.endswith(("_rad", "_m", "_s"))
     if parameter.startswith("effect."):

@@ -55,7 +55,8 @@ class Hypothesis:
 
     @property
     def trades(self) -> bool:
-        """Whether it trades places with calibration and other effects of its kind: friction and stiffness in the load's path."""
+        """Whether it trades places with calibration and other effects of its kind: friction and stiffness in
+        the load's path."""
         plain = not (self.has_instant or self.has_phase or self.effect.texts or self.effect.rates)
         return plain and bool({"load", "reversal"} & set(self.effect.acts_through)) and not self.groove
 
@@ -156,8 +157,8 @@ def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tu
 
 
 def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
-    """Times at which an event is asked for: even over what counts, well inside of a recording, and between recordings of one
-    session; between sessions the joint was taken apart."""
+    """Times at which an event is asked for: even over what counts, well inside of a recording, and between
+    recordings of one session; between sessions the joint was taken apart."""
     spans = []
     for k, e in enumerate(evidence):
         time = (

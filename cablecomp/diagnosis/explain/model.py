@@ -1,4 +1,5 @@
-"""A drive with what was added to it: fitted, left out, compared with others by one yardstick; what a selection consists of."""
+"""A drive with what was added to it: fitted, left out, compared with others by one yardstick; what a selection
+consists of."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ class Model:
 
 @dataclass(frozen=True)
 class Tried:
-    """One hypothesis of a round: its model, its score against the model before, share of resampled data in which it was best."""
+    """One hypothesis of a round: its model, its score against the model before, share of resampled data in
+    which it was best."""
 
     term: Term
     model: Model
@@ -49,7 +51,8 @@ class Tried:
 
 @dataclass(frozen=True)
 class Round:
-    """One step: what was promised (cost before over cost after a linear step, by name), what was fitted, what was taken."""
+    """One step: what was promised (cost before over cost after a linear step, by name), what was fitted, what
+    was taken."""
 
     base: Model
     promised: Mapping[str, float]
@@ -59,7 +62,8 @@ class Round:
 
 @dataclass(frozen=True)
 class Selection:
-    """The calibrated drive, the rounds, the final model; answers of the first round (how much each effect could show)."""
+    """The calibrated drive, the rounds, the final model; answers of the first round (how much each effect could
+    show)."""
 
     baseline: Model
     rounds: tuple[Round, ...]
@@ -90,7 +94,8 @@ def loss(model: Model, size: FloatArray, groups: Groups) -> float:
 
 
 def searching(fit: Fit) -> Weighing:
-    """Weights for a search beyond this fit: a part of what it leaves of each channel, never below the sensor's noise."""
+    """Weights for a search beyond this fit: a part of what it leaves of each channel, never below the sensor's
+    noise."""
     problem = fit.problem
     sigma = {}
     for c in problem.channels:
@@ -111,7 +116,8 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
 
 
 def is_told(fit: Fit, term: Term) -> bool:
-    """Whether an effect's own amount is told from none: a guide without friction is free cable, and yields as a mount does."""
+    """Whether an effect's own amount is told from none: a guide without friction is free cable, and yields as a
+    mount does."""
     if not isinstance(term, Hypothesis):
         return True
     name = f"effect.{term.effect.id}.{term.amount.name}"

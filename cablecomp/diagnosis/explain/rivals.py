@@ -1,4 +1,5 @@
-"""Which effects stand in for a named one as well: each tried in its place, the set that data left out cannot tell apart."""
+"""Which effects stand in for a named one as well: each tried in its place, the set that data left out cannot
+tell apart."""
 
 from __future__ import annotations
 
@@ -32,8 +33,8 @@ ZERO_STEP = "a step of the joint encoder's zero"
 def rivals(
     model: Model, term: Hypothesis, pool: Sequence[Hypothesis], groups: Groups, rng: np.random.Generator
 ) -> tuple[tuple[str, ...], dict[str, ScoreDifference]]:
-    """Effects that stand in for a term as well (its model confidence set, itself left out), and the term's score against each
-    that was tried in its place."""
+    """Effects that stand in for a term as well (its model confidence set, itself left out), and the term's
+    score against each that was tried in its place."""
     base = without(model, term, groups)
     if base is None:
         return (), {}
@@ -68,8 +69,8 @@ def rivals(
 
 
 def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
-    """What is left out with a plain step of the joint's zero in place of an event: what an encoder's hub does when it slips. It
-    speaks against the event only where it predicts better, for an event steps the zero too."""
+    """What is left out with a plain step of the joint's zero in place of an event: what an encoder's hub does
+    when it slips. It speaks against the event only where it predicts better, for an event steps the zero too."""
     fit, problem = base.fit, base.fit.problem
     after = [(e.at_rows("time_s") >= instant_s).astype(np.float64) for e in problem.evidence]
     struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)

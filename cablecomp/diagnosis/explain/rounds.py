@@ -1,4 +1,5 @@
-"""One round of the search: every hypothesis asked cheaply, the promising ones fitted roughly, the best of them to the end.
+"""One round of the search: every hypothesis asked cheaply, the promising ones fitted roughly, the best of them
+to the end.
 
 Besides effects, a round tries dependences: a parameter that is each session's own, or grows with a condition.
 """
@@ -37,7 +38,8 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Begun:
-    """A fit that has been begun: its cost so far, what it adds, where it stands, and what is roughly known of its derivative."""
+    """A fit that has been begun: its cost so far, what it adds, where it stands, and what is roughly known of
+    its derivative."""
 
     cost: float
     terms: tuple[Term, ...]
@@ -57,8 +59,9 @@ def one_round(
     cold: Mapping[str, float] | None,
     known: Sequence[Model],
 ) -> tuple[Round, tuple[Answer, ...]]:
-    """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to begin from
-    where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well."""
+    """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to
+    begin from where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin
+    from as well."""
     anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
     names = {t.name for t in model.terms}
     ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
@@ -151,8 +154,9 @@ def one_round(
 def _further(
     h: Hypothesis, model: Model, known: Sequence[Model], cold: Mapping[str, float] | None
 ) -> list[Mapping[str, float]]:
-    """Values to begin from beside where calibration stands: effects that trade places sit in a valley of their own, and an
-    earlier model that has this one may have found it; what that model lacks begins at a part of its amount."""
+    """Values to begin from beside where calibration stands: effects that trade places sit in a valley of their
+    own, and an earlier model that has this one may have found it; what that model lacks begins at a part of its
+    amount."""
     names = {t.name for t in model.terms}
     having = [m for m in known if any(t.name == h.name for t in m.terms) and len(m.terms) <= len(names)]
     if not having:
@@ -166,8 +170,8 @@ def _further(
 
 
 def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
-    """Where every effect would begin beside the nominal drive; None where the drive is known better than by order of magnitude
-    (calibration then stays in its valley)."""
+    """Where every effect would begin beside the nominal drive; None where the drive is known better than by
+    order of magnitude (calibration then stays in its valley)."""
     if not any(p.sd >= DECADE for p in baseline.problem.parameters if np.isfinite(p.sd)):
         return None
     evidence = baseline.problem.evidence

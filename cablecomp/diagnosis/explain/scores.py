@@ -1,9 +1,11 @@
-"""How well models predict what they were not fitted to: residuals with a group left out, paired differences, resampling.
+"""How well models predict what they were not fitted to: residuals with a group left out, paired differences,
+resampling.
 
-With J the derivative of a fit's weighted residual r, H = J'J (priors in it), leaving the rows g out moves the solution by
-a Gauss-Newton step, so that their residual becomes r_g + J_g (H - J_g' J_g)^-1 J_g' r_g. Models are compared by paired
-differences of a Huber score over groups; the scatter between groups is the yardstick (P. Hansen, A. Lunde and J. Nason, The
-Model Confidence Set, Econometrica 79, 2011, for the set of models that cannot be told apart).
+With J the derivative of a fit's weighted residual r, H = J'J (priors in it), leaving the rows g out moves the
+solution by a Gauss-Newton step, so that their residual becomes r_g + J_g (H - J_g' J_g)^-1 J_g' r_g. Models are
+compared by paired differences of a Huber score over groups; the scatter between groups is the yardstick (P.
+Hansen, A. Lunde and J. Nason, The Model Confidence Set, Econometrica 79, 2011, for the set of models that
+cannot be told apart).
 """
 
 from __future__ import annotations
@@ -27,10 +29,11 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Groups:
-    """Which group each row of the residual belongs to, channel by channel as the residual goes (-1: a penalty row, in none).
+    """Which group each row of the residual belongs to, channel by channel as the residual goes (-1: a penalty
+    row, in none).
 
-    `fold`: groups that are left out together (a recording, a session, a condition; a block where there is one recording).
-    `by`: what the folds are.
+    `fold`: groups that are left out together (a recording, a session, a condition; a block where there is one
+    recording). `by`: what the folds are.
     """
 
     block: IntArray
@@ -95,8 +98,8 @@ def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntAr
 
 
 def left_out(fit: Fit, groups: Groups) -> FloatArray:
-    """Weighted residual of every data row with its fold left out of the fit: one Gauss-Newton step each, or fits done again
-    where the drive is known by order of magnitude only."""
+    """Weighted residual of every data row with its fold left out of the fit: one Gauss-Newton step each, or
+    fits done again where the drive is known by order of magnitude only."""
     if any(p.sd >= DECADE for p in fit.problem.parameters if np.isfinite(p.sd)):
         return left_out_exactly(fit, groups)
     return left_out_linearly(fit.residual, fit.J[:, _free(fit)], groups)
@@ -122,7 +125,8 @@ def left_out_linearly(residual: FloatArray, J: FloatArray, groups: Groups) -> Fl
             step = np.linalg.solve(rest, Jg.T @ rg)
         except np.linalg.LinAlgError:
             continue
-        # a linear step far beyond what the rows left in would bear is no prediction: it is held inside of their ellipsoid
+        # a linear step far beyond what the rows left in would bear is no prediction: it is held inside of their
+        # ellipsoid
         length = float(step @ rest @ step)
         if length > reach:
             step = step * sqrt(reach / length)
@@ -135,8 +139,8 @@ EXACT = 4
 
 
 def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArray:
-    """As `left_out`, each of a few parts really left out and the rest fitted again: for drives known by order of magnitude
-    only, whose parameters trade places along bent valleys that no linear step follows."""
+    """As `left_out`, each of a few parts really left out and the rest fitted again: for drives known by order
+    of magnitude only, whose parameters trade places along bent valleys that no linear step follows."""
     n = len(groups.fold)
     r = fit.residual[:n].copy()
     for k in range(min(EXACT, groups.folds)):
@@ -169,7 +173,8 @@ def _kept(problem: Problem, out: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> 
 
 
 def _free(fit: Fit) -> IntArray:
-    """Parameters that are not on a bound; an event's instant is read from all rows, a block left out cannot place it."""
+    """Parameters that are not on a bound; an event's instant is read from all rows, a block left out cannot
+    place it."""
     low, high = fit.problem.bounds()
     margin = 1e-4 * (high - low)
     instant = np.array([p.base.endswith(".time_s") for p in fit.problem.parameters], dtype=np.bool_)
@@ -184,8 +189,8 @@ def huber(r: FloatArray) -> FloatArray:
 
 
 def scales(r: FloatArray, groups: Groups) -> FloatArray:
-    """Deviation (scaled median) of what is left of each channel: a torque may be followed closely and an angle not, each has its
-    own yardstick."""
+    """Deviation (scaled median) of what is left of each channel: a torque may be followed closely and an angle
+    not, each has its own yardstick."""
     here = groups.block >= 0
     found = [
         np.median(np.abs(r[here & (groups.channel == c)])) / 0.6745 for c in range(groups.channel.max() + 1)
@@ -204,8 +209,9 @@ def block_losses(r: FloatArray, scale: FloatArray, groups: Groups) -> FloatArray
 class ScoreDifference:
     """How much better one model predicts than another.
 
-    `gain`: share of the worse one's loss that it takes off. `z`: the difference over what the better one's own remainder
-    makes of it by chance. `z_blocks`: over its scatter between blocks. `by_block`: the difference of each block.
+    `gain`: share of the worse one's loss that it takes off. `z`: the difference over what the better one's own
+    remainder makes of it by chance. `z_blocks`: over its scatter between blocks. `by_block`: the difference of
+    each block.
     """
 
     gain: float
@@ -217,8 +223,8 @@ class ScoreDifference:
 def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> ScoreDifference:
     """Paired comparison on left-out residuals.
 
-    With d the difference of the two residuals and r the better one's, the losses differ by sum d^2 + 2 sum r d: the first
-    is what the better one explains, the second is chance, and scatters by the blocks' sums of r d.
+    With d the difference of the two residuals and r the better one's, the losses differ by sum d^2 + 2 sum r d:
+    the first is what the better one explains, the second is chance, and scatters by the blocks' sums of r d.
     """
     here = groups.block >= 0
     size = scales(better, groups)
@@ -241,8 +247,8 @@ def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> S
 
 
 def halves(problem: Problem, groups: Groups) -> list[IntArray]:
-    """Ways to part the data rows in two (1 and -1; 0: in neither): early and late in each recording, more and less load than
-    usual, quicker and slower than usual."""
+    """Ways to part the data rows in two (1 and -1; 0: in neither): early and late in each recording, more and
+    less load than usual, quicker and slower than usual."""
     parts: list[list[IntArray]] = [[], [], []]
     for c in problem.channels:
         for e in problem.evidence:

@@ -1,8 +1,9 @@
 """Ask every hypothesis cheaply: how far would the misfit fall, by one or two simulations beside a fitted model.
 
-At an anchor (a fit, or the nominal drive) with residual r and derivative J, an effect's contribution d = r(0) - r(a) at a
-size a that is worth seeing tells the cost after a joint linear step. What promises anything is then fitted for a few steps
-from each anchor: where calibration has paid for a missing effect, the way there begins at the nominal drive.
+At an anchor (a fit, or the nominal drive) with residual r and derivative J, an effect's contribution d = r(0) -
+r(a) at a size a that is worth seeing tells the cost after a joint linear step. What promises anything is then
+fitted for a few steps from each anchor: where calibration has paid for a missing effect, the way there begins
+at the nominal drive.
 """
 
 from __future__ import annotations
@@ -45,8 +46,9 @@ def anchor(fit: Fit) -> Anchor:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a hypothesis promises at its best start: cost after it (half the sum of squares), its problem with the effect in
-    it, where to begin, the derivative there, and the information: RMS that a unit of its amount adds beyond calibration."""
+    """What a hypothesis promises at its best start: cost after it (half the sum of squares), its problem with
+    the effect in it, where to begin, the derivative there, and the information: RMS that a unit of its amount
+    adds beyond calibration."""
 
     hypothesis: Hypothesis
     cost: float

@@ -36,10 +36,11 @@ def select(
     rng: np.random.Generator,
     progress: Progress,
 ) -> Selection:
-    """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is not missed.
+    """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is
+    not missed.
 
-    `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to the effect
-    begins there.
+    `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to
+    the effect begins there.
     """
     sharp = searching(baseline)
     first = reweighed(Model((), baseline, left_out(baseline, groups)), sharp, groups)
@@ -84,8 +85,8 @@ def select(
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
-    """Models, best first, but one with fewer parameters before one that predicts as well: what a law adds to another has to
-    bring something."""
+    """Models, best first, but one with fewer parameters before one that predicts as well: what a law adds to
+    another has to bring something."""
     size = common(models, groups)
     most = (1.0 + LIMITS.tie) * loss(models[0], size, groups)
     alike = [m for m in models if loss(m, size, groups) <= most]

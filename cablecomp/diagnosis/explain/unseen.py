@@ -49,8 +49,8 @@ class Hidden:
 def could_be_unseen(
     fit: Fit, pool: Sequence[Hypothesis], named: Sequence[str]
 ) -> tuple[list[dict[str, Any]], list[Hidden]]:
-    """One row per effect: its amount is below `below` unless it hides in the least visible of its shapes; None = any size.
-    Beside them the effects that calibration within its tolerances conceals."""
+    """One row per effect: its amount is below `below` unless it hides in the least visible of its shapes; None
+    = any size. Beside them the effects that calibration within its tolerances conceals."""
     here = anchor(fit)
     found, hidden = [], []
     for h in pool:
@@ -84,7 +84,8 @@ def _bound(here: Anchor, d: FloatArray, size: float) -> float | None:
 
 
 def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float) -> Hidden | None:
-    """Whether steps of the calibration inside the tolerances do what `size` of the effect does: J s = d, |s_j| <= WITHIN."""
+    """Whether steps of the calibration inside the tolerances do what `size` of the effect does: J s = d, |s_j|
+    <= WITHIN."""
     problem = here.fit.problem
     count = len(problem.parameters)
     J, d = here.fit.J[: len(d) - count], d[: len(d) - count]

@@ -20,10 +20,12 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Weighed:
-    """One effect of the final model: its evidence, confidence, rivals that stand in for it, its score against the nearest one.
+    """One effect of the final model: its evidence, confidence, rivals that stand in for it, its score against
+    the nearest one.
 
-    `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the last to come,
-    whichever is more: effects that trade places take off little as the last, what others hide takes off little alone.
+    `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the
+    last to come, whichever is more: effects that trade places take off little as the last, what others hide
+    takes off little alone.
     """
 
     term: Hypothesis
@@ -106,8 +108,8 @@ def _selected(selection: Selection, term: Hypothesis) -> float:
 
 
 def _share_of_baseline(selection: Selection, bare: Model | None, final: Model) -> float:
-    """Share of the calibrated drive's mean square on data left out that goes with the effect, in the channel in which it shows
-    most; single rows far off the rest count as at most `LIMITS.tail` deviations."""
+    """Share of the calibrated drive's mean square on data left out that goes with the effect, in the channel in
+    which it shows most; single rows far off the rest count as at most `LIMITS.tail` deviations."""
     if bare is None:
         return 1.0
     return _gone(selection, bare, final)
@@ -139,9 +141,9 @@ def _mean_squares(model: Model, groups: Groups) -> FloatArray:
 
 
 def _unsteady(final: Model, term: Hypothesis, groups: Groups) -> float:
-    """How far the effect's amount differs between halves of the data (early and late, much and little load, quick and slow,
-    one channel and another), each fitted by a linear step of its own: a true constant is constant. In units of their mean; at
-    most 1."""
+    """How far the effect's amount differs between halves of the data (early and late, much and little load,
+    quick and slow, one channel and another), each fitted by a linear step of its own: a true constant is
+    constant. In units of their mean; at most 1."""
     fit = final.fit
     name = f"effect.{term.effect.id}.{term.amount.name}"
     column = next((k for k, p in enumerate(fit.problem.parameters) if p.name == name), None)

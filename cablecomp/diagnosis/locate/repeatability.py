@@ -1,4 +1,5 @@
-"""What the machine itself repeats: the joint angle at the same motor angle, load and distance from the last reversals."""
+"""What the machine itself repeats: the joint angle at the same motor angle, load and distance from the last
+reversals."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ FEWEST = 30
 
 
 def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]) -> float | None:
-    """RMS difference [rad] between repeats of the same state in one recording, over sqrt 2; None where nothing repeats."""
+    """RMS difference [rad] between repeats of the same state in one recording, over sqrt 2; None where nothing
+    repeats."""
     squares: list[FloatArray] = []
     for e, c in zip(evidence, covariates, strict=True):
         v = c.values
