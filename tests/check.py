@@ -25,7 +25,8 @@ def main() -> int:
         begin = time.monotonic()
         code = subprocess.run([TOOLS / check[0], *check[1:]], cwd=ROOT, check=False).returncode
         print(
-            f"== {check[0]}: {'passed' if code == 0 else f'FAILED (exit code {code})'} in {time.monotonic() - begin:.0f} s",
+            f"== {check[0]}: {'passed' if code == 0 else f'FAILED (exit code {code})'} "
+            f"in {time.monotonic() - begin:.0f} s",
             flush=True,
         )
         if code != 0:

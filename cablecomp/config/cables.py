@@ -28,7 +28,8 @@ class Cable(NamedTuple):
 CABLES: Final = {
     "steel-7x7": Cable(
         65e9, 0.30, 0.15, 0.35,
-        "rigging tables give 57 GPa over the circle, small bedded-in cables up to 99 (E. R. Snow's, 0.018 in); dry steel on metal",
+        "rigging tables give 57 GPa over the circle, small bedded-in cables up to "
+        "99 (E. R. Snow's, 0.018 in); dry steel on metal",
     ),
     "steel-7x7-nylon": Cable(
         60e9, 0.40, 0.12, 0.30,

@@ -199,8 +199,10 @@ def _warnings(drive: Calibrated, fit: Fit) -> tuple[str, ...]:
     count = max(_count_rad(e) for e in fit.problem.evidence) * fit.problem.config.drive.ratio
     if count > float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
         found.append(
-            f"one count of the motor encoder turns the joint by {1e6 * count:.2g} urad, more than the joint encoder's noise: "
-            "a motor that hunts within a count shakes friction loose unseen; mu_input is what acts then, not the material's"
+            f"one count of the motor encoder turns the joint by {1e6 * count:.2g} "
+            f"urad, more than the joint encoder's noise: "
+            "a motor that hunts within a count shakes friction loose unseen; "
+            "mu_input is what acts then, not the material's"
         )
     if rms_left(fit) > 2.0 * float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
         found.append("more than noise is left: `cablecomp diagnose` says what the model lacks")

@@ -30,7 +30,8 @@ def _loop_arc(config: JointConfig) -> float:
 
 EFFECT = Effect(
     id="clamp_slip",
-    statement="A clamp or termination slipped once (of cable h where the length is positive, of l where it is negative): the "
+    statement="A clamp or termination slipped once (of cable h where the length is "
+    "positive, of l where it is negative): the "
     "joint stands off from then on, and the pretension is lower.",
     equation="length of cable h + s, s > 0; of cable l + |s|, s < 0; for t >= t*",
     source="kinematics; in a closed circuit the joint moves by about s/(2R), and both tensions fall",

@@ -19,9 +19,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 EFFECT = Effect(
     id="routing_friction",
-    statement="The cable rubs on fixed guides, idlers or a sheath between the pulleys; tension is lost over the bends in "
+    statement="The cable rubs on fixed guides, idlers or a sheath between the "
+    "pulleys; tension is lost over the bends in "
     "the direction of sliding, and motion is lost at each reversal until all of the path slides the other way.",
-    equation="ln(T_out/T_in) = -+ mu Theta while sliding; in between the guide's tension profile sticks, clamped from both ends",
+    equation="ln(T_out/T_in) = -+ mu Theta while sliding; in between the guide's "
+    "tension profile sticks, clamped from both ends",
     source="capstan law (Euler-Eytelwein); Kaneko et al. 1991; profile law of a doubly free arc",
     parameters=(
         Parameter("mu_angle", "-", 0.0, 0.0, 5.0, "friction coefficient times total bend angle of the path"),

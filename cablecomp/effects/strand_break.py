@@ -25,7 +25,8 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 EFFECT = Effect(
     id="strand_break",
-    statement="Wires of one cable broke (of h where the share is positive, of l where it is negative): from one instant "
+    statement="Wires of one cable broke (of h where the share is positive, of "
+    "l where it is negative): from one instant "
     "on it is softer, and at the same stretch it pulls less.",
     equation="EA_h -> EA_h (1 - f), f > 0; EA_l -> EA_l (1 - |f|), f < 0; for t >= t*, stretch unchanged",
     source="EA is modulus times metallic area; a broken wire carries nothing (G. A. Costello, Theory of "

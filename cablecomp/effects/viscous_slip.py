@@ -20,7 +20,8 @@ def _unit(config: JointConfig) -> float:
 
 EFFECT = Effect(
     id="viscous_slip",
-    statement="Where cable slides on a pulley, friction grows with slip speed, so that deflection lags the load, creeps on "
+    statement="Where cable slides on a pulley, friction grows with slip speed, so "
+    "that deflection lags the load, creeps on "
     "while the load holds, and the drive is stiffer the faster it is loaded.",
     equation="|dT/dtheta| = mu T + c v while sliding at speed v: the stretch diffuses through the sliding zone",
     source="Snow 1993, sections 3.3 and 4.3 (observed, unexplained)",

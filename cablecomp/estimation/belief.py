@@ -118,7 +118,8 @@ class _View:
         found = []
         if factor < 0.0:
             words = (
-                f"motor_position_rad and joint_position_rad seem to turn against each other: RMS {_mrad(self.left())} as "
+                f"motor_position_rad and joint_position_rad seem to turn against "
+                f"each other: RMS {_mrad(self.left())} as "
                 f"they are, {_mrad(self.left(ratio=-self.ratio))} with one of them turned"
             )
             found.append(Suspicion("sign", JOINT, words, {"slope_over_ratio": factor}))
@@ -129,7 +130,8 @@ class _View:
             kind = "unit" if unit else "ratio"
             left = _rms(self.y - self.slope * self.q)
             said = (
-                f"{words}: the joint moves {off:.4g} times as far as the drive's ratio allows; RMS {_mrad(self.left())} as "
+                f"{words}: the joint moves {off:.4g} times as far as the drive's "
+                f"ratio allows; RMS {_mrad(self.left())} as "
                 f"it is, {_mrad(left)} with the ratio seen"
             )
             found.append(Suspicion(kind, JOINT, said, {"slope_over_ratio": factor}))
@@ -190,7 +192,8 @@ class _View:
             if abs(late) >= 1.5 * step and after < LATE_GAIN * before:
                 how = "late" if late > 0.0 else "early"
                 words = (
-                    f"{name} seems to come {1e3 * abs(late):.3g} ms {how}: the nominal drive leaves {_mrad(before)} RMS, "
+                    f"{name} seems to come {1e3 * abs(late):.3g} ms {how}: the "
+                    f"nominal drive leaves {_mrad(before)} RMS, "
                     f"{_mrad(after)} with it shifted"
                 )
                 numbers = {"late_s": late, "rms_rad": before, "left_rad": after}
@@ -272,7 +275,8 @@ def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
             k = int(at[np.argmax(moved[at])])
             more = f" ({len(at) - 1} more such gaps)" if len(at) > 1 else ""
             words = (
-                f"gap of {steps[k]:.3g} s after {time[k]:.6g} s, over which {name} moved by {100 * moved[k]:.0f} % of its "
+                f"gap of {steps[k]:.3g} s after {time[k]:.6g} s, over which {name} "
+                f"moved by {100 * moved[k]:.0f} % of its "
                 f"range{more}: the way between is not known, the drive is taken as having gone straight"
             )
             yield Suspicion("gap", name, words, {"at_s": float(time[k]), "gap_s": float(steps[k])})

@@ -70,13 +70,15 @@ def in_condition(
         channel = config.condition[law.on]
         if channel not in columns or not np.isfinite(columns[channel]).any():
             raise InputError(
-                f"channel `{channel}` is missing, which [condition] `{law.on}` names and `{law.parameter}` depends on; record it"
+                f"channel `{channel}` is missing, which [condition] `{law.on}` names "
+                f"and `{law.parameter}` depends on; record it"
             )
         there = float(np.nanmedian(columns[channel]))
         inside = min(max(there, law.seen[0]), law.seen[1])
         if inside != there:
             said.append(
-                f"{law.on} = {there:.4g} lies beyond {law.seen[0]:.4g} to {law.seen[1]:.4g}, from which `{law.parameter}` was told:"
+                f"{law.on} = {there:.4g} lies beyond {law.seen[0]:.4g} to {law.seen[1]:.4g}, "
+                f"from which `{law.parameter}` was told:"
                 f" taken at {inside:.4g}"
             )
         before = gained.get(law.parameter, value_of(config, law.parameter))

@@ -35,7 +35,8 @@ class Equivalent(NamedTuple):
         return (
             f"of the loop at +-{self.most_Nm:.4g} N m the equivalent leaves {1e6 * self.rms_rad:.3g} urad RMS of "
             f"{1e6 * self.reach_rad:.3g} urad",
-            "smaller loads: their loops are narrower than those of one dry friction; the drive is stiffer at each reversal",
+            "smaller loads: their loops are narrower than those of one dry "
+            "friction; the drive is stiffer at each reversal",
             "the memory of the wraps: turning either pulley moves what earlier loads have left",
             "bounds for what came before",
             *(

@@ -173,6 +173,7 @@ def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:
         settled = last.pretension_N * ratio * last.output_radius_m / stage.output_radius_m
         if abs(stage.pretension_N - settled) > 1e-3 * settled:
             raise InputError(
-                f"{config.name}: key `drive.stage.{number - 1}.pretension_N` is {stage.pretension_N:g}; cables in a chain settle at "
+                f"{config.name}: key `drive.stage.{number - 1}.pretension_N` is "
+                f"{stage.pretension_N:g}; cables in a chain settle at "
                 f"{settled:.6g} N there, given the output stage's pretension; write that value"
             )

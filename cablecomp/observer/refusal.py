@@ -23,14 +23,19 @@ class Refusal(IntEnum):
 
 
 REASONS = {
-    Refusal.UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, wrap_input_rad and the angles' zero",
-    Refusal.SLACK: "the load would slacken the cable of an open circuit (T0 + M/R <= 0); check pretension_N and the load's sign",
+    Refusal.UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, "
+    "wrap_input_rad and the angles' zero",
+    Refusal.SLACK: "the load would slacken the cable of an open circuit (T0 + M/R <= "
+    "0); check pretension_N and the load's sign",
     Refusal.DIVERGED: "the tensions could not be solved; check the configuration's orders of magnitude",
-    Refusal.NOT_FINITE: "has no finite time, motor angle or load, or an infinite further reading; leave it out or mend the channel",
+    Refusal.NOT_FINITE: "has no finite time, motor angle or load, or an infinite further "
+    "reading; leave it out or mend the channel",
     Refusal.BACKWARD: "comes after a later one; time must not run backwards",
     Refusal.BREAKS: "loads a cable beyond its breaking force; lower the load or check breaking_force_N",
-    Refusal.EFFECT: "makes an effect of the configuration give no finite answer; check its parameters and the channels it reads",
-    Refusal.UNREACHABLE: "no load that the joint can take brings it to this joint angle; check the encoders' zeros and the pretension",
+    Refusal.EFFECT: "makes an effect of the configuration give no finite answer; check "
+    "its parameters and the channels it reads",
+    Refusal.UNREACHABLE: "no load that the joint can take brings it to this joint angle; "
+    "check the encoders' zeros and the pretension",
     Refusal.UNKNOWN: "comes before any other: nothing is known of the joint yet; step a first sample",
 }
 

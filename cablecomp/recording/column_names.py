@@ -25,7 +25,8 @@ _WORDS: Final = {
 _SIDES: Final = {
     "motor": _set("motor mot m act actuator drive spindle input in capstan servo qin qm taum iq"),
     "joint": _set(
-        "joint jnt j link output out load jaw arm tip elbow knuckle wrist finger end external ext qout qj tauj ft sensor"
+        "joint jnt j link output out load jaw arm tip elbow knuckle wrist "
+        "finger end external ext qout qj tauj ft sensor"
     ),
 }
 _ASKED: Final = _set("cmd command commanded des desired target ref reference setpoint goal sp want")

@@ -24,7 +24,8 @@ def calibration_summary(found: Calibration) -> RenderableType:
     for kept in found.kept:
         table.add_row(kept.name, f"{kept.nominal:.5g}", "not told", "", "")
     head = (
-        f"The joint's angle is left with {1e3 * found.rmse_rad:.4g} mrad RMS ({1e3 * found.nominal_rmse_rad:.4g} with the "
+        f"The joint's angle is left with {1e3 * found.rmse_rad:.4g} mrad RMS "
+        f"({1e3 * found.nominal_rmse_rad:.4g} with the "
         f"nominal values; the encoder's own noise is {1e3 * found.noise_rad:.4g})."
     )
     return Group(Text(head), "", table, *(Text(line, overflow="fold") for line in calibration_notes(found)))

@@ -65,12 +65,14 @@ def feedback_words(found: Comparison) -> str:
     """What feedback on the joint encoder leaves of the difference, and why."""
     noise, ours = found.encoder_noise_rad, _true(found.closed_loop, OBSERVER)
     words = (
-        f"All three have the same feedback on the joint encoder; the motions are {QUICK:g} times as fast. The encoder's "
+        f"All three have the same feedback on the joint encoder; the motions "
+        f"are {QUICK:g} times as fast. The encoder's "
         f"noise and resolution come to {1e3 * noise:.4f} mrad RMS."
     )
     if max(ours, _true(found.closed_loop, LINEAR)) < _AT_NOISE * noise:
         words += (
-            " Feedback passes that noise on, and both compensators sit at it: there is nothing left to tell them apart by. "
+            " Feedback passes that noise on, and both compensators sit at it: "
+            "there is nothing left to tell them apart by. "
             "They part where no joint encoder closes the loop (above)."
         )
     return words

@@ -18,8 +18,10 @@ from cablecomp.report.page import Fact, Section
 
 _COLUMNS = 3
 _EXPLAINED = (
-    "Each trial stands beside a twin: the same stretch of recordings with nothing concealed. Found: a right name that the twin "
-    "was not given; for a drift of the joint's reading, that the temperature is what the residual follows first; for a gain, "
+    "Each trial stands beside a twin: the same stretch of recordings with nothing "
+    "concealed. Found: a right name that the twin "
+    "was not given; for a drift of the joint's reading, that the temperature "
+    "is what the residual follows first; for a gain, "
     "that a calibrated constant left its twin's by three of its standard deviations. Bars are 95 % intervals."
 )
 
@@ -81,7 +83,8 @@ def concealed_page(answer: Mapping[str, Any]) -> str:
         Section("Recordings", page.bullets(answer["recordings"])),
     ]
     lead = (
-        f"Physics of known size, concealed in stretches of {answer['seconds']:g} s of {len(answer['recordings'])} recordings; the "
+        f"Physics of known size, concealed in stretches of {answer['seconds']:g} s "
+        f"of {len(answer['recordings'])} recordings; the "
         "truth was sealed before any diagnosis and opened after all verdicts were written."
     )
     return page.page("What would have been found", lead, sections)

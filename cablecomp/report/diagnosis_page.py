@@ -98,7 +98,8 @@ def _missing(result: Mapping[str, Any]) -> Iterator[str]:
         if m["depends_on"]:
             yield page.paragraph(f"{depends(m['depends_on'])}.")
         yield page.paragraph(
-            f"Takes {100 * known(m['heldout_gain']):.1f} % off the calibrated drive's held-out mean square; probability "
+            f"Takes {100 * known(m['heldout_gain']):.1f} % off the calibrated "
+            f"drive's held-out mean square; probability "
             f"that the name is right: {100 * known(m['confidence']):.0f} %. Source: {effect.source}."
         )
         yield page.fold("the evidence", page.table(("evidence", "value"), list(m["evidence"].items())))
@@ -204,7 +205,8 @@ def _overlays(d: Diagnosis, unit: Scale) -> Section:
     intervals = d.location.mismatch[0].intervals_s if d.location.mismatch else ()
     body = page.figure(
         figures.overlay(first, [i for i in intervals if _inside(i, first)], unit),
-        f"{short(first.name)}. Shaded above: not fitted (unknown history, or kept for the end). Shaded in the middle: where the "
+        f"{short(first.name)}. Shaded above: not fitted (unknown history, or kept "
+        f"for the end). Shaded in the middle: where the "
         "mismatch sits.",
     )
     body += page.figure(
@@ -239,7 +241,8 @@ def _rejected(d: Diagnosis) -> Section:
         body += page.figure(figures.tried(d.tested, rounds), f"By step. {steps}.")
         body += page.fold(f"all {len(d.tested)} that were fitted", rejected(d.tested, rounds))
     lead = (
-        f"{len({t.name for t in d.tested})} hypotheses were fitted together with the calibration and judged on data that "
+        f"{len({t.name for t in d.tested})} hypotheses were fitted together "
+        f"with the calibration and judged on data that "
         "their fit had not seen; the others promised less when they were asked."
     )
     return Section("What was rejected, and why", body, lead)

@@ -42,8 +42,10 @@ def scoreboard_page(board: Scoreboard) -> str:
     wish = board.wish
     command = "cablecomp prove " + " ".join(f"--{k} {v}" for k, v in wish.items())
     lead = (
-        f"{len(board.rows)} simulated joints with concealed physics, seed {wish['seed']}, laws: {wish['laws']}, imperfections: "
-        f"{wish['imperfections']}. The truth was sealed before any diagnosis and opened after all verdicts were written."
+        f"{len(board.rows)} simulated joints with concealed physics, seed "
+        f"{wish['seed']}, laws: {wish['laws']}, imperfections: "
+        f"{wish['imperfections']}. The truth was sealed before any diagnosis "
+        f"and opened after all verdicts were written."
     )
     sections = [
         Section("What was reached", _facts(board) + _targets(board) + page.code(command)),
@@ -51,7 +53,8 @@ def scoreboard_page(board: Scoreboard) -> str:
             "What it hangs on",
             page.columns(_parts("imperfection", board.by_imperfection), _parts("size / loop", board.by_size))
             + page.fold("by law", _parts("law", board.by_law)),
-            "Named first and located by the residual itself where decidable; wrong names of all trials. An imperfection's trials "
+            "Named first and located by the residual itself where decidable; wrong "
+            "names of all trials. An imperfection's trials "
             "mostly have others too.",
         ),
         Section(
@@ -62,7 +65,8 @@ def scoreboard_page(board: Scoreboard) -> str:
                     figures.confusion(board), "What was concealed, and the first name; trials counted."
                 ),
             ),
-            "Decidable are the trials in which the true law itself, taken off the recorded angle, beats the recalibrated drive on "
+            "Decidable are the trials in which the true law itself, taken off the "
+            "recorded angle, beats the recalibrated drive on "
             "data left out by what an effect has to bring.",
         ),
         Section(
@@ -73,7 +77,8 @@ def scoreboard_page(board: Scoreboard) -> str:
                 ),
                 page.figure(figures.risk(board), "Of the surest share of them, how many are wrong."),
             ),
-            f"Expected calibration error {page.number(board.trust.error)}, Brier score {page.number(board.trust.brier)}.",
+            f"Expected calibration error {page.number(board.trust.error)}, Brier "
+            f"score {page.number(board.trust.brier)}.",
         ),
         Section(
             "How good the models are",

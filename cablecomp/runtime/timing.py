@@ -87,7 +87,8 @@ class TimingReport:
                 "frames",
                 f"{self.frames} taken, {self.lost_frames} lost, {self.repeated_frames} repeated, "
                 f"{self.reordered_frames} reordered, {self.invalid_frames} damaged, "
-                f"{self.foreign_frames} of other devices, {self.dropped_frames} dropped by the system, {self.send_failures} not sent",
+                f"{self.foreign_frames} of other devices, {self.dropped_frames} dropped "
+                f"by the system, {self.send_failures} not sent",
             ),
             *((f"minute {m.number}", m.words()) for m in shown(self.minutes)),
             *(("policy", line_) for line_ in self.policy),

@@ -87,7 +87,8 @@ def learn(judged: Sequence[Judged], ridge: float) -> Logistic:
     right = np.array([float(j.right) for j in judged])
     if len(judged) < LEAST or right.min() == right.max():
         raise InputError(
-            f"{len(judged)} weighed effects, {int(right.sum()) if len(right) else 0} right: at least {LEAST}, right and "
+            f"{len(judged)} weighed effects, {int(right.sum()) if len(right) else 0} "
+            f"right: at least {LEAST}, right and "
             "wrong ones, are needed; run more trials with `cablecomp prove`"
         )
     raw = np.array([[j.evidence[f] for f in FEATURES] for j in judged])

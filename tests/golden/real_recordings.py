@@ -73,7 +73,8 @@ def _show(what: str, d: Diagnosis) -> None:
     for name, e in (("calibrated drive", d.baseline), ("augmented", d.augmented)):
         values = [float(np.degrees(v)) for v in (e.rmse_rad, e.heldout_rmse_rad, e.final_rmse_rad)]
         print(
-            f"  {name}: fitted {values[0]:.3f}, {d.heldout_by}s left out {values[1]:.3f}, for the end {values[2]:.3f} deg"
+            f"  {name}: fitted {values[0]:.3f}, {d.heldout_by}s left out "
+            f"{values[1]:.3f}, for the end {values[2]:.3f} deg"
         )
 
 

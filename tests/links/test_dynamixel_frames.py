@@ -343,7 +343,8 @@ def test_a_drive_that_does_not_keep_what_it_is_set_to(drives: Any) -> None:
         ('mode = "position"', 'mode = "impedance"', "accepted: torque, velocity, position"),
         ("command_timeout_s = 0.1", "command_timeout_s = 5.0", "0.02 to 2.54"),
         ("node = 1", "node = 253", "0 to 252"),
-        ('kind = "serial"\nport = "/dev/ttyUSB0"\nbaud = 4_000_000', 'kind = "can"\ninterface = "virtual"', "line of its own"),
+        ('kind = "serial"\nport = "/dev/ttyUSB0"\nbaud '
+         '= 4_000_000', 'kind = "can"\ninterface = "virtual"', "line of its own"),
     ],
 )  # fmt: skip
 def test_mistakes_end_in_one_line(drives: Any, old: str, new: str, says: str) -> None:

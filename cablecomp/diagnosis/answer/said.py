@@ -113,7 +113,8 @@ def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple
         names = conformal_set(deficits({t.term.name: t.difference.z for t in first}), level)
         if len(names) > 1 and all(set(names) != set(effects) for effects, _ in rows):
             why = (
-                f"asked alone, each is within {level:.1f} standard errors of the best: sets made so held the truth in nine of "
+                f"asked alone, each is within {level:.1f} standard errors of the "
+                f"best: sets made so held the truth in nine of "
                 "ten trials"
             )
             rows.append((names, why))
