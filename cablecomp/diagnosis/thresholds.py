@@ -46,9 +46,9 @@ class Thresholds:
     tolerance: float = 1e-3
     """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by
     far more."""
-    told: float = 2.0
-    """Standard deviations by which an effect's amount has to differ from none, or it is not that effect that
-    helps (trials seed 602: a mount that yields one way was answered by a guide without friction)."""
+    none: float = 2e-4
+    """Share of its range up to which an effect's amount is none, and it is not that effect that helps (trials seed
+    602: a mount that yields one way was answered by a guide without friction)."""
     tie: float = 0.01
     """Share of the loss on data left out by which a law with more parameters has to be better than one with fewer."""
     hopeless: float = 2.5

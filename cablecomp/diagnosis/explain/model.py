@@ -14,7 +14,7 @@ from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_lo
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
+from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -116,20 +116,20 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
 
 
 def is_told(fit: Fit, term: Term) -> bool:
-    """Whether an effect's own amount is told from none: a guide without friction is free cable, and yields as a
-    mount does."""
+    """Whether an effect's own amount is more than none: a guide without friction is free cable, and yields as such.
+    What depends on a condition may be none where that is none."""
     if not isinstance(term, Hypothesis):
         return True
     name = f"effect.{term.effect.id}.{term.amount.name}"
-    k = next((k for k, p in enumerate(fit.problem.parameters) if p.name == name), None)
-    if k is None:
+    names = [p.name for p in fit.problem.parameters]
+    if name not in names or any(n.startswith(f"{name}~") for n in names):
         return True
+    k = names.index(name)
     p, x = fit.problem.parameters[k], float(fit.x[k])
-    low, high = (bound[k] for bound in fit.problem.bounds())
+    low, high = (float(bound[k]) for bound in fit.problem.bounds())
     if p.log:
-        return bool(x > low + 1e-3 * (high - low))
-    sd = float(np.sqrt(covariance(fit)[k, k])) * abs(p.slope(x))
-    return abs(p.value(x) - term.amount.neutral) > LIMITS.told * sd
+        return x > low + LIMITS.none * (high - low)
+    return abs(p.value(x) - term.amount.neutral) > LIMITS.none * (p.high - p.low)
 
 
 def finely(model: Model, groups: Groups) -> Model:

@@ -57,8 +57,6 @@ class Answer:
     J: FloatArray
     length: float
     amount: float
-    size: float
-    """The amount that it was asked at: about as large as what was left."""
     place: int = 0
     """Which of the anchors it was asked at."""
 
@@ -184,7 +182,7 @@ def _answer(
             J[:data, count + k] = -d[:data] / size * p.slope(x[count + k])
     own = here.beyond(d)
     length = float(np.linalg.norm(own)) / max(abs(size), 1e-300)
-    return Answer(h, cost, problem, x, J, length, float(entry.parameters[h.amount.name]), size)
+    return Answer(h, cost, problem, x, J, length, float(entry.parameters[h.amount.name]))
 
 
 def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
@@ -204,26 +202,6 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
     values = {**h.starts[0].values, h.amount.name: size, PHASE: phase}
     d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
     return _answer(here, h, values, cost, d, size)
-
-
-def sized(pool: Sequence[Hypothesis], answers: Sequence[Answer]) -> list[Hypothesis]:
-    """The hypotheses, beginning at the amounts that they were asked at: what is left next is of about that size too."""
-    known = {a.hypothesis.name: abs(a.size) for a in answers}
-    found = []
-    for h in pool:
-        if known.get(h.name, 0.0) > 0.0:
-            starts = tuple(
-                Start(
-                    {
-                        **s.values,
-                        h.amount.name: float(np.copysign(known[h.name], float(s.values[h.amount.name]))),
-                    }
-                )
-                for s in h.starts
-            )
-            h = replace(h, starts=starts)
-        found.append(h)
-    return found
 
 
 def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:

@@ -23,7 +23,7 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.rounds import Progress, cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score_difference
-from cablecomp.diagnosis.explain.screening import Answer, sized
+from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
 
@@ -57,7 +57,7 @@ def select(
         for model, start in beam:
             known = [t.model for r in rounds for t in r.tried]
             round_, answered = one_round(model, start, pool, groups, rng, progress, number, cold, known)
-            answers, pool = answers or answered, sized(pool, answered)
+            answers = answers or answered
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
         good = [t for _, t in candidates if demanded(t.difference, first=number == 0)]
