@@ -26,13 +26,13 @@ def _call(typing: Any, address: Any, data: Any, parameters: Any, state: Any) -> 
     return signature, generate
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]  # numba is not typed
 def call_term(address: int, context: Any, parameters: Any, state: Any) -> None:
     """Run the compiled term at `address` on three float64 arrays (context, its parameters, its state)."""
     _call(address, context.ctypes.data, parameters.ctypes.data, state.ctypes.data)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic  # type: ignore[untyped-decorator]  # numba is not typed
 def call_walk(
     typing: Any, address: Any, P: Any, I: Any, S: Any, J: Any, L: Any, rows: Any, outs: Any, commit: Any
 ) -> Any:

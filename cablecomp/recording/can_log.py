@@ -143,8 +143,8 @@ class _AbsoluteAsc:
         return next(self._lines)
 
     def read(self, size: int = -1) -> str:
-        """Not used: python-can reads a log by lines."""
-        raise NotImplementedError
+        """What is left of the text; python-can itself reads by lines."""
+        return "".join(self._lines)
 
     def close(self) -> None:
         """Close the file."""

@@ -46,7 +46,7 @@ class WireFault(Fault):
 
     def change(self, frame: Frame, at_s: float) -> list[Timed]:
         """What goes on instead of a frame that was to go on at `at_s`."""
-        raise NotImplementedError
+        raise NotImplementedError  # each fault has its own
 
 
 @dataclass

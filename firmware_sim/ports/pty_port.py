@@ -146,11 +146,11 @@ class PtyPort:
 
     def frames(self, data: bytes, now_s: float) -> list[Frame]:
         """Frames in these bytes."""
-        raise NotImplementedError
+        raise NotImplementedError  # each line protocol has its own
 
     def bytes_of(self, frame: Frame, now_s: float) -> bytes:
         """Bytes of one frame."""
-        raise NotImplementedError
+        raise NotImplementedError  # each line protocol has its own
 
 
 class SlcanPort(PtyPort):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 
 from cablecomp.recording.reader import open_recording
@@ -32,8 +33,7 @@ def _columns() -> dict[str, np.ndarray]:
 def test_reading(benchmark: Any, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"a.{ending}"
     if ending == "parquet":
-        polars = pytest.importorskip("polars")
-        polars.DataFrame(_columns()).write_parquet(path)
+        pl.DataFrame(_columns()).write_parquet(path)
     else:
         write_canonical(path, _columns())
     rows = benchmark(lambda: sum(block.rows for block in open_recording(path).blocks()))

@@ -54,7 +54,7 @@ def test_leaving_a_fold_out_is_fitting_without_it() -> None:
     g = groups()
     A = rng.standard_normal((BLOCKS * ROWS, 4))
     y = A @ np.array([1.0, -2.0, 0.5, 0.0]) + rng.standard_normal(len(A))
-    found = left_out(linear(y, A, 1.5), g)  # type: ignore[arg-type]
+    found = left_out(linear(y, A, 1.5), g)  # type: ignore[arg-type]  # a stand-in for a fit
     for fold in range(g.folds):
         out = g.fold == fold
         without = linear(y[~out], A[~out], 1.5)
@@ -70,7 +70,7 @@ def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:
     steps = (g.block[:, None] == np.arange(BLOCKS)).astype(np.float64)
     plain = linear(y, np.ones((len(y), 1)), 1.5)
     fitted = linear(y, np.column_stack([np.ones(len(y)), steps]), 1.0)
-    step = score_difference(left_out(fitted, g), left_out(plain, g), g)  # type: ignore[arg-type]
+    step = score_difference(left_out(fitted, g), left_out(plain, g), g)  # type: ignore[arg-type]  # a stand-in for a fit
     assert np.mean(fitted.residual[: len(y)] ** 2) < np.mean(plain.residual[: len(y)] ** 2)
     assert step.gain < 0.02
 

@@ -18,7 +18,9 @@ from firmware_sim.ports import open_port
 from firmware_sim.runner import BenchThread
 
 canopen = pytest.importorskip("canopen", reason="peer not installed: pip install 'cablecomp[peers]'")
-p402 = pytest.importorskip("canopen.profiles.p402")
+p402 = pytest.importorskip(
+    "canopen.profiles.p402", reason="peer not installed: pip install 'cablecomp[peers]'"
+)
 
 TURN = 65536
 TYPES = {"u8": 0x5, "u16": 0x6, "u32": 0x7, "i8": 0x2, "i16": 0x3, "i32": 0x4}

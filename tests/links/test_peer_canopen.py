@@ -93,7 +93,7 @@ class Drive:
 @pytest.fixture
 def met(rigs: Any) -> Iterator[tuple[Rig, Drive]]:
     rig: Rig = rigs("cia402-socketcan.toml")
-    drive = Drive(str(rig.link.config.bus.channel))  # type: ignore[union-attr]
+    drive = Drive(str(rig.link.config.bus.channel))  # type: ignore[union-attr]  # a CAN link has a bus
     yield rig, drive
     drive.close()
 

@@ -20,7 +20,7 @@ from cablecomp.links import BusLink, DriveState, MotorCommand, Request, load_lin
 from cablecomp.links.records import MOTOR_POSITION
 
 odrive_can = pytest.importorskip("odrive_can", reason="peer not installed: pip install 'cablecomp[peers]'")
-mock = pytest.importorskip("odrive_can.mock")
+mock = pytest.importorskip("odrive_can.mock", reason="peer not installed: pip install 'cablecomp[peers]'")
 
 CONFIGS = Path(__file__).parents[2] / "configs" / "links"
 TABLES = {"0.5": "odrive-cansimple-0.5.6", "0.6": "odrive-cansimple-0.6.10"}

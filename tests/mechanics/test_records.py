@@ -72,11 +72,11 @@ def test_circuits_multiply_to_the_rigid_drive_and_chains_pull_against_each_other
 
 def test_a_term_takes_its_parameters_by_name_and_no_others() -> None:
     @term(parameters=("gain", ("curve", 3)), state=("z", ("past", 5)))
-    def follow(c, p, s):  # type: ignore[no-untyped-def]
+    def follow(c, p, s):  # type: ignore[no-untyped-def]  # the kernel gives them their types
         c.reading += p.gain * p.curve[1] + s.z
 
     (made,) = follow(gain=2.0, curve=(1.0, 4.0, 9.0))
     assert (made.parameters, made.state_size) == ((2.0, 1.0, 4.0, 9.0), 6)
     for wrong in ({"gain": 2.0}, {"gain": 2.0, "curve": (1.0, 4.0, 9.0), "phase": 0.0}):
         with pytest.raises(InputError, match="term `follow` takes gain, curve, not"):
-            follow(**wrong)  # type: ignore[arg-type]
+            follow(**wrong)  # type: ignore[arg-type]  # wrong on purpose

@@ -36,9 +36,9 @@ def text_of(html: str) -> str:
 
 def terminal(d: Diagnosis) -> str:
     """What the command prints."""
-    console = Console(width=200, file=StringIO())
-    console.print(diagnosis_summary(report_json(d)))
-    return console.file.getvalue()  # type: ignore[attr-defined]
+    text = StringIO()
+    Console(width=200, file=text).print(diagnosis_summary(report_json(d)))
+    return text.getvalue()
 
 
 def test_all_parts_of_the_result_are_on_the_page(found: Diagnosis) -> None:

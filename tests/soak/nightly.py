@@ -26,16 +26,17 @@ import polars as pl
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/system"))
 
-from fault_runs import JOINT, matched_link  # noqa: E402
+# ruff: noqa: E402 -- the helpers of the system tests are found by the line above
+from fault_runs import JOINT, matched_link
 
-from cablecomp.cli.simulation import start_simulation  # noqa: E402
-from cablecomp.config import load_joint  # noqa: E402
-from cablecomp.control.standard import reaching_protocol  # noqa: E402
-from cablecomp.observer import Observer  # noqa: E402
-from cablecomp.recording.reader import open_recording  # noqa: E402
-from cablecomp.runtime.minutes import resident_MB  # noqa: E402
-from cablecomp.runtime.run import RunOptions, run_joint  # noqa: E402
-from cablecomp.runtime.simulated import SimulationWish  # noqa: E402
+from cablecomp.cli.simulation import start_simulation
+from cablecomp.config import load_joint
+from cablecomp.control.standard import reaching_protocol
+from cablecomp.observer import Observer
+from cablecomp.recording.reader import open_recording
+from cablecomp.runtime.minutes import resident_MB
+from cablecomp.runtime.run import RunOptions, run_joint
+from cablecomp.runtime.simulated import SimulationWish
 
 GOES_ON = "time is over"
 FAULTS = (

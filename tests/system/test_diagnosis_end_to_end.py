@@ -165,11 +165,6 @@ def test_a_compliance_behind_the_stiffness_is_said_with_the_experiment_that_show
     assert protocol["segment"]
 
 
-@pytest.mark.xfail(
-    strict=False,
-    reason="cleaning the load leaves 0.9 µrad beside 1 µrad of noise at the turning points of this joint of little "
-    "noise, and friction is named for it",
-)
 def test_a_compliance_behind_the_stiffness_is_not_named(behind_stiffness: Path) -> None:
     result = json.loads((behind_stiffness / "diagnosis.json").read_text())
     assert result["missing_physics"] == []
