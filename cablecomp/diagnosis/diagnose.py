@@ -37,10 +37,12 @@ from cablecomp.diagnosis.locate.location import Location, locate
 from cablecomp.diagnosis.locate.remainders import covariates_of, sensitivities, series_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
 from cablecomp.diagnosis.locate.series import Series
-from cablecomp.diagnosis.result import Diagnosis, Law
+from cablecomp.diagnosis.result import Diagnosis, Errors, Law
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, rms_left, solve, weighed
+
+NO_BETTER = "the joint's angle is predicted no better by it on data left out"
 
 
 def diagnose(
@@ -86,6 +88,11 @@ def diagnose(
     share_left = _share_left(drive, final)
     progress("holding each name against its rivals", 0.92)
     weighed_terms = weigh(selection, pool, rest, share_left, rng)
+    by = groups.by
+    baseline = errors_of(drive.fit, body.final, by)
+    augmented = errors_of(final.fit, body.final, by) if final.terms else baseline
+    if weighed_terms and not _predicts(drive.fit, final.fit, baseline, augmented):
+        weighed_terms = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed_terms]
     named = [w for w in weighed_terms if w.confidence >= LIMITS.name]
     named.sort(key=lambda w: -w.evidence["gain"])  # what is missed most stands first
     if len(named) < len(weighed_terms) and not named:
@@ -97,10 +104,11 @@ def diagnose(
     structured = _structured(rest if named else location, after if named else before, repeated, bool(named))
     verdict = _verdict(named, structured, drive)
     progress("counting errors on data left out", 0.95)
-    by = groups.by
-    baseline = errors_of(drive.fit, body.final, by)
     empirical = [f.law for f in laws]
-    augmented = errors_of(kept.fit, body.final, by, empirical) if kept is final and final.terms else baseline
+    if kept is not final:
+        augmented = baseline
+    elif empirical:
+        augmented = errors_of(kept.fit, body.final, by, empirical)
     joint = augmented_joint(config, kept, empirical, body.names)
     unseen, hidden = could_be_unseen(kept.fit, pool, [w.term.name for w in named])
     tied = (*tied_of(weighed_terms, selection), *(((h.effect,), h.why) for h in hidden))
@@ -182,6 +190,15 @@ def _share_left(drive: Calibrated, final: Model) -> float:
     noise = drive.floor_rad**2
     before, after = rms_left(drive.fit) ** 2 - noise, rms_left(final.fit) ** 2 - noise
     return float(np.clip(after / max(before, 1e-3 * noise), 0.0, 1.0))
+
+
+def _predicts(before: Fit, after: Fit, baseline: Errors, augmented: Errors) -> bool:
+    """Whether a fit done again without a part predicts that part better than the calibrated drive does; or whether
+    another channel than the joint's angle is followed better."""
+    others = [c for c in before.problem.channels if c != JOINT]
+    return augmented.heldout_rmse_rad < baseline.heldout_rmse_rad or any(
+        rms_left(after, c) < LIMITS.recalibrate * rms_left(before, c) for c in others
+    )
 
 
 def _structured(found: Location, series: Series, repeated: float | None, named: bool) -> bool:

@@ -218,7 +218,7 @@ class Problem:
             sessions = self.sessions
             by_name = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(sessions)}
             first = width * len(sessions)
-            departures = solved[first : first + len(self.evidence)] if self._departs else None
+            departures = solved[first : first + len(self.evidence)] if self.departs else None
             for r, d in zip(
                 self.evidence, np.zeros(len(self.evidence)) if departures is None else departures, strict=True
             ):
@@ -242,7 +242,7 @@ class Problem:
     def _pasts(self, channel: str, solved: FloatArray) -> list[FloatArray]:
         """What each recording's past adds to its judged rows."""
         first = (2 if channel == MOTOR else 1) * len(self.sessions) + (
-            len(self.evidence) if self._departs else 0
+            len(self.evidence) if self.departs else 0
         )
         found = []
         for r in self.evidence:
@@ -255,7 +255,7 @@ class Problem:
         return found
 
     @property
-    def _departs(self) -> bool:
+    def departs(self) -> bool:
         """Whether recordings have zeros beside their sessions': one alone in its session has none, and whether
         there are penalties must not hang on weights."""
         return len(self.evidence) > len(self.sessions)
@@ -298,7 +298,7 @@ class Problem:
         sigma, spread = self.weighing.sigma[channel], self.weighing.zero_sd.get(channel, 0.0)
         width = 2 if channel == MOTOR else 1
         sessions = self.sessions
-        n_dep = len(self.evidence) if self._departs else 0
+        n_dep = len(self.evidence) if self.departs else 0
         spread = max(spread, 1e-6 * sigma)
         past = [
             r.past[channel].shape[1] if channel in r.counted and channel in r.past else 0

@@ -102,3 +102,20 @@ def test_no_value_is_made_up_where_an_input_has_no_reading() -> None:
     measured = columns["time_s"][np.isfinite(broken["motor_position_rad"] + broken["joint_torque_Nm"])]
     assert len(e.columns["time_s"]) >= len(measured) - e.outliers
     assert np.all(np.isin(e.columns["time_s"], measured))
+
+
+def test_a_run_of_absurd_readings_is_set_aside_and_a_quick_motion_after_a_long_rest_is_not() -> None:
+    columns = recorded()
+    clean = gathered(columns).outliers
+    absurd = {k: v.copy() for k, v in columns.items()}
+    absurd["joint_position_rad"][500:510] = 572.0
+    e = gathered(absurd)
+    assert e.outliers - clean == 10
+    assert not e.counted["joint_position_rad"][(e.rows >= 500) & (e.rows < 510)].any()
+    rested = {k: v.copy() for k, v in columns.items()}
+    n = len(rested["time_s"])
+    rested["motor_position_rad"] = 1e-5 * np.sin(np.arange(n)) + np.where(
+        np.arange(n) > n - 16, 0.02 * (np.arange(n) - n + 16), 0.0
+    )
+    before = gathered({**rested, "motor_position_rad": 1e-5 * np.sin(np.arange(n))}).outliers
+    assert gathered(rested).outliers == before

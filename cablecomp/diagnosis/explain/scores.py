@@ -30,7 +30,8 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 @dataclass(frozen=True)
 class Groups:
     """Which group each row of the residual belongs to, channel by channel as the residual goes (-1: a penalty
-    row, in none).
+    row, in none). Where whole recordings are left out, how far a recording's zero departs from its session's is a
+    row of its own: an offset that follows the load is a compliance, and not the encoder's matter.
 
     `fold`: groups that are left out together (a recording, a session, a condition; a block where there is one
     recording). `by`: what the folds are.
@@ -70,6 +71,8 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
     for number, (c, own) in enumerate(zip(problem.channels, owners, strict=True)):
         block = np.full(len(own), -1, dtype=np.int64)
         first = 0
+        departs, in_fold = (np.full(problem.bases[c].penalty_rows, -1, dtype=np.int64) for _ in range(2))
+        zeros = len(problem.evidence) if problem.departs and by != "block" else 0
         for k in range(len(problem.evidence)):
             here = own == k
             n = int(here.sum())
@@ -77,16 +80,19 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
             # by time, so that a block holds all channels of its time
             place = np.linspace(0, each, n, endpoint=False).astype(np.int64)
             block[here] = first + place
+            if k < zeros:
+                departs[k] = first + each // 2
             first += each
-        fold = own if by == "recording" else _fold_of(problem, own, block, by)
-        penalty = np.full(problem.bases[c].penalty_rows, -1, dtype=np.int64)
-        blocks += [block, penalty]
-        folds += [fold, penalty]
-        channels.append(np.full(len(own) + len(penalty), number, dtype=np.int64))
+        in_fold[:zeros] = _fold_of(problem, np.arange(zeros), departs[:zeros], by)
+        blocks += [block, departs]
+        folds += [_fold_of(problem, own, block, by), in_fold]
+        channels.append(np.full(len(own) + len(departs), number, dtype=np.int64))
     return Groups(np.concatenate(blocks), np.concatenate(folds), by, np.concatenate(channels))
 
 
 def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntArray:
+    if by == "recording":
+        return own
     if by == "session":
         names = problem.sessions
         return np.array([names.index(e.session) for e in problem.evidence])[own]

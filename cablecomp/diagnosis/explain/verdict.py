@@ -130,13 +130,11 @@ def _gone(selection: Selection, before: Model, after: Model) -> float:
 
 def _mean_squares(model: Model, groups: Groups) -> FloatArray:
     """Mean square left out of each channel, in its own unit."""
-    here = groups.block >= 0
-    bound = LIMITS.tail * scales(model.left_out, groups)[groups.channel]
-    square = np.minimum(np.abs(model.left_out), bound) ** 2
+    bound = LIMITS.tail * scales(model.left_out, groups)
     problem = model.fit.problem
     return np.array([
-        float(np.mean(square[here & (groups.channel == k)])) * problem.weighing.sigma[c] ** 2
-        for k, c in enumerate(problem.channels)
+        float(np.mean(np.minimum(np.abs(model.left_out[span]), most) ** 2)) * problem.weighing.sigma[c] ** 2
+        for (c, span), most in zip(problem.spans().items(), bound, strict=True)
     ])  # fmt: skip
 
 
