@@ -99,8 +99,8 @@ def _ways(
     ways: list[tuple[Dependence, list[FloatArray], Problem]] = []
     sessions = problem.sessions
     place = problem.parameters.index(p)
-    several = min(sum(e.session == s for e in problem.evidence) for s in sessions) > 1
-    if len(sessions) > 1 and several and p.base in PER_SESSION:
+    several = [s for s in sessions if sum(e.session == s for e in problem.evidence) > 1]
+    if len(several) > 1 and p.base in PER_SESSION:
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

@@ -10,7 +10,14 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_losses, left_out, scales
+from cablecomp.diagnosis.explain.scores import (
+    RECORDINGS,
+    Groups,
+    ScoreDifference,
+    block_losses,
+    left_out,
+    scales,
+)
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -101,11 +108,13 @@ def searching(fit: Fit) -> Weighing:
     for c in problem.channels:
         noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
         sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise, 1e-12)
-    # zeros may not take up what an effect could explain: an offset that follows the load is a compliance
-    spread = {
-        c: float(np.clip(problem.weighing.zero_sd.get(c, 0.0), 0.1 * sigma[c], LIMITS.zero * sigma[c]))
-        for c in problem.channels
-    }
+    # zeros may not take up what an effect could explain: an offset that follows the load is a compliance. Where there
+    # are recordings enough to tell, a zero keeps what it counts for among rows that remember each other
+    told = len(problem.evidence) >= RECORDINGS
+    spread = {}
+    for c in problem.channels:
+        usual = problem.weighing.zero_sd.get(c, 0.0) * (sigma[c] / problem.weighing.sigma[c] if told else 1.0)
+        spread[c] = float(np.clip(usual, 0.1 * sigma[c], LIMITS.zero * sigma[c]))
     return Weighing(sigma, spread)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
+from typing import Final
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray
+
+RECORDINGS: Final = 4
+"""Recordings from which whole ones are left out; of fewer, blocks."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
     problem = fit.problem
     owners = [problem.owners(c) for c in problem.channels]
     counts = np.bincount(owners[0], minlength=len(problem.evidence))
-    by = by or ("recording" if len(problem.evidence) >= 4 else "block")
+    by = by or ("recording" if len(problem.evidence) >= RECORDINGS else "block")
     spans = problem.spans()
     first_rows = fit.residual[spans[problem.channels[0]]]
     parts = [first_rows[owners[0] == k] for k in range(len(problem.evidence)) if counts[k] > 8]
