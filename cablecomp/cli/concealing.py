@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from cablecomp.cli.shared import console, plain_counts
+from cablecomp.cli.shared import plain_counts, warn
 from cablecomp.errors import InputError
 from cablecomp.trials.prove import Wish
 
@@ -67,7 +67,7 @@ def _concealed(module: str, options: Mapping[str, object], told: Told) -> str:
             elif words[:1] == ["sha256"]:
                 sha256 = words[1]
             elif words[:1] == ["left"]:
-                console.print(line.strip(), soft_wrap=True)
+                warn([line.strip()])
     if process.returncode != 0 or not sha256:
         raise InputError(_last_line(last))
     return sha256

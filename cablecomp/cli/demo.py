@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from cablecomp.cli.shared import DEMO_LINK, console
+from cablecomp.cli.shared import DEMO_LINK, JsonOption, console, echo_json, errors
 from cablecomp.cli.simulation import start_simulation, true_values
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
@@ -35,12 +35,13 @@ def demo(
         "demo"
     ),
     seed: Annotated[int, typer.Option(min=0, help="of true parameters, noise and motions")] = 1,
+    as_json: JsonOption = False,
 ) -> None:
     """A compensated joint against uncompensated ones, on a simulated bus; ends with where the report lies."""
     path = example("joints", DEMO)
     joint, wanted = load_joint(path), load_control(example("control", DEMO))
     bus, wanted = matched(load_link(DEMO_LINK), wanted, own_link=False)
-    compare_controllers(path, joint, bus, wanted, out, seed, 14.0)
+    compare_controllers(path, joint, bus, wanted, out, seed, 14.0, as_json)
 
 
 def compare_controllers(
@@ -51,9 +52,10 @@ def compare_controllers(
     out: Path,
     seed: int,
     duration_s: float,
+    as_json: bool,
 ) -> None:
     """Run motor-side control, linear stiffness and observer side by side on simulated joints; show and write it."""
-    with LiveView(console) as view:
+    with LiveView(errors() if as_json else console) as view:
         found = compare(
             joint,
             bus,
@@ -66,6 +68,9 @@ def compare_controllers(
             view.watch,
         )
     page = write_comparison(found, out, joint_text(found.calibrated.config))
+    if as_json:
+        echo_json({**found.as_dict(), "report": page})
+        return
     _summary(found)
     console.print(f"report: {page}")
 

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from cablecomp.cli.shared import Config, Control, announce_compilation, console, control_of, read_joint
+from cablecomp.cli.shared import (
+    Config,
+    Control,
+    JsonOption,
+    announce_compilation,
+    console,
+    control_of,
+    echo_json,
+    read_joint,
+)
 from cablecomp.config import JointConfig
 from cablecomp.control.nonlinear_system import fit_plays
 from cablecomp.errors import InputError
@@ -32,6 +41,7 @@ def export(
     fmu: Annotated[bool, typer.Option("--fmu", help="NAME.fmu: the same for co-simulation, FMI 2.0")] = False,
     control: Control = None,
     out: Annotated[Path, typer.Option(help="folder to write into")] = Path("export"),
+    as_json: JsonOption = False,
 ) -> None:
     """A joint for simulators and other programs: what was identified, and what each format loses."""
     if not (mujoco or urdf or c or fmu):
@@ -39,41 +49,58 @@ def export(
     joint = read_joint(config)
     announce_compilation()
     out.mkdir(parents=True, exist_ok=True)
+    result: dict[str, object] = {"name": joint.name}
     if mujoco or urdf:
-        _simulators(joint, out, control, mujoco, urdf)
+        result |= _simulators(joint, out, control, mujoco, urdf)
     if c or fmu:
-        _code(joint, out, c, fmu)
+        result |= _code(joint, out, c, fmu)
+    if as_json:
+        echo_json(result)
+    else:
+        _say(result)
 
 
-def _simulators(joint: JointConfig, out: Path, control: Path | None, mujoco: bool, urdf: bool) -> None:
+def _simulators(
+    joint: JointConfig, out: Path, control: Path | None, mujoco: bool, urdf: bool
+) -> dict[str, object]:
     found, motor = equivalent(joint), control_of(control, joint).motor
+    result: dict[str, object] = {"equivalent": found, "simulators_leave_out": found.lost(joint)}
     if mujoco:
-        _write(out / f"{identifier(joint.name)}.xml", mujoco_model(joint, found, motor))
+        result["mujoco"] = _write(out / f"{identifier(joint.name)}.xml", mujoco_model(joint, found, motor))
     if urdf:
-        _write(out / f"{identifier(joint.name)}.urdf", urdf_model(joint, found, motor))
-    console.print(
-        f"stiffness {found.stiffness_Nm_per_rad:.5g} Nm/rad, friction {found.friction_Nm:.4g} Nm, equivalent backlash "
-        f"{1e3 * found.backlash_rad:.4g} mrad at ±{found.most_Nm:.4g} Nm"
-    )
-    _lost(found.lost(joint))
+        result["urdf"] = _write(out / f"{identifier(joint.name)}.urdf", urdf_model(joint, found, motor))
+    return result
 
 
-def _code(joint: JointConfig, out: Path, c: bool, fmu: bool) -> None:
+def _code(joint: JointConfig, out: Path, c: bool, fmu: bool) -> dict[str, object]:
     found = fit_plays(joint)
+    result: dict[str, object] = {"code_rms_rad": found.rms_rad, "code_leaves_out": LOST}
     if c:
-        _write(out / f"{identifier(joint.name)}.c", c_source(joint, found))
+        result["c"] = _write(out / f"{identifier(joint.name)}.c", c_source(joint, found))
     if fmu:
-        console.print(f"written: {write_fmu(joint, found, out)}", soft_wrap=True)
-    console.print(f"error on the loops that it was fitted to: {1e3 * found.rms_rad:.3g} mrad RMS")
-    _lost(LOST)
+        result["fmu"] = write_fmu(joint, found, out)
+    return result
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, text: str) -> Path:
     with atomic_file(path) as spare:
         spare.write_text(text, encoding="utf-8")
-    console.print(f"written: {path}", soft_wrap=True)
+    return path
 
 
-def _lost(lines: Sequence[str]) -> None:
-    for line in lines:
+def _say(result: Mapping[str, Any]) -> None:
+    for name in ("mujoco", "urdf", "c", "fmu"):
+        if name in result:
+            console.print(f"written: {result[name]}", soft_wrap=True)
+    if "equivalent" in result:
+        found = result["equivalent"]
+        console.print(
+            f"stiffness {found.stiffness_Nm_per_rad:.5g} Nm/rad, friction {found.friction_Nm:.4g} Nm, equivalent "
+            f"backlash {1e3 * found.backlash_rad:.4g} mrad at ±{found.most_Nm:.4g} Nm"
+        )
+    if "code_rms_rad" in result:
+        console.print(
+            f"error on the loops that it was fitted to: {1e3 * result['code_rms_rad']:.3g} mrad RMS"
+        )
+    for line in (*result.get("simulators_leave_out", ()), *result.get("code_leaves_out", ())):
         console.print(f"left out: {line}", style="dim", soft_wrap=True)

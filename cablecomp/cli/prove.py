@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.concealing import Told, conceal_in, conceal_joints, experiment, trial_bar
-from cablecomp.cli.shared import announce_compilation, console, read_joint
+from cablecomp.cli.shared import JsonOption, announce_compilation, console, echo_json, read_joint, warn
 from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.cluster import Workers
 from cablecomp.config_text import joint_text
@@ -19,6 +19,7 @@ from cablecomp.report.concealed_page import concealed_table, write_concealed_pag
 from cablecomp.report.scoreboard_page import scoreboard_table, write_scoreboard_page
 from cablecomp.trials.own import Own, OwnWish, prove_in
 from cablecomp.trials.prove import Blind, Wish, prove
+from cablecomp.trials.scoreboard import as_json as scoreboard_json
 
 KINDS = "single,single,single,pair,none,stranger,sessions,confounded"
 
@@ -49,6 +50,7 @@ def prove_blindly(
         str | None, typer.Option(help="address of a Dask scheduler to diagnose on, in place of --workers")
     ] = None,
     reading: Reading,
+    as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Blind trials: conceal physics in simulated joints or in your own recordings, diagnose, open the truth,
     keep the score."""
@@ -59,7 +61,7 @@ def prove_blindly(
             raise InputError(
                 "--config goes with --in: give recordings too, or leave it out for simulated joints"
             )
-        _on_joints(Wish(trials, seed, kinds, laws, imperfections), out, by)
+        _on_joints(Wish(trials, seed, kinds, laws, imperfections), out, by, as_json)
         return
     if config is None:
         raise InputError("--in needs --config: the joint's configuration, as `cablecomp diagnose` takes it")
@@ -67,25 +69,31 @@ def prove_blindly(
     source = reading(joint)
     data = {path_text(p): source.read(p, gaps=True).columns for p in find_recordings(recordings)}
     own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
-    _in_recordings(own, OwnWish(seed, rounds, seconds, minutes), out)
+    _in_recordings(own, OwnWish(seed, rounds, seconds, minutes), out, as_json)
 
 
-def _on_joints(wish: Wish, out: Path, by: Workers) -> None:
+def _on_joints(wish: Wish, out: Path, by: Workers, as_json: bool) -> None:
     def conceal(where: Path, wanted: Wish, told: Told) -> str:
         return conceal_joints(where, wanted, by.processes, told)
 
     with trial_bar() as tell:
         board = prove(Blind(out.absolute(), conceal, experiment, by), wish, tell, _announce)
     write_scoreboard_page(board, out / "scoreboard.html")
+    if as_json:
+        echo_json(scoreboard_json(board))
+        return
     console.print(scoreboard_table(board))
     console.print(f"report: {out / 'scoreboard.html'}")
 
 
-def _in_recordings(own: Own, wish: OwnWish, out: Path) -> None:
+def _in_recordings(own: Own, wish: OwnWish, out: Path, as_json: bool) -> None:
     with trial_bar() as tell:
         found = prove_in(own, wish, tell, _announce)
     answer = found.as_json()
     write_concealed_page(answer, out / "concealed.html")
+    if as_json:
+        echo_json(answer)
+        return
     console.print(concealed_table(answer))
     if found.done < found.of:
         console.print(f"{found.done} of {found.of} trials are done; the same with more --minutes goes on")
@@ -93,4 +101,4 @@ def _in_recordings(own: Own, wish: OwnWish, out: Path) -> None:
 
 
 def _announce(sha256: str) -> None:
-    console.print(f"sealed truth, SHA-256 {sha256}", soft_wrap=True)
+    warn([f"sealed truth, SHA-256 {sha256}"])

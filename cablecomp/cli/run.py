@@ -113,7 +113,8 @@ def run(
     if comparison:
         from cablecomp.cli.demo import compare_controllers  # brings the plant
 
-        compare_controllers(config, joint, bus, wanted, out, seed, 30.0 if duration is None else duration)
+        length = 30.0 if duration is None else duration
+        compare_controllers(config, joint, bus, wanted, out, seed, length, as_json)
         return
     if mode is not None:
         wanted = wanted.model_copy(

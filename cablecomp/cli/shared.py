@@ -57,9 +57,14 @@ def read_joint(path: Path, effects: Sequence[Path] | None = None) -> JointConfig
     return joint
 
 
+def errors() -> Console:
+    """Standard error, where what is no result goes."""
+    return Console(stderr=True, markup=False, emoji=False, highlight=False, soft_wrap=True)
+
+
 def warn(lines: Iterable[str]) -> None:
     """One line each on standard error."""
-    asking = Console(stderr=True, markup=False, emoji=False, highlight=False, soft_wrap=True)
+    asking = errors()
     for words in lines:
         asking.print(words, style="yellow")
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import console, share_bar
+from cablecomp.cli.shared import JsonOption, console, echo_json, share_bar
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.errors import InputError
 from cablecomp.report.study_page import study_table, write_study
@@ -17,13 +17,18 @@ from cablecomp.thesis.bench.study import study
 
 def study_bench(
     out: Annotated[Path, typer.Option(help="folder for study.html")] = Path("study"),
+    as_json: JsonOption = False,
 ) -> None:
     """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""
     rigs = Rigs(load_joint("snow-open-rig"), load_joint("snow-closed-rig"))
     with share_bar() as told:
         found = study(rigs, by_plant, told)
+    page = write_study(found, out, f"cablecomp study --out {out}")
+    if as_json:
+        echo_json({**found.as_dict(), "report": page})
+        return
     console.print(study_table(found))
-    console.print(f"report: {write_study(found, out, f'cablecomp study --out {out}')}")
+    console.print(f"report: {page}")
 
 
 def by_plant(config: JointConfig, columns: Columns) -> Array:

@@ -86,6 +86,27 @@ class Comparison:
         joint = self.force.joints[0]
         return _error(joint.true_torque_Nm, joint.torque_Nm) / self.force_range_Nm
 
+    def as_dict(self) -> dict[str, object]:
+        """True joint-side RMS errors (rad) and how many times the observer's they are, by controller."""
+        loops = {"without_joint_feedback": self.open_loop, "with_joint_feedback": self.closed_loop}
+        return {
+            "name": self.name,
+            "calibrated": dict(self.calibrated.rows),
+            **{
+                loop: {
+                    j.name: {
+                        "error_rad": _error(j.true_position_rad, j.position_rad),
+                        "over_observer": self.factor(j.name, report),
+                    }
+                    for j in report.joints
+                }
+                for loop, report in loops.items()
+            },
+            "encoder_noise_rad": self.encoder_noise_rad,
+            "force_error_share": self.force_share,
+            "seconds": self.seconds,
+        }
+
 
 class CompareOptions(NamedTuple):
     """Seed of plant and motions, length of the judged runs (s), folder for all files."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import json
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cablecomp.cli import main
 from cablecomp.config import load_joint
 from cablecomp.control.nonlinear_system import Plays
 from cablecomp.control.options import MotorModel
@@ -157,3 +159,10 @@ def test_the_equivalent_lies_on_the_observers_loop() -> None:
     assert 2.0 * found.most_Nm / found.stiffness_Nm_per_rad == pytest.approx(found.reach_rad, rel=0.02)
     assert found.rms_rad < 0.5 * found.backlash_rad
     assert all(found.lost(JOINT))
+
+
+def test_the_result_is_had_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "--config", "wrist-capstan", "--urdf", "--out", str(tmp_path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["name"], Path(told["urdf"]).read_text()[:7]) == ("wrist-capstan", "<?xml v")
+    assert told["equivalent"]["friction_Nm"] == pytest.approx(equivalent(JOINT).friction_Nm)

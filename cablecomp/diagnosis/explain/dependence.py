@@ -19,8 +19,6 @@ from cablecomp.estimation.parameter import Parameter, by_condition, own_of
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
-PER_SESSION: Final = ("pretension_N",)
-"""What of the drive mounting it anew may change: how tight the cables are."""
 POSTURES: Final = ("_rad", "_deg", "_m")
 """Ends of the names of conditions that say how the path lies."""
 PROMISING = 3
@@ -61,6 +59,12 @@ def may_depend(parameter: str, condition: str) -> bool:
     path; with anything else (a temperature, an age), every amount."""
     if not condition.endswith(POSTURES):
         return not parameter.endswith(("_rad", "_m", "_s"))
+    return _along_path(parameter)
+
+
+def _along_path(parameter: str) -> bool:
+    """Whether it is what another posture, or mounting the drive anew, may change: how tight the cables are, how
+    their path lies."""
     if parameter.startswith("effect."):
         effect = catalogue()[parameter.split(".")[1]]
         return effect.posture and not effect.parameter(parameter.split(".")[2]).shape
@@ -100,7 +104,7 @@ def _ways(
     sessions = problem.sessions
     place = problem.parameters.index(p)
     several = [s for s in sessions if sum(e.session == s for e in problem.evidence) > 1]
-    if len(several) > 1 and p.base in PER_SESSION:
+    if len(several) > 1 and _along_path(p.base):
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

@@ -63,6 +63,14 @@ class Study:
     together: tuple[Finding, ...]
     plain_misfit: float
 
+    def as_dict(self) -> dict[str, object]:
+        """What was switched on, its size, what came of it, how far from the thesis; without the traces."""
+        told = ("name", "sizes", "units", "plausible", "signature", "misfit")
+        return {
+            "plain_misfit": self.plain_misfit,
+            "findings": [{k: getattr(f, k) for k in told} for f in (*self.together, *self.findings)],
+        }
+
 
 def study(
     rigs: Rigs, simulate: Simulate, told: Callable[[str, float], None] = lambda what, share: None
