@@ -14,8 +14,8 @@ from cablecomp.recording.atomic import atomic_file
 from cablecomp.report import page
 from cablecomp.report import scoreboard_figures as figures
 from cablecomp.report.page import Fact, Section
+from cablecomp.trials.row import Row
 from cablecomp.trials.scoreboard import Part, Scoreboard, Target
-from cablecomp.trials.scoring import Row
 from cablecomp.trials.shares import Rate
 
 

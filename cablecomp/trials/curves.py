@@ -8,8 +8,8 @@ from math import isfinite, nan
 from statistics import median
 from typing import Any
 
+from cablecomp.trials.row import SURE
 from cablecomp.trials.run import Verdict
-from cablecomp.trials.scoring import SURE
 from cablecomp.trials.shares import Rate, finite, rate
 
 MOVED = 3.0

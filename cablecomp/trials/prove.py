@@ -10,6 +10,7 @@ from cablecomp.cluster import Workers, spread
 from cablecomp.config import load_joint
 from cablecomp.errors import CablecompError, InputError
 from cablecomp.trials.reference import Yardstick, measure_truth
+from cablecomp.trials.row import Row
 from cablecomp.trials.run import (
     JOINT_FILE,
     Announce,
@@ -24,7 +25,7 @@ from cablecomp.trials.run import (
     verdict_of,
 )
 from cablecomp.trials.scoreboard import Scoreboard, as_json, scoreboard
-from cablecomp.trials.scoring import Row, failed_trial, score_trial
+from cablecomp.trials.scoring import failed_trial, score_trial
 from cablecomp.trials.sealed import SEALED, check_seal, read_sealed, truth_from
 from cablecomp.trials.shares import write_json
 

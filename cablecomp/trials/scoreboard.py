@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cablecomp.trials.calibrated import brier, calibration_error, risk_area, risk_coverage
-from cablecomp.trials.scoring import SURE, Named, Row
+from cablecomp.trials.row import SURE, Named, Row
 from cablecomp.trials.shares import Rate, bootstrapped, finite, quantile, rate
 
 SIZE_EDGES = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.6001)

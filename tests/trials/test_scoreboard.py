@@ -23,8 +23,9 @@ from cablecomp.recording.writer import write_canonical
 from cablecomp.report.scoreboard_page import scoreboard_page, scoreboard_table
 from cablecomp.trials.prove import Blind, Wish, prove
 from cablecomp.trials.reference import Yardstick, measure_truth
+from cablecomp.trials.row import Row
 from cablecomp.trials.scoreboard import as_json, scoreboard
-from cablecomp.trials.scoring import Row, failed_trial, score_trial
+from cablecomp.trials.scoring import failed_trial, score_trial
 from cablecomp.trials.sealed import SEALED, TrueEffect, Truth, check_seal, digest, read_sealed, truth_from
 from cablecomp.trials.shares import Rate
 
