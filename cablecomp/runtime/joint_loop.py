@@ -185,7 +185,8 @@ class JointLoop:
 
     def _observe(self, now_s: float, since_s: float | None) -> Command:
         """Take in what has come; returns what the compensator asks for. A sample that the observer refuses
-        ends the run: replay would refuse it as well.
+        ends the run: replay would refuse it as well. So does one that it takes where the next one, as expected, is
+        beyond what the joint can take.
         """
         s = self.setup
         target = self._sent.motor_position_rad if since_s is not None else nan
@@ -203,7 +204,8 @@ class JointLoop:
             command = compensator.step(checked.sample, reference, feed, joint_ok=checked.joint_ok)
         except InputError as error:
             self._refused = True
-            self.stop_reason = self.stop_reason or f"the observer refuses what came: {error}"
+            what = "would come next" if compensator.observed else "came"
+            self.stop_reason = self.stop_reason or f"the observer refuses what {what}: {error}"
             command = _NONE_YET
         self.step_s = perf_counter() - begin
         estimate = compensator.estimate

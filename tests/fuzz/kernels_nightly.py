@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def fuzz(minutes: float, seed: int) -> int:
     """Random joints one after the other, each by a seed of its own."""
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests/observer")]
+    sys.path[:0] = [str(ROOT / part) for part in (".", "tests/observer", "tests/shared")]
     import numpy as np
     from random_joints import drive_hard, random_joint
 
