@@ -12,6 +12,11 @@ from firmware_sim.firmware.records import FAULTS, DriveFlag, DriveState, Mode, R
 from firmware_sim.firmware.shaping import InputMode, Shaper
 from firmware_sim.plantlike import Readings
 
+_SEARCH_INTEGRATOR_PER_S = 20.0
+"""Integral over proportional gain of a search for the index: what holds the motor back is overcome bit by bit."""
+_STALL_S, _STALL_RAD = 5.0, 0.01
+"""A search that gets less far in that time has come to an end of the travel."""
+
 # What a request does in each state; a pair that is missing is refused and leaves everything as it is.
 TABLE: dict[tuple[DriveState, Request], DriveState] = {
     (DriveState.DISABLED, Request.DISABLE): DriveState.DISABLED,
@@ -112,6 +117,8 @@ class Drive:
         self._search_start: float | None = None
         self._search_sign = 1.0
         self._search_turn = 0
+        self._search_far = -math.inf
+        self._search_far_s = now_s
         self._enable_when_homed = False
         self._torque_command = 0.0
         self._unheard = False
@@ -200,7 +207,7 @@ class Drive:
         self._check(readings, dt_s, now_s)
         self.observe(readings)
         if self.state is DriveState.CALIBRATING:
-            wanted = self._search(now_s)
+            wanted = self._search(dt_s, now_s)
         elif self.state is DriveState.ENABLED:
             wanted = 0.0 if self._unheard else self._law(dt_s)
         else:
@@ -277,7 +284,8 @@ class Drive:
         if target is DriveState.DISABLED:
             self._enable_when_homed = False
         if target is DriveState.CALIBRATING:
-            self._search_start, self._search_sign = None, 1.0
+            self._search_start = None
+            self._turn_search(1.0, now_s)
         if target is DriveState.ENABLED and self.state is not DriveState.ENABLED:
             self._hold()
         self.state = target
@@ -329,19 +337,24 @@ class Drive:
         velocity = s.velocity_rad_s
         if self.mode is Mode.POSITION:
             velocity += c.position_gain_per_s * (position - self.position_rad)
-        return self._velocity_loop(velocity, dt_s) + s.torque_Nm
+        return self._velocity_loop(velocity, dt_s, c.velocity_integrator_Nm_per_rad) + s.torque_Nm
 
-    def _velocity_loop(self, wanted_rad_s: float, dt_s: float) -> float:
+    def _velocity_loop(self, wanted_rad_s: float, dt_s: float, integrator: float) -> float:
         c = self.config
         wanted = min(max(wanted_rad_s, -c.velocity_limit_rad_s), c.velocity_limit_rad_s)
         error = wanted - self.velocity_rad_s
-        self._integral_Nm += c.velocity_integrator_Nm_per_rad * error * dt_s
+        self._integral_Nm += integrator * error * dt_s
         self._integral_Nm = min(max(self._integral_Nm, -c.torque_limit_Nm), c.torque_limit_Nm)
         return c.velocity_gain_Nms_per_rad * error + self._integral_Nm
 
-    def _search(self, now_s: float) -> float:
-        """Turn slowly until the index passes; turn back once, then give up."""
-        raw, index = self._last_raw, self.config.index_position_rad
+    def _turn_search(self, sign: float, now_s: float) -> None:
+        self._search_sign, self._integral_Nm = sign, 0.0
+        self._search_far, self._search_far_s = -math.inf, now_s
+
+    def _search(self, dt_s: float, now_s: float) -> float:
+        """Turn slowly until the index passes; turn back once where the range or the travel ends, then give up."""
+        c, raw = self.config, self._last_raw
+        index = c.index_position_rad
         if raw is None or index is None:
             return 0.0
         if self._search_start is None:
@@ -355,9 +368,12 @@ class Drive:
             self._enter(DriveState.ENABLED if self._enable_when_homed else DriveState.DISABLED, now_s)
             return 0.0
         travelled = (raw - self._search_start) * self._search_sign
-        if travelled > self.config.search_range_rad:
+        if travelled > self._search_far + _STALL_RAD:
+            self._search_far, self._search_far_s = travelled, now_s
+        if travelled > c.search_range_rad or now_s - self._search_far_s > _STALL_S:
             if self._search_sign < 0.0:
                 self._fault(DriveFlag.INDEX_NOT_FOUND)
                 return 0.0
-            self._search_sign = -1.0
-        return self._velocity_loop(self._search_sign * self.config.search_velocity_rad_s, 0.0)
+            self._turn_search(-1.0, now_s)
+        gain = _SEARCH_INTEGRATOR_PER_S * c.velocity_gain_Nms_per_rad
+        return self._velocity_loop(self._search_sign * c.search_velocity_rad_s, dt_s, gain)

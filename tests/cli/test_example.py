@@ -30,6 +30,7 @@ def test_a_bare_name_stands_for_an_example_unless_such_a_file_is_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    Path("mit-udp").mkdir()  # a folder of that name hides nothing
     assert load_joint("capstan-arm") == load_joint(examples.example("joints", "capstan-arm"))
     assert load_link("mit-udp") == load_link(examples.example("links", "mit-udp"))
     Path("capstan-arm").write_text("schema = 2\n", encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -13,6 +14,7 @@ from sim_two_mass import TwoMass
 from firmware_sim.firmware import Drive, DriveConfig, DriveFlag, DriveState, Mode, Request, Setpoint
 from firmware_sim.firmware.drive import TABLE
 from firmware_sim.plantlike import Readings
+from firmware_sim.scenario import Scenario, plant_maker
 
 STEP = 2.5e-4
 STILL = Readings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 25.0)
@@ -173,6 +175,30 @@ def test_index_search_finds_the_absolute_angle_and_then_enables(start: float) ->
     assert drive.state is DriveState.ENABLED
     assert drive.homed
     assert drive.position_rad == pytest.approx(readings.motor_position_rad, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["capstan-arm", "snow-closed-rig"])
+def test_index_search_overcomes_what_holds_a_joint_back(name: str) -> None:
+    """Both hold the motor harder than the search's speed alone would push."""
+    make = plant_maker(Path(__file__).parents[2] / f"configs/joints/{name}.toml", Scenario())
+    drive, plant = Drive(DriveConfig(index_position_rad=0.3)), make(1)
+    readings = plant.step(STEP, 0.0)
+    drive.update(readings, STEP, readings.time_s)
+    assert drive.request(Request.ENABLE, readings.time_s)
+    while drive.state is DriveState.CALIBRATING and readings.time_s < 2.0:
+        readings = plant.step(STEP, drive.update(readings, STEP, readings.time_s))
+    assert drive.state is DriveState.ENABLED
+    assert drive.position_rad == pytest.approx(readings.motor_position_rad, abs=1e-3)
+
+
+def test_index_search_of_a_motor_that_cannot_turn_ends() -> None:
+    drive = Drive(DriveConfig(index_position_rad=0.3))
+    drive.update(STILL, STEP, 0.0)
+    drive.request(Request.ENABLE, 0.0)
+    for k in range(130):
+        drive.update(STILL, 0.1, 0.1 * k)
+    assert drive.state is DriveState.FAULT
+    assert drive.flags & DriveFlag.INDEX_NOT_FOUND
 
 
 def test_index_out_of_reach_is_a_fault() -> None:

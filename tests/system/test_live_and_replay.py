@@ -67,7 +67,9 @@ def stopped_run(case: Case, out: Path) -> tuple[str, JointLoop]:
     path = CONFIGS / f"joints/{case.joint}.toml"
     control = control_for(load_joint(path))
     options = control.compensator.model_copy(update={**GAINS, **case.options})
-    control = control.model_copy(update={"compensator": options, "health": HealthOptions(joint_rate_rad_s=1e6)})
+    control = control.model_copy(
+        update={"compensator": options, "health": HealthOptions(joint_rate_rad_s=1e6)}
+    )
     link, control = matched(load_link(CONFIGS / "links/wrist-virtual.toml"), control, own_link=False)
     faults = (case.fault,) if case.fault else ()
     simulation = start_simulation(path, SimulationWish(link, control, 1, False, 3, faults))
