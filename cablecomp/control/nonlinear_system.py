@@ -48,7 +48,8 @@ def to_nlsys(
     """The drive as a discrete-time `control.NonlinearIOSystem` from (motor position, joint torque) to (joint position,
     deflection); a state of zeros is uniform pretension at the first motor angle, and time is the state's own.
 
-    `states` None: the observer itself, thousands of states, with both tensions as further outputs: for simulation.
+    `states` None: the observer itself, thousands of states, with both tensions as further outputs: for simulation; it
+    has no operating points, as time is one of its states.
     `states` = n: n play operators (Prandtl-Ishlinskii) fitted to the drive's loops with the motor held, for loads up to
     `load_max_Nm` (None = the joint's limit, else R T0): any state is possible, so operating points, linearisation and
     frequency responses are quick; what turning of the drums does to the history is not in it. Its error on the loops
@@ -66,18 +67,27 @@ def _exact(config: JointConfig, period_s: float, name: str) -> Any:
     model.step(full(Sample(0.0, 0.0, 0.0, 0.0, 0.0, 20.0), model))
     start = model.vector()
 
+    def take_up(x: Floats) -> None:
+        try:
+            model.set_vector(x)
+        except InputError as error:
+            raise InputError(
+                f"{error}; what tries states of its own (find_operating_point, linearize) needs the reduced "
+                "system, to_nlsys(joint, states=16)"
+            ) from None
+
     def sample(x: Floats, u: Floats) -> Sample:
         known = bool(np.any(x[:-1]))
         time = float(x[-1]) + period_s if known else 0.0
         return full(Sample(time, float(u[0]), float(u[1]), 0.0, 0.0, 20.0), model)
 
     def update(t: float, x: Floats, u: Floats, params: Any) -> Floats:
-        model.set_vector(x)
+        take_up(x)
         model.step(sample(x, u))
         return model.vector()
 
     def output(t: float, x: Floats, u: Floats, params: Any) -> Floats:
-        model.set_vector(x)
+        take_up(x)
         e = model.peek(sample(x, u))
         low = e.tension_l_N if e.tension_l_N == e.tension_l_N else 0.0
         return np.array([e.joint_position_rad, e.deflection_rad, e.tension_h_N, low])

@@ -101,6 +101,12 @@ def test_the_reduced_system_has_operating_points_and_a_linearisation() -> None:
     assert np.isfinite(control.step_response(system, np.arange(30) * T).outputs).all()
 
 
+def test_what_tries_states_of_its_own_is_sent_to_the_reduced_system() -> None:
+    system = to_nlsys(JOINT, T)
+    with pytest.raises(InputError, match=r"to_nlsys\(joint, states=16\)"):
+        system.dynamics(0.0, np.ones(system.nstates), np.zeros(2))
+
+
 @pytest.mark.parametrize("states", [0, -1, 65])
 def test_a_number_of_states_that_makes_no_sense_is_refused(states: int) -> None:
     with pytest.raises(InputError, match="1 to 64"):
