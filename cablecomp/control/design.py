@@ -50,12 +50,8 @@ def design_loop(config: JointConfig, rate_Hz: float, wanted: ControlConfig | Non
     """Design filter and gains for a joint at a loop rate; raises InputError if the motor model cannot
     carry any loop.
     """
-    if not 1.0 <= rate_Hz <= 1e5:
-        raise InputError(f"rate is {rate_Hz:g} Hz; 1 to 100 000 Hz is accepted")
     wanted = ControlConfig() if wanted is None else wanted
-    stiffness = stiffness_range(config, wanted.load_max_Nm)
-    work = DesignWork(config, 1.0 / rate_Hz, wanted, stiffness)
-    work.check_drive()
+    stiffness, work = _begun(config, rate_Hz, wanted)
     gains = work.gains()
     loops = work.loops(gains)
     grid = np.geomspace(0.1, 0.45 * rate_Hz, 160)
@@ -76,6 +72,20 @@ def design_loop(config: JointConfig, rate_Hz: float, wanted: ControlConfig | Non
         _warnings(gains, loops, limit, float(low)),
         work.responses(gains),
     )
+
+
+def design_gains(config: JointConfig, rate_Hz: float, wanted: ControlConfig) -> Gains:
+    """The gains of `design_loop` without what it shows about them: a run need not wait for that."""
+    return _begun(config, rate_Hz, wanted)[1].gains()
+
+
+def _begun(config: JointConfig, rate_Hz: float, wanted: ControlConfig) -> tuple[StiffnessRange, DesignWork]:
+    if not 1.0 <= rate_Hz <= 1e5:
+        raise InputError(f"rate is {rate_Hz:g} Hz; 1 to 100 000 Hz is accepted")
+    stiffness = stiffness_range(config, wanted.load_max_Nm)
+    work = DesignWork(config, 1.0 / rate_Hz, wanted, stiffness)
+    work.check_drive()
+    return stiffness, work
 
 
 def _warnings(gains: Gains, loops: tuple[Loop, ...], limit: LimitCycle, link_Hz: float) -> tuple[str, ...]:

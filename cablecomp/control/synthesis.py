@@ -182,9 +182,7 @@ class DesignWork:
         target = response(self.path(k, filter_Hz, lead_s), z)[:, :, 0]
         # the motor's answer with the cable's pull known and fed forward: a motor that carries nothing
         # but itself
-        answer = response(pick(joint_model(self.motor, self.ratio, 1e-9, self.period), [MOTOR], [0, 1]), z)[
-            :, 0, :
-        ]
+        answer = response(pick(self.model(1e-9), [MOTOR], [0, 1]), z)[:, 0, :]
         found: Complex = -self.ratio * k * (answer[:, 0] * target[:, 0] + answer[:, 1] * target[:, 1])
         return found
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from cablecomp.config import JointConfig
 from cablecomp.config_text import write_joint
 from cablecomp.control.compensator import given_gains
-from cablecomp.control.design import design_loop
+from cablecomp.control.design import design_gains
 from cablecomp.control.options import ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol
 from cablecomp.durable import write_durably
@@ -112,7 +112,7 @@ def run_joints(
     mode = ControlMode.FORCE if protocol.mode == "force" else first.options.mode
     chosen = control.model_copy(update={"compensator": first.options.model_copy(update={"mode": mode})})
     given = given_gains(chosen.compensator)
-    gains = design_loop(first.config, link.rate_Hz, chosen).gains if given is None else given
+    gains = design_gains(first.config, link.rate_Hz, chosen) if given is None else given
     period = 1.0 / link.rate_Hz
     bus: Link = BusLink(link)
     references = references_of(protocol, mode is ControlMode.FORCE)
