@@ -42,13 +42,13 @@ def joint_file(folder: Path) -> Path:
 
 
 def recordings(folder: Path, effects: list[EffectSpec], seed: int) -> list[Path]:
-    """Two recordings of 30 s at 100 Hz: both pulleys turning, load of two frequencies, noise on all
+    """Two recordings of 30 s at 50 Hz: both pulleys turning, load of two frequencies, noise on all
     channels.
     """
     rng = np.random.default_rng(seed)
     paths = []
     for number in range(2):
-        time = np.arange(0.0, 30.0, 0.01)
+        time = np.arange(0.0, 30.0, 0.02)
         w = rng.uniform(0.4, 2.2, 4)
         soft = 1.0 - np.exp(-time)
         motor = soft * (0.8 * np.sin(w[0] * time) + 0.5 * np.sin(w[1] * time))
