@@ -1,4 +1,6 @@
-"""Checks everything, in order: format, lint, types, import contracts, tests; stops at the first failure."""
+"""Checks everything, in order: format, lint, types, import contracts, tests (by two workers); stops at the first
+failure.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ CHECKS = (
     ("ruff", "check", "."),
     ("mypy",),
     ("lint-imports",),
-    ("pytest", "--durations=15"),
+    ("pytest", "-n", "2", "--durations=15"),
 )
 
 
