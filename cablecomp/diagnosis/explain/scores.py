@@ -10,6 +10,7 @@ cannot be told apart).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
@@ -71,6 +72,7 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
     memory = integrated_time_of_parts(parts)
     least, most = LIMITS.blocks
     total = int(np.clip(counts.sum() / (LIMITS.memory * memory), least, most))
+    alone = _alone(problem) if by == "recording" else np.zeros(len(problem.evidence), dtype=np.bool_)
     blocks, folds, channels = [], [], []
     for number, (c, own) in enumerate(zip(problem.channels, owners, strict=True)):
         block = np.full(len(own), -1, dtype=np.int64)
@@ -87,11 +89,21 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
             if k < zeros:
                 departs[k] = first + each // 2
             first += each
-        in_fold[:zeros] = _fold_of(problem, np.arange(zeros), departs[:zeros], by)
+        in_fold[:zeros] = np.where(
+            alone[:zeros], -1, _fold_of(problem, np.arange(zeros), departs[:zeros], by)
+        )
         blocks += [block, departs]
-        folds += [_fold_of(problem, own, block, by), in_fold]
+        folds += [np.where(alone[own], -1, _fold_of(problem, own, block, by)), in_fold]
         channels.append(np.full(len(own) + len(departs), number, dtype=np.int64))
     return Groups(np.concatenate(blocks), np.concatenate(folds), by, np.concatenate(channels))
+
+
+def _alone(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Recordings that alone show how their session's drive stands, where other sessions have several: they are not
+    left out, or a session's own value could not be judged by the others."""
+    count = Counter(e.session for e in problem.evidence)
+    several = sum(n > 1 for n in count.values()) > 1
+    return np.array([several and count[e.session] == 1 for e in problem.evidence], dtype=np.bool_)
 
 
 def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntArray:
