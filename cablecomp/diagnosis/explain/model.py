@@ -21,6 +21,7 @@ from cablecomp.diagnosis.explain.scores import (
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import load_channel
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -139,6 +140,25 @@ def is_told(fit: Fit, term: Term) -> bool:
     if p.log:
         return x > low + LIMITS.none * (high - low)
     return abs(p.value(x) - term.amount.neutral) > LIMITS.none * (p.high - p.low)
+
+
+def bears(fit: Fit) -> bool:
+    """Whether the fitted drive can be run at `LIMITS.beyond` times the loads that it was fitted to: what falls apart
+    just beyond its data predicts nothing there."""
+    problem = fit.problem
+    stages = tuple(s.model_copy(update={"breaking_force_N": None}) for s in problem.config.drive.stage)
+    drive = problem.config.drive.model_copy(update={"stage": stages})
+    more = []
+    for e in problem.evidence:
+        load = load_channel(problem.config, e.columns)
+        further = {} if load is None else {load: LIMITS.beyond * e.columns[load]}
+        more.append(replace(e, columns={**e.columns, **further}))
+    try:
+        unbroken = problem.config.model_copy(update={"drive": drive})
+        replace(problem, config=unbroken, evidence=tuple(more)).misfits(fit.x)
+    except InputError:
+        return False
+    return True
 
 
 def finely(model: Model, groups: Groups) -> Model:

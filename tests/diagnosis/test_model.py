@@ -1,0 +1,63 @@
+"""What a model has to be able to, beside predicting well."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from turning import JOINT
+
+from cablecomp.config import EffectEntry, JointConfig, with_values
+from cablecomp.diagnosis.explain.model import bears
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.observer import Observer
+
+ANGLE = "joint_position_rad"
+
+
+def fitted(config: JointConfig, load_Nm: float) -> Fit:
+    """The joint as a fit of a recording of its own at this load."""
+    time = np.arange(0.0, 10.0, 0.02)
+    columns = {
+        "time_s": time,
+        "motor_position_rad": 0.6 * np.sin(time),
+        "joint_torque_Nm": load_Nm * np.sin(2.3 * time),
+    }
+    columns[ANGLE] = Observer(config).run(columns)[ANGLE]
+    e = gather(config, "one", columns, "all", fine_rows=500, judged_rows=200)
+    problem = Problem(config, (), (e,), Weighing({ANGLE: 1e-4}, {}))
+    nothing = np.empty(0)
+    return Fit(problem, nothing, problem.residual(nothing), np.empty((len(e.rows), 0)))
+
+
+def holding(force_N: float | None) -> JointConfig:
+    """The joint with cables of this breaking force."""
+    stages = tuple(s.model_copy(update={"breaking_force_N": force_N}) for s in JOINT.drive.stage)
+    return JOINT.model_copy(update={"drive": JOINT.drive.model_copy(update={"stage": stages})})
+
+
+def test_a_model_that_has_no_solution_just_beyond_its_loads_is_known() -> None:
+    """Slack cables, whose friction grows without bound as they slacken, unwind a drum at 4 N m and not at 3."""
+    slack = with_values(holding(None), {"pretension_N": 5.0, "mu_output": 0.15, "mu_input": 0.15})
+    light = slack.model_copy(
+        update={
+            "effect": (
+                EffectEntry(id="routing_friction", mu_angle=0.5, arc_length_m=0.01),
+                EffectEntry(id="pressure_dependent_friction", exponent=0.8),
+            )
+        }
+    )
+    assert bears(fitted(light, 1.0))
+    assert not bears(fitted(light, 2.9))
+
+
+def test_a_stated_breaking_force_is_no_reason() -> None:
+    """The limit is the cable's, and not the model's: this one holds the load, and not 1.5 times it."""
+    fit = fitted(holding(None), 2.0)
+    torque = {k: 1.5 * v if k == "joint_torque_Nm" else v for k, v in fit.problem.evidence[0].columns.items()}
+    weak = holding(115.0)
+    with pytest.raises(InputError, match="breaking force"):
+        Observer(weak).run(torque)
+    assert bears(fitted(weak, 2.0))
