@@ -123,6 +123,28 @@ def test_the_simulated_joint_sits_behind_every_kind_of_link(name: str, tmp_path:
     assert said["timing"]["lost_frames"] == 0
 
 
+def test_a_joint_with_nothing_but_its_motor_runs_on_the_motor_s_torque(tmp_path: Path) -> None:
+    joint, link = tmp_path / "joint.toml", tmp_path / "link.toml"
+    observer = '\n[observer]\nload = "motor_torque"\ninput_filter_Hz = 3.0\n'
+    joint.write_text(JOINT.read_text() + observer, encoding="utf-8")
+    text = (CONFIGS / "links/mit-virtual.toml").read_text()
+    text = text.replace("cablecomp_joint.dbc", str(CONFIGS / "links/cablecomp_joint.dbc"))
+    link.write_text(text.partition("[joint.sensor]")[0], encoding="utf-8")
+    arguments = [
+        "run",
+        "--config",
+        str(joint),
+        "--control",
+        str(CONTROL),
+        "--link",
+        str(link),
+        "--sim",
+        "--fast",
+    ]
+    assert cli.main([*arguments, "--duration", "1.5", "--no-bounds", "--out", str(tmp_path / "out")]) == 0
+    assert "joint_position_rad" not in (tmp_path / "out/recording.csv").read_text()
+
+
 def test_a_run_that_had_to_stop_the_joint_says_so_by_its_exit_code(tmp_path: Path) -> None:
     arguments = [
         "run",
