@@ -207,3 +207,9 @@ def test_a_wire_that_cannot_say_zero_or_nearly_so_is_refused() -> None:
 @pytest.mark.parametrize("at", [-3.0, 3.0, 0.7])
 def test_the_first_command_is_given_anywhere_within_the_limits(at: float) -> None:
     assert first_command(at, LIMITS) == SafeCommand(at, 0.0, 0.0, 0)
+
+
+def test_unless_told_otherwise_no_command_is_more_than_half_a_radian_from_the_motor() -> None:
+    limits = GateLimits(-3.0, 3.0, position_rate_rad_s=1e6)
+    safe = gate(Command(2.0, 0.0, 0.0), SafeCommand(0.0, 0.0, 0.0, 0), 0.2, 0.0, T, limits)
+    assert safe.motor_position_rad == pytest.approx(0.7)

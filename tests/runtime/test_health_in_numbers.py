@@ -220,14 +220,14 @@ def test_joint_torque_and_motor_torque_have_to_balance(sign: float, preload_Nm: 
 def test_a_load_that_shakes_is_old_a_fifth_of_the_confirmation_later() -> None:
     """Alternating +-1 Nm about nothing: the mean square of the quick part goes to nearly 1."""
     fed, shaking, begun = (
-        Fed(options(shake_Nm=0.5, confirm_s=40.0 * T, torque_rate_Nm_s=1e5)),
+        Fed(options(shake_Nm=0.6, confirm_s=40.0 * T, torque_rate_Nm_s=1e5)),
         Shaking(T),
         None,
     )
     for k in range(100):
         value = 1.0 if k % 2 else -1.0
         checked = fed.cycle(motor=0.0, torque=value, joint=0.0)
-        begun = k if shaking.step(value) > 0.25 and begun is None else begun
+        begun = k if shaking.step(value) > 0.36 and begun is None else begun
         over = begun is not None and k - begun >= 8
         assert checked.flags == (h.SHAKES if over else 0)
         assert checked.load_age_s == pytest.approx(max(k - begun - 8, 0) * T if begun is not None else 0.0)
