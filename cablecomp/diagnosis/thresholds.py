@@ -50,8 +50,8 @@ class Thresholds:
     """Share of its range up to which an effect's amount is none, and it is not that effect that helps (trials seed
     602: a mount that yields one way was answered by a guide without friction)."""
     beyond: float = 1.5
-    """Loads over those seen at which a model still has to be solvable, where the model before it is (a coefficient
-    that falls with pressure fitted light loads, and had no solution at the next)."""
+    """Loads over those seen at which a model still has to be solvable, where any of a round is (a coefficient that
+    falls with pressure fitted light loads, and had no solution at the next)."""
     tie: float = 0.01
     """Share of the loss on data left out by which a law with more parameters has to be better than one with fewer."""
     hopeless: float = 2.5

@@ -13,7 +13,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, bears, finely, is_told, loss, placed
+from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, is_told, loss, placed
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.scores import (
     Groups,
@@ -120,15 +120,13 @@ def one_round(
     taken = [c.terms[0].name for c in chosen]
     chosen += [c for c in second if c.terms[0].name in taken and c.cost < LIMITS.hopeless * top]
 
-    borne = bears(model.fit)
-
     def finish(c: Begun) -> Model | None:
         progress(f"fitting {c.terms[0].name}", done)
         try:
             fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
         except InputError:
             return None
-        if not is_told(fit, c.terms[0]) or (borne and not bears(fit)):
+        if not is_told(fit, c.terms[0]):
             return None
         ratio = 1.0
         if fine is not None and fit.problem.fine:

@@ -13,6 +13,7 @@ from cablecomp.diagnosis.explain.model import (
     Round,
     Selection,
     Tried,
+    bears,
     common,
     is_told,
     loss,
@@ -62,6 +63,7 @@ def select(
             candidates += [(round_, t) for t in round_.tried]
         good = [t for _, t in candidates if demanded(t.difference, first=number == 0)]
         fresh = ranked([t.model for t in good], groups)
+        fresh = [m for m in fresh if bears(m.fit)] or fresh
         if not fresh:
             break
         size = common([fresh[0]], groups)
