@@ -8,7 +8,7 @@ from html import escape
 from typing import Any, Final
 
 from cablecomp.diagnosis.result import Diagnosis, Traces, report_json
-from cablecomp.effects import catalogue
+from cablecomp.effects import Effect, catalogue
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report import page
 from cablecomp.report.concealed_page import concealed_section
@@ -89,11 +89,10 @@ def _sections(d: Diagnosis, augmented_toml: str, concealed: Mapping[str, Any] | 
 def _missing(result: Mapping[str, Any]) -> Iterator[str]:
     for m in result["missing_physics"]:
         effect = catalogue()[m["effect"]]
-        units = {p.name: p.unit for p in effect.parameters}
         yield f"<h3>{escape(sentence(plain(m['effect'])))} <code>{escape(m['effect'])}</code></h3>"
         yield page.paragraph(m["statement"])
         yield f'<div class="equation">{escape(m["equation"])}</div>'
-        rows = [_parameter(name, value, units.get(name, "")) for name, value in m["parameters"].items()]
+        rows = [_parameter(effect, name, value) for name, value in m["parameters"].items()]
         yield page.table(("parameter", "value", "unit", "95 % interval"), rows)
         if m["depends_on"]:
             yield page.paragraph(f"{depends(m['depends_on'])}.")
@@ -105,12 +104,16 @@ def _missing(result: Mapping[str, Any]) -> Iterator[str]:
         yield page.fold("the evidence", page.table(("evidence", "value"), list(m["evidence"].items())))
 
 
-def _parameter(name: str, entry: Any, unit: str) -> tuple[str, str, str, str]:
+def _parameter(effect: Effect, name: str, entry: Any) -> tuple[str, str, str, str]:
     """A row of the table of fitted values; a text (such as a channel's name) stands as it is."""
     if not isinstance(entry, Mapping):
         return name, str(entry), "", ""
     value, sd = known(entry["value"]), known(entry["sd"])
-    return name, with_sd(value, sd), unit, interval(value, sd)
+    known_as = next((p for p in effect.parameters if p.name == name), None)
+    if known_as is None:
+        return name, with_sd(value, sd), "", interval(value, sd)
+    least = 0.0 if known_as.low >= 0.0 else known_as.minimum
+    return name, with_sd(value, sd), known_as.unit, interval(value, sd, least, known_as.maximum)
 
 
 def _sessions(d: Diagnosis, result: Mapping[str, Any], laws: Sequence[Mapping[str, Any]]) -> Section:

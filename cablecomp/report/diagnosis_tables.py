@@ -47,11 +47,12 @@ def with_sd(value: float, sd: float) -> str:
     return f"{page.number(value, digits=digits)} ± {page.number(sd, digits=2)}"
 
 
-def interval(value: float, sd: float) -> str:
-    """Return the 95 % interval of a value, a dash if its uncertainty is not known."""
+def interval(value: float, sd: float, least: float = -np.inf, most: float = np.inf) -> str:
+    """The 95 % interval of a value inside what it can be, a dash if its uncertainty is not known."""
     if not np.isfinite(sd):
         return "–"
-    return f"{page.number(value - 1.96 * sd, digits=4)} … {page.number(value + 1.96 * sd, digits=4)}"
+    low, high = max(value - 1.96 * sd, least), min(value + 1.96 * sd, most)
+    return f"{page.number(low, digits=4)} … {page.number(high, digits=4)}"
 
 
 def errors(result: Mapping[str, Any], unit: Scale) -> str:

@@ -19,6 +19,7 @@ from diagnosis_example import NOISE, example, without_a_name
 from cablecomp.diagnosis.result import Diagnosis, Value, report_json
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_page import diagnosis_page
+from cablecomp.report.diagnosis_tables import interval
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 from cablecomp.report.replay_figures import Scale
 
@@ -165,3 +166,8 @@ def test_the_law_that_ties_sessions_is_drawn_at_their_values(found: Diagnosis) -
     fig = figures.dependence({"0": 0.1132, "2": 0.1132 + 2 * 0.2}, by_bend["parameter"], "bend")
     (line,) = fig.data
     assert (line.y[1] - line.y[0]) / (line.x[1] - line.x[0]) == pytest.approx(0.2)
+
+
+def test_an_interval_stays_inside_what_the_value_can_be() -> None:
+    assert interval(0.5, 1.0, 0.0).split(" … ")[0] == "0"
+    assert interval(0.5, 1.0).startswith("−1.46")
