@@ -27,7 +27,7 @@ from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, sprea
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.model import Model, bears
 from cablecomp.diagnosis.explain.rounds import Progress
 from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
 from cablecomp.diagnosis.explain.selection import select
@@ -150,7 +150,7 @@ def diagnose(
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, seen)),
         runtime_s=time.monotonic() - begin,
-        warnings=tuple(f"{name} ended on its bound" for name in kept.fit.at_bound()),
+        warnings=_warnings(kept),
     )
 
 
@@ -210,6 +210,15 @@ def _structured(found: Location, series: Series, repeated: float | None, named: 
     follows = bool(found.significant(0.01))
     beyond = LIMITS.beyond_noise if named else LIMITS.far_beyond_noise
     return ratio > (LIMITS.structured if follows else beyond)
+
+
+def _warnings(model: Model) -> tuple[str, ...]:
+    lines = [f"{name} ended on its bound" for name in model.fit.at_bound()]
+    if model.terms and not bears(model.fit):
+        lines.append(
+            "the joint as fitted has no solution at up to twice these loads; record greater ones as well"
+        )
+    return tuple(lines)
 
 
 def _verdict(named: Sequence[Weighed], structured: bool, drive: Calibrated) -> str:

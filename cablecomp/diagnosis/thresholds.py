@@ -49,7 +49,7 @@ class Thresholds:
     none: float = 2e-4
     """Share of its range up to which an effect's amount is none, and it is not that effect that helps (trials seed
     602: a mount that yields one way was answered by a guide without friction)."""
-    beyond: float = 1.5
+    beyond: tuple[float, ...] = (1.2, 1.5, 2.0)
     """Loads over those seen at which a model still has to be solvable, where any of a round is (a coefficient that
     falls with pressure fitted light loads, and had no solution at the next)."""
     tie: float = 0.01

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import (
@@ -21,7 +22,7 @@ from cablecomp.diagnosis.explain.scores import (
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import load_channel
+from cablecomp.estimation.evidence import Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -148,17 +149,20 @@ def bears(fit: Fit) -> bool:
     problem = fit.problem
     stages = tuple(s.model_copy(update={"breaking_force_N": None}) for s in problem.config.drive.stage)
     drive = problem.config.drive.model_copy(update={"stage": stages})
-    more = []
-    for e in problem.evidence:
-        load = load_channel(problem.config, e.columns)
-        further = {} if load is None else {load: LIMITS.beyond * e.columns[load]}
-        more.append(replace(e, columns={**e.columns, **further}))
+    unbroken = replace(problem, config=problem.config.model_copy(update={"drive": drive}))
     try:
-        unbroken = problem.config.model_copy(update={"drive": drive})
-        replace(problem, config=unbroken, evidence=tuple(more)).misfits(fit.x)
+        for times in LIMITS.beyond:
+            further = tuple(_loaded(problem.config, e, times) for e in problem.evidence)
+            replace(unbroken, evidence=further).misfits(fit.x)
     except InputError:
         return False
     return True
+
+
+def _loaded(config: JointConfig, e: Evidence, times: float) -> Evidence:
+    """A recording with its load so many times as large."""
+    load = load_channel(config, e.columns)
+    return e if load is None else replace(e, columns={**e.columns, load: times * e.columns[load]})
 
 
 def finely(model: Model, groups: Groups) -> Model:
