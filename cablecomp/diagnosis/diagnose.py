@@ -197,7 +197,7 @@ def _predicts(before: Fit, after: Fit, baseline: Errors, augmented: Errors) -> b
     another channel than the joint's angle is followed better."""
     others = [c for c in before.problem.channels if c != JOINT]
     return augmented.heldout_rmse_rad < baseline.heldout_rmse_rad or any(
-        rms_left(after, c) < LIMITS.recalibrate * rms_left(before, c) for c in others
+        rms_left(after, c) < LIMITS.followed * rms_left(before, c) for c in others
     )
 
 

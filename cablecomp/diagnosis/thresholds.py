@@ -90,6 +90,12 @@ class Thresholds:
     """Draws of blocks for `selected_in` and for the model confidence set."""
     rival: float = 0.10
     """Level of the model confidence set: models that are as good in a tenth of resampled bodies of data stay in."""
+    recordings: int = 4
+    """Recordings from which whole ones are left out, and from which their zeros can tell a compliance; of fewer,
+    blocks are left out."""
+    followed: float = 0.9
+    """What the final model leaves of a further channel over what the calibrated drive leaves (RMS), below which it
+    follows that channel better: a name may rest on this where the joint's angle is predicted no better."""
     final_share: float = 0.15
     """Share of the data that nothing is chosen or fitted on."""
     history: float = 0.15

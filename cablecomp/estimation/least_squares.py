@@ -182,7 +182,7 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
         spread = [
             float(zeros[r.name][0] - zeros[r.session][0])
             for r in problem.evidence
-            if sum(q.session == r.session for q in problem.evidence) > 1
+            if r.session in problem.repeated
         ]
         if spread:
             seen = min(float(np.sqrt(np.mean(np.square(spread)))), ZERO * size[c])

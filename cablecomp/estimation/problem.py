@@ -9,6 +9,7 @@ say the same weigh as what they are). Zeros are linear: a session's is free, a r
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -264,6 +265,12 @@ class Problem:
     def sessions(self) -> tuple[str, ...]:
         """The recordings' sessions, in order."""
         return tuple(dict.fromkeys(r.session for r in self.evidence))
+
+    @property
+    def repeated(self) -> frozenset[str]:
+        """Sessions of more than one recording."""
+        count = Counter(r.session for r in self.evidence)
+        return frozenset(s for s, n in count.items() if n > 1)
 
     def spans(self) -> dict[str, slice]:
         """Where each channel's rows lie in the residual."""

@@ -66,7 +66,7 @@ def met() -> Iterator[tuple[Any, Any, Bench]]:
         try:
             node = p402.BaseNode402(1, dictionary())
             network.add_node(node)
-            until(lambda: bench.joints[0].wire.node.state == 0x7F)  # type: ignore[attr-defined]
+            until(lambda: bench.joints[0].wire.node.state == 0x7F)  # type: ignore[attr-defined]  # its own wire
             yield network, node, bench
         finally:
             network.disconnect()

@@ -145,7 +145,7 @@ def test_the_bus_watchdog_stops_and_locks_goals(met: tuple[Client, Bench]) -> No
     client.write(1, TORQUE, 1, 1)
     assert client.write(1, WATCHDOG, 1, 2) == 0
     client.write(1, GOAL_VELOCITY, 4, 100)
-    until(lambda: bench.joints[0].wire.items[WATCHDOG].value == -1)  # type: ignore[attr-defined]
+    until(lambda: bench.joints[0].wire.items[WATCHDOG].value == -1)  # type: ignore[attr-defined]  # its own wire
     assert client.read(1, WATCHDOG, 1) == 0xFF
     assert client.write(1, GOAL_VELOCITY, 4, 100) == 4
     until(lambda: abs(client.read(1, VELOCITY, 4)) <= 3)

@@ -103,8 +103,7 @@ def _ways(
     ways: list[tuple[Dependence, list[FloatArray], Problem]] = []
     sessions = problem.sessions
     place = problem.parameters.index(p)
-    several = [s for s in sessions if sum(e.session == s for e in problem.evidence) > 1]
-    if len(several) > 1 and _along_path(p.base):
+    if len(problem.repeated) > 1 and _along_path(p.base):
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

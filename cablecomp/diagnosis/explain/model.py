@@ -11,14 +11,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.scores import (
-    RECORDINGS,
-    Groups,
-    ScoreDifference,
-    block_losses,
-    left_out,
-    scales,
-)
+from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -112,7 +105,7 @@ def searching(fit: Fit) -> Weighing:
         sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise, 1e-12)
     # zeros may not take up what an effect could explain: an offset that follows the load is a compliance. Where there
     # are recordings enough to tell, a zero keeps what it counts for among rows that remember each other
-    told = len(problem.evidence) >= RECORDINGS
+    told = len(problem.evidence) >= LIMITS.recordings
     spread = {}
     for c in problem.channels:
         usual = problem.weighing.zero_sd.get(c, 0.0) * (sigma[c] / problem.weighing.sigma[c] if told else 1.0)

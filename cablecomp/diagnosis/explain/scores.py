@@ -10,11 +10,9 @@ cannot be told apart).
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Final
 
 import numpy as np
 
@@ -27,9 +25,6 @@ from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray
-
-RECORDINGS: Final = 4
-"""Recordings from which whole ones are left out; of fewer, blocks."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
     problem = fit.problem
     owners = [problem.owners(c) for c in problem.channels]
     counts = np.bincount(owners[0], minlength=len(problem.evidence))
-    by = by or ("recording" if len(problem.evidence) >= RECORDINGS else "block")
+    by = by or ("recording" if len(problem.evidence) >= LIMITS.recordings else "block")
     spans = problem.spans()
     first_rows = fit.residual[spans[problem.channels[0]]]
     parts = [first_rows[owners[0] == k] for k in range(len(problem.evidence)) if counts[k] > 8]
@@ -101,9 +96,8 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
 def _alone(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Recordings that alone show how their session's drive stands, where other sessions have several: they are not
     left out, or a session's own value could not be judged by the others."""
-    count = Counter(e.session for e in problem.evidence)
-    several = sum(n > 1 for n in count.values()) > 1
-    return np.array([several and count[e.session] == 1 for e in problem.evidence], dtype=np.bool_)
+    several = problem.repeated
+    return np.array([len(several) > 1 and e.session not in several for e in problem.evidence], dtype=np.bool_)
 
 
 def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntArray:
