@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from firmware_sim.errors import SimError
+from firmware_sim.firmware.index_search import IndexSearch
 from firmware_sim.firmware.records import FAULTS, DriveFlag, DriveState, Mode, Request, Setpoint
 from firmware_sim.firmware.shaping import InputMode, Shaper
 from firmware_sim.plantlike import Readings
 
 _SEARCH_INTEGRATOR_PER_S = 20.0
 """Integral over proportional gain of a search for the index: what holds the motor back is overcome bit by bit."""
-_STALL_S, _STALL_RAD = 5.0, 0.01
-"""A search that gets less far in that time has come to an end of the travel."""
 
 # What a request does in each state; a pair that is missing is refused and leaves everything as it is.
 TABLE: dict[tuple[DriveState, Request], DriveState] = {
@@ -114,11 +113,7 @@ class Drive:
         self._checked_raw: float | None = None
         self._braked_at: float | None = None
         self._integral_Nm = 0.0
-        self._search_start: float | None = None
-        self._search_sign = 1.0
-        self._search_turn = 0
-        self._search_far = -math.inf
-        self._search_far_s = now_s
+        self._index = self._new_search(now_s)
         self._enable_when_homed = False
         self._torque_command = 0.0
         self._unheard = False
@@ -284,8 +279,8 @@ class Drive:
         if target is DriveState.DISABLED:
             self._enable_when_homed = False
         if target is DriveState.CALIBRATING:
-            self._search_start = None
-            self._turn_search(1.0, now_s)
+            self._index = self._new_search(now_s)
+            self._integral_Nm = 0.0
         if target is DriveState.ENABLED and self.state is not DriveState.ENABLED:
             self._hold()
         self.state = target
@@ -347,33 +342,25 @@ class Drive:
         self._integral_Nm = min(max(self._integral_Nm, -c.torque_limit_Nm), c.torque_limit_Nm)
         return c.velocity_gain_Nms_per_rad * error + self._integral_Nm
 
-    def _turn_search(self, sign: float, now_s: float) -> None:
-        self._search_sign, self._integral_Nm = sign, 0.0
-        self._search_far, self._search_far_s = -math.inf, now_s
+    def _new_search(self, now_s: float) -> IndexSearch:
+        return IndexSearch(self.config.index_position_rad, self.config.search_range_rad, now_s)
 
     def _search(self, dt_s: float, now_s: float) -> float:
-        """Turn slowly until the index passes; turn back once where the range or the travel ends, then give up."""
-        c, raw = self.config, self._last_raw
-        index = c.index_position_rad
-        if raw is None or index is None:
+        """Turn slowly until the index passes, or the search is given up."""
+        c, index = self.config, self._index
+        if self._last_raw is None or c.index_position_rad is None:
             return 0.0
-        if self._search_start is None:
-            self._search_start, self._search_turn = raw, math.floor((raw - index) / (2.0 * math.pi))
-        turn = math.floor((raw - index) / (2.0 * math.pi))
-        if turn != self._search_turn:
-            # The index says where in the turn the motor is; which turn it is, the drive takes to be that of
-            # its zero.
-            self._raw_zero, self.homed = 2.0 * math.pi * max(turn, self._search_turn), True
+        sign = index.sign
+        index.look(self._last_raw, now_s)
+        if index.zero_rad is not None:
+            self._raw_zero, self.homed = index.zero_rad, True
             self.flags &= ~DriveFlag.NOT_CALIBRATED
             self._enter(DriveState.ENABLED if self._enable_when_homed else DriveState.DISABLED, now_s)
             return 0.0
-        travelled = (raw - self._search_start) * self._search_sign
-        if travelled > self._search_far + _STALL_RAD:
-            self._search_far, self._search_far_s = travelled, now_s
-        if travelled > c.search_range_rad or now_s - self._search_far_s > _STALL_S:
-            if self._search_sign < 0.0:
-                self._fault(DriveFlag.INDEX_NOT_FOUND)
-                return 0.0
-            self._turn_search(-1.0, now_s)
+        if index.lost:
+            self._fault(DriveFlag.INDEX_NOT_FOUND)
+            return 0.0
+        if index.sign != sign:
+            self._integral_Nm = 0.0
         gain = _SEARCH_INTEGRATOR_PER_S * c.velocity_gain_Nms_per_rad
-        return self._velocity_loop(self._search_sign * c.search_velocity_rad_s, dt_s, gain)
+        return self._velocity_loop(index.sign * c.search_velocity_rad_s, dt_s, gain)
