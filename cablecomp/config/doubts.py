@@ -56,6 +56,11 @@ def _all(config: JointConfig) -> Iterator[str]:
     for key, value in config.tolerance.items():
         if value > 3.0 and not key.endswith(("offset_rad", "offset_Nm")):
             yield f"[tolerance] {key} = {value:g} is relative (0.05 = 5 %); per cent?"
+    if config.observer.load == "motor_torque" and config.observer.input_filter_Hz == 0.0:
+        yield (
+            '[observer] load = "motor_torque" accelerates the motor too, and a loop on it may swing; '
+            "try input_filter_Hz = 3"
+        )
 
 
 def _of_stage(stage: Stage, tolerance: dict[str, float]) -> Iterator[str]:

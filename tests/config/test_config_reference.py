@@ -72,6 +72,7 @@ def test_a_plausible_joint_raises_no_doubt(path: Path) -> None:
         ("joint_position_noise_rad = 2e-4", "joint_position_noise_rad = 0.2", "poor sensor"),
         ("mu_output = 0.30", "mu_output = 30.0", "per cent?"),
         ("joint_position_max_rad = 0.8", "joint_position_max_rad = 45.0", "unwinds"),
+        ("[tolerance]", '[observer]\nload = "motor_torque"\n\n[tolerance]', "may swing"),
     ],
 )
 def test_the_implausible_is_asked_about(old: str, new: str, words: str) -> None:
