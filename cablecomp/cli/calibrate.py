@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.beliefs import believe
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     Config,
     EffectsOption,
@@ -33,7 +34,7 @@ def calibrate_joint(
         list[Path], typer.Argument(help="recordings of one joint, or folders: all recordings in them")
     ],
     config: Config,
-    out: Annotated[Path, typer.Option(help="folder for joint.calibrated.toml, calibration.json")] = Path(
+    out: Annotated[Path, out_option("folder for joint.calibrated.toml, calibration.json")] = Path(
         "calibration"
     ),
     seed: Annotated[int, typer.Option(min=0, help="of the noise replicas")] = 0,

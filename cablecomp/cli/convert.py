@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import console
+from cablecomp.cli.shared import JsonOption, console, echo_json
 from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
@@ -30,11 +30,15 @@ def convert_recording(
     ros: Annotated[
         bool, typer.Option("--ros2", help="ROS 2's messages in .mcap, which `ros2 bag play` publishes")
     ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
     source = reading().open(recording)
     with progress_bar(f"convert {recording.name}") as told:
         rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())), ros)
+    if as_json:
+        echo_json({"written": to, "rows": rows, "channels": source.channels, "notes": source.notes})
+        return
     for note in source.notes:
         console.print(f"note: {note}")
     console.print(f"written: {to} ({rows:,} rows: {', '.join(source.channels)})", soft_wrap=True)

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import DEMO_LINK, JsonOption, console, echo_json, errors
 from cablecomp.cli.simulation import start_simulation, true_values
 from cablecomp.config import JointConfig, load_joint
@@ -31,9 +32,7 @@ DEMO = "wrist-capstan"
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="folder for everything that the demonstration leaves")] = Path(
-        "demo"
-    ),
+    out: Annotated[Path, out_option("folder for everything that the demonstration leaves")] = Path("demo"),
     seed: Annotated[int, typer.Option(min=0, help="of true parameters, noise and motions")] = 1,
     as_json: JsonOption = False,
 ) -> None:

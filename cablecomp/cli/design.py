@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     Config,
     Control,
@@ -26,7 +27,7 @@ def design(
     config: Config,
     rate: Annotated[float, typer.Option(help="loop rate, Hz")] = 1000.0,
     control: Control = None,
-    out: Annotated[Path | None, typer.Option(help="folder for design.html")] = None,
+    out: Annotated[Path | None, out_option("folder for design.html")] = None,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
 ) -> None:

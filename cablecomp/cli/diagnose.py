@@ -12,6 +12,7 @@ import typer
 
 from cablecomp.cli.beliefs import believe
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     Config,
     EffectsOption,
@@ -46,9 +47,9 @@ def diagnose_recordings(
         list[Path], typer.Argument(help="recordings of one joint, or folders: all recordings in them")
     ],
     config: Config,
-    out: Annotated[
-        Path, typer.Option(help="folder for diagnosis.json, report.html, joint.augmented.toml")
-    ] = Path("diagnosis"),
+    out: Annotated[Path, out_option("folder for diagnosis.json, report.html, joint.augmented.toml")] = Path(
+        "diagnosis"
+    ),
     session: Annotated[
         Together | None,
         typer.Option(
@@ -69,7 +70,7 @@ def diagnose_recordings(
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:
-        work_fleet("diagnose", recordings, config, out, fleet)
+        work_fleet("diagnose", recordings, config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)
     data = read_moving(recordings, reading(joint))

@@ -11,14 +11,16 @@ from rich.console import Console
 from rich.table import Table
 
 from cablecomp import examples
+from cablecomp.cli.folders import out_option
 from cablecomp.errors import InputError
+from cablecomp.recording.atomic import atomic_file
 
 
 def copy_example(
     name: Annotated[
         str | None, typer.Argument(help="such as capstan-arm or links/mit-udp; lists them if absent")
     ] = None,
-    out: Annotated[Path, typer.Option(help="folder to copy into")] = Path(),
+    out: Annotated[Path, out_option("folder to copy into")] = Path(),
 ) -> None:
     """Copy out a configuration that comes with the project: a joint, a link, a controller; or list them."""
     console = Console(markup=False, emoji=False)
@@ -36,7 +38,8 @@ def copy_example(
             raise InputError(f"{target}: is there already, and differs; remove it or give another --out")
     out.mkdir(parents=True, exist_ok=True)
     for path in files:
-        (out / path.name).write_bytes(path.read_bytes())
+        with atomic_file(out / path.name) as spare:
+            spare.write_bytes(path.read_bytes())
         console.print(f"written: {out / path.name}", soft_wrap=True)
 
 

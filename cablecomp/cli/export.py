@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     Config,
     Control,
@@ -40,7 +41,7 @@ def export(
     ] = False,
     fmu: Annotated[bool, typer.Option("--fmu", help="NAME.fmu: the same for co-simulation, FMI 2.0")] = False,
     control: Control = None,
-    out: Annotated[Path, typer.Option(help="folder to write into")] = Path("export"),
+    out: Annotated[Path, out_option("folder to write into")] = Path("export"),
     as_json: JsonOption = False,
 ) -> None:
     """A joint for simulators and other programs: what was identified, and what each format loses."""

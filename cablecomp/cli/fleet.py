@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
-from cablecomp.cli.shared import announce_compilation, console, plain_counts
+from cablecomp.cli.shared import announce_compilation, console, echo_json, plain_counts
 from cablecomp.cluster import Workers
 from cablecomp.errors import InputError
 from cablecomp.fleet.fleet import Work, run_fleet
@@ -40,7 +41,9 @@ def asked_for(workers: int | None, scheduler: str | None) -> Workers | None:
     return None if workers is None and scheduler is None else Workers(workers or 0, scheduler)
 
 
-def work_fleet(work: Work, folders: Sequence[Path], config: Path | None, out: Path, workers: Workers) -> None:
+def work_fleet(
+    work: Work, folders: Sequence[Path], config: Path | None, out: Path, workers: Workers, as_json: bool
+) -> None:
     """Work through a fleet, show and write what became of it."""
     places = nights(folders, config)
     announce_compilation()
@@ -58,9 +61,12 @@ def work_fleet(work: Work, folders: Sequence[Path], config: Path | None, out: Pa
         found = run_fleet(work, places, out, workers, told)
     with atomic_file(out / "fleet.html") as path:
         path.write_text(fleet_page(found, " ".join(["cablecomp", *sys.argv[1:]])), encoding="utf-8")
-    console.print(fleet_table(found))
-    if found.reused:
-        console.print(f"{found.reused} nights were there already")
-    console.print(f"report: {out / 'fleet.html'}")
+    if as_json:
+        echo_json({**asdict(found), "report": out / "fleet.html"})
+    else:
+        console.print(fleet_table(found))
+        if found.reused:
+            console.print(f"{found.reused} nights were there already")
+        console.print(f"report: {out / 'fleet.html'}", soft_wrap=True)
     if all(row["failed"] for row in found.rows):
         raise InputError(f"every night failed; the first: {found.rows[0]['failed']}")

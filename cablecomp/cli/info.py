@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from cablecomp.cli.folders import writable
 from cablecomp.cli.shared import Config, EffectsOption, JsonOption, console, echo_json, read_joint
 from cablecomp.report.info import design_table
 from cablecomp.report.theory import write_theory_figures
@@ -20,7 +21,9 @@ def info(
     ] = None,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
-    figures: Annotated[Path | None, typer.Option(help="folder for the theory figures of this joint")] = None,
+    figures: Annotated[
+        Path | None, typer.Option(callback=writable, help="folder for the theory figures of this joint")
+    ] = None,
 ) -> None:
     """The design sheet of a joint: stiffness, hysteresis, pretension, wrap, efficiency."""
     joint = read_joint(config, effects)

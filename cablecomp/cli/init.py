@@ -11,7 +11,8 @@ from typing import Annotated, Any, Final, get_args, get_origin
 
 import typer
 
-from cablecomp.cli.shared import console, warn
+from cablecomp.cli.folders import out_option
+from cablecomp.cli.shared import JsonOption, console, echo_json, warn
 from cablecomp.config import doubts, load_joint, read_toml, validated
 from cablecomp.config.draft import Draft, draft_text
 from cablecomp.config.reference import CONVENTIONS, reference
@@ -20,6 +21,7 @@ from cablecomp.control.options import ControlConfig
 from cablecomp.errors import InputError
 from cablecomp.examples import example, with_companions
 from cablecomp.links.schema import LinkConfig
+from cablecomp.recording.atomic import atomic_file
 
 _FILES: Final = (
     (Draft, "WHAT `cablecomp init` ASKS (--from, --set)"),
@@ -38,7 +40,7 @@ _LINKS: Final = {
 
 
 def init(
-    out: Annotated[Path, typer.Option(help="folder for joint.toml, link.toml")] = Path(),
+    out: Annotated[Path, out_option("folder for joint.toml, link.toml")] = Path(),
     answers: Annotated[
         Path | None, typer.Option("--from", help="TOML file with the answers (see --keys); nothing is asked")
     ] = None,
@@ -48,6 +50,7 @@ def init(
     keys: Annotated[
         bool, typer.Option("--keys", help="every key of the answers, of joint, control and link files")
     ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """A joint file from what you know (asked, or by --set and --from); --keys: what can stand in a configuration."""
     if keys:
@@ -71,9 +74,15 @@ def init(
             raise InputError(f"{place}: is there already, and differs; remove it or give another --out")
     out.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
-        (out / name).write_text(text, encoding="utf-8")
+        with atomic_file(out / name) as spare:
+            spare.write_text(text, encoding="utf-8")
+    asked = doubts(load_joint(out / "joint.toml"))
+    if as_json:
+        echo_json({"written": [out / name for name in files], "doubts": asked})
+        return
+    for name in files:
         console.print(f"written: {out / name}", soft_wrap=True)
-    warn(f"{out / 'joint.toml'}: {words}" for words in doubts(load_joint(out / "joint.toml")))
+    warn(f"{out / 'joint.toml'}: {words}" for words in asked)
 
 
 def _answer(word: str) -> tuple[str, Any]:

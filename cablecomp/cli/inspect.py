@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import console
+from cablecomp.cli.shared import JsonOption, console, errors
 from cablecomp.cli.sources import Reading, Sources, reads_recordings
 from cablecomp.config import load_joint
 from cablecomp.errors import InputError, path_text
@@ -40,7 +40,7 @@ def inspect_recording(
         bool,
         typer.Option("--save", help=f"keep the mapping for this folder ({FOLDER_MAP}), for every command"),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="print everything as JSON instead")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """What a recording holds: columns and what they may mean, rate, gaps, stuck or clipped sensors, noise."""
     given = reading()
@@ -64,7 +64,7 @@ def inspect_recording(
             mapping,
             (f"what the columns of {path_text(recording.name)} mean; check it before you trust it",),
         )
-        console.print(f"saved: {place}")
+        (errors() if as_json else console).print(f"saved: {place}", soft_wrap=True)
 
 
 def _looked_at(

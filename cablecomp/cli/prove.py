@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.concealing import Told, conceal_in, conceal_joints, experiment, trial_bar
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import JsonOption, announce_compilation, console, echo_json, read_joint, warn
 from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.cluster import Workers
@@ -41,7 +42,7 @@ def prove_blindly(
     seconds: Annotated[float, typer.Option(min=1.0, help="with --in: of recordings, in each piece")] = 20.0,
     trials: Annotated[int, typer.Option(min=1, help="how many simulated joints")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="of everything that is drawn")] = 1,
-    out: Annotated[Path, typer.Option(help="folder for trials, verdicts, answer and page")] = Path("prove"),
+    out: Annotated[Path, out_option("folder for trials, verdicts, answer and page")] = Path("prove"),
     kinds: Annotated[str, typer.Option(help="what the joints conceal, in turn; one given twice comes twice")] = KINDS,
     laws: Annotated[str, typer.Option(help="catalogue, other, or mixed")] = "mixed",
     imperfections: Annotated[str, typer.Option(help="of the world: none, some, or all")] = "some",

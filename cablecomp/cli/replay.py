@@ -13,6 +13,7 @@ from rich.table import Table
 
 from cablecomp.cli.beliefs import believe_streamed
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     Config,
     EffectsOption,
@@ -43,9 +44,7 @@ def replay(
         Path, typer.Argument(help="recording (CSV, Parquet, npz, mat, MCAP, ROS bag, CAN log)")
     ],
     config: Config,
-    out: Annotated[Path, typer.Option(help="folder for prediction.csv, replay.json, report.html")] = Path(
-        "replay"
-    ),
+    out: Annotated[Path, out_option("folder for prediction.csv, replay.json, report.html")] = Path("replay"),
     bounds: Annotated[
         bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
     ] = True,
@@ -69,7 +68,7 @@ def replay(
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:
-        work_fleet("replay", [recording], config, out, fleet)
+        work_fleet("replay", [recording], config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)
     source = reading(joint).open(recording)

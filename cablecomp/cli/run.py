@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 from rich.table import Table
 
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.live import LiveRun
 from cablecomp.cli.shared import (
     DEMO_LINK,
@@ -22,6 +24,7 @@ from cablecomp.cli.shared import (
     console,
     control_of,
     echo_json,
+    errors,
     read_joint,
 )
 from cablecomp.config import JointConfig
@@ -66,7 +69,7 @@ def run(
     ] = None,
     mode: Annotated[ControlMode | None, typer.Option(help="what is controlled")] = None,
     duration: Annotated[float | None, typer.Option(help="end after this many seconds", min=0.0)] = None,
-    out: Annotated[Path, typer.Option(help="folder for recording, predictions, report")] = Path("run"),
+    out: Annotated[Path, out_option("folder for recording, predictions, report")] = Path("run"),
     fast: Annotated[bool, typer.Option("--fast", help="simulated time, as fast as it goes")] = False,
     bounds: Annotated[
         bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
@@ -121,7 +124,7 @@ def run(
             update={"compensator": wanted.compensator.model_copy(update={"mode": mode})}
         )
     force = wanted.compensator.mode is ControlMode.FORCE
-    if protocol == CALIBRATE and not CALIBRATE.exists():
+    if protocol == CALIBRATE and not CALIBRATE.is_file():
         asked = calibration_protocol(joint)
     elif protocol is not None:
         asked = load_protocol(protocol)
@@ -138,7 +141,11 @@ def run(
         try:
             if simulation is not None and asked.mode == "force":
                 simulation.set_wall(1, 0.0)
-            with LiveView(console) as shown, _onlookers(joint, out, shown.watch, view, plotjuggler) as watch:
+            said = errors() if as_json else console
+            with (
+                LiveView(said) as shown,
+                _onlookers(joint, out, shown.watch, view, plotjuggler, said) as watch,
+            ):
                 beside = LiveRun(joint, bus.rate_Hz, out, watch, stepped=fast) if live else None
                 watch = watch if beside is None else beside.watch
                 report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
@@ -149,7 +156,9 @@ def run(
 
 
 @contextmanager
-def _onlookers(joint: JointConfig, out: Path, shown: Watch, view: bool, plotjuggler: bool) -> Iterator[Watch]:
+def _onlookers(
+    joint: JointConfig, out: Path, shown: Watch, view: bool, plotjuggler: bool, said: Console
+) -> Iterator[Watch]:
     """What is called once a tick: the terminal's view, and the instrument where someone looks on."""
     if not (view or plotjuggler):
         yield shown
@@ -163,14 +172,14 @@ def _onlookers(joint: JointConfig, out: Path, shown: Watch, view: bool, plotjugg
     )
     with watched(joint, who, CSS) as (instrument, words):
         for line in words:
-            console.print(line, soft_wrap=True)
+            said.print(line, soft_wrap=True)
 
         def both(loop: Loop, tick: Tick) -> None:
             shown(loop, tick)
             instrument.watch(loop, tick)
 
         yield both
-    console.print(f"onlookers: {instrument.sent} frames sent, {instrument.dropped} dropped")
+    said.print(f"onlookers: {instrument.sent} frames sent, {instrument.dropped} dropped")
 
 
 def _installed(package: str) -> bool:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Protocol, get_type_hints
 
 import typer
 
-from cablecomp.cli.shared import console
+from cablecomp.cli.shared import errors
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError, path_text
 from cablecomp.links.load import load_link
@@ -64,7 +64,7 @@ class Sources:
         raw = raw_columns(path, self.decode)
         found = as_mapping(suggest(raw.columns, self.ratio, raw.units))
         found = found if self.mapping is None else joined_maps(found, self.mapping)
-        console.print(f"{path} is read so:\n{mapping_text(found)}", style="dim")
+        errors().print(f"{path} is read so:\n{mapping_text(found)}", style="dim")
         return found
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import JsonOption, console, echo_json, share_bar
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.errors import InputError
@@ -16,7 +15,7 @@ from cablecomp.thesis.bench.study import study
 
 
 def study_bench(
-    out: Annotated[Path, typer.Option(help="folder for study.html")] = Path("study"),
+    out: Annotated[Path, out_option("folder for study.html")] = Path("study"),
     as_json: JsonOption = False,
 ) -> None:
     """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""

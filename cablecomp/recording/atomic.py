@@ -20,8 +20,7 @@ def atomic_directory(out: Path | str) -> Iterator[Path]:
     Files of an existing `out` that are not written anew stay. InputError if `out` cannot be made.
     """
     out = Path(out)
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; --out takes a directory, which is made if it is missing")
+    check_directory(out)
     made = _make_parents(out)
     try:
         temporary = _sibling(out)
@@ -36,6 +35,19 @@ def atomic_directory(out: Path | str) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise InputError(f"{out}: cannot be written ({_why(error)}); nothing was left there") from None
         raise
+
+
+def check_directory(out: Path) -> None:
+    """Raise InputError if `out` can be no directory that files are written into; nothing is made."""
+    for place in (out, *out.absolute().parents):
+        if place.is_dir():
+            if not os.access(place, os.W_OK | os.X_OK):
+                raise InputError(f"{out}: may not be written; choose another directory")
+            return
+        if os.path.lexists(place):
+            what = "is a file" if place.exists() else "is a link that leads nowhere"
+            where = "" if place == out else f" ({place})"
+            raise InputError(f"{out}: {what}{where}; --out takes a directory, which is made if it is missing")
 
 
 @contextmanager

@@ -6,7 +6,9 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
+import polars as pl
 import pytest
 
 from cablecomp import __version__
@@ -62,3 +64,57 @@ def test_an_option_given_twice_is_an_error(capsys: pytest.CaptureFixture[str]) -
 def test_a_result_is_had_as_json(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--config", "capstan-arm", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["name"] == "capstan-arm"
+
+
+@pytest.mark.parametrize("name", sorted(set(app.COMMANDS) - {"guide", "example"}))
+def test_every_command_with_a_result_gives_it_as_json(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main([name, "--help"])
+    assert "--json" in capsys.readouterr().out
+
+
+def test_what_is_written_is_said_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answers = {
+        "output_radius_mm": 30, "input_radius_mm": 10, "cable": "steel-7x7", "cable_diameter_mm": 1,
+        "free_length_mm": 200, "output_turns": 1, "input_turns": 3, "joint_torque_max_Nm": 2,
+    }  # fmt: skip
+    given = [word for key, value in answers.items() for word in ("--set", f"{key}={value}")]
+    assert main(["init", *given, "--out", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["written"] == [str(tmp_path / "joint.toml")]
+    rows = {"time_s": [0.0, 0.1, 0.2], "q_in": [0.0, 0.1, 0.0]}
+    pl.DataFrame(rows).write_csv(tmp_path / "a.csv")
+    read = ["--map", "motor_position_rad=q_in,unit=rad", "--map", "auto"]
+    to = str(tmp_path / "b.csv")
+    assert main(["convert", str(tmp_path / "a.csv"), to, *read, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["written"], found["rows"]) == (to, 3)
+    assert found["channels"] == ["time_s", "motor_position_rad"]
+    assert main(["inspect", str(tmp_path / "a.csv"), *read, "--save", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)
+
+
+OUTS = {
+    "calibrate": ["a.csv", "--config", "nowhere.toml"],
+    "demo": [],
+    "design": ["--config", "nowhere.toml"],
+    "diagnose": ["a.csv", "--config", "nowhere.toml"],
+    "export": ["--config", "nowhere.toml", "--c"],
+    "init": ["--set", "circuit=square"],
+    "prove": ["--kinds", "square"],
+    "replay": ["a.csv", "--config", "nowhere.toml"],
+    "run": ["--config", "nowhere.toml"],
+    "study": [],
+}
+
+
+@pytest.mark.parametrize("name", OUTS)
+@pytest.mark.parametrize("below", ["", "folder"])
+def test_a_folder_that_cannot_be_one_is_refused_before_any_work(
+    name: str, below: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    assert main([name, *OUTS[name], "--out", str(taken / below)]) == 2
+    said = capsys.readouterr().err
+    assert "is a file" in said
+    assert str(taken) in said
+    assert taken.read_text(encoding="utf-8") == "mine"

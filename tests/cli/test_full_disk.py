@@ -14,6 +14,10 @@ import pytest
 from cablecomp.config import load_joint
 
 RATIO = load_joint("tendon-finger").drive.ratio
+ANSWERS = (
+    *("output_radius_mm=30", "input_radius_mm=10", "cable=steel-7x7", "cable_diameter_mm=1"),
+    *("free_length_mm=200", "output_turns=1", "input_turns=3", "joint_torque_max_Nm=2"),
+)
 COMMANDS = {
     "replay": ["replay", "a.csv", "--config", "tendon-finger", "--out", "out/replay"],
     "design": ["design", "--config", "tendon-finger", "--out", "out/design"],
@@ -22,6 +26,8 @@ COMMANDS = {
     "parquet": ["convert", "a.csv", "out.parquet"],
     "npz": ["convert", "a.csv", "out.npz"],
     "inspect": ["inspect", "a.csv", "--save"],
+    "example": ["example", "links/wrist-virtual"],
+    "init": ["init", *(word for answer in ANSWERS for word in ("--set", answer))],
 }
 LIMITED = """
 import contextlib, io, json, resource, sys
@@ -31,7 +37,7 @@ main(commands["replay"][:-1] + ["warm"])  # whatever is compiled is compiled now
 answers = {}
 for name, arguments in commands.items():
     out, error = io.StringIO(), io.StringIO()
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200 if name == "inspect" else 20_000, resource.RLIM_INFINITY))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200 if name in ("inspect", "example", "init") else 20_000, resource.RLIM_INFINITY))
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
         code = main(arguments)
     resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
