@@ -160,9 +160,11 @@ def gate(
     if inside != near:
         flags |= POSITION_LIMITED
     wire = limits.wire
-    position = _follow(
+    position, spare_rad, cut = _follow(
         inside, before[0], limits.position_rate_rad_s * period_s, before.spare_rad, low, high, wire.position
     )
+    if cut:
+        flags |= RATE_LIMITED
     slow = _within(v, 0.0, limits.velocity_max_rad_s)
     if slow != v:
         flags |= VELOCITY_LIMITED
@@ -170,49 +172,48 @@ def gate(
     weak = _within(tau, 0.0, most)
     if weak != tau:
         flags |= TORQUE_LIMITED
-    torque = _follow(
+    torque, spare_Nm, cut = _follow(
         weak, before[2], limits.torque_rate_Nm_s * period_s, before.spare_Nm, -most, most, wire.torque
     )
-    if position.cut or torque.cut:
+    if cut:
         flags |= RATE_LIMITED
     if wire.velocity.step > 0.0:
         slow = _carried(slow, -limits.velocity_max_rad_s, limits.velocity_max_rad_s, wire.velocity) or 0.0
-    return SafeCommand(position.value, slow, torque.value, flags, position.spare, torque.spare)
-
-
-class _Followed(NamedTuple):
-    value: float
-    spare: float
-    cut: bool
+    return SafeCommand(position, slow, torque, flags, spare_rad, spare_Nm)
 
 
 def _follow(
     wanted: float, before: float, reach: float, spare: float, low: float, high: float, grid: Grid
-) -> _Followed:
-    """The value nearest to `wanted` that lies within `reach` of the one before, and on the wire."""
+) -> tuple[float, float, bool]:
+    """The value nearest to `wanted` that lies within `reach` of the one before, and on the wire; what is left of the
+    reach; whether it was cut."""
     step = grid.step
     coarse = step > reach
     reach += spare
     even = _within(wanted, before, reach)
     if step == 0.0:
-        return _Followed(even, 0.0, even != wanted)
+        return even, 0.0, even != wanted
     # the one before is on the wire, so there is always one that may be sent
     slack = 1e-6 * step
-    carried = _carried(even, max(low, before - reach - slack), min(high, before + reach + slack), grid)
+    least, most = before - reach - slack, before + reach + slack
+    carried = _carried(even, low if low > least else least, high if high < most else most, grid)
     value = before if carried is None else carried
-    left = min(reach - abs(value - before), step) if coarse else 0.0
-    return _Followed(value, max(left, 0.0), even != wanted)
+    if not coarse:
+        return value, 0.0, even != wanted
+    return value, max(min(reach - abs(value - before), step), 0.0), even != wanted
 
 
 def _carried(value: float, low: float, high: float, grid: Grid) -> float | None:
     """The value nearest to `value` that the wire carries within low…high; None if there is none."""
-    origin, step, least, most = grid
-    low, high = max(low, least), min(high, most)
+    origin, step, least, most = grid  # written out, as builtin functions take longer than the rest together
+    low, high = least if least > low else low, most if most < high else high
+    value = low if value < low else value
+    value = high if value > high else value
     if step == 0.0:
-        return min(max(value, low), high) if low <= high else None
+        return value if low <= high else None
     edge = 1e-6 * step
     # ties go down, as on the wires themselves
-    found = origin + step * ceil((min(max(value, low), high) - origin) / step - 0.5 - 1e-9)
+    found = origin + step * ceil((value - origin) / step - 0.5 - 1e-9)
     if found > high + edge:
         found -= step
     elif found < low - edge:

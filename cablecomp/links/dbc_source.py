@@ -60,8 +60,9 @@ class Source:
     """
 
     __slots__ = (
+        "_big",
         "_entries",
-        "_layout",
+        "_length",
         "_readings",
         "_real",
         "_selector",
@@ -78,7 +79,8 @@ class Source:
         entries: dict[int, tuple[Entry, ...]],
         sequence: Field | None,
     ) -> None:
-        self._layout = layout
+        self._length = layout.length
+        self._big = any(field.big for field in layout.fields.values())
         self._readings = readings
         self._entries = entries
         self._selector = layout.selector if ALWAYS not in entries else None
@@ -92,10 +94,11 @@ class Source:
     def take(self, data: bytes, now_s: float) -> int:
         """Take one frame."""
         stats, readings = self.stats, self._readings
-        if len(data) != self._layout.length:
+        if len(data) != self._length:
             stats.invalid += 1
             return 0
-        little, big = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+        little = int.from_bytes(data, "little")
+        big = int.from_bytes(data, "big") if self._big else 0
         selector = self._selector
         chosen = ALWAYS if selector is None else dbc.counts_in(selector, little, big)
         entries = self._entries.get(chosen, ())

@@ -266,7 +266,7 @@ class Loop:
             minute = self.minutes.close(self.times, self._skipped, self.link.status())
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
         if tick.number % LOOK_EVERY == 0:
-            self._backlogs = (self._backlogs[1], self.link.status().backlogs)
+            self._backlogs = (self._backlogs[1], self.link.backlogs)
         if tick.skipped:
             self.events.add(now, "", f"{tick.skipped} ticks skipped")
         why = self._asked_to_stop or self._joint_trouble() or self._bus_trouble()
