@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from flipped_bits import same_or_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from springy_joint import RATIO, joint
 
 from cablecomp.cli.app import main
 from cablecomp.errors import ConfigError, InputError
@@ -29,22 +29,6 @@ from cablecomp.recording.mapping import (
 )
 from cablecomp.recording.reader import open_recording, read_all
 from cablecomp.recording.suggest import as_mapping, suggest
-
-RATIO = 0.25
-
-
-def joint(rows: int = 4000) -> dict[str, np.ndarray]:
-    """A drive that gives way by 4 mrad/(N m), with friction of 0.03 N m at the motor: nothing of our mechanics."""
-    t = np.arange(rows) * 1e-3
-    q = 1.2 * np.sin(2.0 * np.pi * 0.5 * t) + 0.1 * np.sin(2.0 * np.pi * 3.1 * t)
-    load = 1.5 * np.sin(2.0 * np.pi * 0.8 * t + 0.4)
-    return {
-        "time_s": t,
-        "motor_position_rad": q,
-        "joint_position_rad": RATIO * q + 4e-3 * load,
-        "joint_torque_Nm": load,
-        "motor_torque_Nm": -RATIO * load + 0.03 * np.sign(np.gradient(q)),
-    }
 
 
 @pytest.mark.parametrize(
@@ -277,36 +261,6 @@ def test_repeatability_is_the_difference_between_like_cycles() -> None:
     assert inspect({"time_s": t, "motor_position_rad": noise, "joint_position_rad": q}).repeats is None
 
 
-@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet", ".npz", ".mcap"])
-def test_convert_keeps_every_bit(ending: str, tmp_path: Path) -> None:
-    if ending == ".mcap":
-        pytest.importorskip("mcap", reason="optional package mcap is not installed")
-    pl.DataFrame(joint(3000)).write_csv(tmp_path / "a.csv")
-    assert main(["convert", str(tmp_path / "a.csv"), str(tmp_path / f"b{ending}")]) == 0
-    expected, found = (read_all(tmp_path / name).columns for name in ("a.csv", f"b{ending}"))
-    assert {n: v.tobytes() for n, v in found.items()} == {n: v.tobytes() for n, v in expected.items()}
-    assert (
-        main(["convert", str(tmp_path / "a.csv"), str(tmp_path / f"c{ending}"), "--from", "1", "--to", "1.5"])
-        == 0
-    )
-    time = read_all(tmp_path / f"c{ending}").columns["time_s"]
-    assert (time[0], time[-1], len(time)) == (1.0, 1.5, 501)
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["a.csv", f"b{ending}", f"c{ending}"])
-
-
-@pytest.mark.parametrize("ending", [".parquet", ".npz", ".csv.gz"])
-def test_no_flipped_bit_in_what_we_write_changes_what_is_read(ending: str, tmp_path: Path) -> None:
-    pl.DataFrame(joint(300)).write_csv(tmp_path / "a.csv")
-    path = tmp_path / f"b{ending}"
-    assert main(["convert", str(tmp_path / "a.csv"), str(path)]) == 0
-    same_or_refused(path, path.read_bytes(), 5)
-
-
-def test_parquet_without_checksums_says_so(tmp_path: Path) -> None:
-    pl.DataFrame(joint(300)).write_parquet(tmp_path / "a.parquet")
-    assert any("no checksums" in note for note in open_recording(tmp_path / "a.parquet").notes)
-
-
 def test_inspect_shows_suggests_and_saves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     true = joint(500)
     path = tmp_path / "[red]a.csv"
@@ -321,57 +275,6 @@ def test_inspect_shows_suggests_and_saves(tmp_path: Path, capsys: pytest.Capture
     answer = json.loads(capsys.readouterr().out)
     assert answer["text_columns"] == ["state [x]"]
     assert answer["quality"]["rate_Hz"] == pytest.approx(1000.0)
-
-
-def test_what_is_written_opens_in_pandas_and_polars_with_their_defaults(tmp_path: Path) -> None:
-    pandas = pytest.importorskip("pandas", reason="optional package pandas is not installed")
-    from cablecomp.recording.recorder import Recorder
-
-    rows = np.random.default_rng(5).standard_normal((3000, 4))
-    rows[:, 0] = np.arange(3000) * 1e-3
-    rows[:2500, 2] = np.nan  # a temperature that comes late
-    names = ("time_s", "motor_position_rad", "temperature_degC", "other_x")
-    with Recorder(tmp_path / "recording.csv", names) as recorder:
-        for row in rows:
-            recorder.append(tuple(row))
-    for frame in (pandas.read_csv(tmp_path / "recording.csv"), pl.read_csv(tmp_path / "recording.csv")):
-        assert tuple(frame.columns) == names
-        for k, name in enumerate(names):
-            assert "float" in str(frame[name].dtype).lower()
-            np.testing.assert_array_equal(np.asarray(frame[name].to_numpy(), dtype=np.float64), rows[:, k])
-
-
-def test_matlab_files_of_both_kinds_read_alike(tmp_path: Path) -> None:
-    import scipy.io
-
-    true = joint(400)
-    table = np.column_stack([true["motor_position_rad"], true["joint_position_rad"]])
-    scipy.io.savemat(tmp_path / "a.mat", {"time_s": true["time_s"], "angles": table, "rate": 1000.0})
-    files = [tmp_path / "a.mat"]
-    try:
-        import h5py
-    except ImportError:
-        pass
-    else:  # as MATLAB lays it down: turned over, behind a head of 512 bytes
-        with h5py.File(tmp_path / "b.mat", "w", userblock_size=512) as file:
-            for name, values in (
-                ("time_s", true["time_s"][None, :]),
-                ("angles", table.T),
-                ("rate", [[1000.0]]),
-            ):
-                file.create_dataset(name, data=values, chunks=None).attrs["MATLAB_class"] = np.bytes_(
-                    "double"
-                )
-        head = bytearray((tmp_path / "b.mat").read_bytes())
-        head[:19] = b"MATLAB 7.3 MAT-file"
-        (tmp_path / "b.mat").write_bytes(head)
-        files.append(tmp_path / "b.mat")
-    for path in files:
-        columns = read_all(
-            path, mapping_from(["motor_position_rad=angles[0]", "joint_position_rad=angles[1]"])
-        ).columns
-        for name in ("time_s", "motor_position_rad", "joint_position_rad"):
-            assert columns[name].tobytes() == true[name].tobytes(), path
 
 
 def test_units_that_the_file_states_count_in_a_suggestion(tmp_path: Path) -> None:
