@@ -1,4 +1,7 @@
-"""What several commands share: options, the console, progress, and where the project's own files lie."""
+"""What several commands share: options, the console, progress, and where the project's own files lie.
+
+What not every command needs is imported where it is used: control brings plots along, the kernels a compiler.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -16,11 +19,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from cablecomp.config import JointConfig, doubts, load_joint
-from cablecomp.control.motors import control_for
-from cablecomp.control.options import ControlConfig, load_control
-from cablecomp.effects import load_effects
 from cablecomp.examples import resolve
-from cablecomp.mechanics.jit import is_compiled
+
+if TYPE_CHECKING:
+    from cablecomp.control.options import ControlConfig
 
 DEMO_LINK = "wrist-virtual"
 
@@ -50,8 +52,11 @@ JsonOption = Annotated[bool, typer.Option("--json", help="print the result as JS
 def read_joint(path: Path, effects: Sequence[Path] | None = None) -> JointConfig:
     """The joint configuration, effects of the user's own registered first; what it states but hardly means is asked
     about on standard error."""
-    for file in effects or ():
-        load_effects(file)
+    if effects:
+        from cablecomp.effects import load_effects
+
+        for file in effects:
+            load_effects(file)
     joint = load_joint(path)
     warn(f"{path}: {words}" for words in doubts(joint))
     return joint
@@ -100,11 +105,19 @@ def _plain(value: Any) -> Any:
 
 def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
     """The control file, or what the joint itself suggests if there is none."""
-    return control_for(joint) if path is None else load_control(path)
+    if path is None:
+        from cablecomp.control.motors import control_for
+
+        return control_for(joint)
+    from cablecomp.control.options import load_control
+
+    return load_control(path)
 
 
 def announce_compilation() -> None:
     """Say so before the first use of this very version compiles its kernels."""
+    from cablecomp.mechanics.jit import is_compiled
+
     if not is_compiled():
         Console(stderr=True).print(
             "compiling the kernels, once for this version (under a minute) ...", style="dim"

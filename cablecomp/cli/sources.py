@@ -14,8 +14,6 @@ import typer
 from cablecomp.cli.shared import errors
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError, path_text
-from cablecomp.links.load import load_link
-from cablecomp.links.logged import LinkDecoder
 from cablecomp.recording.can_log import DecodeFrame, by_dbc
 from cablecomp.recording.folder import find_recordings
 from cablecomp.recording.inspection import require_motion
@@ -118,6 +116,9 @@ def sources(
         raise InputError("--link and --dbc say the same: give one of them")
     decode: Callable[[], DecodeFrame] | None = None
     if link is not None:
+        from cablecomp.links.load import load_link  # brings python-can: only where a link is given
+        from cablecomp.links.logged import LinkDecoder
+
         loaded = load_link(link)
         LinkDecoder(loaded, joint)  # says at once if there is no such joint
         decode = lambda: LinkDecoder(loaded, joint)  # noqa: E731  # a new one for each reading

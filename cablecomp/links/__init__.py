@@ -1,39 +1,10 @@
 """Joints on CAN buses and serial lines: frames without I/O, ports that read cheaply, devices, the link that joins them.
 
 Imports configuration, signals and errors. Start reading at `link.py`; a protocol is a pair such as `mit.py` (bytes)
-and `device_mit.py` (what the loop asks of it).
+and `device_mit.py` (what the loop asks of it). The public names are imported when they are first used: whoever wants
+to know what a link file may hold needs no bus.
 """
 
-from cablecomp.links.link import BusLink, Link, LinkStatus
-from cablecomp.links.load import load_link, parse_link
-from cablecomp.links.readings import Age, JointReadings, MessageStats
-from cablecomp.links.records import (
-    CHANNELS,
-    BusState,
-    DriveState,
-    Mode,
-    MotorCommand,
-    Request,
-    clip_names,
-)
-from cablecomp.links.schema import LinkConfig, Timeouts
+import lazy_loader
 
-__all__ = [
-    "CHANNELS",
-    "Age",
-    "BusLink",
-    "BusState",
-    "DriveState",
-    "JointReadings",
-    "Link",
-    "LinkConfig",
-    "LinkStatus",
-    "MessageStats",
-    "Mode",
-    "MotorCommand",
-    "Request",
-    "Timeouts",
-    "clip_names",
-    "load_link",
-    "parse_link",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

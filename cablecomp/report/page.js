@@ -45,6 +45,13 @@
     if (words && layout.xaxis.range) layout.xaxis.range = [layout.xaxis.range[0], 1.35 * layout.xaxis.range[1]];
     const beside = axes.filter((axis) => (axis.domain?.[0] ?? 0) > 0.2 && axis.title?.text).length;
     if (beside) for (const axis of axes) if (axis.title?.text) axis.title.text = wrapped(axis.title.text);
+    const columns = Object.keys(layout).filter((key) => /^xaxis/.test(key) && layout[key].domain);
+    const below = (axis) => layout[(axis.anchor ?? "x").replace("x", "xaxis")]?.domain?.[0] ?? 0;
+    const named = Object.keys(layout).some((key) => /^yaxis/.test(key) && layout[key].title?.text && below(layout[key]) > 0.2);
+    for (const key of named ? columns : []) {  // room for the name of an axis between two columns
+      const [from, to] = layout[key].domain;
+      layout[key].domain = [from > 0.2 ? from + 0.06 : from, to < 0.8 ? to - 0.05 : to];
+    }
     if (layout.legend?.orientation === "v") layout.legend = { orientation: "h", x: 0, y: -0.2, yanchor: "top" };
   };
 

@@ -142,7 +142,7 @@ class JointLoop:
     def stand(self, now_s: float) -> None:
         """After the stop: observe and record what has come, command nothing."""
         if self.checked is not None and self.checked.ready and not self._refused:
-            self._finish(self._observe(now_s, None), None)
+            self._finish(self._observe(now_s, None, told=False), None)
 
     def keep(self) -> None:
         """In idle time: hand what has been recorded and the observer's state to those who write it."""
@@ -183,8 +183,9 @@ class JointLoop:
         if not self._link.send(self.setup.place, command) & NOT_TAKEN:
             self._sent = safe
 
-    def _observe(self, now_s: float, since_s: float | None) -> Command:
-        """Take in what has come; returns what the compensator asks for. A sample that the observer refuses
+    def _observe(self, now_s: float, since_s: float | None, *, told: bool = True) -> Command:
+        """Take in what has come; returns what the compensator asks for. `told`: what is wrong with it is an event,
+        which the silence of a drive that was stopped is not. A sample that the observer refuses
         ends the run: replay would refuse it as well. So does one that it takes where the next one, as expected, is
         beyond what the joint can take.
         """
@@ -212,7 +213,7 @@ class JointLoop:
         if estimate is not None:
             self._predicted = estimate.joint_position_rad
             self._seen = (now_s, checked.sample, estimate, command, reference, checked.flags)
-        if checked.flags != self._flags:
+        if told and checked.flags != self._flags:
             self._note(checked.flags, now_s)
         return command
 

@@ -1,0 +1,17 @@
+from .link import BusLink as BusLink
+from .link import Link as Link
+from .link import LinkStatus as LinkStatus
+from .load import load_link as load_link
+from .load import parse_link as parse_link
+from .readings import Age as Age
+from .readings import JointReadings as JointReadings
+from .readings import MessageStats as MessageStats
+from .records import CHANNELS as CHANNELS
+from .records import BusState as BusState
+from .records import DriveState as DriveState
+from .records import Mode as Mode
+from .records import MotorCommand as MotorCommand
+from .records import Request as Request
+from .records import clip_names as clip_names
+from .schema import LinkConfig as LinkConfig
+from .schema import Timeouts as Timeouts
