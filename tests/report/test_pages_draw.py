@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plotly.subplots import make_subplots
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -118,6 +119,20 @@ def test_figures_follow_the_reader_into_the_dark_and_onto_paper(
         # the figures are drawn anew after the change, not within it
         light = f'JSON.stringify({ground}) === \'["rgb(255, 255, 255)","{style.PAPER}"]\''
         seen.wait_for_function(light, timeout=20_000)
+
+
+def test_the_name_of_an_axis_stays_out_of_the_column_before_it(chromium: Any, tmp_path: Path) -> None:
+    fig = make_subplots(rows=1, cols=2, horizontal_spacing=0.12)
+    for column, name in ((1, "tension / N"), (2, "load / N·m")):
+        fig.add_scatter(x=[0.0, 1.0], y=[-100.0, 100.0], row=1, col=column)
+        style.axes(fig, "time / s", name, row=1, col=column)
+    text = page.page("A page", "", [Section("Figure", page.figure(fig))])
+    edges = """(() => { const plot = document.querySelector('.plot'), first = plot._fullLayout.xaxis;
+      return [first._offset + first._length,
+        document.querySelector('.y2title').getBoundingClientRect().left - plot.getBoundingClientRect().left]; })()"""
+    with drawn(chromium, text, tmp_path, PHONE) as seen:
+        ends, begins = seen.evaluate(edges)
+    assert begins >= ends
 
 
 def test_bounds_do_not_flatten_what_they_bound(chromium: Any, pages: dict[str, str], tmp_path: Path) -> None:
