@@ -47,8 +47,11 @@ class Thresholds:
     """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by
     far more."""
     none: float = 2e-4
-    """Share of its range up to which an effect's amount is none, and it is not that effect that helps (trials seed
-    602: a mount that yields one way was answered by a guide without friction)."""
+    """Share of the largest plausible amount up to which an effect's amount is none, and it is not that effect that
+    helps (trials seed 602: a mount that yields one way was answered by a guide without friction)."""
+    none_of_least: float = 0.1
+    """The same, over the least plausible amount, where amounts are known by orders of magnitude (a share of the
+    largest, which lies six decades above the least, took 0.12 of a loop of viscous slip for none)."""
     beyond: tuple[float, ...] = (1.2, 1.5, 2.0)
     """Loads over those seen at which a model still has to be solvable, where any of a round is (a coefficient that
     falls with pressure fitted light loads, and had no solution at the next)."""
