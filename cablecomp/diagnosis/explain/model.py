@@ -116,7 +116,7 @@ def searching(fit: Fit) -> Weighing:
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     """The model refitted with other weights."""
-    fit = refit(model.fit, weighing, 6)
+    fit = refit(model.fit, weighing, LIMITS.settled)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
@@ -175,7 +175,7 @@ def without(model: Model, term: Term, groups: Groups) -> Model | None:
     problem = stripped(model.fit.problem, term)
     start = placed(model.fit, problem)
     try:
-        fit = solve(problem, start, 10, LIMITS.tolerance, _derivative_of_rest(model.fit, problem))
+        fit = solve(problem, start, LIMITS.settled, LIMITS.tolerance, _derivative_of_rest(model.fit, problem))
     except InputError:
         return None
     return Model(kept, fit, left_out(fit, groups))
