@@ -60,6 +60,10 @@ class Thresholds:
     falls with pressure fitted light loads, and had no solution at the next)."""
     tie: float = 0.01
     """Share of the loss on data left out by which a law with more parameters has to be better than one with fewer."""
+    dethrone: float = 0.1
+    """Share of what the best model so far takes off, by which one without its effects has to take off more (trials
+    seed 604: two right effects took off twice as much as a wrong one; on a jaw friction at both ends took off 2 % more
+    than the path's)."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0
