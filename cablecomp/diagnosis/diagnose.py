@@ -26,8 +26,9 @@ from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, spread
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.describe.empirical import empirical_laws
-from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.model import Model, bears
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
+from cablecomp.diagnosis.explain.model import Model, bears, without
 from cablecomp.diagnosis.explain.rounds import Progress
 from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
 from cablecomp.diagnosis.explain.selection import select
@@ -95,20 +96,18 @@ def diagnose(
         weighed_terms = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed_terms]
     named = [w for w in weighed_terms if w.confidence >= LIMITS.name]
     named.sort(key=lambda w: -w.evidence["gain"])  # what is missed most stands first
-    if len(named) < len(weighed_terms) and not named:
-        kept = Model((), drive.fit, left_out(drive.fit, groups))
-    else:
-        kept = final
+    kept = final if named else _without_effects(final, drive, groups)
+    if kept is not final:
+        after = series_of(kept.fit, seen, drive.floor_rad) if kept.terms else before
+        rest = locate(after, rng, sensitivities(kept.fit)) if kept.terms else location
     laws = empirical_laws(final, groups) if named else []
     repeated = repeatability(drive.fit.problem.evidence, seen)
-    structured = _structured(rest if named else location, after if named else before, repeated, bool(named))
-    verdict = _verdict(named, structured, drive)
+    structured = _structured(rest, after, repeated, bool(named))
+    verdict = _verdict(named, structured, drive, kept)
     progress("counting errors on data left out", 0.95)
     empirical = [f.law for f in laws]
-    if kept is not final:
-        augmented = baseline
-    elif empirical:
-        augmented = errors_of(kept.fit, body.final, by, empirical)
+    if kept is not final or empirical:
+        augmented = errors_of(kept.fit, body.final, by, empirical) if kept.terms else baseline
     joint = augmented_joint(config, kept, empirical, body.names)
     unseen, hidden = could_be_unseen(kept.fit, pool, [w.term.name for w in named])
     tied = (*tied_of(weighed_terms, selection), *(((h.effect,), h.why) for h in hidden))
@@ -140,10 +139,8 @@ def diagnose(
         ),
         next_experiment=next_experiment(selection, weighed_terms, kept, hidden, drive, seen),
         could_be_unseen=tuple(unseen),
-        remainder=remainder(
-            kept, rest if named else location, after if named else before, structured, drive, rng
-        ),
-        remainder_location=rest if named else location,
+        remainder=remainder(kept, rest, after, structured, drive, rng),
+        remainder_location=rest,
         tested=tested(selection, [w.term.name for w in named]),
         notes=notes(config, body, drive),
         augmented_joint=joint,
@@ -185,6 +182,25 @@ def _settled(model: Model, drive: Calibrated, groups: Groups) -> Model:
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
+def _without_effects(model: Model, drive: Calibrated, groups: Groups) -> Model:
+    """The model with no effect in it: what differs between sessions or with a condition stays where it is the drive's
+    own; the calibrated drive where nothing does."""
+    kept = model
+    while True:
+        effects = [t for t in kept.terms if isinstance(t, Hypothesis)]
+        if not effects:
+            break
+        for term in (t for t in kept.terms if isinstance(t, Dependence) and t.belongs_to(effects[0])):
+            kept = replace(kept, terms=tuple(t for t in kept.terms if t is not term))
+        smaller = without(kept, effects[0], groups)
+        if smaller is None:
+            break
+        kept = smaller
+    if kept.terms and not any(isinstance(t, Hypothesis) for t in kept.terms):
+        return kept if kept is model else _settled(kept, drive, groups)
+    return Model((), drive.fit, left_out(drive.fit, groups))
+
+
 def _share_left(drive: Calibrated, final: Model) -> float:
     """Mean square beyond noise left by the final model over that of the calibrated drive."""
     noise = drive.floor_rad**2
@@ -221,10 +237,10 @@ def _warnings(model: Model) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _verdict(named: Sequence[Weighed], structured: bool, drive: Calibrated) -> str:
+def _verdict(named: Sequence[Weighed], structured: bool, drive: Calibrated, kept: Model) -> str:
     if named:
         return "partly explained" if structured else "explained"
     if structured:
         return "unexplained"
-    before, after = rms_left(drive.nominal), rms_left(drive.fit)
+    before, after = rms_left(drive.nominal), rms_left(kept.fit)
     return "recalibrate" if after < LIMITS.recalibrate * before else "consistent"

@@ -43,17 +43,27 @@ class Thresholds:
     worth_rates: float = 1.08
     """Cost before over cost after, by a linear step on thinned rows, from which a law with rates is run on
     every sample."""
+    settled: int = 30
+    """Evaluations at most of the fit that hypotheses are held against: where it has not come to rest, whatever is added
+    beside it seems to help (trials seed 604: a fifth of the cost was left to win in two of ten after six)."""
     tolerance: float = 1e-3
     """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by
     far more."""
     none: float = 2e-4
-    """Share of its range up to which an effect's amount is none, and it is not that effect that helps (trials seed
-    602: a mount that yields one way was answered by a guide without friction)."""
+    """Share of the largest plausible amount up to which an effect's amount is none, and it is not that effect that
+    helps (trials seed 602: a mount that yields one way was answered by a guide without friction)."""
+    none_of_least: float = 0.1
+    """The same, over the least plausible amount, where amounts are known by orders of magnitude (a share of the
+    largest, which lies six decades above the least, took 0.12 of a loop of viscous slip for none)."""
     beyond: tuple[float, ...] = (1.2, 1.5, 2.0)
     """Loads over those seen at which a model still has to be solvable, where any of a round is (a coefficient that
     falls with pressure fitted light loads, and had no solution at the next)."""
     tie: float = 0.01
     """Share of the loss on data left out by which a law with more parameters has to be better than one with fewer."""
+    dethrone: float = 0.1
+    """Share of what the best model so far takes off, by which one without its effects has to take off more (trials
+    seed 604: two right effects took off twice as much as a wrong one; on a jaw friction at both ends took off 2 % more
+    than the path's)."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0

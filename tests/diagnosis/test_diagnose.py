@@ -25,14 +25,16 @@ def joint() -> JointConfig:
     return parse_joint({**closed(SMALL, "small"), "tolerance": SMALL_TOLERANCE}, "small")
 
 
-def recording(effects: list[EffectSpec], seed: int = 3) -> dict[str, FloatArray]:
-    """24 s at 50 Hz of the plant: both pulleys turning, load of two frequencies, noise on all channels."""
+def recording(effects: list[EffectSpec], seed: int = 3, tighter: float = 1.0) -> dict[str, FloatArray]:
+    """24 s at 50 Hz of the plant: both pulleys turning, load of two frequencies, noise on all channels; cables
+    `tighter` times as tight as they are meant to be."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 24.0, 0.02)
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
     load = soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
-    config = PlantConfig.from_dict(closed(SMALL))
+    stage = {**SMALL, "pretension_N": tighter * float(SMALL["pretension_N"])}
+    config = PlantConfig.from_dict(closed(stage))
     found = simulate(config, time, motor, load, effects=effects).channels()
     columns = {"time_s": time}
     for name, sigma in SMALL_NOISE.items():
@@ -117,3 +119,14 @@ def test_the_same_seed_gives_the_same_report(nothing: Diagnosis) -> None:
     for report in (again, before):
         report.pop("runtime_s")
     assert again == before
+
+
+def test_a_pretension_that_differs_between_sessions_is_no_event() -> None:
+    """Mounted anew, a drive is a little tighter: sessions follow each other, and the step between them is no slip."""
+    d = diagnose(joint(), {"monday/1": recording([], 3, 0.95), "tuesday/1": recording([], 4, 1.05)})
+    assert not d.named
+    found = {v.session: v.value for v in d.calibration if v.name.startswith("pretension_N@")}
+    # how tight both are trades places with friction; by how much they differ does not
+    assert found["tuesday"] / found["monday"] == pytest.approx(1.05 / 0.95, rel=0.02)
+    assert d.verdict in ("consistent", "recalibrate")
+    assert d.augmented.heldout_rmse_rad < 0.8 * d.baseline.heldout_rmse_rad

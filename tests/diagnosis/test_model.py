@@ -7,7 +7,9 @@ import pytest
 from turning import JOINT
 
 from cablecomp.config import EffectEntry, JointConfig, with_values
-from cablecomp.diagnosis.explain.model import bears
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.model import bears, is_told
+from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
@@ -61,3 +63,26 @@ def test_a_stated_breaking_force_is_no_reason() -> None:
     with pytest.raises(InputError, match="breaking force"):
         Observer(weak).run(torque)
     assert bears(fitted(weak, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount", "told"),
+    [
+        # plausible from 1e-5 to 1e3 EA/R: what delays a small joint is a thousandth of a thousandth of the largest
+        ("viscous_slip", {"coefficient_Ns_per_m_rad": 1e-4 * 2e5 / 0.025}, True),
+        ("viscous_slip", {"coefficient_Ns_per_m_rad": 0.0}, False),
+        ("bearing_friction", {"torque_Nm": 2e-3, "presliding_rad": 1e-4}, True),
+        ("bearing_friction", {"torque_Nm": 1e-9, "presliding_rad": 1e-4}, False),
+        ("routing_friction", {"mu_angle": 0.02, "arc_length_m": 0.01}, True),
+        ("routing_friction", {"mu_angle": 1e-5, "arc_length_m": 0.01}, False),
+    ],
+)
+def test_an_amount_is_told_from_none_by_what_is_plausible(
+    effect: str, amount: dict[str, float], told: bool
+) -> None:
+    fit = fitted(JOINT, 1.0)
+    (h,) = [h for h in hypotheses(JOINT, fit.problem.evidence) if h.name == effect]
+    entry = h.entry({**h.starts[0].values, **amount})
+    problem = with_entry(fit.problem, h, entry)
+    x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
+    assert is_told(Fit(problem, x, fit.residual, np.empty((0, len(x)))), h) == told

@@ -71,8 +71,11 @@ def _along_path(parameter: str) -> bool:
     return parameter == "pretension_N"
 
 
-def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, float, Problem]]:
-    """The dependences that promise most: each with the cost after a linear step, and the problem that has it."""
+def ask_dependences(fit: Fit, terms: Sequence[Any], by: str) -> list[tuple[Dependence, float, Problem]]:
+    """The dependences that promise most: each with the cost after a linear step, and the problem that has it.
+
+    `by`: what is left out in turn; a session of one recording shows a value of its own where blocks of it are.
+    """
     problem = fit.problem
     here = anchor(fit)
     left = here.beyond(fit.residual)
@@ -83,7 +86,7 @@ def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, fl
     for k, p in enumerate(problem.parameters):
         if p.session or p.condition:
             continue
-        for dependence, columns, changed in _ways(problem, p, fit.J[:, k], owners):
+        for dependence, columns, changed in _ways(problem, p, fit.J[:, k], owners, by):
             if dependence.name in known:
                 continue
             own = np.column_stack([here.beyond(c) for c in columns])
@@ -98,12 +101,13 @@ def ask_dependences(fit: Fit, terms: Sequence[Any]) -> list[tuple[Dependence, fl
 
 
 def _ways(
-    problem: Problem, p: Parameter, column: FloatArray, owners: FloatArray
+    problem: Problem, p: Parameter, column: FloatArray, owners: FloatArray, by: str
 ) -> list[tuple[Dependence, list[FloatArray], Problem]]:
     ways: list[tuple[Dependence, list[FloatArray], Problem]] = []
     sessions = problem.sessions
     place = problem.parameters.index(p)
-    if len(problem.repeated) > 1 and _along_path(p.base):
+    shown = sessions if by == "block" else problem.repeated
+    if len(shown) > 1 and _along_path(p.base):
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

@@ -14,6 +14,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects import Parameter
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
@@ -115,7 +116,7 @@ def searching(fit: Fit) -> Weighing:
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     """The model refitted with other weights."""
-    fit = refit(model.fit, weighing, 6)
+    fit = refit(model.fit, weighing, LIMITS.settled)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
@@ -129,11 +130,15 @@ def is_told(fit: Fit, term: Term) -> bool:
     if name not in names or any(n.startswith(f"{name}~") for n in names):
         return True
     k = names.index(name)
-    p, x = fit.problem.parameters[k], float(fit.x[k])
-    low, high = (float(bound[k]) for bound in fit.problem.bounds())
-    if p.log:
-        return x > low + LIMITS.none * (high - low)
-    return abs(p.value(x) - term.amount.neutral) > LIMITS.none * (p.high - p.low)
+    value = fit.problem.parameters[k].value(float(fit.x[k]))
+    return abs(value - term.amount.neutral) > least(term.amount, fit.problem.config)
+
+
+def least(amount: Parameter, config: JointConfig) -> float:
+    """What counts as none of an amount: far below the least that is plausible where that is known by orders of
+    magnitude, else a small share of what is plausible."""
+    low, high = amount.bounds(config)
+    return LIMITS.none_of_least * low if amount.log else LIMITS.none * max(abs(low), abs(high))
 
 
 def bears(fit: Fit) -> bool:
@@ -170,7 +175,7 @@ def without(model: Model, term: Term, groups: Groups) -> Model | None:
     problem = stripped(model.fit.problem, term)
     start = placed(model.fit, problem)
     try:
-        fit = solve(problem, start, 10, LIMITS.tolerance, _derivative_of_rest(model.fit, problem))
+        fit = solve(problem, start, LIMITS.settled, LIMITS.tolerance, _derivative_of_rest(model.fit, problem))
     except InputError:
         return None
     return Model(kept, fit, left_out(fit, groups))

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.hypotheses import INSTANT, Hypothesis
-from cablecomp.diagnosis.explain.model import Model, without
+from cablecomp.diagnosis.explain.model import Model, placed, without
 from cablecomp.diagnosis.explain.scores import (
     Groups,
     ScoreDifference,
@@ -28,6 +29,7 @@ from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
 ZERO_STEP = "a step of the joint encoder's zero"
+OWN = "a pretension of each session's own"
 
 
 def rivals(
@@ -64,6 +66,10 @@ def rivals(
         step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
         if step.gain < 0.0:
             differences[ZERO_STEP] = step
+        for other in _by_session(base, groups):
+            step = score_difference(model.left_out, other.left_out, groups)
+            if step.z < LIMITS.z:
+                differences[OWN] = step
     kept = confidence_set(losses, rng)
     return tuple(n for n in kept if n != term.name), differences
 
@@ -86,6 +92,21 @@ def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
     A = np.column_stack((fit.J, column))
     step = np.linalg.lstsq(A, -fit.residual, rcond=None)[0]
     return left_out_linearly(fit.residual + A @ step, A, groups)
+
+
+def _by_session(base: Model, groups: Groups) -> list[Model]:
+    """What the drive's mounting anew explains in place of an event: sessions follow each other in time, and what lies
+    between two looks like an instant."""
+    found = []
+    for dependence, _, problem in ask_dependences(base.fit, base.terms, groups.by):
+        if dependence.on != "session" or dependence.parameter.startswith("effect."):
+            continue
+        try:
+            fit = solve(problem, placed(base.fit, problem), 10, LIMITS.tolerance)
+        except InputError:
+            continue
+        found.append(Model((*base.terms, dependence), fit, left_out(fit, groups)))
+    return found
 
 
 def _tried(fit: Fit) -> Fit | None:

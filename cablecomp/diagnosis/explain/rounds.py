@@ -82,7 +82,9 @@ def one_round(
             for a in answers
         ]
     dependences = (
-        [] if number == 0 and not model.fit.problem.parameters else ask_dependences(model.fit, model.terms)
+        []
+        if number == 0 and not model.fit.problem.parameters
+        else ask_dependences(model.fit, model.terms, groups.by)
     )
     promised = {a[0].hypothesis.name: before / max(a[0].cost, 1e-12) for a in answers}
     promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}

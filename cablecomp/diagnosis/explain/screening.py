@@ -106,9 +106,10 @@ def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], F
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)
     best = None
+    size = None  # what was worth seeing at one start is about that at the next
     # an event's instants are looked at coarsely where every run is dear
     for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
-        found = contribution(here, h, start)
+        found = contribution(here, h, start, size)
         if found is None:
             continue
         d, size = found
@@ -132,10 +133,13 @@ def _turned(h: Hypothesis, t: float) -> Start:
     return Start({**base, INSTANT: t, h.amount.name: -float(base[h.amount.name])})
 
 
-def contribution(here: Anchor, h: Hypothesis, start: Start) -> tuple[FloatArray, float] | None:
-    """What the effect adds to the prediction (weighted) at a size that is about as large as the residual."""
+def contribution(
+    here: Anchor, h: Hypothesis, start: Start, about: float | None = None
+) -> tuple[FloatArray, float] | None:
+    """What the effect adds to the prediction (weighted) at a size that is about as large as the residual, looked for
+    from `about` on, or from the start's own."""
     wanted = max(float(np.linalg.norm(here.fit.residual)), 1.0)
-    size = float(start.values[h.amount.name])
+    size = float(start.values[h.amount.name]) if about is None else about
     low, high = h.amount.minimum, h.amount.maximum
     result = None
     for _ in range(4):
@@ -187,7 +191,8 @@ def _answer(
 
 def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
     """Amount and phase as a pair (a cos, a sin): both contributions in one linear step."""
-    found = [contribution(here, h, s) for s in h.starts[:2]]
+    first = contribution(here, h, h.starts[0])
+    found = [first, contribution(here, h, h.starts[1], first and first[1])]
     if any(f is None for f in found):
         return None
     (d0, s0), (d1, s1) = (f for f in found if f is not None)

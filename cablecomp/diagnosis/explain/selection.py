@@ -27,6 +27,7 @@ from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
+from cablecomp.estimation.problem import Weighing
 
 
 def select(
@@ -75,15 +76,35 @@ def select(
         if not carried:
             break
         carried = simplest_first(carried, groups)
-        rival = best if best.fit.problem.fine == carried[0].fit.problem.fine else None
-        if rival is None or not number or _better(carried[0], reweighed(rival, sharper, groups), groups):
-            best = carried[0]
+        best = _reigning(best, carried, first, sharper, groups) if number else carried[0]
         if quiet(best.fit):
             break
         # a law that is run on every sample is a hundred times as dear: the best model alone goes on from there
         beam = [(m, None) for m in carried[: 1 if carried[0].fit.problem.fine else LIMITS.beam]]
     final = _pruned(best, groups)
     return Selection(first, tuple(rounds), final, groups, answers)
+
+
+def _reigning(
+    best: Model, carried: Sequence[Model], baseline: Model, sharper: Weighing, groups: Groups
+) -> Model:
+    """The model to go by: the first of those carried on that is worth its further terms, if it extends the best so
+    far, or if it takes off much that this one leaves. Laws have other forms in reality, and two wrong ones can follow
+    what is left of the right one a little more closely."""
+    if best.fit.problem.fine != carried[0].fit.problem.fine:
+        return carried[0]
+    rival, base = reweighed(best, sharper, groups), reweighed(baseline, sharper, groups)
+    mine = {t.name for t in best.terms}
+    for m in carried:
+        if not _better(m, rival, groups):
+            continue
+        size = common([m], groups)
+        left, before = loss(rival, size, groups), loss(base, size, groups)
+        if mine <= {t.name for t in m.terms} or left - loss(m, size, groups) > LIMITS.dethrone * (
+            before - left
+        ):
+            return m
+    return best
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:

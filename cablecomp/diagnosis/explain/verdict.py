@@ -11,7 +11,7 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
-from cablecomp.diagnosis.explain.rivals import ZERO_STEP, rivals
+from cablecomp.diagnosis.explain.rivals import OWN, ZERO_STEP, rivals
 from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -87,7 +87,7 @@ def weigh(
         found.append(
             Weighed(
                 term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, kept, nearest,
-                _against((*kept, *(n for n in differences if n == ZERO_STEP)), follows, own, evidence)
+                _against((*kept, *(n for n in differences if n in (ZERO_STEP, OWN))), follows, own, evidence)
                 if told
                 else "its amount is not told from none",
                 max(evidence["share_total"], _alone(selection, term)),

@@ -1,0 +1,60 @@
+"""Which model reigns after a round: one that extends the best, or one that takes off much that the best leaves."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.diagnosis.explain import selection
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.scores import Groups
+
+ROWS, BLOCKS = 600, 20
+GROUPS = Groups(
+    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS),
+    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS) % 6,
+    "block",
+    np.zeros(ROWS, dtype=np.int64),
+)
+NOISE = np.random.default_rng(1).standard_normal(ROWS)
+
+
+def model(size: float, *names: str) -> Model:
+    """A model with these terms that leaves noise of this size (seed 1: the same shape for all)."""
+    terms: Any = tuple(SimpleNamespace(name=n) for n in names)
+    fit: Any = SimpleNamespace(problem=SimpleNamespace(fine=False))
+    return Model(terms, fit, size * NOISE)
+
+
+@pytest.fixture(autouse=True)
+def _as_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(selection, "reweighed", lambda m, weighing, groups: m)
+
+
+def reigning(best: Model, *carried: Model) -> str:
+    weights: Any = None
+    return selection._reigning(best, carried, model(2.0), weights, GROUPS).name
+
+
+def test_one_that_adds_to_the_best_and_predicts_better_reigns() -> None:
+    assert reigning(model(1.0, "a"), model(0.9, "a", "b")) == "a + b"
+
+
+def test_two_others_that_take_off_a_little_more_than_one_do_not() -> None:
+    """The one takes off 3 of 4 (in squares), the two 0.1 more: less than a tenth of that."""
+    assert reigning(model(1.0, "a"), model(0.95, "b", "c")) == "a"
+
+
+def test_two_others_that_take_off_much_more_do() -> None:
+    assert reigning(model(1.0, "a"), model(0.5, "b", "c")) == "b + c"
+
+
+def test_where_others_are_not_enough_better_one_that_adds_to_the_best_is_taken() -> None:
+    assert reigning(model(1.0, "a"), model(0.94, "b", "c"), model(0.95, "a", "c")) == "a + c"
+
+
+def test_what_predicts_no_better_does_not() -> None:
+    assert reigning(model(1.0, "a"), model(1.0, "a", "b")) == "a"
