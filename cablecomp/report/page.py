@@ -178,13 +178,17 @@ def _card(card: Fact) -> str:
 def _cell(cell: object) -> str:
     if isinstance(cell, int | float) and not isinstance(cell, bool):
         return f'<td class="number">{escape(number(cell, digits=5))}</td>'
-    return f"<td>{escape(str(cell))}</td>"
+    text = str(cell)
+    kind = ' class="long"' if len(text) > LONG_TEXT else ""
+    return f"<td{kind}>{escape(text)}</td>"
 
 
 def _superscript(exponent: int) -> str:
     return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
+LONG_TEXT: Final = 60
+"""Characters from which on a cell is a sentence, and keeps a width that it can be read at."""
 _LONG: Final = (64, 16_384)
 """Lengths between which an array is worth packing, and 65 534 steps are finer than its points."""
 _CONFIG: Final = json.dumps({

@@ -135,6 +135,16 @@ def test_the_name_of_an_axis_stays_out_of_the_column_before_it(chromium: Any, tm
     assert begins >= ends
 
 
+def test_a_sentence_in_a_table_keeps_a_width_that_it_can_be_read_at(chromium: Any, tmp_path: Path) -> None:
+    fig = style.figure(300)
+    style.curve(fig, np.arange(3.0), np.arange(3.0), "line", style.PREDICTED, 1.0)
+    row = [*["position_dependent_friction"] * 4, "because it was " * 20]
+    body = page.figure(fig) + page.table(["one", "two", "three", "four", "why"], [row])
+    with drawn(chromium, page.page("A page", "", [Section("Table", body)]), tmp_path, PHONE) as seen:
+        assert seen.evaluate("document.querySelector('td:last-child').clientWidth") > 0.5 * PHONE
+        assert seen.evaluate(SIDEWAYS) <= 0
+
+
 def test_bounds_do_not_flatten_what_they_bound(chromium: Any, pages: dict[str, str], tmp_path: Path) -> None:
     """The predicted deflection takes more than half of its axis, however wide the band is."""
     ask = """(() => { const plot = document.querySelector('.plot'), [low, high] = plot.layout.yaxis.range;
