@@ -1,0 +1,99 @@
+"""Every effect of the catalogue is named when the simulated plant has it: a short recording through the whole
+diagnosis."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from joints import SMALL, SMALL_NOISE, closed
+
+from cablecomp.config import parse_joint
+from cablecomp.diagnosis.diagnose import diagnose
+from cablecomp.effects import catalogue
+from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
+
+EVENT_S = 11.0
+
+
+class Case(NamedTuple):
+    """An effect's values in the plant, and what its recording needs beyond the common one."""
+
+    values: dict[str, float]
+    channels: tuple[str, ...] = ()
+    seconds: float = 20.0
+    loads: float = 1.0
+
+
+CASES = {
+    "bearing_friction": Case({"torque_Nm": 0.03, "load_coefficient": 0.0, "presliding_rad": 2e-4}),
+    "clamp_slip": Case({"slip_m": 2e-4, "time_s": EVENT_S}),
+    "clock_skew": Case({"delay_s": 0.02}),
+    "crosstalk": Case({"load_coefficient": 0.1}, ("other_1",)),
+    "gravity_load": Case({"moment_Nm": 0.15, "phase_rad": 0.4}),
+    "inertial_load": Case({"inertia_kgm2": 0.05}),
+    "motor_friction": Case({"torque_Nm": 0.03, "presliding_rad": 0.01}, ("motor_torque_Nm",)),
+    "nonlinear_cable": Case({"stiffening": 0.6}),
+    "position_dependent_friction": Case({"amplitude": 0.6, "phase_rad": 0.5}),
+    "pressure_dependent_friction": Case({"exponent": 0.6}, loads=1.7),
+    "pretension_relaxation": Case({"fraction": 0.05, "time_constant_s": 2.0}),
+    "pulley_runout": Case({"eccentricity_m": 3e-4, "phase_rad": 0.7}),
+    "routing_friction": Case({"mu_angle": 0.3, "arc_length_m": 0.01}),
+    "series_compliance": Case({"compliance_rad_per_Nm": 5e-3}),
+    "strand_break": Case({"fraction": 0.15, "time_s": EVENT_S}),
+    "strand_friction": Case({"fraction": 0.5, "yield_N": 8.0}),
+    "termination_backlash": Case({"gap_rad": 1e-3}),
+    "thermal_pretension": Case({"coefficient_per_K": 0.02, "reference_degC": 20.0}, ("temperature_degC",)),
+    "viscous_slip": Case({"coefficient_Ns_per_m_rad": 2e5}),
+}
+
+
+def recording(effect: str, case: Case) -> dict[str, FloatArray]:
+    """25 Hz of the plant with the effect: both pulleys turning, load of two frequencies, noise on all channels."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, case.seconds, 0.04)
+    soft = 1.0 - np.exp(-time)
+    motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
+    load = case.loads * soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
+    given: dict[str, Any] = {
+        "temperature_degC": 20.0 + 4.0 * np.sin(0.9 * time),
+        "other_1": np.sin(1.3 * time),
+    }
+    specs = [] if effect == "motor_friction" else [EffectSpec(effect, case.values)]
+    found = simulate(
+        PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=specs, **given
+    ).channels()
+    if effect == "motor_friction":
+        found["motor_torque_Nm"] = found["motor_torque_Nm"] + dragged(motor, **case.values)
+    noise = {**SMALL_NOISE, "motor_torque_Nm": 1e-3, "temperature_degC": 0.02, "other_1": 1e-3}
+    columns = {"time_s": time}
+    for name in (*SMALL_NOISE, *case.channels):
+        columns[name] = found[name] + noise[name] * rng.standard_normal(len(time))
+    return columns
+
+
+def dragged(angle: FloatArray, torque_Nm: float, presliding_rad: float) -> FloatArray:
+    """Torque [N m] of a friction that yields elastically over `presliding_rad` before it slips."""
+    z, found = 0.0, np.zeros(len(angle))
+    for k in range(1, len(angle)):
+        z = float(np.clip(z + (angle[k] - angle[k - 1]) / presliding_rad, -1.0, 1.0))
+        found[k] = torque_Nm * z
+    return found
+
+
+def test_every_effect_of_the_catalogue_has_its_case() -> None:
+    built_in = {
+        name for name, effect in catalogue().items() if effect.change.__module__.startswith("cablecomp.")
+    }
+    assert set(CASES) == built_in
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
+    joint = parse_joint(
+        {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
+    )
+    found = diagnose(joint, {"small/1": recording(effect, CASES[effect])})
+    assert [named.effect for named in found.named] == [effect]
