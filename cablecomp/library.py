@@ -146,7 +146,7 @@ def replay(
     for line in said:
         warnings.warn(line, stacklevel=2)
     rows = _Rows()
-    summary = _replay(source, Observer(joint, bounds=bounds), [rows], config=joint, bounds=bounds)
+    summary = _replay(source, Observer(joint, bounds=bounds), [rows], config=joint)
     return ReplayResult(summary, rows.columns(), suspicions(joint, rows.measured()))
 
 

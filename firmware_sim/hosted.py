@@ -70,7 +70,6 @@ class HostedJoints:
         config = PlantConfig.from_dict(spec.joint, str(spec.joint.get("name", "joint")))
         if spec.off_nominal_seed is not None:
             config = off_nominal(config, spec.joint.get("tolerance", {}), spec.off_nominal_seed)
-        self.true_config = config
         self.plants: dict[int, LoadedPlant] = {}
 
         def make(number: int) -> LoadedPlant:

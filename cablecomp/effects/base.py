@@ -12,23 +12,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, ratios_to_last
 from cablecomp.errors import InputError
-from cablecomp.mechanics.assemble import Term
+from cablecomp.mechanics.change import Change, Term
 from cablecomp.mechanics.jit import cached, njit
 from cablecomp.mechanics.pointer import TERM_SIGNATURE
 from cablecomp.mechanics.records import CONTEXT
+
+__all__ = ["Change", "CompiledTerm", "Effect", "Parameter", "Role", "term"]
 
 Floats = NDArray[np.float64]
 TermFunction = Callable[[Any, Any, Any], None]
 Names = Sequence[str | tuple[str, int]]
 """Names of numbers; a name with a length is an array."""
+Role = Literal["amount", "shape", "phase", "instant", "reference", "length", "presliding"]
+"""An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s]; the
+reference of what the law reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; any
+other shape."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +42,9 @@ class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
 
     `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where
-    a scale is given; `shape` marks parameters that say how, not how much (a phase, a time constant, an
-    instant). `minimum`..`maximum`, in the parameter's unit, is what the law can take; beyond it a
-    configuration is refused.
+    a scale is given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`:
+    a diagnosis leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in
+    the parameter's unit, is what the law can take; beyond it a configuration is refused.
     """
 
     name: str
@@ -48,10 +54,16 @@ class Parameter:
     high: float
     text: str
     log: bool = False
-    shape: bool = False
+    role: Role = "amount"
+    held: bool = False
     scale: Callable[[JointConfig], float] | None = None
     minimum: float = -math.inf
     maximum: float = math.inf
+
+    @property
+    def shape(self) -> bool:
+        """Whether it says how, not how much."""
+        return self.role != "amount"
 
     def middle(self) -> float:
         """Middle of low..high (geometric where `log`)."""
@@ -90,11 +102,11 @@ def cable_strain(config: JointConfig) -> float:
 
 def wrap_deflection(config: JointConfig) -> float:
     """T0/(EA mu_eff) over stages, at the output [rad]: the thesis's unit of deflection, (3-17), (4-18)."""
-    total, ratio = 0.0, 1.0
-    for stage in reversed(config.drive.stage):
+    stages = config.drive.stage
+    total = 0.0
+    for ratio, stage in reversed(list(zip(ratios_to_last(stages), stages, strict=True))):
         per_mu = 1.0 / stage.mu_output + stage.ratio / stage.mu_input
         total += ratio * stage.pretension_N / stage.EA_N * per_mu
-        ratio *= stage.ratio
     return total
 
 
@@ -104,24 +116,13 @@ def wrap_compliance(config: JointConfig) -> float:
 
 
 @dataclass(frozen=True)
-class Change:
-    """What one effect does to the drive; every default is neutral."""
+class Restated:
+    """The same cable described from elsewhere: the effect's values there, and factors on the drive's own."""
 
-    terms: tuple[Term, ...] = ()
-    tension_factor: Callable[[Floats], Floats] | None = None
-    """mu/mu0 as a function of tau = T/T0, vectorised."""
-    joint_angle_factor: Callable[[Floats], Floats] | None = None
-    """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs there."""
-    stiffening: float = 0.0
-    guide_angle: float = 0.0
-    guide_length_m: float = 0.0
-    extra_length_m: float = 0.0
-    """Free cable beyond the stage's own free length."""
-    play_share: float = 0.0
-    play_yield_N: float = 0.0
-    viscous_Ns_per_m_rad: float = 0.0
-    moves_pretension: bool = False
-    """Set where a term writes the pretension factors: what lies on the drums then has to follow."""
+    values: Mapping[str, float]
+    pretension: float = 1.0
+    EA: float = 1.0
+    mu: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -144,16 +145,28 @@ class Effect:
     change: Callable[[Mapping[str, float], JointConfig], Change]
     texts: tuple[str, ...] = field(default=())
     """Names of parameters that are text, such as the channel that loads the cable."""
+    needs: tuple[str, ...] = field(default=())
+    """Channels without which no recording tells it: an output that has to be measured, an input that has to change."""
     rates: bool = False
     """Its law knows rates within a stroke: a fit has to run it on every sample, not on rows thinned by travel."""
     posture: bool = False
     """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
+    at_pretension: Callable[[Mapping[str, float], float], Restated] | None = None
+    """Where its law counts from T0: the same law with T0 this many times as high."""
+    at_reference: Callable[[Mapping[str, float], float], Restated] | None = None
+    """Where it has a reference: the same law with this one."""
+    flag: str = ""
+    """What a joint does that has it, in a list of many joints, where that changes from night to night."""
     rank: int = 0
     """Terms run in rising rank; a term that sees the sum of the others (a delay) ranks last."""
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name."""
         return next(p for p in self.parameters if p.name == name)
+
+    def of_role(self, role: Role) -> Parameter | None:
+        """Its first parameter of that role, if any."""
+        return next((p for p in self.parameters if p.role == role), None)
 
     def neutral(self) -> dict[str, float]:
         """The values that switch the effect off (shape parameters at the middle of their range)."""

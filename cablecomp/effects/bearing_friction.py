@@ -76,6 +76,7 @@ EFFECT = Effect(
             "κ, growth with the radial load times R",
             minimum=0.0,
             maximum=1.0,
+            held=True,  # the load's own friction grows with it already
         ),
         Parameter(
             "presliding_rad",
@@ -85,7 +86,7 @@ EFFECT = Effect(
             3e-3,
             "δ, turn in which the friction builds up",
             log=True,
-            shape=True,
+            role="presliding",
             minimum=1e-9,
         ),
     ),

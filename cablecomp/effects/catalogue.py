@@ -8,20 +8,17 @@ import importlib.util
 import math
 import pkgutil
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cablecomp.config import EffectEntry, JointConfig
-from cablecomp.effects.base import Change, Effect, Floats, Parameter
+from cablecomp.effects.base import Effect, Parameter, Role
 from cablecomp.effects.empirical import empirical_term
 from cablecomp.errors import InputError
-from cablecomp.mechanics.assemble import Extension, Term
+from cablecomp.mechanics.change import Change, Term, together
 from cablecomp.mechanics.records import OTHERS
-from cablecomp.mechanics.tables import law_table, plain_law, stiffening_law
 
 _registered: dict[str, Effect] = {}
 
@@ -73,6 +70,14 @@ def catalogue() -> dict[str, Effect]:
     return {**_built_in(), **_registered}
 
 
+def role_of(name: str) -> Role | None:
+    """The role of the effect's parameter `effect.ID.KEY`; None for any other name."""
+    if not name.startswith("effect."):
+        return None
+    _, effect, key = name.split(".")
+    return _look_up(effect).parameter(key).role
+
+
 def with_effects(config: JointConfig, effects: Sequence[tuple[str, Mapping[str, Any]]]) -> JointConfig:
     """The same joint with exactly these effects, (id, {parameter: value}) each; `extend` checks them.
 
@@ -89,7 +94,7 @@ def acts_through(entry: EffectEntry) -> tuple[str, ...]:
     return tuple(f"other:{channel.removeprefix('other_')}" if n == "other" else n for n in names)
 
 
-def extend(config: JointConfig) -> Extension | None:
+def extend(config: JointConfig) -> Change | None:
     """What the configuration's effects change in the plain drive; None if there are none.
 
     Raises InputError for an unknown id, an unknown or missing parameter, or a value that the law cannot take.
@@ -98,18 +103,10 @@ def extend(config: JointConfig) -> Extension | None:
         return None
     known = sorted(((_look_up(entry.id), entry) for entry in config.effect), key=lambda pair: pair[0].rank)
     changes = [_change(effect, _values(effect, entry, config), config) for effect, entry in known]
-    if sum(c.play_share > 0.0 for c in changes) > 1:
-        raise InputError(f"{config.name}: effect `strand_friction` is given twice; one is accepted")
-    return Extension(
-        terms=(*(t for change in changes for t in change.terms), *_empirical(config)),
-        law=_law(changes, config),
-        guide_angle=sum(c.guide_angle for c in changes),
-        guide_length_m=sum(c.guide_length_m for c in changes),
-        extra_length_m=sum(c.extra_length_m for c in changes),
-        play_share=sum(c.play_share for c in changes),
-        play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
-        viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
-    )
+    plays = [effect.id for (effect, _), c in zip(known, changes, strict=True) if c.play_share > 0.0]
+    if len(plays) > 1:
+        raise InputError(f"{config.name}: effect `{plays[1]}` is given twice; one is accepted")
+    return together([*changes, Change(terms=tuple(_empirical(config)))])
 
 
 def is_bounded(config: JointConfig) -> bool:
@@ -200,37 +197,3 @@ def other_channels(config: JointConfig) -> list[str]:
                 names.append(channel)
     names += [law.of for law in config.empirical if law.of.startswith("other_")]
     return list(dict.fromkeys(names))
-
-
-def _law(changes: Sequence[Change], config: JointConfig) -> Floats | None:
-    """Law tables for the output drums of chain h and l and for all other places.
-
-    None where terms are all that is added: the kernel then runs the plain drive's own, quicker code.
-    """
-    by_tension = [c.tension_factor for c in changes if c.tension_factor is not None]
-    by_angle = [c.joint_angle_factor for c in changes if c.joint_angle_factor is not None]
-    stiffening = sum(c.stiffening for c in changes)
-    if not by_tension and not by_angle and stiffening == 0.0:
-        inside = any(
-            c.play_share or c.guide_angle or c.viscous_Ns_per_m_rad or c.moves_pretension for c in changes
-        )
-        return np.stack([plain_law()] * 3) if inside else None
-    if not by_tension and not by_angle:
-        return np.stack([stiffening_law(stiffening)] * 3)
-    stage = config.drive.stage[-1]
-    widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
-    tables = []
-    for sign in (1.0, -1.0, 0.0):
-
-        def groove(y: Floats, sign: float = sign) -> Floats:
-            return _product(by_angle, sign * (y - stage.wrap_output_rad)) if sign else np.ones_like(y)
-
-        tables.append(law_table(lambda tau: _product(by_tension, tau), groove, widest, stiffening))
-    return np.stack(tables)
-
-
-def _product(factors: Sequence[Callable[[Floats], Floats]], x: Floats) -> Floats:
-    total = np.ones_like(x)
-    for factor in factors:
-        total = total * factor(x)
-    return total

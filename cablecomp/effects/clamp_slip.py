@@ -47,9 +47,10 @@ EFFECT = Effect(
             minimum=-0.1,
             maximum=0.1,
         ),
-        Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", shape=True),
+        Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
     ),
     acts_through=("time",),
     bounded=True,
     change=_change,
+    flag="slips",
 )

@@ -8,7 +8,7 @@ from typing import Any, Final
 from cablecomp.config import Empirical, JointConfig
 from cablecomp.effects.base import term
 from cablecomp.errors import InputError
-from cablecomp.mechanics.assemble import Term
+from cablecomp.mechanics.change import Term
 from cablecomp.mechanics.jit import njit
 from cablecomp.mechanics.records import OTHERS
 

@@ -39,7 +39,7 @@ EFFECT = Effect(
             log=True,
             scale=pretension_moment,
         ),
-        Parameter("phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, angle from the hanging rest", shape=True),
+        Parameter("phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, angle from the hanging rest", role="phase"),
     ),
     acts_through=("joint_angle", "motor_angle"),
     bounded=False,

@@ -49,11 +49,12 @@ EFFECT = Effect(
             0.05,
             "δ, turn in which the friction builds up",
             log=True,
-            shape=True,
+            role="presliding",
             minimum=1e-9,
         ),
     ),
     acts_through=("velocity", "reversal"),
+    needs=("motor_torque_Nm",),
     bounded=True,
     change=_change,
 )

@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter
+from cablecomp.effects.base import Change, Effect, Parameter, Restated
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(stiffening=values["stiffening"])
+
+
+def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
+    """EA (1 + b (T/T0 - 1)) keeps its values: EA -> EA g, b -> b t/g, g = 1 + b (t - 1), t = T0'/T0."""
+    gain = max(1.0 + values["stiffening"] * (factor - 1.0), 0.05)
+    return Restated({"stiffening": values["stiffening"] * factor / gain}, EA=gain)
 
 
 EFFECT = Effect(
@@ -33,4 +39,5 @@ EFFECT = Effect(
     acts_through=("load",),
     bounded=True,
     change=_change,
+    at_pretension=_at_pretension,
 )

@@ -47,7 +47,7 @@ EFFECT = Effect(
             -math.pi,
             math.pi,
             "φ, joint angle of the roughest place",
-            shape=True,
+            role="phase",
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

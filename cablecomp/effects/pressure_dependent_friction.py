@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Floats, Parameter
+from cablecomp.effects.base import Change, Effect, Floats, Parameter, Restated
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -17,6 +17,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         return np.asarray(tau**-exponent, dtype=np.float64)
 
     return Change(tension_factor=factor)
+
+
+def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
+    """mu0 (T/T0)^-n keeps its values: mu0 -> mu0 t^-n, t = T0'/T0."""
+    return Restated(values, mu=factor ** -values["exponent"])
 
 
 EFFECT = Effect(
@@ -42,4 +47,5 @@ EFFECT = Effect(
     acts_through=("load", "load_direction", "reversal"),
     bounded=True,
     change=_change,
+    at_pretension=_at_pretension,
 )

@@ -58,7 +58,7 @@ EFFECT = Effect(
             maximum=0.01,
         ),
         Parameter(
-            "phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, its direction at joint angle zero", shape=True
+            "phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, its direction at joint angle zero", role="phase"
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

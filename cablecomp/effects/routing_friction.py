@@ -11,7 +11,7 @@ FRICTIONLESS = 1e-5  # below, a guide is nothing but more free cable
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    angle, arc = max(values["mu_angle"], 0.0), max(values["arc_length_m"], 0.0)
+    angle, arc = values["mu_angle"], values["arc_length_m"]
     if angle < FRICTIONLESS:
         return Change(extra_length_m=arc)
     return Change(guide_angle=angle, guide_length_m=arc)
@@ -26,7 +26,15 @@ EFFECT = Effect(
     "tension profile sticks, clamped from both ends",
     source="capstan law (Euler-Eytelwein); Kaneko et al. 1991; profile law of a doubly free arc",
     parameters=(
-        Parameter("mu_angle", "-", 0.0, 0.0, 5.0, "friction coefficient times total bend angle of the path"),
+        Parameter(
+            "mu_angle",
+            "-",
+            0.0,
+            0.0,
+            5.0,
+            "friction coefficient times total bend angle of the path",
+            minimum=0.0,
+        ),
         Parameter(
             "arc_length_m",
             "m",
@@ -34,8 +42,9 @@ EFFECT = Effect(
             0.0,
             4.0,
             "length of cable lying on guides or in the sheath",
-            shape=True,
+            role="length",
             scale=lambda config: config.drive.stage[-1].free_length_m,
+            minimum=0.0,
         ),
     ),
     acts_through=("reversal", "load_direction", "velocity", "load"),

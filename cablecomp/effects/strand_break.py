@@ -42,9 +42,10 @@ EFFECT = Effect(
             minimum=-0.95,
             maximum=0.95,
         ),
-        Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", shape=True),
+        Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
     ),
     acts_through=("time", "load"),
     bounded=True,
     change=_change,
+    flag="loses strands",
 )

@@ -40,7 +40,7 @@ EFFECT = Effect(
             1.0,
             "y, change of tension that the grip holds",
             log=True,
-            shape=True,
+            role="shape",
             scale=pretension,
             minimum=1e-9,
         ),

@@ -7,7 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, cable_strain, pretension_moment, term
+from cablecomp.effects.base import (
+    Change,
+    Effect,
+    Parameter,
+    Restated,
+    cable_strain,
+    pretension_moment,
+    term,
+)
 
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
@@ -42,6 +50,12 @@ def _per_strain(config: JointConfig) -> float:
     return 1.0 / cable_strain(config)
 
 
+def _at_reference(values: Mapping[str, float], reference: float) -> Restated:
+    """T0 (1 + k (ϑ - ϑ_ref)) keeps its values: T0 -> T0 f, k -> k/f, f = 1 + k (ϑ_ref' - ϑ_ref)."""
+    factor = 1.0 + values["coefficient_per_K"] * (reference - values["reference_degC"])
+    return Restated({"coefficient_per_K": values["coefficient_per_K"] / factor}, pretension=factor)
+
+
 EFFECT = Effect(
     id="thermal_pretension",
     statement="Cable and frame expand differently with temperature, and the pretension rises or falls with "
@@ -63,11 +77,20 @@ EFFECT = Effect(
             maximum=1.0,
         ),
         Parameter(
-            "reference_degC", "degC", 0.0, 0.0, 40.0, "temperature at which T0 is the nominal one", shape=True
+            "reference_degC",
+            "degC",
+            0.0,
+            0.0,
+            40.0,
+            "temperature at which T0 is the nominal one",
+            role="reference",
+            held=True,
         ),
     ),
     acts_through=("temperature", "time"),
+    needs=("temperature_degC",),
     bounded=True,
     change=_change,
+    at_reference=_at_reference,
     rank=15,
 )

@@ -119,9 +119,9 @@ def of_effect(effect: Effect, values: Mapping[str, float], config: JointConfig) 
 def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig) -> Parameter:
     low, high = p.bounds(config)
     span = max(abs(low), abs(high))
-    if p.name == "phase_rad":
+    if p.role == "phase":
         return Parameter(name, value, -20.0, 20.0, False)
-    if p.name == "time_s":
+    if p.role == "instant":
         return Parameter(
             name, value, value - INSTANT_REACH_S, value + INSTANT_REACH_S, False, INSTANT_STEP_S / STEP
         )

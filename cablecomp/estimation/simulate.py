@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.effects import catalogue, extend
+from cablecomp.effects import extend
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
@@ -18,13 +18,14 @@ from cablecomp.mechanics.start import joint_start
 from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import stepper as st
 from cablecomp.observer.refusal import REASONS, Refusal
+from cablecomp.observer.rows import Answer, Readings, answers, readings
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
-_PLACES: Final[Mapping[str, int]] = {
-    JOINT: st.OUT_JOINT,
-    MOTOR: st.OUT_MOTOR_TORQUE,
-    "tension_h_N": st.OUT_T_H,
-    "tension_l_N": st.OUT_T_L,
+_ANSWERS: Final[Mapping[str, str]] = {
+    JOINT: "joint",
+    MOTOR: "motor_torque",
+    "tension_h_N": "tension_h",
+    "tension_l_N": "tension_l",
 }
 
 
@@ -44,46 +45,45 @@ class Simulator:
         where the drive cannot follow (slack in an open circuit, a drum run out of cable).
         """
         kept = recording.rated if self.fine else recording.rows
-        outs = self.run(recording, kept, history)
-        if self.fine:
-            outs = outs[np.searchsorted(kept, recording.rows)]
-        return {name: outs[:, place] for name, place in _PLACES.items()}
+        answer = self.run(recording, kept, history)
+        judged = np.searchsorted(kept, recording.rows) if self.fine else slice(None)
+        return {name: getattr(answer, field)[judged] for name, field in _ANSWERS.items()}
 
-    def run(self, recording: Evidence, kept: IntArray, history: FloatArray | None = None) -> FloatArray:
-        """The kernel's outputs on the fine rows `kept`."""
-        rows = self._rows(recording, kept)
+    def run(self, recording: Evidence, kept: IntArray, history: FloatArray | None = None) -> Answer:
+        """The kernel's answers on the fine rows `kept`."""
         before = 0 if history is None else len(history)
+        read = self._readings(recording, kept, before)
         if history is not None:
-            past = np.repeat(rows[:1], before, axis=0)
-            past[:, st.IN_TIME] -= np.arange(before, 0, -1) * 0.05
-            past[:, st.IN_MOTOR], past[:, st.IN_LOAD] = history[:, 0], history[:, 1]
-            rows = np.concatenate([past, rows])
+            read.rows[:before] = read.rows[before]
+            read.time[:before] -= np.arange(before, 0, -1) * 0.05
+            read.motor[:before], read.load[:before] = history[:, 0], history[:, 1]
         model = self.model
-        S, J = model.S.copy(), model.J.copy()
-        joint_start(model.P, model.I, S, J, model.L, rows[0, st.IN_TIME], rows[0, st.IN_MOTOR], 0.0)
-        outs = np.empty((len(rows), st.OUT_WIDTH))
-        done, status = st.walk(model.P, model.I, S, J, model.L, rows, outs, True)
+        memory, heights = model.memory.copy(), model.heights.copy()
+        joint_start(model.fixed, model.layout, memory, heights, model.laws, read.time[0], read.motor[0], 0.0)
+        outs, answer = answers(len(read.rows))
+        done, status = st.walk(model.fixed, model.layout, memory, heights, model.laws, read.rows, outs, True)
         if status != STATUS_OK:
-            at = rows[min(done, len(rows) - 1), st.IN_TIME]
+            at = read.time[min(done, len(outs) - 1)]
             raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")
-        return outs[before:]
+        return Answer(*(column[before:] for column in answer))
 
-    def _rows(self, recording: Evidence, kept: IntArray) -> FloatArray:
+    def _readings(self, recording: Evidence, kept: IntArray, before: int) -> Readings:
+        """The recording's fine rows `kept`, behind room for a history of `before` rows."""
         columns = recording.columns
-        time = columns["time_s"]
-        rows = np.full((len(time), st.IN_OTHER + len(self.others)), np.nan)
-        rows[:, st.IN_TIME], rows[:, st.IN_MOTOR] = time, columns["motor_position_rad"]
-        rows[:, st.IN_LOAD] = load_of(self.joint, columns)
-        rows[:, st.IN_JOINT] = columns[JOINT]
+        read = readings(before + len(kept), len(self.others))
+        load = load_of(self.joint, columns)
+        read.time[before:], read.motor[before:] = columns["time_s"][kept], columns["motor_position_rad"][kept]
+        read.load[before:] = load if isinstance(load, float) else load[kept]
+        read.joint[before:] = columns[JOINT][kept]
         if "temperature_degC" in columns:
-            rows[:, st.IN_TEMPERATURE] = columns["temperature_degC"]
+            read.temperature[before:] = columns["temperature_degC"][kept]
         for k, name in enumerate(self.others):
             if name not in columns:
                 raise InputError(
                     f"{recording.name}: channel `{name}` is missing, which an effect reads; record it"
                 )
-            rows[:, st.IN_OTHER + k] = columns[name]
-        return np.ascontiguousarray(rows[kept])
+            read.other[before:, k] = columns[name][kept]
+        return read
 
 
 def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray | float:
@@ -92,14 +92,8 @@ def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray
     if source is None:
         return 0.0
     if source == MOTOR:
-        ratio = float(np.prod([s.input_radius_m / s.output_radius_m for s in joint.drive.stage]))
-        return -columns[MOTOR] / ratio
+        return -columns[MOTOR] / joint.drive.ratio
     return columns["joint_torque_Nm"]
-
-
-def knows_rates(joint: JointConfig) -> bool:
-    """Whether an effect of the joint has to be run on every sample."""
-    return any(catalogue()[e.id].rates for e in joint.effect)
 
 
 def simulator(joint: JointConfig, fine: bool = False) -> Simulator:

@@ -87,23 +87,18 @@ def in_condition(
 
 
 def at_pretension(config: JointConfig, pretension_N: float) -> JointConfig:
-    """The same joint tightened to another pretension (output stage), its cable and coats unchanged.
-
-    EA(T) = EA (1 + b (T/T0 - 1)) keeps its values, so EA -> EA (1 + b (t - 1)), b -> b t/(1 + b (t - 1)), t = T0'/T0; a
-    coefficient mu0 (T/T0)^-n keeps mu(T), so mu0 -> mu0 t^-n.
-    """
+    """The same joint tightened to another pretension (output stage), its cable and coats unchanged: laws that count
+    from T0 are restated."""
     factor = pretension_N / config.drive.stage[-1].pretension_N
     changes = {PRETENSION: config.drive.stage[0].pretension_N * factor}
     for entry in config.effect:
-        if entry.id == "nonlinear_cable":
-            b = float(entry.parameters["stiffening"])
-            gain = max(1.0 + b * (factor - 1.0), 0.05)
-            changes["EA_N"] = config.drive.stage[0].EA_N * gain
-            changes["effect.nonlinear_cable.stiffening"] = b * factor / gain
-        if entry.id == "pressure_dependent_friction":
-            n = float(entry.parameters["exponent"])
-            for key in ("mu_output", "mu_input"):
-                changes[key] = getattr(config.drive.stage[0], key) * factor**-n
+        restate = catalogue()[entry.id].at_pretension
+        if restate is None:
+            continue
+        law = restate({k: float(v) for k, v in entry.parameters.items()}, factor)
+        changes |= {f"effect.{entry.id}.{k}": v for k, v in law.values.items()}
+        for key, by in (("EA_N", law.EA), ("mu_output", law.mu), ("mu_input", law.mu)):
+            changes[key] = changes.get(key, getattr(config.drive.stage[0], key)) * by
     return with_values(config, _checked(config, changes))
 
 
@@ -128,7 +123,5 @@ def _checked(config: JointConfig, values: Mapping[str, float]) -> dict[str, floa
             _, identifier, key = name.split(".")
             p = catalogue()[identifier].parameter(key)
             value = min(max(value, p.minimum), p.maximum)
-            if p.neutral == 0.0 and p.name in ("mu_angle", "arc_length_m"):
-                value = max(value, 0.0)
         found[name] = value
     return found

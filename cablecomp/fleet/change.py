@@ -1,4 +1,4 @@
-"""Did a value change over the nights, slowly or at once? Three descriptions, the shortest wins."""
+"""Did a value change over the nights, slowly or at once? The shortest of three descriptions; own code: it is short."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from typing import Final, Literal
 import polars as pl
 
 from cablecomp.cluster import Workers, spread
+from cablecomp.effects import catalogue
 from cablecomp.fleet.change import FEWEST, change
 from cablecomp.fleet.places import Night
 from cablecomp.fleet.rows import Row, diagnosed_row, replayed_row
@@ -134,5 +135,6 @@ def _zeros(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
 
 def _named(missing: str) -> str:
     """The flag that a named effect stands for."""
-    meaning = {"clamp_slip": "slips", "strand_break": "loses strands", "pretension_relaxation": "drifts"}
-    return next((flag for effect, flag in meaning.items() if effect in missing.split(", ")), "")
+    known = catalogue()
+    flags = (known[name].flag for name in missing.split(", ") if name in known)
+    return next((flag for flag in flags if flag), "")

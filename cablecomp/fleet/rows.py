@@ -92,7 +92,7 @@ def replayed_row(night: Night) -> Row:
     for path in night.recordings:
         recording = open_recording(path)
         joint, _, _ = as_it_stood(load_joint(night.config), path, recording.head)
-        summary = replay(recording, Observer(joint, bounds=False), [sink], config=joint, bounds=False)
+        summary = replay(recording, Observer(joint), [sink], config=joint)
         samples, seconds = samples + summary.samples, seconds + summary.duration_s
     means = sink.parts.means()
     within = change(means, _scatter(means))

@@ -10,87 +10,50 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.config import JointConfig, Stage
+from cablecomp.config import JointConfig, Stage, ratios_to_last
 from cablecomp.errors import InputError
+from cablecomp.mechanics import records
+from cablecomp.mechanics.change import Change, law_tables
 from cablecomp.mechanics.drive import Drive, named
-from cablecomp.mechanics.profile import ROWS, Floats, Ints
-from cablecomp.mechanics.records import (
-    CABLE,
-    CIRCUIT,
-    CONTEXT,
-    FILTER,
-    GRID,
-    SENSOR,
-    SIZES,
-    STATE,
-    STEP,
-    TERM,
-    floats,
-)
+from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.records import floats
+from cablecomp.mechanics.tables import ELSEWHERE, ON_H, ON_L
 
 HEAD = 8  # numbers of a grid before its nodes
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
 
 
 @dataclass(frozen=True)
-class Term:
-    """A compiled term: its address, its parameters, the size of its state."""
-
-    address: int
-    parameters: tuple[float, ...]
-    state_size: int
-
-
-@dataclass(frozen=True)
-class Extension:
-    """What effects change in the drive's own parameters; every default is neutral."""
-
-    terms: tuple[Term, ...] = ()
-    law: NDArray[np.float64] | None = None
-    guide_angle: float = 0.0
-    guide_length_m: float = 0.0
-    extra_length_m: float = 0.0
-    play_share: float = 0.0
-    play_yield_N: float = 0.0
-    viscous_Ns_per_m_rad: float = 0.0
-
-
-@dataclass(frozen=True)
 class Model:
-    """The kernel's arrays for one joint: parameters P and sizes I never change; S (all numbers) and J (points
-    in use of every profile) are the initial state; L the law tables (None = plain). `named` says what lies in them."""
+    """The kernel's arrays for one joint; `named` says what lies in them.
 
-    P: Floats
-    I: Ints
-    S: Floats
-    J: Ints
-    L: Any  # law tables, or None for the plain drive: the compiler tells the two apart
+    `fixed` (its parameters) and `layout` (how much there is of everything, and where) never change; `memory` (all
+    numbers) and `heights` (points in use of every profile) are the initial state.
+    """
 
-    def named(self, S: Floats, J: Ints) -> Drive:
-        """The records of this joint in the state S, J; what is written to them is written there."""
-        return named(self.P, self.I, S, J)
+    fixed: Floats
+    layout: Ints
+    memory: Floats
+    heights: Ints
+    laws: Any  # law tables (`tables.py`), or None for the plain drive: the compiler tells the two apart
 
-
-def stage_ratios(stages: Sequence[Stage]) -> list[float]:
-    """N_ik = product over j = i+1..k of r_j/R_j (thesis 5-22), for every stage i."""
-    ratios = [1.0]
-    for stage in reversed(stages[1:]):
-        ratios.insert(0, ratios[0] * stage.input_radius_m / stage.output_radius_m)
-    return ratios
+    def named(self, memory: Floats, heights: Ints) -> Drive:
+        """The records of this joint in the state `memory`, `heights`; what is written to them is written there."""
+        return named(self.fixed, self.layout, memory, heights)
 
 
-def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
-    """Arrays of the joint in `config` with the physics of `extension`; raises InputError for pretensions that
+def assemble(config: JointConfig, change: Change | None = None) -> Model:
+    """Arrays of the joint in `config` with the physics of `change`; raises InputError for pretensions that
     cannot settle."""
-    extra = extension or Extension()
+    extra = change or Change()
     stages = config.drive.stage
     closed = int(config.drive.circuit == "closed")
     chained = closed == 0 or config.drive.arrangement == "parallel"
     groups = [list(stages)] if chained else [[stage] for stage in stages]
-    ratios = stage_ratios(stages)
+    ratios = ratios_to_last(stages)
     if chained:
         _check_pretensions(config, ratios)
-    circuits = np.zeros(len(groups), CIRCUIT)
+    circuits = np.zeros(len(groups), records.CIRCUIT)
     chains: list[tuple[float, list[Stage]]] = []  # of cables, each with its sign
     first = 0
     for circuit, group, ratio in zip(circuits, groups, ratios, strict=False):
@@ -103,55 +66,61 @@ def assemble(config: JointConfig, extension: Extension | None = None) -> Model:
         chains += [(1.0, group), (-1.0, group)][: 1 + closed]
         first += len(group) * (1 + closed)
     cables = np.concatenate([_chain(group, sign, config, extra) for sign, group in chains])
-    sensor = np.zeros(1, SENSOR)
+    sensor = np.zeros(1, records.SENSOR)
     sensor["gain"] = config.sensors.joint_torque_gain
     sensor["offset"] = config.sensors.joint_torque_offset_Nm
     sensor["cutoff"] = 2.0 * np.pi * config.observer.input_filter_Hz
-    size = np.zeros(1, SIZES)[0]
+    size = np.zeros(1, records.SIZES)[0]
     size.circuits, size.cables, size.terms = len(circuits), len(cables), len(extra.terms)
     size.stacks = (3 if extra.guide_angle > 0.0 else 2) * len(cables)
     size.capacity = config.observer.max_pieces
     size.grids = 2 * len(cables) if extra.viscous_Ns_per_m_rad > 0.0 else 0
-    size.cables_at = len(circuits) * floats(CIRCUIT)
+    size.cables_at = len(circuits) * floats(records.CIRCUIT)
     size.sensor_at = (
-        size.cables_at + len(cables) * floats(CABLE) + sum(len(t.parameters) for t in extra.terms)
+        size.cables_at + len(cables) * floats(records.CABLE) + sum(len(t.parameters) for t in extra.terms)
     )
-    size.context_at = len(cables) * floats(STATE)
-    size.filter_at = size.context_at + floats(CONTEXT)
-    size.grids_at = size.filter_at + floats(FILTER) + sum(t.state_size for t in extra.terms)
+    size.context_at = len(cables) * floats(records.STATE)
+    size.filter_at = size.context_at + floats(records.CONTEXT)
+    size.grids_at = size.filter_at + floats(records.FILTER) + sum(t.state_size for t in extra.terms)
     # without grids the room of their heads is left, as snapshots have it
-    size.steps_at = size.grids_at + (size.grids * floats(GRID) if size.grids else 2 * len(cables) * HEAD)
-    size.profiles_at = size.steps_at + 2 * len(cables) * floats(STEP)
-    size.spare_at = size.profiles_at + size.stacks * ROWS * size.capacity
-    terms = np.zeros(len(extra.terms), TERM)
+    size.steps_at = size.grids_at + (
+        size.grids * floats(records.GRID) if size.grids else 2 * len(cables) * HEAD
+    )
+    size.profiles_at = size.steps_at + 2 * len(cables) * floats(records.STEP)
+    size.spare_at = size.profiles_at + size.stacks * size.capacity * floats(records.POINT)
+    terms = np.zeros(len(extra.terms), records.TERM)
     parameters: list[float] = []
-    state_at = size.filter_at + floats(FILTER)
+    state_at = size.filter_at + floats(records.FILTER)
     for call, term in zip(terms, extra.terms, strict=True):
         call.address = term.address
-        call.parameters_at = size.cables_at + len(cables) * floats(CABLE) + len(parameters)
+        call.parameters_at = size.cables_at + len(cables) * floats(records.CABLE) + len(parameters)
         call.state_at = state_at
         parameters += term.parameters
         state_at += term.state_size
-    P = np.concatenate([circuits.view("f8"), cables.view("f8"), parameters, sensor.view("f8")])
-    I = np.concatenate([size.reshape(1).view("i8"), terms.view("i8")])
+    fixed = np.concatenate([circuits.view("f8"), cables.view("f8"), parameters, sensor.view("f8")])
+    layout = np.concatenate([size.reshape(1).view("i8"), terms.view("i8")])
     model = Model(
-        P, I, np.zeros(size.spare_at + size.steps_at), np.zeros(size.stacks, dtype=np.int64), extra.law
+        fixed,
+        layout,
+        np.zeros(size.spare_at + size.steps_at),
+        np.zeros(size.stacks, dtype=np.int64),
+        law_tables(extra, config),
     )
-    model.named(model.S, model.J).context.radius = stages[-1].output_radius_m
+    model.named(model.memory, model.heights).context.radius = stages[-1].output_radius_m
     return model
 
 
-def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Extension) -> NDArray[Any]:
+def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Change) -> NDArray[Any]:
     """Records of the cables of one chain, input side first."""
-    cables = np.zeros(len(group), CABLE)
+    cables = np.zeros(len(group), records.CABLE)
     last = group[-1]
-    for cable, stage, n_i in zip(cables, group, stage_ratios(group), strict=True):
+    for cable, stage, n_i in zip(cables, group, ratios_to_last(group), strict=True):
         cable.radius = stage.output_radius_m, stage.input_radius_m
         cable.mu = stage.mu_output, stage.mu_input
         cable.wrap = stage.wrap_output_rad, stage.wrap_input_rad
-        cable.law = 2, 2
+        cable.law = ELSEWHERE, ELSEWHERE
         if stage is config.drive.stage[-1]:
-            cable.law = (0 if sign > 0.0 else 1), 2
+            cable.law = (ON_H if sign > 0.0 else ON_L), ELSEWHERE
         cable.length = stage.free_length_m + extra.extra_length_m
         cable.EA, cable.T0 = stage.EA_N, stage.pretension_N
         cable.scale = n_i * last.output_radius_m / stage.output_radius_m

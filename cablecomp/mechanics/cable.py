@@ -3,21 +3,28 @@ tension."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
-from cablecomp.mechanics.profile import LEAST_WRAP, B, Floats, set_pending, wrap_commit, wrap_eval
+from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Wound, set_pending, wrap_commit, wrap_eval
 from cablecomp.mechanics.records import IN, OUT
-from cablecomp.mechanics.tables import dv_dtau, strain_of_tau, v_of_tau
+from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 
 
+class Stretch(NamedTuple):
+    """How much longer a cable is than at T0."""
+
+    length: float  # m
+    compliance: float  # its derivative by the tension, m/N
+    by_shaft: float  # by the output shaft's angle, m/rad
+
+
 @inlined_kernel
-def drum_eval(
-    d: Drive, L: Floats, c: int, end: int, tau: float, v: float, w: float
-) -> tuple[float, float, float]:
-    """Integral of strain * EA/T0 over one drum's wrap at end value v, its derivatives by v and by the wrap
-    angle; kept as pending.
+def drum_eval(d: Drive, laws: Floats, c: int, end: int, tau: float, v: float, w: float) -> Wound:
+    """The cable on one drum at wrap angle w and end value v, T/T0 = tau; kept as pending.
 
     A solver's trial may unwind the drum: it is then taken to keep `LEAST_WRAP`, and `joint_ready` refuses it.
     """
@@ -25,25 +32,22 @@ def drum_eval(
     wrap = 2 * c + end
     mu = cable.mu[end]
     step = d.steps[wrap]
-    step.w, step.end, step.tau = w, v, tau
+    step.w, step.end_v, step.end_tau = w, v, tau
     w = w if w > LEAST_WRAP else LEAST_WRAP
-    if L is not None:
+    if laws is not None:
         if cable.viscous > 0.0:
             return viscous_eval(d, c, end, w, tau, mu)
-    meet = wrap_eval(d.profiles, L, cable.law[end], wrap, d.heights[wrap], w, v, tau, mu)
+    meet = wrap_eval(d.profiles[wrap], laws, cable.law[end], d.heights[wrap], w, v, tau, mu)
     set_pending(step, meet)
     slope = meet.slope
     # where the cone cuts, turning by dw lowers the slipped part by mu dw
     turn = tau - 1.0 - (mu * slope if v > meet.v else -mu * slope) if slope > 0.0 else tau - 1.0
-    return meet.total, slope, turn
+    return Wound(meet.total, slope, turn)
 
 
 @inlined_kernel
-def cable_eval(
-    d: Drive, L: Floats, c: int, tension: float, x_in: float, x_out: float
-) -> tuple[float, float, float]:
-    """Stretch [m] of cable c at output-side tension [N] and shaft angles [rad] beyond its stretch at T0, and
-    its derivatives by the tension [m/N] and by the output shaft's angle [m/rad].
+def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_out: float) -> Stretch:
+    """Stretch of cable c at output-side tension [N] and shaft angles [rad].
 
     With a guide in the path the input-side tension follows from the guide's friction and the material passed over it.
     """
@@ -51,19 +55,19 @@ def cable_eval(
     t0 = cable.T0 * state.pretension * state.stiffness
     unit = cable.T0 * state.pretension / cable.EA
     tau = tension / t0
-    v = v_of_tau(L, 2, tau)
-    dv = dv_dtau(L, 2, tau, v)
-    e_span, a_span = strain_of_tau(L, 2, tau)
+    v = v_of_tau(laws, ELSEWHERE, tau)
+    dv = dv_dtau(laws, ELSEWHERE, tau, v)
+    strain, strain_slope = strain_of_tau(laws, ELSEWHERE, tau)
     length = cable.length
-    total = turn = slope = 0.0
+    total = by_shaft = slope = 0.0
     ends = 2
     state.tension = state.tension_in = tension
-    if L is not None:
+    if laws is not None:
         if cable.guide > 0.0:
             w_in = cable.wrap[IN] - cable.sign * x_in
-            total, slope, tau_in = guide_split(d, L, c, v, x_in, w_in)
-            slope *= dv
-            state.tension_in = tau_in * t0
+            split = guide_split(d, laws, c, v, x_in, w_in)
+            total, slope = split.stretch, split.slope * dv
+            state.tension_in = split.tau_in * t0
             length *= 0.5
             ends = 1
         else:
@@ -71,20 +75,20 @@ def cable_eval(
             state.play_try = play
             total = length * cable.play_share * play / t0
             slope = length * cable.play_share * d_play
-    total += length * e_span
-    slope += length * a_span
+    total += length * strain
+    slope += length * strain_slope
     angle = cable.sign * x_out
     for end in range(ends):
         radius = cable.radius[end]
-        e, a, by_angle = drum_eval(d, L, c, end, tau, v, cable.wrap[end] + angle)
-        total += radius * e
-        slope += radius * a * dv
+        wound = drum_eval(d, laws, c, end, tau, v, cable.wrap[end] + angle)
+        total += radius * wound.total
+        slope += radius * wound.by_v * dv
         if end == OUT:
-            turn = radius * by_angle
+            by_shaft = radius * wound.by_wrap
         angle = -cable.sign * x_in
     state.stretch = total * unit
     state.compliance = slope * unit / t0
-    return total * unit, slope * unit / t0, cable.sign * turn * unit
+    return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit)
 
 
 @kernel
@@ -101,7 +105,7 @@ def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
 
 
 @inner_kernel
-def cable_commit(d: Drive, L: Floats, c: int) -> None:
+def cable_commit(d: Drive, laws: Floats, c: int) -> None:
     """Make the last evaluation of cable c its state, and renew the bound on what merging has done to its stretch.
 
     In a closed circuit an error of the stretch moves the tensions against it, so the errors of later cable do
@@ -109,7 +113,7 @@ def cable_commit(d: Drive, L: Floats, c: int) -> None:
     """
     cable, state = d.cables[c], d.states[c]
     first = OUT
-    if L is not None:
+    if laws is not None:
         state.play = state.play_try
         if cable.guide > 0.0:
             guide_commit(d, c)
@@ -123,7 +127,7 @@ def cable_commit(d: Drive, L: Floats, c: int) -> None:
     for end in range(first, 2):
         wrap = 2 * c + end
         d.heights[wrap] = wrap_commit(
-            d.profiles, L, cable.law[end], wrap, d.heights[wrap], d.steps[wrap], cable.merge
+            d.profiles[wrap], laws, cable.law[end], d.heights[wrap], d.steps[wrap], cable.merge
         )
-        error += cable.radius[end] * d.profiles[wrap, B, d.heights[wrap] - 1]
+        error += cable.radius[end] * d.profiles[wrap, d.heights[wrap] - 1].stretch_error
     state.error = error * cable.T0 / cable.EA

@@ -8,6 +8,8 @@ the unknown joint angle; that coupling is weak (strain, about 1e-3), so the angl
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from cablecomp.mechanics.cable import cable_commit, cable_eval
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
@@ -17,39 +19,49 @@ from cablecomp.mechanics.records import OUT
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK, STATUS_SLACK
 
 
+class Chain(NamedTuple):
+    """What a chain's stretch does to its output shaft."""
+
+    theta: float  # rotation, rad
+    compliance: float  # its derivative by the output cable's tension, rad/N
+    by_shaft: float  # by the shaft's angle
+
+
+class Solved(NamedTuple):
+    """A circuit under its load."""
+
+    angle: float  # of the output pulley, rad
+    compliance: float  # rad/(N m)
+    status: int
+
+
 @inlined_kernel
 def chain_eval(
-    d: Drive, L: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
-) -> tuple[float, float, float]:
-    """Rotation [rad] of the chain's output shaft out of its stretch, and its derivatives by the output cable's
-    tension and by that shaft's angle.
+    d: Drive, laws: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
+) -> Chain:
+    """Rotation of the chain's output shaft at this tension [N] of its output cable and these shaft angles [rad].
 
     The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their
     ratios (5-2).
     """
-    theta = 0.0
-    compliance = 0.0
-    turn = 0.0
+    theta = compliance = by_shaft = 0.0
     x = x_in
     for j in range(count):
         cable, state = d.cables[first + j], d.states[first + j]
         shaft = x_out if j == count - 1 else state.shaft
-        stretch, slope, by_angle = cable_eval(d, L, first + j, tension * cable.scale, x, shaft)
-        stretch -= state.offset
-        theta += cable.weight * stretch
-        turn = cable.weight * by_angle
-        compliance += cable.weight * slope * cable.scale
-        x = cable.ratio * x + cable.sign * stretch / cable.radius[OUT]
+        stretch = cable_eval(d, laws, first + j, tension * cable.scale, x, shaft)
+        longer = stretch.length - state.offset
+        theta += cable.weight * longer
+        by_shaft = cable.weight * stretch.by_shaft
+        compliance += cable.weight * stretch.compliance * cable.scale
+        x = cable.ratio * x + cable.sign * longer / cable.radius[OUT]
         state.shaft = x
-    return theta, compliance, turn
+    return Chain(theta, compliance, by_shaft)
 
 
 @inner_kernel
-def circuit_solve(
-    d: Drive, L: Floats, ic: int, moment: float, x_in: float, x_guess: float
-) -> tuple[float, float, int]:
-    """Output angle [rad] of circuit `ic` under `moment` [N m] at input angle x_in, its compliance [rad/(N m)],
-    and a status."""
+def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x_guess: float) -> Solved:
+    """Circuit `ic` under `moment` [N m] at input angle x_in [rad]."""
     circuit = d.circuits[ic]
     first_h, first_l, count = circuit.first[0], circuit.first[1], circuit.count
     closed = circuit.chains == 2
@@ -67,44 +79,46 @@ def circuit_solve(
     else:
         tension = last_l.reference * last_l.pretension
         if tension + pull <= floor:
-            return x, 0.0, STATUS_SLACK
+            return Solved(x, 0.0, STATUS_SLACK)
     low, high = lowest, 1e300
-    theta_h = theta_l = a_h = a_l = b_h = b_l = 0.0
+    on_h = on_l = Chain(0.0, 0.0, 0.0)
     for iteration in range(80):
         for chain in range(circuit.chains):
             first, here = (first_h, tension + pull) if chain == 0 else (first_l, tension)
-            theta, a, b = chain_eval(d, L, first, count, here, x_in, x)
+            evaluated = chain_eval(d, laws, first, count, here, x_in, x)
             if chain == 0:
-                theta_h, a_h, b_h = theta, a, b
+                on_h = evaluated
             else:
-                theta_l, a_l, b_l = theta, a, b
-        off = rigid + theta_h - x
+                on_l = evaluated
+        off = rigid + on_h.theta - x
         if not closed:
-            turn = off / (1.0 - b_h)
-            if L is None and count == 1 and abs(turn) <= SMALL and cable_nudge(d, first_h, 0.0, turn):
-                return x + turn, a_h / radius, STATUS_OK
+            turn = off / (1.0 - on_h.by_shaft)
+            if laws is None and count == 1 and abs(turn) <= SMALL and cable_nudge(d, first_h, 0.0, turn):
+                return Solved(x + turn, on_h.compliance / radius, STATUS_OK)
             if abs(turn) <= (1e-11 if iteration < 12 else 1e-9):
-                return x + turn, a_h / radius, STATUS_OK
+                return Solved(x + turn, on_h.compliance / radius, STATUS_OK)
             x += turn if iteration < 12 else off
             continue
-        gap = theta_h + theta_l
+        gap = on_h.theta + on_l.theta
         if tension <= lowest and gap >= 0.0:  # one side is slack: the other alone carries and positions
-            new = rigid + theta_h if pull >= 0.0 else rigid - theta_l
+            new = rigid + on_h.theta if pull >= 0.0 else rigid - on_l.theta
             if abs(new - x) <= 1e-11:
-                return new, (a_h if pull >= 0.0 else a_l) / radius, STATUS_OK
+                return Solved(new, (on_h.compliance if pull >= 0.0 else on_l.compliance) / radius, STATUS_OK)
             x = new
             continue
         # Newton in (T_l, x) on gap = 0 and off = 0
-        scale = 1.0 / ((a_h + a_l) * (b_h - 1.0) - a_h * (b_h + b_l))
-        step = (off * (b_h + b_l) - gap * (b_h - 1.0)) * scale
-        turn = (gap * a_h - off * (a_h + a_l)) * scale
+        by_tension, by_shaft = on_h.compliance + on_l.compliance, on_h.by_shaft + on_l.by_shaft
+        compliance = on_h.compliance * on_l.compliance / by_tension / radius
+        scale = 1.0 / (by_tension * (on_h.by_shaft - 1.0) - on_h.compliance * by_shaft)
+        step = (off * by_shaft - gap * (on_h.by_shaft - 1.0)) * scale
+        turn = (gap * on_h.compliance - off * by_tension) * scale
         if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
-            return x + turn, a_h * a_l / (a_h + a_l) / radius, STATUS_OK
-        if L is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
+            return Solved(x + turn, compliance, STATUS_OK)
+        if laws is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
             if abs(step) <= SMALL * min(tension, tension + pull):
                 done = cable_nudge(d, first_h, step, turn)
                 if done and cable_nudge(d, first_l, step, turn):
-                    return x + turn, a_h * a_l / (a_h + a_l) / radius, STATUS_OK
+                    return Solved(x + turn, compliance, STATUS_OK)
         x += turn
         if gap > 0.0:
             high = tension
@@ -115,14 +129,14 @@ def circuit_solve(
             tension = lowest
         elif iteration > 8 and high < 1e299:
             if high - low <= 1e-11 * unit:
-                return x, a_h * a_l / (a_h + a_l) / radius, STATUS_OK
+                return Solved(x, compliance, STATUS_OK)
             if not low < tension < high:
                 tension = 0.5 * (low + high)
-    return x, 0.0, STATUS_DIVERGED
+    return Solved(x, 0.0, STATUS_DIVERGED)
 
 
 @inner_kernel
-def circuit_commit(d: Drive, L: Floats, ic: int) -> None:
+def circuit_commit(d: Drive, laws: Floats, ic: int) -> None:
     """Make the last solution of circuit `ic` its state."""
     circuit = d.circuits[ic]
     first_h, first_l, count = circuit.first[0], circuit.first[1], circuit.count
@@ -145,6 +159,6 @@ def circuit_commit(d: Drive, L: Floats, ic: int) -> None:
         last_l.kept = last_l.tension + share * pull
         last_l.reference = share
     for j in range(count):
-        cable_commit(d, L, first_h + j)
+        cable_commit(d, laws, first_h + j)
         if circuit.chains == 2:
-            cable_commit(d, L, first_l + j)
+            cable_commit(d, laws, first_l + j)

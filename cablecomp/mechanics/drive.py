@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from cablecomp.mechanics.jit import inlined_kernel
-from cablecomp.mechanics.profile import ROWS, Floats, Ints
+from cablecomp.mechanics.profile import Floats, Ints, Points
 from cablecomp.mechanics.records import (
     CABLE,
     CIRCUIT,
     CONTEXT,
     FILTER,
     GRID,
+    POINT,
     SENSOR,
     SIZES,
     STATE,
@@ -36,7 +37,7 @@ class Drive(NamedTuple):
     states: Any  # by cable
     steps: Any  # by wrap: 2c is cable c's drum OUT, 2c + 1 its drum IN
     grids: Any  # by wrap, where slip is viscous
-    profiles: Floats  # [stack, row, point] (`profile.py`): the wraps, then the guides
+    profiles: Points  # [stack, point] (`profile.py`): the wraps, then the guides
     heights: Ints  # points in use, by stack
 
 
@@ -48,26 +49,30 @@ class Terms(NamedTuple):
     memory: Floats
 
 
-def named(P: Floats, I: Ints, S: Floats, J: Ints) -> Drive:
-    """The records in a joint's arrays."""
-    size = I[:N_SIZES].view(SIZES)[0]
+def named(fixed: Floats, layout: Ints, memory: Floats, heights: Ints) -> Drive:
+    """The records in a joint's arrays (`assemble.Model`).
+
+    Kernels that Python calls take the flat arrays: one tuple of them would cost 1.5 us a call to recognise. The law
+    tables go beside them, as the compiler leaves out what a plain drive does not need by an argument that is None.
+    """
+    size = layout[:N_SIZES].view(SIZES)[0]
     return Drive(
         size,
-        P[size.sensor_at : size.sensor_at + N_SENSOR].view(SENSOR)[0],
-        S[size.context_at : size.context_at + N_CONTEXT].view(CONTEXT)[0],
-        S[size.filter_at : size.filter_at + N_FILTER].view(FILTER)[0],
-        P[: size.cables_at].view(CIRCUIT),
-        P[size.cables_at : size.cables_at + size.cables * N_CABLE].view(CABLE),
-        S[: size.context_at].view(STATE),
-        S[size.steps_at : size.profiles_at].view(STEP),
-        S[size.grids_at : size.grids_at + size.grids * N_GRID].view(GRID),
-        S[size.profiles_at : size.spare_at].reshape((size.stacks, ROWS, size.capacity)),
-        J,
+        fixed[size.sensor_at : size.sensor_at + N_SENSOR].view(SENSOR)[0],
+        memory[size.context_at : size.context_at + N_CONTEXT].view(CONTEXT)[0],
+        memory[size.filter_at : size.filter_at + N_FILTER].view(FILTER)[0],
+        fixed[: size.cables_at].view(CIRCUIT),
+        fixed[size.cables_at : size.cables_at + size.cables * N_CABLE].view(CABLE),
+        memory[: size.context_at].view(STATE),
+        memory[size.steps_at : size.profiles_at].view(STEP),
+        memory[size.grids_at : size.grids_at + size.grids * N_GRID].view(GRID),
+        memory[size.profiles_at : size.spare_at].view(POINT).reshape((size.stacks, size.capacity)),
+        heights,
     )
 
 
-def _terms(P: Floats, I: Ints, S: Floats) -> Terms:
-    return Terms(I[N_SIZES:].view(TERM), P, S)
+def _terms(fixed: Floats, layout: Ints, memory: Floats) -> Terms:
+    return Terms(layout[N_SIZES:].view(TERM), fixed, memory)
 
 
 drive = inlined_kernel(named)

@@ -8,26 +8,31 @@ ln(T_out/T_in) = -+ mu Theta, and cable passes from one side to the other.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from cablecomp.mechanics.arc import arc_commit, arc_eval
+from cablecomp.mechanics.arc import ArcMeet, arc_commit, arc_eval
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inner_kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, set_pending, wrap_eval
 from cablecomp.mechanics.records import IN
-from cablecomp.mechanics.tables import strain_of_tau, tau_of_v
+from cablecomp.mechanics.tables import ELSEWHERE, strain_of_tau, tau_of_v
+
+
+class Split(NamedTuple):
+    """The cable from the guide's output end to the input drum."""
+
+    stretch: float  # of guide, input half of the free span and input drum, m at strain T0/EA
+    slope: float  # its derivative by the end value
+    tau_in: float  # T/T0 at the input drum
 
 
 @inner_kernel
-def guide_split(
-    d: Drive, L: Floats, c: int, v2: float, x_in: float, w_in: float
-) -> tuple[float, float, float]:
-    """Input side of cable c when the guide's output end stands at v2 = ln(T/T0).
+def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in: float) -> Split:
+    """Input side of cable c when the guide's output end stands at v_out = ln(T/T0).
 
-    Returns (stretch of guide, input half of the free span and input drum [m at strain T0/EA], its derivative by v2,
-    tension ratio at the input drum). The input drum's pending step is kept.
+    The input drum's pending step is kept.
     """
     cable, state = d.cables[c], d.states[c]
-    G, J = d.profiles, d.heights
     width = cable.guide
     per_turn = cable.guide_length / width
     span = 0.5 * cable.length
@@ -36,46 +41,51 @@ def guide_split(
     wrap = 2 * c + 1
     unit = cable.T0 * state.pretension / cable.EA
     target = (state.side - cable.sign * radius * (x_in - state.shaft_in)) / unit
-    low, high = v2 - width, v2 + width
+    low, high = v_out - width, v_out + width
     least, most = low, high
-    v1 = min(max(state.guide_end, low), high)
-    side = a_side = e_arc = g1 = g2 = swap = 0.0
+    v_in = min(max(state.guide_end, low), high)
+    side = by_v = 0.0
+    on_guide = ArcMeet(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     slides = False
     step = d.steps[wrap]
     step.w = w_in
     w_in = w_in if w_in > LEAST_WRAP else LEAST_WRAP
     for iteration in range(60):
-        tau1 = tau_of_v(L, 2, v1)
-        meet = wrap_eval(G, L, 2, wrap, J[wrap], w_in, v1, tau1, cable.mu[IN])
-        set_pending(step, meet)
-        step.end, step.tau = v1, tau1
-        e_arc, change, g1, g2, _, _, swap = arc_eval(G, arc, J[arc], v1, v2, 1.0)
-        e_span, a_span = strain_of_tau(L, 2, tau1)
-        side = radius * meet.total + span * e_span
-        a_side = radius * meet.slope + span * a_span * tau1
-        miss = side + per_turn * change - target
-        slides = (v1 >= high and miss < 0.0) or (v1 <= low and miss > 0.0)
+        tau_in = tau_of_v(laws, ELSEWHERE, v_in)
+        on_drum = wrap_eval(
+            d.profiles[wrap], laws, ELSEWHERE, d.heights[wrap], w_in, v_in, tau_in, cable.mu[IN]
+        )
+        set_pending(step, on_drum)
+        step.end_v, step.end_tau = v_in, tau_in
+        on_guide = arc_eval(d.profiles[arc], d.heights[arc], v_in, v_out, 1.0)
+        strain, strain_slope = strain_of_tau(laws, ELSEWHERE, tau_in)
+        side = radius * on_drum.total + span * strain
+        by_v = radius * on_drum.slope + span * strain_slope * tau_in
+        miss = side + per_turn * on_guide.change - target
+        slides = (v_in >= high and miss < 0.0) or (v_in <= low and miss > 0.0)
         if slides:
             break
-        newton = -miss / (a_side + per_turn * (g1 + swap))
+        newton = -miss / (by_v + per_turn * (on_guide.by_near + on_guide.swap))
         if abs(newton) <= 1e-14:
             break
         if miss > 0.0:
-            most = min(most, v1)
+            most = min(most, v_in)
         else:
-            least = max(least, v1)
-        new = min(max(v1 + newton, low), high)
+            least = max(least, v_in)
+        new = min(max(v_in + newton, low), high)
         if iteration > 6 and not least < new < most:
             new = 0.5 * (least + most)
-        v1 = new
+        v_in = new
     state.side_try = side * unit
-    state.guide_try = v1
-    state.guide_far = v2
+    state.guide_try = v_in
+    state.guide_far = v_out
     state.shaft_in_try = x_in
     # how far the near end follows the far end: wholly while sliding, through the touching slip zones otherwise
-    follow = 1.0 if slides else per_turn * swap / (a_side + per_turn * (g1 + swap))
-    slope = per_turn * g2 + follow * (a_side + per_turn * g1)
-    return side + per_turn * e_arc, slope, math.exp(v1)
+    follow = 1.0
+    if not slides:
+        follow = per_turn * on_guide.swap / (by_v + per_turn * (on_guide.by_near + on_guide.swap))
+    slope = per_turn * on_guide.by_far + follow * (by_v + per_turn * on_guide.by_near)
+    return Split(side + per_turn * on_guide.total, slope, math.exp(v_in))
 
 
 @inner_kernel
@@ -86,4 +96,4 @@ def guide_commit(d: Drive, c: int) -> None:
     state.side = state.side_try
     state.guide_end = state.guide_try
     state.shaft_in = state.shaft_in_try
-    d.heights[arc] = arc_commit(d.profiles, arc, d.heights[arc], state.guide_try, state.guide_far, 1.0)
+    d.heights[arc] = arc_commit(d.profiles[arc], d.heights[arc], state.guide_try, state.guide_far, 1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cablecomp.mechanics.circuit import circuit_commit, circuit_solve
+from cablecomp.mechanics.circuit import Solved, circuit_commit, circuit_solve
 from cablecomp.mechanics.drive import Drive, Terms
 from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
 from cablecomp.mechanics.pointer import call_term
@@ -46,20 +46,20 @@ def _distribute(d: Drive) -> None:
 
 
 @inlined_kernel
-def _solve_all(d: Drive, L: Floats, moment: float) -> tuple[float, float, int]:
-    """Joint angle and compliance with `moment` on the output pulley, through all circuits from the motor outward."""
+def _solve_all(d: Drive, laws: Floats, moment: float) -> Solved:
+    """The joint with `moment` [N m] on its output pulley, through all circuits from the motor outward."""
     angle = d.context.motor
-    total = 0.0
+    compliance = 0.0
     for ic in range(d.size.circuits):
         circuit = d.circuits[ic]
         last = d.states[circuit.first[0] + circuit.count - 1]
         guess = last.shaft if ic < d.size.circuits - 1 else d.context.joint
-        after, compliance, status = circuit_solve(d, L, ic, moment * circuit.share, angle, guess)
-        if status != STATUS_OK:
-            return after, total, status
-        total = total * circuit.ratio * circuit.ratio + compliance
-        angle = after
-    return angle, total, STATUS_OK
+        solved = circuit_solve(d, laws, ic, moment * circuit.share, angle, guess)
+        angle = solved.angle
+        if solved.status != STATUS_OK:
+            return Solved(angle, compliance, solved.status)
+        compliance = compliance * circuit.ratio * circuit.ratio + solved.compliance
+    return Solved(angle, compliance, STATUS_OK)
 
 
 @inlined_kernel
@@ -73,33 +73,31 @@ def _show_tensions(d: Drive) -> None:
 
 
 @inlined_kernel
-def joint_solve(d: Drive, terms: Terms, L: Floats) -> int:
+def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
     """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved
     together."""
     x = d.context
     load = x.load
     if d.size.terms == 0:
-        joint, compliance, status = _solve_all(d, L, load)
+        solved = _solve_all(d, laws, load)
     else:
-        joint = x.joint
-        compliance = 0.0
-        status = STATUS_DIVERGED
+        solved = Solved(x.joint, 0.0, STATUS_DIVERGED)
         low, high = -1e300, 1e300
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
             _distribute(d)
             before_slope, before_h, before_l = x.moment_slope, x.length_h, x.length_l
-            joint, compliance, status = _solve_all(d, L, moment)
-            if status == STATUS_SLACK and load > moment:
+            solved = _solve_all(d, laws, moment)
+            if solved.status == STATUS_SLACK and load > moment:
                 # a trial moment that no open circuit can take (a first guess of the acceleration): nearer to the load
                 low = max(low, moment)
                 moment = 0.5 * (moment + load)
                 continue
-            if status != STATUS_OK:
+            if solved.status != STATUS_OK:
                 break
-            moved = abs(joint - x.joint)
-            x.joint = joint
+            moved = abs(solved.angle - x.joint)
+            x.joint = solved.angle
             _show_tensions(d)
             run_terms(d, terms)
             excess = moment - (load - x.moment)
@@ -112,13 +110,13 @@ def joint_solve(d: Drive, terms: Terms, L: Floats) -> int:
                 high = min(high, moment)
             else:
                 low = max(low, moment)
-            moment -= excess / (1.0 + x.moment_slope * compliance)
+            moment -= excess / (1.0 + x.moment_slope * solved.compliance)
             if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
                 moment = 0.5 * (low + high)
-    x.joint = joint
-    x.compliance = compliance
+    x.joint = solved.angle
+    x.compliance = solved.compliance
     _show_tensions(d)
-    return status
+    return solved.status
 
 
 @inner_kernel
@@ -136,14 +134,14 @@ def advance(d: Drive, time: float, motor: float, load: float, temperature: float
 
 
 @inner_kernel
-def _follow_pretension(d: Drive, L: Floats) -> None:
+def _follow_pretension(d: Drive, laws: Floats) -> None:
     """Let the pretension of all cables follow the terms' factors; the next sample finds it."""
     x = d.context
     for ic in range(d.size.circuits):
         circuit = d.circuits[ic]
         for chain in range(circuit.chains):
             for j in range(circuit.count):
-                retension(d, L, circuit.first[chain] + j, x.pretension_h if chain == 0 else x.pretension_l)
+                retension(d, laws, circuit.first[chain] + j, x.pretension_h if chain == 0 else x.pretension_l)
 
 
 @inner_kernel
@@ -167,7 +165,7 @@ def joint_ready(d: Drive) -> int:
         step = d.steps[wrap]
         if not step.w > LEAST_WRAP:
             return STATUS_UNWOUND
-        if not (0.0 < step.tau < 1e300 and abs(step.total) < 1e300):
+        if not (0.0 < step.end_tau < 1e300 and abs(step.total) < 1e300):
             return STATUS_DIVERGED
     return STATUS_OK if abs(d.context.joint) < 1e300 else STATUS_DIVERGED
 
@@ -183,7 +181,7 @@ def strength_used(d: Drive) -> float:
 
 
 @inner_kernel
-def joint_commit(d: Drive, terms: Terms, L: Floats) -> int:
+def joint_commit(d: Drive, terms: Terms, laws: Floats) -> int:
     """Make the solved sample the state, unless a term's last word forbids it (the status says so)."""
     x = d.context
     if d.size.terms > 0:
@@ -193,9 +191,9 @@ def joint_commit(d: Drive, terms: Terms, L: Floats) -> int:
         if not terms_sane(d):
             return STATUS_EFFECT
     for ic in range(d.size.circuits):
-        circuit_commit(d, L, ic)
+        circuit_commit(d, laws, ic)
     if d.size.terms > 0:
-        _follow_pretension(d, L)
+        _follow_pretension(d, laws)
     x.motor_old = x.motor
     x.load_old = x.load
     x.joint_older = x.joint_old

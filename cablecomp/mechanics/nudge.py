@@ -11,7 +11,7 @@ from typing import Any
 
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
-from cablecomp.mechanics.profile import D, Floats, V, Y, piece_plain
+from cablecomp.mechanics.profile import Points, piece_plain
 from cablecomp.mechanics.records import IN, OUT
 
 SMALL = 1e-7  # greatest step, as a share of the tension and in rad
@@ -24,38 +24,38 @@ def grown(value: float, d: float) -> float:
 
 
 @inner_kernel
-def wrap_nudge(step: Any, G: Floats, i: int, n: int, mu: float, dv: float, dw: float) -> bool:
+def wrap_nudge(step: Any, p: Points, n: int, mu: float, dv: float, dw: float) -> bool:
     """Shift the pending step of plain wrap i by dv in its end value and dw in its wrap angle, if that is simple."""
-    k = int(step.k)
-    w, v, tau = step.w + dw, step.end + dv, grown(step.tau, dv)
-    y, t, c = step.y, step.e, step.c
+    k = int(step.kept)
+    w, v, end_tau = step.w + dw, step.end_v + dv, grown(step.end_tau, dv)
+    y, tau, stretch = step.y, step.tau, step.stretch
     before = step.v
     if k == n - 1:  # cable was wound on and nothing slips
         if not abs(v - before) <= mu * (w - y):
             return False
-        total, _ = piece_plain(w - y, v - before, t, tau)
-        step.total = c + total
+        total, _ = piece_plain(w - y, v - before, tau, end_tau)
+        step.total = stretch + total
     else:
         steep = mu if v > before else -mu
         if y == step.w:
             return False
         if k >= 0:
-            y0, y1 = G[i, Y, k], G[i, Y, k + 1]
-            slope = (G[i, V, k + 1] - G[i, V, k]) / (y1 - y0)
+            y0, y1 = p[k].y, p[k + 1].y
+            slope = (p[k + 1].v - p[k].v) / (y1 - y0)
             dy = (dv - steep * dw) / (slope - steep)
             y += dy
             if not (y0 <= y <= y1 and y < w):
                 return False
-            c += dy * (grown(t, 0.5 * slope * dy) - 1.0)
-            step.b += G[i, D, k + 1] * dy * t
+            stretch += dy * (grown(tau, 0.5 * slope * dy) - 1.0)
+            step.stretch_error += p[k + 1].merged * dy * tau
         here = v - steep * (w - y)
-        if k < 0 and (here - G[i, V, 0]) * steep < 0.0:
+        if k < 0 and (here - p[0].v) * steep < 0.0:
             return False
-        t = grown(t, here - before)
-        total, _ = piece_plain(w - y, v - here, t, tau)
-        step.total = c + total
-        step.y, step.v, step.c, step.e = y, here, c, t
-    step.w, step.end, step.tau = w, v, tau
+        tau = grown(tau, here - before)
+        total, _ = piece_plain(w - y, v - here, tau, end_tau)
+        step.total = stretch + total
+        step.y, step.v, step.stretch, step.tau = y, here, stretch, tau
+    step.w, step.end_v, step.end_tau = w, v, end_tau
     return True
 
 
@@ -65,10 +65,10 @@ def cable_nudge(d: Drive, c: int, change: float, turn: float) -> bool:
     cable, state = d.cables[c], d.states[c]
     r = change / state.tension
     dv = r * (1.0 - 0.5 * r)
-    G, out, into = d.profiles, 2 * c, 2 * c + 1
-    if not wrap_nudge(d.steps[out], G, out, d.heights[out], cable.mu[OUT], dv, cable.sign * turn):
+    out, into = 2 * c, 2 * c + 1
+    if not wrap_nudge(d.steps[out], d.profiles[out], d.heights[out], cable.mu[OUT], dv, cable.sign * turn):
         return False
-    if not wrap_nudge(d.steps[into], G, into, d.heights[into], cable.mu[IN], dv, 0.0):
+    if not wrap_nudge(d.steps[into], d.profiles[into], d.heights[into], cable.mu[IN], dv, 0.0):
         return False
     stretched = state.compliance * change
     state.tension += change

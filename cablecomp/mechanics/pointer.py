@@ -34,13 +34,22 @@ def call_term(address: int, context: Any, parameters: Any, state: Any) -> None:
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba is not typed
 def call_walk(
-    typing: Any, address: Any, P: Any, I: Any, S: Any, J: Any, L: Any, rows: Any, outs: Any, commit: Any
+    typing: Any,
+    address: Any,
+    fixed: Any,
+    layout: Any,
+    memory: Any,
+    heights: Any,
+    laws: Any,
+    rows: Any,
+    outs: Any,
+    commit: Any,
 ) -> Any:
     """Run the kernel `walk` whose machine code lies at `address` (`kernel_address`): rows done, status.
 
     An ordinary call would link the callee's code into the caller's and compile all of it once more.
     """
-    kinds = (P, I, S, J, L, rows, outs, commit)
+    kinds = (fixed, layout, memory, heights, laws, rows, outs, commit)
     result = types.UniTuple(types.int64, 2)
 
     def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:

@@ -11,8 +11,7 @@ The clamp touches one contiguous piece at the departure point, so the list works
 Where friction depends on tension or on the place in the groove, the law is the same in the coordinates
 v = int dT/(T m(T)) and sigma = mu int g(y) dy (table mode, see `tables.py`).
 
-Rows of `G[i]`: Y angle, V logarithmic tension, C integral of strain * EA/T0 from the termination, D bound on the error
-of v that merging left in the piece below a point, B integral of D * tau: the bound on the error of C, E = exp(V).
+A profile is an array `p` of records `POINT`, whose first n are in use.
 """
 
 from __future__ import annotations
@@ -26,6 +25,8 @@ from numpy.typing import NDArray
 from cablecomp.mechanics.jit import kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
     GROOVED,
+    HEAD,
+    MODE,
     PLAIN,
     STIFF,
     STIFFENING,
@@ -37,9 +38,9 @@ from cablecomp.mechanics.tables import (
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
+Points: TypeAlias = Any
+"""An array of records `POINT`."""
 
-Y, V, C, D, B, E = 0, 1, 2, 3, 4, 5
-ROWS = 6
 LEAST_WRAP = 1e-3  # [rad] of cable that a drum has to keep
 
 # 8-point Gauss-Legendre on [0, 1]
@@ -57,12 +58,20 @@ class Meet(NamedTuple):
 
     total: float  # integral of e
     slope: float  # its derivative by the end value
-    k: int  # last point kept
-    y: float  # the meeting point
+    kept: int  # last point kept
+    y: float  # the meeting point, as a `POINT`
     v: float
-    c: float
-    b: float
-    e: float
+    stretch: float
+    stretch_error: float
+    tau: float
+
+
+class Wound(NamedTuple):
+    """The cable on one drum."""
+
+    total: float  # integral of strain EA/T0 over the wrap
+    by_v: float  # its derivative by the end value ln(T/T0)
+    by_wrap: float  # by the wrap angle
 
 
 @kernel
@@ -74,28 +83,28 @@ def copy_floats(source: Floats, i: int, target: Floats, j: int, n: int) -> None:
 
 @leaf_kernel
 def piece(
-    L: Floats, law: int, y1: float, v1: float, t1: float, y2: float, v2: float, t2: float
+    laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
 ) -> tuple[float, float]:
     """Integral of e(v) over y1..y2 and of de/dv; e = strain * EA/T0 = tau - 1 for the plain cable, whose tau
-    are t1, t2."""
+    are tau1, tau2."""
     dy = y2 - y1
     d = v2 - v1
-    if L is None:
-        return piece_plain(dy, d, t1, t2)
-    if L[0, 0, 0] == PLAIN:
-        return piece_plain(dy, d, t1, t2)
-    if L[0, 0, 0] == STIFF:
-        return _piece_stiff(L[law, 0, STIFFENING], dy, v1, d)
-    return piece_table(L, law, y1, v1, y2, v2)
+    if laws is None:
+        return piece_plain(dy, d, tau1, tau2)
+    if laws[0, HEAD, MODE] == PLAIN:
+        return piece_plain(dy, d, tau1, tau2)
+    if laws[0, HEAD, MODE] == STIFF:
+        return _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, d)
+    return piece_table(laws, law, y1, v1, y2, v2)
 
 
 @leaf_kernel
-def piece_plain(dy: float, d: float, t1: float, t2: float) -> tuple[float, float]:
+def piece_plain(dy: float, d: float, tau1: float, tau2: float) -> tuple[float, float]:
     """`piece` in closed form: exp(v) over a straight piece that rises by d."""
     if abs(d) > 0.1:
-        grown = dy * (t2 - t1) / d
+        grown = dy * (tau2 - tau1) / d
     else:  # (1 - exp(-d))/d as a series: the difference of the exponentials would cancel
-        grown = dy * t2 * (1.0 - d * (F2 - d * (F3 - d * (F4 - d * (F5 - d * (F6 - d * (F7 - d * F8)))))))
+        grown = dy * tau2 * (1.0 - d * (F2 - d * (F3 - d * (F4 - d * (F5 - d * (F6 - d * (F7 - d * F8)))))))
     return grown - dy, grown
 
 
@@ -119,31 +128,31 @@ def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float
 
 
 @kernel
-def piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
+def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
     """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no
     place."""
     dy = y2 - y1
     d = v2 - v1
     total = 0.0
     slope = 0.0
-    if L[law, 0, GROOVED] == 0.0:
+    if laws[law, HEAD, GROOVED] == 0.0:
         if abs(d) < 0.05:
             for j in range(3):
-                e, de = strain(L, law, v1 + d * SHORT_X[j])
+                e, de = strain(laws, law, v1 + d * SHORT_X[j])
                 total += SHORT_W[j] * e
                 slope += SHORT_W[j] * de
         else:
             for j in range(8):
-                e, de = strain(L, law, v1 + d * GAUSS_X[j])
+                e, de = strain(laws, law, v1 + d * GAUSS_X[j])
                 total += GAUSS_W[j] * e
                 slope += GAUSS_W[j] * de
         return total * dy, slope * dy
-    s1 = groove(L, law, y1)
-    span = groove(L, law, y2) - s1
+    s1 = groove(laws, law, y1)
+    span = groove(laws, law, y2) - s1
     for j in range(8):
         y = y1 + dy * GAUSS_X[j]
-        share = (groove(L, law, y) - s1) / span if span > 0.0 else 0.0
-        e, de = strain(L, law, v1 + d * share)
+        share = (groove(laws, law, y) - s1) / span if span > 0.0 else 0.0
+        e, de = strain(laws, law, v1 + d * share)
         total += GAUSS_W[j] * e
         slope += GAUSS_W[j] * de
     return total * dy, slope * dy
@@ -152,180 +161,187 @@ def piece_table(L: Floats, law: int, y1: float, v1: float, y2: float, v2: float)
 @leaf_kernel
 def set_pending(step: Any, meet: Meet) -> None:
     """Write an evaluated step into a wrap's record `STEP`."""
-    step.total, step.k = meet.total, meet.k
-    step.y, step.v, step.c, step.b, step.e = meet.y, meet.v, meet.c, meet.b, meet.e
+    step.total, step.kept = meet.total, meet.kept
+    step.y, step.v, step.tau = meet.y, meet.v, meet.tau
+    step.stretch, step.stretch_error = meet.stretch, meet.stretch_error
 
 
 @leaf_kernel
-def wrap_eval(
-    G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float, tau: float, mu: float
-) -> Meet:
-    """What wrap i would hold at wrap angle w and end value v, without committing it.
+def wrap_eval(p: Points, laws: Floats, law: int, n: int, w: float, v: float, tau: float, mu: float) -> Meet:
+    """What the wrap would hold at wrap angle w and end value v, without committing it.
 
-    `w` is above 0; `tau` is exp(v).
+    `w` is above 0; `tau` is exp(v). `g_` are groove coordinates (y itself for the plain law).
     """
     top = n - 1
     k = top
-    yp, vp, tp = G[i, Y, top], G[i, V, top], G[i, E, top]
-    if w < yp:
+    y_old, v_old, tau_old = p[top].y, p[top].v, p[top].tau
+    if w < y_old:
         k -= 1
-        while G[i, Y, k] > w:  # ends at the termination, y = 0, at the latest
+        while p[k].y > w:  # ends at the termination, y = 0, at the latest
             k -= 1
-        y1, v1 = G[i, Y, k], G[i, V, k]
-        s1 = groove(L, law, y1)
-        share = (groove(L, law, w) - s1) / (groove(L, law, G[i, Y, k + 1]) - s1)
-        yp = w
-        vp = v1 + share * (G[i, V, k + 1] - v1)
-        tp = math.exp(vp)
-    sw = groove(L, law, w)
-    if abs(v - vp) <= mu * (sw - groove(L, law, yp)):
+        y1, v1 = p[k].y, p[k].v
+        g1 = groove(laws, law, y1)
+        share = (groove(laws, law, w) - g1) / (groove(laws, law, p[k + 1].y) - g1)
+        y_old = w
+        v_old = v1 + share * (p[k + 1].v - v1)
+        tau_old = math.exp(v_old)
+    g_end = groove(laws, law, w)
+    if abs(v - v_old) <= mu * (g_end - groove(laws, law, y_old)):
         # cable wound on, or nothing at all happened: no slip
-        cp, bp = _running(G, L, law, i, k, n, yp, vp, tp)
-        if w == yp:
-            return Meet(cp, 0.0, k, yp, vp, cp, bp, tp)
-        integral, slope = piece(L, law, yp, vp, tp, w, v, tau)
+        stretch, error = _running(p, laws, law, k, n, y_old, v_old, tau_old)
+        if w == y_old:
+            return Meet(stretch, 0.0, k, y_old, v_old, stretch, error, tau_old)
+        integral, slope = piece(laws, law, y_old, v_old, tau_old, w, v, tau)
         # its derivative by the new end alone: about half of the whole shift's, enough for Newton's method
-        return Meet(cp + integral, 0.5 * slope, k, yp, vp, cp, bp, tp)
+        return Meet(stretch + integral, 0.5 * slope, k, y_old, v_old, stretch, error, tau_old)
     # the cone of the new end cuts into the profile: walk inward to where they meet
-    s = 1.0 if v > vp else -1.0
+    s = 1.0 if v > v_old else -1.0
     steep = s * mu
-    over_upper = v - steep * (sw - groove(L, law, yp)) - vp
-    y_upper = yp
+    over_upper = v - steep * (g_end - groove(laws, law, y_old)) - v_old
+    y_upper = y_old
     over = 0.0
     while k >= 0:
-        over = v - steep * (sw - groove(L, law, G[i, Y, k])) - G[i, V, k]
+        over = v - steep * (g_end - groove(laws, law, p[k].y)) - p[k].v
         if over * s <= 0.0:
             break
         over_upper = over
-        y_upper = G[i, Y, k]
+        y_upper = p[k].y
         k -= 1
     if k < 0:  # the whole wrap slips, down to the termination
-        ym = 0.0
+        y_meet = 0.0
     else:
         # both differences vanish together where the new end lies on the old profile to the last bit
         share = over / (over - over_upper) if over != over_upper else 1.0
-        ym = between(L, law, G[i, Y, k], y_upper, share)
-    vm = v - steep * (sw - groove(L, law, ym))
-    tm = math.exp(vm)
-    cm = bm = 0.0
+        y_meet = between(laws, law, p[k].y, y_upper, share)
+    v_meet = v - steep * (g_end - groove(laws, law, y_meet))
+    tau_meet = math.exp(v_meet)
+    stretch = error = 0.0
     if k >= 0:
-        cm, bm = _running(G, L, law, i, k, n, ym, vm, tm)
-    integral, slope = piece(L, law, ym, vm, tm, w, v, tau)
-    return Meet(cm + integral, slope, k, ym, vm, cm, bm, tm)
+        stretch, error = _running(p, laws, law, k, n, y_meet, v_meet, tau_meet)
+    integral, slope = piece(laws, law, y_meet, v_meet, tau_meet, w, v, tau)
+    return Meet(stretch + integral, slope, k, y_meet, v_meet, stretch, error, tau_meet)
 
 
 @leaf_kernel
 def _running(
-    G: Floats, L: Floats, law: int, i: int, k: int, n: int, y: float, v: float, t: float
+    p: Points, laws: Floats, law: int, k: int, n: int, y: float, v: float, t: float
 ) -> tuple[float, float]:
-    """C and B at a point (y, v) of the profile on the piece above point k."""
-    if k == n - 1 or y == G[i, Y, k]:
-        return G[i, C, k], G[i, B, k]
-    integral, _ = piece(L, law, G[i, Y, k], G[i, V, k], G[i, E, k], y, v, t)
-    error = G[i, D, k + 1]
-    return G[i, C, k] + integral, G[i, B, k] + error * (integral + y - G[i, Y, k])
+    """`stretch` and `stretch_error` at a point (y, v) of the profile on the piece above point k."""
+    if k == n - 1 or y == p[k].y:
+        return p[k].stretch, p[k].stretch_error
+    integral, _ = piece(laws, law, p[k].y, p[k].v, p[k].tau, y, v, t)
+    error = p[k + 1].merged
+    return p[k].stretch + integral, p[k].stretch_error + error * (integral + y - p[k].y)
 
 
 @kernel
-def wrap_commit(G: Floats, L: Floats, law: int, i: int, n: int, step: Any, tolerance: float) -> int:
+def wrap_commit(p: Points, laws: Floats, law: int, n: int, step: Any, tolerance: float) -> int:
     """Make an evaluated step, a record `STEP`, the state; returns the new number of points.
 
     `tolerance` bounds the error of v that merging of neighbours may leave in a piece; a merged piece's integral is that
     of the straight piece, so that the stretch stays a continuous function of the tension. The stack never
     outgrows its array.
     """
-    total, k, w, v, tau = step.total, int(step.k), step.w, step.end, step.tau
-    below = G[i, D, k + 1] if 0 <= k < n - 1 else 0.0
+    total, k, w, v, tau = step.total, int(step.kept), step.w, step.end_v, step.end_tau
+    below = p[k + 1].merged if 0 <= k < n - 1 else 0.0
     kept = k == n - 1  # nothing was cut off: cable was wound on, and may continue the piece below
     n = k + 1
-    if n == 0 or step.y > G[i, Y, n - 1]:
-        G[i, Y, n], G[i, V, n], G[i, C, n] = step.y, step.v, step.c
-        G[i, D, n], G[i, B, n], G[i, E, n] = below, step.b, step.e
+    if n == 0 or step.y > p[n - 1].y:
+        p[n].y, p[n].v, p[n].stretch = step.y, step.v, step.stretch
+        p[n].merged, p[n].stretch_error, p[n].tau = below, step.stretch_error, step.tau
         n += 1
         kept = False
     last = n - 1
-    if w > G[i, Y, last]:
+    if w > p[last].y:
         error = 0.0
         if kept and last >= 1:
-            merged = G[i, D, last] + _merge_error(G, L, law, i, n, w, v)
+            merged = p[last].merged + _merge_error(p, laws, law, n, w, v)
             if merged <= tolerance:
                 error = merged
                 last -= 1
-                straight, _ = piece(L, law, G[i, Y, last], G[i, V, last], G[i, E, last], w, v, tau)
-                total = G[i, C, last] + straight
+                straight, _ = piece(laws, law, p[last].y, p[last].v, p[last].tau, w, v, tau)
+                total = p[last].stretch + straight
         n = last + 2
-        G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1] = w, v, error
-        G[i, C, n - 1], G[i, E, n - 1] = total, tau
-        G[i, B, n - 1] = G[i, B, last] + error * (total - G[i, C, last] + w - G[i, Y, last])
-    if n >= G.shape[2] - 3:
-        n = compact(G, L, law, i, n)
+        p[n - 1].y, p[n - 1].v, p[n - 1].merged = w, v, error
+        p[n - 1].stretch, p[n - 1].tau = total, tau
+        p[n - 1].stretch_error = p[last].stretch_error + error * (total - p[last].stretch + w - p[last].y)
+    if n >= p.shape[0] - 3:
+        n = compact(p, laws, law, n)
     return n
 
 
 @kernel
-def _merge_error(G: Floats, L: Floats, law: int, i: int, n: int, w: float, v: float) -> float:
+def _merge_error(p: Points, laws: Floats, law: int, n: int, w: float, v: float) -> float:
     """Distance in v of the last point from the straight piece that would replace it."""
-    y0, y1 = G[i, Y, n - 2], G[i, Y, n - 1]
-    s0 = groove(L, law, y0)
-    share = (groove(L, law, y1) - s0) / (groove(L, law, w) - s0)
-    return abs(G[i, V, n - 2] + share * (v - G[i, V, n - 2]) - G[i, V, n - 1])
+    y0, y1 = p[n - 2].y, p[n - 1].y
+    g0 = groove(laws, law, y0)
+    share = (groove(laws, law, y1) - g0) / (groove(laws, law, w) - g0)
+    return abs(p[n - 2].v + share * (v - p[n - 2].v) - p[n - 1].v)
 
 
 @kernel
-def compact(G: Floats, L: Floats, law: int, i: int, n: int) -> int:
-    """Halve the list by dropping the points that a straight piece replaces best; the error made is kept in D and B.
+def compact(p: Points, laws: Floats, law: int, n: int) -> int:
+    """Halve the list by dropping the points that a straight piece replaces best; the error made is kept in
+    `merged` and `stretch_error`.
 
     A chord of a mu-Lipschitz profile is mu-Lipschitz, so the friction bound survives.
     """
-    # error made here, by the piece below each point, kept in the row E (renewed at the end); the limit is on this alone
+    # error made here, by the piece below each point, kept in the field tau (renewed at the end): the limit is on
+    # this alone
     for k in range(n):
-        G[i, E, k] = 0.0
+        p[k].tau = 0.0
     limit = 1e-12
-    while n > G.shape[2] // 2:
+    while n > p.shape[0] // 2:
         m = 1
         for k in range(1, n - 1):
-            y0, v0 = G[i, Y, m - 1], G[i, V, m - 1]
-            y1, v1 = G[i, Y, k], G[i, V, k]
-            y2, v2 = G[i, Y, k + 1], G[i, V, k + 1]
-            s0 = groove(L, law, y0)
-            off = abs(v0 + (groove(L, law, y1) - s0) / (groove(L, law, y2) - s0) * (v2 - v0) - v1)
-            error = max(G[i, E, k], G[i, E, k + 1]) + off
+            y0, v0 = p[m - 1].y, p[m - 1].v
+            y1, v1 = p[k].y, p[k].v
+            y2, v2 = p[k + 1].y, p[k + 1].v
+            g0 = groove(laws, law, y0)
+            off = abs(v0 + (groove(laws, law, y1) - g0) / (groove(laws, law, y2) - g0) * (v2 - v0) - v1)
+            error = max(p[k].tau, p[k + 1].tau) + off
             if error <= limit:
-                G[i, E, k + 1] = error
-                G[i, D, k + 1] = max(G[i, D, k], G[i, D, k + 1]) + off
+                p[k + 1].tau = error
+                p[k + 1].merged = max(p[k].merged, p[k + 1].merged) + off
             else:
-                G[i, Y, m], G[i, V, m], G[i, D, m], G[i, E, m] = y1, v1, G[i, D, k], G[i, E, k]
+                p[m].y, p[m].v, p[m].merged, p[m].tau = y1, v1, p[k].merged, p[k].tau
                 m += 1
-        G[i, Y, m], G[i, V, m], G[i, D, m], G[i, E, m] = (
-            G[i, Y, n - 1], G[i, V, n - 1], G[i, D, n - 1], G[i, E, n - 1]
+        p[m].y, p[m].v, p[m].merged, p[m].tau = (
+            p[n - 1].y, p[n - 1].v, p[n - 1].merged, p[n - 1].tau
         )  # fmt: skip
         n = m + 1
         limit *= 4.0
-    accumulate(G, L, law, i, n)
+    accumulate(p, laws, law, n)
     return n
 
 
 @kernel
-def accumulate(G: Floats, L: Floats, law: int, i: int, n: int) -> None:
-    """Recompute the running integrals C and B of wrap i."""
-    G[i, C, 0] = 0.0
-    G[i, B, 0] = 0.0
-    G[i, E, 0] = math.exp(G[i, V, 0])
+def accumulate(p: Points, laws: Floats, law: int, n: int) -> None:
+    """Recompute the running integrals `stretch` and `stretch_error`."""
+    p[0].stretch = 0.0
+    p[0].stretch_error = 0.0
+    p[0].tau = math.exp(p[0].v)
     for k in range(1, n):
-        dy = G[i, Y, k] - G[i, Y, k - 1]
-        G[i, E, k] = math.exp(G[i, V, k])
-        integral, _ = piece(
-            L, law, G[i, Y, k - 1], G[i, V, k - 1], G[i, E, k - 1], G[i, Y, k], G[i, V, k], G[i, E, k]
-        )
-        G[i, C, k] = G[i, C, k - 1] + integral
-        G[i, B, k] = G[i, B, k - 1] + G[i, D, k] * (integral + dy)
+        dy = p[k].y - p[k - 1].y
+        p[k].tau = math.exp(p[k].v)
+        integral, _ = piece(laws, law, p[k - 1].y, p[k - 1].v, p[k - 1].tau, p[k].y, p[k].v, p[k].tau)
+        p[k].stretch = p[k - 1].stretch + integral
+        p[k].stretch_error = p[k - 1].stretch_error + p[k].merged * (integral + dy)
 
 
 @kernel
-def wrap_fill(G: Floats, L: Floats, law: int, i: int, w: float, v: float, slope: float) -> int:
-    """Start wrap i straight: v at the departure point, falling inward by `slope` per sigma (0 = uniform)."""
-    G[i, :, :] = 0.0
-    G[i, V, 0] = v - slope * (groove(L, law, w) - groove(L, law, 0.0))
-    G[i, Y, 1], G[i, V, 1] = w, v
-    accumulate(G, L, law, i, 2)
+def clear(p: Points) -> None:
+    """Set every point to zero."""
+    for k in range(p.shape[0]):
+        p[k].y = p[k].v = p[k].stretch = 0.0
+        p[k].merged = p[k].stretch_error = p[k].tau = 0.0
+
+
+@kernel
+def wrap_fill(p: Points, laws: Floats, law: int, w: float, v: float, slope: float) -> int:
+    """Start the wrap straight: v at the departure point, falling inward by `slope` per sigma (0 = uniform)."""
+    clear(p)
+    p[0].v = v - slope * (groove(laws, law, w) - groove(laws, law, 0.0))
+    p[1].y, p[1].v = w, v
+    accumulate(p, laws, law, 2)
     return 2

@@ -33,10 +33,10 @@ SIZES = record(
         ("terms", "i8"),
         ("capacity", "i8"),  # points that a profile has room for
         ("grids", "i8"),  # drums with viscous slip: all or none
-        # in the parameters P: circuits, then
+        # in `fixed`: circuits, then
         ("cables_at", "i8"),
         ("sensor_at", "i8"),  # behind the terms' parameters
-        # in the state S: states of the cables, then
+        # in `memory`: states of the cables, then
         ("context_at", "i8"),
         ("filter_at", "i8"),  # the terms' own states follow
         ("grids_at", "i8"),
@@ -65,7 +65,7 @@ CABLE = record(
         ("radius", "f8", (2,)),
         ("mu", "f8", (2,)),
         ("wrap", "f8", (2,)),  # wrap angle at position zero
-        ("law", "i8", (2,)),  # law table: 0, 1 = the joint's own drum in chain h, l; 2 = everywhere else
+        ("law", "i8", (2,)),  # its law table: ON_H, ON_L, ELSEWHERE
         ("length", "f8"),  # of the free span
         ("EA", "f8"),
         ("T0", "f8"),
@@ -92,7 +92,7 @@ SENSOR = record(
     ]
 )
 
-# A term of further physics: its compiled function, where its parameters lie in P, its state in S.
+# A term of further physics: its compiled function, where its parameters lie in `fixed`, its state in `memory`.
 TERM = record(
     [
         ("address", "i8"),
@@ -129,19 +129,31 @@ STATE = record(
     ]
 )
 
+# A point of a tension profile, the first at the termination, the last where the cable leaves (`profile.py`).
+POINT = record(
+    [
+        ("y", "f8"),  # angle from the termination, fixed to the drum
+        ("v", "f8"),  # ln(T/T0)
+        ("stretch", "f8"),  # integral of strain EA/T0 from the termination
+        ("merged", "f8"),  # bound on the error of v that merging left in the piece below
+        ("stretch_error", "f8"),  # integral of merged tau: bound on the error of stretch
+        ("tau", "f8"),  # exp(v)
+    ]
+)
+
 # A wrap's pending step (no state: every solution writes it anew).
 STEP = record(
     [
         ("total", "f8"),  # integral of strain EA/T0 over the wrap
-        ("k", "f8"),  # last point of the profile that is kept,
-        ("y", "f8"),  # and where the cone meets the profile:
+        ("kept", "f8"),  # last point of the profile that is kept,
+        ("y", "f8"),  # and the point where the cone meets the profile
         ("v", "f8"),
-        ("c", "f8"),
-        ("b", "f8"),
-        ("e", "f8"),
+        ("stretch", "f8"),
+        ("stretch_error", "f8"),
+        ("tau", "f8"),
         ("w", "f8"),  # wrap angle
-        ("end", "f8"),  # end value of v
-        ("tau", "f8"),  # end value of T/T0
+        ("end_v", "f8"),  # v at the departure point
+        ("end_tau", "f8"),
     ]
 )
 

@@ -17,14 +17,21 @@ VISCOUS_TRAVEL = 4.0  # rotation [rad] beyond position zero that the viscous gri
 
 @kernel
 def joint_start(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, time: float, motor: float, slope: float
+    fixed: Floats,
+    layout: Ints,
+    memory: Floats,
+    heights: Ints,
+    laws: Floats,
+    time: float,
+    motor: float,
+    slope: float,
 ) -> None:
     """Fill all wraps at the drive's position: u = 0 at every departure point, rising inward by `slope` * mu per radian.
 
     slope 0 = uniform T0; +1 and -1 = the highest and the lowest profile that friction admits at that end tension.
     """
-    d = drive(P, I, S, J)
-    x, G = d.context, d.profiles
+    d = drive(fixed, layout, memory, heights)
+    x = d.context
     x.time = time
     x.first = 1.0
     x.motor = x.motor_old = motor
@@ -40,13 +47,13 @@ def joint_start(
                 for end in range(2):
                     w = cable.wrap[end] + (cable.sign * after if end == OUT else -cable.sign * shaft)
                     wrap, law = 2 * c + end, cable.law[end]
-                    w_kept, v = max(w, LEAST_WRAP), v_of_tau(L, law, 1.0)
-                    J[wrap] = wrap_fill(G, L, law, wrap, w_kept, v, -slope * cable.mu[end])
+                    w_kept, v = max(w, LEAST_WRAP), v_of_tau(laws, law, 1.0)
+                    heights[wrap] = wrap_fill(d.profiles[wrap], laws, law, w_kept, v, -slope * cable.mu[end])
                     if d.size.grids > 0:
                         viscous_fill(d.grids[wrap], w_kept, max(cable.wrap[end] + VISCOUS_TRAVEL, w + 1.0))
                 if d.size.stacks > 2 * d.size.cables:
                     arc = 2 * d.size.cables + c
-                    J[arc] = arc_fill(G, arc, cable.guide, 0.0)
+                    heights[arc] = arc_fill(d.profiles[arc], cable.guide, 0.0)
                 state.shaft_in = shaft
                 state.shaft = after
                 state.pretension = state.stiffness = 1.0

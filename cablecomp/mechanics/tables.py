@@ -1,12 +1,11 @@
 """Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
 
-`L[law]` is a table of 4 rows. Row 0 is the head: [mode, v_low, v_step, v_count, y_low, y_step, y_count, u_low,
-u_step, u_count, stiffening, 1 if friction depends on the place].
-Mode 0 is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `L` is None for the plain drive without any
-extension: the compiler then leaves out all code that a plain drive does not need. Mode 2 is the plain friction
-of mode 0 with the stiffening law of the head. In mode 1 row 1 holds u = ln tau
-on an even grid of v = int du/m(e^u), row 2 the groove coordinate g(y) =
-int m_g dy on an even grid of y, row 3 v on an even grid of u; e(tau) follows from u by the stiffening law in the head.
+`laws[law]` is a table of 4 rows: the head, whose places have names below, and three curves.
+Mode PLAIN is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `laws` is None for the plain drive without
+any change: the compiler then leaves out all code that a plain drive does not need. Mode STIFF is the plain friction of
+PLAIN with the stiffening law of the head. In mode TABLED row U_OF_V holds u = ln tau on an even grid of
+v = int du/m(e^u), row G_OF_Y the groove coordinate g(y) = int m_g dy on an even grid of y, row V_OF_U v on an even grid
+of u; e(tau) follows from u by the stiffening law in the head.
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
 """
 
@@ -25,10 +24,18 @@ from cablecomp.mechanics.jit import kernel, leaf_kernel
 Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
-U_LOW, U_HIGH = -7.0, 2.5
+LEAST_U, MOST_U = -7.0, 2.5
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
-STIFFENING = 10  # place in the head of b in EA(T) = EA (1 + b (tau - 1))
-GROOVED = 11  # place in the head: 0 = g(y) is y itself
+ON_H, ON_L, ELSEWHERE = 0, 1, 2  # laws: of the joint's own drum in chain h and l, of all other places
+HEAD, U_OF_V, G_OF_Y, V_OF_U = range(4)  # rows
+(
+    MODE,
+    V_LOW, V_STEP,  # grids: their first value, and from one to the next
+    Y_LOW, Y_STEP,
+    U_LOW, U_STEP,
+    STIFFENING,  # b in EA(T) = EA (1 + b (tau - 1))
+    GROOVED,  # 0 = g(y) is y itself
+) = range(9)  # fmt: skip
 
 
 def plain_law() -> Floats:
@@ -39,7 +46,7 @@ def plain_law() -> Floats:
 def stiffening_law(stiffening: float) -> Floats:
     """Constant mu with the tangent stiffness EA (1 + stiffening (tau - 1)), in the form of a table."""
     table = np.zeros((4, 16))
-    table[0, 0], table[0, STIFFENING] = STIFF, stiffening
+    table[HEAD, MODE], table[HEAD, STIFFENING] = STIFF, stiffening
     return table
 
 
@@ -52,19 +59,20 @@ def law_table(
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination) and the tangent stiffness EA (1 + stiffening (tau - 1)); both factors are vectorised and positive."""
     table = np.zeros((4, SIZE))
-    u = np.linspace(U_LOW, U_HIGH, SIZE)
+    u = np.linspace(LEAST_U, MOST_U, SIZE)
     v = _integral(u, 1.0 / tension_factor(np.exp(u)))
     v -= np.interp(0.0, u, v)
     v_grid = np.linspace(v[0], v[-1], SIZE)
-    table[1] = CubicHermiteSpline(v, u, tension_factor(np.exp(u)))(v_grid)
-    table[3] = v
+    table[U_OF_V] = CubicHermiteSpline(v, u, tension_factor(np.exp(u)))(v_grid)
+    table[V_OF_U] = v
     y = np.linspace(0.0, wrap_max_rad, SIZE)
     by_place = groove_factor(y)
-    table[2] = _integral(y, by_place)
-    table[0, :12] = [
-        1.0, v[0], v_grid[1] - v_grid[0], SIZE, 0.0, y[1] - y[0], SIZE, U_LOW, u[1] - u[0], SIZE, stiffening,
-        float(np.any(by_place != 1.0)),
-    ]  # fmt: skip
+    table[G_OF_Y] = _integral(y, by_place)
+    head = table[HEAD]
+    head[MODE], head[STIFFENING], head[GROOVED] = TABLED, stiffening, float(np.any(by_place != 1.0))
+    head[V_LOW], head[V_STEP] = v[0], v_grid[1] - v_grid[0]
+    head[Y_LOW], head[Y_STEP] = 0.0, y[1] - y[0]
+    head[U_LOW], head[U_STEP] = LEAST_U, u[1] - u[0]
     return table
 
 
@@ -77,7 +85,7 @@ def _integral(x: Floats, f: Floats) -> Floats:
 
 
 @kernel
-def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) -> float:
+def look_up(laws: Floats, law: int, row: int, low: float, step: float, x: float) -> float:
     """Cubic interpolation on an even grid (Catmull-Rom); straight beyond its ends."""
     p = (x - low) / step
     k = int(p)
@@ -88,8 +96,8 @@ def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) ->
     t = p - k
     if t < -1.0 or t > 2.0:
         edge = 0 if t < 0.0 else SIZE - 2
-        return L[law, row, edge] + (p - edge) * (L[law, row, edge + 1] - L[law, row, edge])
-    a, b, c, d = L[law, row, k - 1], L[law, row, k], L[law, row, k + 1], L[law, row, k + 2]
+        return laws[law, row, edge] + (p - edge) * (laws[law, row, edge + 1] - laws[law, row, edge])
+    a, b, c, d = laws[law, row, k - 1], laws[law, row, k], laws[law, row, k + 1], laws[law, row, k + 2]
     # Lagrange cubic through the four neighbours
     return (
         -a * t * (t - 1.0) * (t - 2.0) / 6.0
@@ -100,16 +108,16 @@ def look_up(L: Floats, law: int, row: int, low: float, step: float, x: float) ->
 
 
 @kernel
-def look_up_slope(L: Floats, law: int, row: int, low: float, step: float, x: float) -> tuple[float, float]:
+def look_up_slope(laws: Floats, law: int, row: int, low: float, step: float, x: float) -> tuple[float, float]:
     """As `look_up`, with its derivative by x."""
     p = (x - low) / step
     k = min(max(int(p), 1), SIZE - 3)
     t = p - k
     if t < -1.0 or t > 2.0:
         edge = 0 if t < 0.0 else SIZE - 2
-        rise = L[law, row, edge + 1] - L[law, row, edge]
-        return L[law, row, edge] + (p - edge) * rise, rise / step
-    a, b, c, d = L[law, row, k - 1], L[law, row, k], L[law, row, k + 1], L[law, row, k + 2]
+        rise = laws[law, row, edge + 1] - laws[law, row, edge]
+        return laws[law, row, edge] + (p - edge) * rise, rise / step
+    a, b, c, d = laws[law, row, k - 1], laws[law, row, k], laws[law, row, k + 1], laws[law, row, k + 2]
     # the same cubic in powers of t
     first = -a / 3.0 - b / 2.0 + c - d / 6.0
     second = a / 2.0 - b + c / 2.0
@@ -119,37 +127,37 @@ def look_up_slope(L: Floats, law: int, row: int, low: float, step: float, x: flo
 
 
 @leaf_kernel
-def groove(L: Floats, law: int, y: float) -> float:
+def groove(laws: Floats, law: int, y: float) -> float:
     """Friction-weighted angle g(y); y itself for the plain law."""
-    if L is None:
+    if laws is None:
         return y
-    if L[law, 0, GROOVED] == 0.0:
+    if laws[law, HEAD, GROOVED] == 0.0:
         return y
-    return look_up(L, law, 2, L[law, 0, 4], L[law, 0, 5], y)
+    return look_up(laws, law, G_OF_Y, laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_STEP], y)
 
 
 @leaf_kernel
-def between(L: Floats, law: int, y_low: float, y_high: float, share: float) -> float:
+def between(laws: Floats, law: int, y_low: float, y_high: float, share: float) -> float:
     """The angle whose groove coordinate lies by `share` between those of y_low and y_high."""
-    if L is None:
+    if laws is None:
         return y_low + share * (y_high - y_low)
-    if L[law, 0, GROOVED] == 0.0:
+    if laws[law, HEAD, GROOVED] == 0.0:
         return y_low + share * (y_high - y_low)
-    low = groove(L, law, y_low)
-    return groove_inverse(L, law, low + share * (groove(L, law, y_high) - low), y_low, y_high)
+    low = groove(laws, law, y_low)
+    return groove_inverse(laws, law, low + share * (groove(laws, law, y_high) - low), y_low, y_high)
 
 
 @kernel
-def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
+def groove_inverse(laws: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
     """The y between y_low and y_high with groove coordinate g (secant, then bisection where it leaves the bracket)."""
     lo, hi = y_low, y_high
-    g_lo, g_hi = groove(L, law, lo), groove(L, law, hi)
+    g_lo, g_hi = groove(laws, law, lo), groove(laws, law, hi)
     y = lo
     for _ in range(60):
         if g_hi - g_lo <= 0.0:
             return lo
         y = lo + (hi - lo) * (g - g_lo) / (g_hi - g_lo)
-        found = groove(L, law, y)
+        found = groove(laws, law, y)
         if abs(found - g) < 1e-14:
             return y
         if found < g:
@@ -157,7 +165,7 @@ def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -
         else:
             hi, g_hi = y, found
         middle = 0.5 * (lo + hi)
-        found = groove(L, law, middle)
+        found = groove(laws, law, middle)
         if found < g:
             lo, g_lo = middle, found
         else:
@@ -166,49 +174,51 @@ def groove_inverse(L: Floats, law: int, g: float, y_low: float, y_high: float) -
 
 
 @leaf_kernel
-def v_of_tau(L: Floats, law: int, tau: float) -> float:
+def v_of_tau(laws: Floats, law: int, tau: float) -> float:
     """Profile variable of the tension ratio tau = T/T0: ln tau for the plain law."""
     u = math.log(tau)
-    if L is None:
+    if laws is None:
         return u
-    if L[0, 0, 0] != TABLED:
+    if laws[0, HEAD, MODE] != TABLED:
         return u
-    return look_up(L, law, 3, L[law, 0, 7], L[law, 0, 8], u)
+    return look_up(laws, law, V_OF_U, laws[law, HEAD, U_LOW], laws[law, HEAD, U_STEP], u)
 
 
 @leaf_kernel
-def dv_dtau(L: Floats, law: int, tau: float, v: float) -> float:
+def dv_dtau(laws: Floats, law: int, tau: float, v: float) -> float:
     """Derivative of `v_of_tau`; 1/tau for the plain law."""
-    if L is None:
+    if laws is None:
         return 1.0 / tau
-    if L[0, 0, 0] != TABLED:
+    if laws[0, HEAD, MODE] != TABLED:
         return 1.0 / tau
-    return _slope_table(L, law, tau, v)
+    return _slope_table(laws, law, tau, v)
 
 
 @kernel
-def _slope_table(L: Floats, law: int, tau: float, v: float) -> float:
-    return 1.0 / (tau * look_up_slope(L, law, 1, L[law, 0, 1], L[law, 0, 2], v)[1])
+def _slope_table(laws: Floats, law: int, tau: float, v: float) -> float:
+    return 1.0 / (
+        tau * look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)[1]
+    )
 
 
 @leaf_kernel
-def tau_of_v(L: Floats, law: int, v: float) -> float:
+def tau_of_v(laws: Floats, law: int, v: float) -> float:
     """Tension ratio of the profile variable."""
-    if L is None:
+    if laws is None:
         return math.exp(v)
-    if L[0, 0, 0] != TABLED:
+    if laws[0, HEAD, MODE] != TABLED:
         return math.exp(v)
-    return math.exp(look_up(L, law, 1, L[law, 0, 1], L[law, 0, 2], v))
+    return math.exp(look_up(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v))
 
 
 @leaf_kernel
-def strain_of_tau(L: Floats, law: int, tau: float) -> tuple[float, float]:
+def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
     """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int d tau/(1 + b (tau - 1))."""
-    if L is None:
+    if laws is None:
         return tau - 1.0, 1.0
-    if L[0, 0, 0] == PLAIN:
+    if laws[0, HEAD, MODE] == PLAIN:
         return tau - 1.0, 1.0
-    return stiffening_strain(L[law, 0, STIFFENING], tau)
+    return stiffening_strain(laws[law, HEAD, STIFFENING], tau)
 
 
 @kernel
@@ -224,9 +234,9 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
 
 
 @kernel
-def strain(L: Floats, law: int, v: float) -> tuple[float, float]:
+def strain(laws: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
-    u, du = look_up_slope(L, law, 1, L[law, 0, 1], L[law, 0, 2], v)
+    u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)
     tau = math.exp(u)
-    e, de = stiffening_strain(L[law, 0, STIFFENING], tau)
+    e, de = stiffening_strain(laws[law, HEAD, STIFFENING], tau)
     return e, de * tau * du

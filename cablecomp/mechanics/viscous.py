@@ -8,11 +8,11 @@ code: `profile.py`).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inner_kernel, kernel
-from cablecomp.mechanics.profile import Floats, copy_floats
+from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
 STIFFEST = 1e3  # diffusion number per step beyond which slip is as good as quasi-static
@@ -38,10 +38,24 @@ def _free_nodes(w: float, h: float) -> int:
     return min(max(int((w - 0.3 * h) / h) + 1, 1), WET_NODES)
 
 
+class Slide(NamedTuple):
+    """One implicit step of a wrap: its nodes, and what drives them."""
+
+    old: Floats  # T/T0 at the nodes, before
+    new: Floats  # and after
+    upper: Floats  # elimination: upper diagonal,
+    right: Floats  # right-hand side, then the solution
+    nodes: int  # how many
+    h: float  # rad between nodes
+    gap: float  # rad from the last node to the departure point
+    tau: float  # T/T0 there
+    mu: float
+    rate: float  # rad^2 that stretch diffuses in this step
+
+
 @inner_kernel
-def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> tuple[float, float, float]:
-    """Integral of tau - 1 over the wrap at end value tau, its derivatives by ln tau and by the wrap angle; kept
-    as pending."""
+def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> Wound:
+    """The cable on a drum at wrap angle w and end tension T/T0 = tau; kept as pending."""
     cable, state, context, grid = d.cables[c], d.states[c], d.context, d.grids[2 * c + end]
     old, new = grid.tau, grid.tau_try
     h = grid.step
@@ -64,107 +78,118 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
     dt = 1e9 if context.first else context.dt
     rate = dt * cable.EA * state.stiffness / (cable.radius[end] * cable.viscous)
     rate = min(rate, STIFFEST * h * h)
-    slope = _relax(old, new, grid.upper, grid.right, count, h, w, tau, mu, rate)
-    total = 0.0
     last = (count - 1) * h
+    slope = _relax(Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate))
+    total = 0.0
     for j in range(count - 1):
         total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
     total += 0.5 * (w - last) * (new[count - 1] + tau - 2.0)
     grid.count_try, grid.angle_try, grid.end_try = count, w, tau
-    return total, slope * tau, tau - 1.0
+    return Wound(total, slope * tau, tau - 1.0)
 
 
-@kernel
-def _relax(
-    old: Floats, new: Floats, upper: Floats, right: Floats, n: int, h: float, w: float, tau: float, mu: float, rate: float
-) -> float:  # fmt: skip
-    """Implicit step of nodes 0..n-1 by Newton's method; returns the derivative of the integral by the end value."""
-    gap = w - (n - 1) * h
-    first = n
+@inner_kernel
+def _relax(s: Slide) -> float:
+    """Implicit step of all nodes by Newton's method; returns the derivative of the integral by the end value."""
+    first = s.nodes
     for _ in range(60):
-        first = _front(old, new, n, h, gap, tau, mu)
-        if first == n:
-            return 0.5 * gap
-        if _newton(old, new, upper, right, n, first, h, gap, tau, mu, rate, False) <= 1e-13:
+        first = _front(s)
+        if first == s.nodes:
+            return 0.5 * s.gap
+        if _newton(s, first, False) <= 1e-13:
             break
     # linear answer to a change of the end value
-    _newton(old, new, upper, right, n, first, h, gap, tau, mu, rate, True)
-    slope = 0.5 * gap * (1.0 + right[n - 1])
-    for j in range(first, n - 1):
-        slope += 0.5 * h * (right[j] + right[j + 1])
+    _newton(s, first, True)
+    slope = 0.5 * s.gap * (1.0 + s.right[s.nodes - 1])
+    for j in range(first, s.nodes - 1):
+        slope += 0.5 * s.h * (s.right[j] + s.right[j + 1])
     if first > 0:
-        slope += 0.5 * h * right[first]
+        slope += 0.5 * s.h * s.right[first]
     return slope
 
 
-@kernel
-def _front(old: Floats, new: Floats, n: int, h: float, gap: float, tau: float, mu: float) -> int:
-    """The deepest node that moves, or n if none does; deep cable may still creep while the cable outside of it
-    sticks."""
-    for j in range(n):
-        right = tau if j == n - 1 else new[j + 1]
-        slip, _, _ = _face(new[j], right, gap if j == n - 1 else h, mu)
-        if slip != 0.0 or new[j] != old[j]:
+@inner_kernel
+def _front(s: Slide) -> int:
+    """The deepest node that moves, or their number if none does; deep cable may still creep while the cable outside of
+    it sticks."""
+    for j in range(s.nodes):
+        if _outward(s, j).slip != 0.0 or s.new[j] != s.old[j]:
             return j
-    return n
+    return s.nodes
+
+
+class Face(NamedTuple):
+    """What drives slip between two neighbouring nodes a (inward) and b."""
+
+    slip: float  # shrink((b - a)/distance, mu (a + b)/2)
+    by_a: float  # its derivatives
+    by_b: float
 
 
 @kernel
-def _face(a: float, b: float, d: float, mu: float) -> tuple[float, float, float]:
-    """Slip drive shrink((b - a)/d, mu (a + b)/2) and its derivatives by a and b."""
-    g = (b - a) / d
+def _face(a: float, b: float, distance: float, mu: float) -> Face:
+    steep = (b - a) / distance
     limit = mu * 0.5 * (a + b)
-    if g > limit:
-        return g - limit, -1.0 / d - 0.5 * mu, 1.0 / d - 0.5 * mu
-    if g < -limit:
-        return g + limit, -1.0 / d + 0.5 * mu, 1.0 / d + 0.5 * mu
-    return 0.0, 0.0, 0.0
+    if steep > limit:
+        return Face(steep - limit, -1.0 / distance - 0.5 * mu, 1.0 / distance - 0.5 * mu)
+    if steep < -limit:
+        return Face(steep + limit, -1.0 / distance + 0.5 * mu, 1.0 / distance + 0.5 * mu)
+    return Face(0.0, 0.0, 0.0)
 
 
-@kernel
-def _row(
-    old: Floats, new: Floats, n: int, j: int, h: float, gap: float, tau: float, mu: float, rate: float
-) -> tuple[float, float, float, float]:
-    """Residual of node j and its derivatives by nodes j - 1, j, j + 1."""
-    size = 0.5 * h if j == 0 else h
-    if j == n - 1:
-        size = (0.0 if j == 0 else 0.5 * h) + 0.5 * gap
-    k = rate / size
-    right = tau if j == n - 1 else new[j + 1]
-    out, out_a, out_b = _face(new[j], right, gap if j == n - 1 else h, mu)
-    inner = inner_a = inner_b = 0.0
+@inner_kernel
+def _outward(s: Slide, j: int) -> Face:
+    """The face on the outer side of node j; beyond the last node lies the departure point."""
+    if j == s.nodes - 1:
+        return _face(s.new[j], s.tau, s.gap, s.mu)
+    return _face(s.new[j], s.new[j + 1], s.h, s.mu)
+
+
+class Row(NamedTuple):
+    """A node's conservation law: its residual, and the derivatives of that by the nodes below, itself, above."""
+
+    residual: float
+    below: float
+    own: float
+    above: float
+
+
+@inner_kernel
+def _row(s: Slide, j: int) -> Row:
+    size = 0.5 * s.h if j == 0 else s.h
+    if j == s.nodes - 1:
+        size = (0.0 if j == 0 else 0.5 * s.h) + 0.5 * s.gap
+    k = s.rate / size
+    out, inner = _outward(s, j), Face(0.0, 0.0, 0.0)
     if j > 0:
-        inner, inner_a, inner_b = _face(new[j - 1], new[j], h, mu)
-    residual = new[j] - old[j] - k * (out - inner)
-    return residual, k * inner_a, 1.0 - k * (out_a - inner_b), -k * out_b
+        inner = _face(s.new[j - 1], s.new[j], s.h, s.mu)
+    residual = s.new[j] - s.old[j] - k * (out.slip - inner.slip)
+    return Row(residual, k * inner.by_a, 1.0 - k * (out.by_a - inner.by_b), -k * out.by_b)
 
 
-@kernel
-def _newton(
-    old: Floats, new: Floats, upper: Floats, right: Floats, n: int, first: int, h: float, gap: float, tau: float,
-    mu: float, rate: float, linear: bool,
-) -> float:  # fmt: skip
-    """One Newton step for nodes first..n-1 (Thomas algorithm), and its largest change.
+@inner_kernel
+def _newton(s: Slide, first: int, linear: bool) -> float:
+    """One Newton step for the nodes from `first` on (Thomas algorithm), and its largest change.
 
     With `linear` nothing moves: `right` gets the nodes' derivatives by the end value instead.
     """
-    for j in range(first, n):
-        residual, below, own, above = _row(old, new, n, j, h, gap, tau, mu, rate)
-        target = -residual
+    for j in range(first, s.nodes):
+        row = _row(s, j)
+        own, target = row.own, -row.residual
         if linear:
-            target = -above if j == n - 1 else 0.0
+            target = -row.above if j == s.nodes - 1 else 0.0
         if j > first:
-            own -= below * upper[j - 1]
-            target -= below * right[j - 1]
-        upper[j] = above / own
-        right[j] = target / own
+            own -= row.below * s.upper[j - 1]
+            target -= row.below * s.right[j - 1]
+        s.upper[j] = row.above / own
+        s.right[j] = target / own
     largest = 0.0
-    for j in range(n - 2, first - 1, -1):
-        right[j] -= upper[j] * right[j + 1]
+    for j in range(s.nodes - 2, first - 1, -1):
+        s.right[j] -= s.upper[j] * s.right[j + 1]
     if not linear:
-        for j in range(first, n):
-            largest = max(largest, abs(right[j]))
-            new[j] = max(new[j] + right[j], 1e-9)
+        for j in range(first, s.nodes):
+            largest = max(largest, abs(s.right[j]))
+            s.new[j] = max(s.new[j] + s.right[j], 1e-9)
     return largest
 
 

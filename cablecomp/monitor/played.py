@@ -37,7 +37,7 @@ def played(
         for row in range(block.rows):
             if time[row] >= due or row == block.rows - 1:
                 part = block.part(start, row + 1)
-                found = observer.run(part.columns, bounds)
+                found = observer.run(part.columns)
                 start = row + 1
                 if time[row] >= due:
                     due = time[row] + period

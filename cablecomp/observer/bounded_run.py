@@ -11,8 +11,8 @@ from cablecomp.observer.bounds_circuit import bounds_step
 
 @kernel
 def run_bounded(
-    walk_at: int, P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats,
-    W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints, interval: Floats,
+    walk_at: int, fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats, rows: Floats, outs: Floats,
+    numbers: Floats, memory_low: Floats, heights_low: Ints, memory_up: Floats, heights_up: Ints, interval: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Step through rows of readings; `interval` gets the lowest and the highest joint angle [rad] of the drive.
 
@@ -20,8 +20,12 @@ def run_bounded(
     stopped it.
     """
     for k in range(rows.shape[0]):
-        _, status = call_walk(walk_at, P, I, S, J, L, rows[k : k + 1], outs[k : k + 1], True)
+        _, status = call_walk(
+            walk_at, fixed, layout, memory, heights, laws, rows[k : k + 1], outs[k : k + 1], True
+        )
         if status != STATUS_OK:
             return k, status
-        interval[k, 0], interval[k, 1] = bounds_step(P, I, L, S, W, SL, JL, SU, JU)
+        interval[k, 0], interval[k, 1] = bounds_step(
+            fixed, layout, laws, memory, numbers, memory_low, heights_low, memory_up, heights_up
+        )
     return rows.shape[0], STATUS_OK

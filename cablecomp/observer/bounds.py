@@ -28,8 +28,8 @@ class BoundPair:
     def __init__(self, model: Model, past: tuple[float | None, float | None] = (None, None)) -> None:
         self._model = model
         low, high = past
-        self._low = (model.S.copy(), model.J.copy())
-        self._up = (model.S.copy(), model.J.copy())
+        self._low = (model.memory.copy(), model.heights.copy())
+        self._up = (model.memory.copy(), model.heights.copy())
         self.numbers: Floats = bounds_numbers(
             model, -EXTREME if low is None else math.log(low), EXTREME if high is None else math.log(high)
         )
@@ -38,20 +38,20 @@ class BoundPair:
     def start(self, time_s: float, motor: float) -> None:
         """Know nothing but the position of the motor [rad]."""
         m = self._model
-        for S, J in (self._low, self._up):
-            joint_start(m.P, m.I, S, J, m.L, time_s, motor, 0.0)
-        sides_start(m.P, m.I, m.L, self.numbers, *self._low, *self._up)
+        for memory, heights in (self._low, self._up):
+            joint_start(m.fixed, m.layout, memory, heights, m.laws, time_s, motor, 0.0)
+        sides_start(m.fixed, m.layout, m.laws, self.numbers, *self._low, *self._up)
 
     def forget(self) -> None:
         """Be as before `start`."""
         self.numbers[:] = self._unstarted
-        for S, J in self.states():
-            S[:], J[:] = self._model.S, self._model.J
+        for memory, heights in self.states():
+            memory[:], heights[:] = self._model.memory, self._model.heights
 
-    def step(self, S_nominal: Floats) -> tuple[float, float]:
+    def step(self, memory: Floats) -> tuple[float, float]:
         """Follow a step that the observer's own state has just committed: lowest and highest joint angle [rad]."""
         m = self._model
-        low, high = bounds_step(m.P, m.I, m.L, S_nominal, self.numbers, *self._low, *self._up)
+        low, high = bounds_step(m.fixed, m.layout, m.laws, memory, self.numbers, *self._low, *self._up)
         return float(low), float(high)
 
     def run(

@@ -41,28 +41,35 @@ class Shafts(NamedTuple):
     x_out: float
 
 
+class Gap(NamedTuple):
+    """Stretch of both chains together [rad]; they cancel where it is 0."""
+
+    total: float
+    slope: float  # its derivative by the tension
+    theta_h: float  # either chain's part
+    theta_l: float
+
+
 @inner_kernel
 def pair_gap(
-    b: Bounds, nominal: Drive, L: Floats, ic: int, high: Side, low: Side, tension: float, pull: float, x: Shafts, safe: float
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Stretch of both chains together [rad] with chain h in state `high` and chain l in state `low`, its slope,
-    and either chain's part. Margins count `safe` times, outward."""
+    b: Bounds, nominal: Drive, laws: Floats, ic: int, high: Side, low: Side, tension: float, pull: float, x: Shafts,
+    safe: float,
+) -> Gap:  # fmt: skip
+    """Both chains with chain h in state `high` and chain l in state `low`; margins count `safe` times, outward."""
     circuit = nominal.circuits[ic]
     count = circuit.count
-    theta_h, a_h, m_h = chain_bound(
-        b, nominal, L, high, circuit.first[0], count, tension + pull, x.x_in, x.x_out, x.eps
+    on_h = chain_bound(
+        b, nominal, laws, high, circuit.first[0], count, tension + pull, x.x_in, x.x_out, x.eps
     )
-    theta_l, a_l, m_l = chain_bound(
-        b, nominal, L, low, circuit.first[1], count, tension, x.x_in, x.x_out, x.eps
-    )
-    theta_h += safe * high.sign * m_h
-    theta_l += safe * low.sign * m_l
-    return theta_h + theta_l, a_h + a_l, theta_h, theta_l
+    on_l = chain_bound(b, nominal, laws, low, circuit.first[1], count, tension, x.x_in, x.x_out, x.eps)
+    theta_h = on_h.value + safe * high.sign * on_h.margin
+    theta_l = on_l.value + safe * low.sign * on_l.margin
+    return Gap(theta_h + theta_l, on_h.slope + on_l.slope, theta_h, theta_l)
 
 
 @inner_kernel
 def pair_root(
-    b: Bounds, nominal: Drive, L: Floats, ic: int, high: Side, low: Side, lowest: float, guess: float, pull: float,
+    b: Bounds, nominal: Drive, laws: Floats, ic: int, high: Side, low: Side, lowest: float, guess: float, pull: float,
     x: Shafts, safe: float, target: float,
 ) -> float:  # fmt: skip
     """The tension of cable l at which `pair_gap` is `target`, or the lowest one where it is more already."""
@@ -71,15 +78,15 @@ def pair_root(
     least, most = lowest, 1e300
     tension = max(guess, lowest)
     for iteration in range(100):
-        gap, slope, _, _ = pair_gap(b, nominal, L, ic, high, low, tension, pull, x, safe)
-        gap -= target
-        if gap >= 0.0:
+        gap = pair_gap(b, nominal, laws, ic, high, low, tension, pull, x, safe)
+        over = gap.total - target
+        if over >= 0.0:
             if tension <= lowest:
                 return lowest
             most = tension
         else:
             least = tension
-        step = -gap / slope
+        step = -over / gap.slope
         if abs(step) <= 1e-13 * unit:
             return max(tension + step, lowest)
         tension += step
@@ -95,18 +102,26 @@ def pair_root(
 
 @inner_kernel
 def tension_interval(
-    b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, lowest: float, pull: float, x: Shafts
+    b: Bounds,
+    nominal: Drive,
+    laws: Floats,
+    ic: int,
+    low: Side,
+    up: Side,
+    lowest: float,
+    pull: float,
+    x: Shafts,
 ) -> tuple[float, float]:
     """Lowest and highest possible tension of cable l."""
     circuit, its = nominal.circuits[ic], b.circuits[ic]
     first_h, first_l, count = circuit.first[0], circuit.first[1], circuit.count
     unit = nominal.cables[first_l + count - 1].T0
     first = its.first > 0.0
-    lead = 0.0 if first else -0.5 * (pull - its.pull)
-    guess_low = unit if first else its.low + lead
-    guess_high = unit if first else its.high + lead
-    t_low = pair_root(b, nominal, L, ic, up, up, lowest, guess_low, pull, x, 1.0, 0.0)
-    t_high = pair_root(b, nominal, L, ic, low, low, lowest, guess_high, pull, x, 1.0, 0.0)
+    moved_on = 0.0 if first else -0.5 * (pull - its.pull)  # by the load since the last step
+    guess_low = unit if first else its.low + moved_on
+    guess_high = unit if first else its.high + moved_on
+    t_low = pair_root(b, nominal, laws, ic, up, up, lowest, guess_low, pull, x, 1.0, 0.0)
+    t_high = pair_root(b, nominal, laws, ic, low, low, lowest, guess_high, pull, x, 1.0, 0.0)
     t_low = max(t_low - OUTWARD * unit, lowest)
     t_high += OUTWARD * unit
     if first or not _comparable(b, nominal, ic, low):
@@ -117,18 +132,20 @@ def tension_interval(
             growth = max(growth, b.cables[c].eps - b.cables[c].eps_old)
     moved = 0.0
     for side in (up, low):
-        turn_h, shift_h, soft_h = chain_turning(b, side.drive, first_h, count)
-        turn_l, shift_l, soft_l = chain_turning(b, side.drive, first_l, count)
-        turning, shifting = turn_h + turn_l, shift_h + shift_l
-        drift = 0.5 * max(soft_h, soft_l) * abs(pull - its.pull) + 2.0 * turning * abs(x.x_in - its.x_in)
+        on_h = chain_turning(b, side.drive, first_h, count)
+        on_l = chain_turning(b, side.drive, first_l, count)
+        turning, shifting = on_h.turning + on_l.turning, on_h.shifting + on_l.shifting
+        drift = 0.5 * max(on_h.compliance, on_l.compliance) * abs(pull - its.pull) + 2.0 * turning * abs(
+            x.x_in - its.x_in
+        )
         moved = max(moved, turning * drift + shifting * growth)
     guess = min(guess_high, t_high)
-    other = pair_root(b, nominal, L, ic, up, up, lowest, guess, pull, x, 0.0, its.surplus + moved)
+    other = pair_root(b, nominal, laws, ic, up, up, lowest, guess, pull, x, 0.0, its.surplus + moved)
     t_high = min(t_high, other + OUTWARD * unit)
     # else a slack cable may have been taken up, and the deficit does not hold
     if its.low > floor_tension(nominal, ic, its.pull) * (1.0 + 1e-6):
         guess = max(guess_low, t_low)
-        other = pair_root(b, nominal, L, ic, low, low, lowest, guess, pull, x, 0.0, its.deficit - moved)
+        other = pair_root(b, nominal, laws, ic, low, low, lowest, guess, pull, x, 0.0, its.deficit - moved)
         t_low = max(t_low, other - OUTWARD * unit)
     return t_low, max(t_high, t_low)
 
@@ -157,24 +174,24 @@ def _comparable(b: Bounds, nominal: Drive, ic: int, low: Side) -> bool:
 
 @inner_kernel
 def closed_interval(
-    b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, pull: float, x: Shafts
+    b: Bounds, nominal: Drive, laws: Floats, ic: int, low: Side, up: Side, pull: float, x: Shafts
 ) -> tuple[float, float]:
     """Lowest and highest possible deflection [rad] of a closed circuit; leaves the sides' next states pending."""
     its = b.circuits[ic]
     lowest = floor_tension(nominal, ic, pull)
-    t_low, t_high = tension_interval(b, nominal, L, ic, low, up, lowest, pull, x)
+    t_low, t_high = tension_interval(b, nominal, laws, ic, low, up, lowest, pull, x)
     # the deflection rises with chain h's profiles and falls with chain l's
     middle = 0.5 * (t_low + t_high)
-    mixed = pair_root(b, nominal, L, ic, up, low, lowest, middle, pull, x, 1.0, 0.0)
+    mixed = pair_root(b, nominal, laws, ic, up, low, lowest, middle, pull, x, 1.0, 0.0)
     clipped = min(max(mixed, t_low), t_high)
-    _, _, theta_h, theta_l = pair_gap(b, nominal, L, ic, up, low, clipped, pull, x, 1.0)
-    theta_high = _part(mixed, t_low, t_high, pull, theta_h, -theta_l)
-    mixed = pair_root(b, nominal, L, ic, low, up, lowest, middle, pull, x, 1.0, 0.0)
+    gap = pair_gap(b, nominal, laws, ic, up, low, clipped, pull, x, 1.0)
+    theta_high = _part(mixed, t_low, t_high, pull, gap.theta_h, -gap.theta_l)
+    mixed = pair_root(b, nominal, laws, ic, low, up, lowest, middle, pull, x, 1.0, 0.0)
     clipped = min(max(mixed, t_low), t_high)
-    _, _, theta_h, theta_l = pair_gap(b, nominal, L, ic, low, up, clipped, pull, x, 1.0)
-    theta_low = _part(-mixed, -t_high, -t_low, pull, theta_h, -theta_l)
-    its.surplus_try, _, _, _ = pair_gap(b, nominal, L, ic, up, up, t_high, pull, x, 0.0)
-    its.deficit_try, _, _, _ = pair_gap(b, nominal, L, ic, low, low, t_low, pull, x, 0.0)
+    gap = pair_gap(b, nominal, laws, ic, low, up, clipped, pull, x, 1.0)
+    theta_low = _part(-mixed, -t_high, -t_low, pull, gap.theta_h, -gap.theta_l)
+    its.surplus_try = pair_gap(b, nominal, laws, ic, up, up, t_high, pull, x, 0.0).total
+    its.deficit_try = pair_gap(b, nominal, laws, ic, low, low, t_low, pull, x, 0.0).total
     its.low_try, its.high_try = t_low, t_high
     return theta_low, theta_high
 
@@ -192,7 +209,7 @@ def _part(mixed: float, least: float, most: float, pull: float, by_h: float, by_
 
 @inner_kernel
 def circuit_interval(
-    b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, moment: float, x: Shafts
+    b: Bounds, nominal: Drive, laws: Floats, ic: int, low: Side, up: Side, moment: float, x: Shafts
 ) -> tuple[float, float]:
     """Interval of a circuit's output angle [rad] at nominal input angle, its half width and nominal output angle `x`.
 
@@ -203,16 +220,14 @@ def circuit_interval(
     pull = moment / circuit.radius
     for _ in range(12):
         if circuit.chains == 2:
-            theta_low, theta_high = closed_interval(b, nominal, L, ic, low, up, pull, x)
+            theta_low, theta_high = closed_interval(b, nominal, laws, ic, low, up, pull, x)
         else:
             last = first_h + count - 1
             tension = nominal.states[last].reference * low.drive.states[last].pretension + pull
-            theta, _, margin = chain_bound(b, nominal, L, up, first_h, count, tension, x.x_in, x.x_out, x.eps)
-            theta_high = theta + margin
-            theta, _, margin = chain_bound(
-                b, nominal, L, low, first_h, count, tension, x.x_in, x.x_out, x.eps
-            )
-            theta_low = theta - margin
+            highest = chain_bound(b, nominal, laws, up, first_h, count, tension, x.x_in, x.x_out, x.eps)
+            theta_high = highest.value + highest.margin
+            lowest = chain_bound(b, nominal, laws, low, first_h, count, tension, x.x_in, x.x_out, x.eps)
+            theta_low = lowest.value - lowest.margin
         if _eps_hold(b, nominal, ic, low, up, theta_low, theta_high, x):
             rigid = circuit.ratio
             rounding = ROUNDING * (1.0 + abs(x.x_out))
@@ -255,14 +270,14 @@ def _eps_hold(
 
 @inner_kernel
 def circuit_keep(
-    b: Bounds, nominal: Drive, L: Floats, ic: int, low: Side, up: Side, pull: float, x_in: float
+    b: Bounds, nominal: Drive, laws: Floats, ic: int, low: Side, up: Side, pull: float, x_in: float
 ) -> None:
     """Make the pending states of a circuit's bounds their states."""
     circuit, its = nominal.circuits[ic], b.circuits[ic]
     for chain in range(circuit.chains):
         first = circuit.first[chain]
-        chain_commit(low.drive, L, first, circuit.count)
-        chain_commit(up.drive, L, first, circuit.count)
+        chain_commit(low.drive, laws, first, circuit.count)
+        chain_commit(up.drive, laws, first, circuit.count)
         for c in range(first, first + circuit.count):
             cable, state = b.cables[c], nominal.states[c]
             cable.pretension, cable.stiffness = low.drive.states[c].pretension, state.stiffness
@@ -276,13 +291,17 @@ def circuit_keep(
 
 @kernel
 def bounds_step(
-    P: Floats, I: Ints, L: Floats, N: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints
-) -> tuple[float, float]:
-    """Follow the nominal state's (N) last committed step; lowest and highest possible joint angle [rad] of the
-    drive."""
-    nominal = drive(P, I, N, JL)  # its profiles' lengths are not looked at
-    low, up = Side(drive(P, I, SL, JL), -1.0), Side(drive(P, I, SU, JU), 1.0)
-    b = bounds_of(nominal.size.circuits, W)
+    fixed: Floats, layout: Ints, laws: Floats, memory: Floats, numbers: Floats,
+    memory_low: Floats, heights_low: Ints, memory_up: Floats, heights_up: Ints,
+) -> tuple[float, float]:  # fmt: skip
+    """Follow the last committed step of the nominal state `memory`; lowest and highest possible joint angle [rad] of
+    the drive."""
+    nominal = drive(fixed, layout, memory, heights_low)  # its profiles' lengths are not looked at
+    low, up = (
+        Side(drive(fixed, layout, memory_low, heights_low), -1.0),
+        Side(drive(fixed, layout, memory_up, heights_up), 1.0),
+    )
+    b = bounds_of(nominal.size.circuits, numbers)
     first = b.circuits[0].first > 0.0
     side_follow(low.drive, nominal, first)
     side_follow(up.drive, nominal, first)
@@ -294,12 +313,12 @@ def bounds_step(
         share = moment * circuit.share
         last = circuit.first[0 if share >= 0.0 else 1] + circuit.count - 1
         x_out = nominal.states[last].shaft
-        least, most = circuit_interval(b, nominal, L, ic, low, up, share, Shafts(x_in, eps, x_out))
+        least, most = circuit_interval(b, nominal, laws, ic, low, up, share, Shafts(x_in, eps, x_out))
         if math.isnan(least):  # nothing is known any more: start anew
-            sides_start(P, I, L, W, SL, JL, SU, JU)
+            sides_start(fixed, layout, laws, numbers, memory_low, heights_low, memory_up, heights_up)
             return least, most
-        circuit_keep(b, nominal, L, ic, low, up, share / circuit.radius, x_in)
+        circuit_keep(b, nominal, laws, ic, low, up, share / circuit.radius, x_in)
         x_in, eps = x_out, max(most - x_out, x_out - least)
-    side_retension(low.drive, nominal, L)
-    side_retension(up.drive, nominal, L)
+    side_retension(low.drive, nominal, laws)
+    side_retension(up.drive, nominal, laws)
     return least, most

@@ -17,17 +17,28 @@ from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import (
     LEAST_WRAP,
-    B,
     Floats,
     Ints,
-    Y,
     set_pending,
     wrap_commit,
     wrap_eval,
     wrap_fill,
 )
 from cablecomp.mechanics.records import OUT, floats, record
-from cablecomp.mechanics.tables import TABLED, dv_dtau, strain_of_tau, tau_of_v, v_of_tau
+from cablecomp.mechanics.tables import (
+    ELSEWHERE,
+    G_OF_Y,
+    HEAD,
+    MODE,
+    TABLED,
+    U_OF_V,
+    V_STEP,
+    Y_STEP,
+    dv_dtau,
+    strain_of_tau,
+    tau_of_v,
+    v_of_tau,
+)
 
 # What is said of the drive as a whole.
 BOUNDS = record(
@@ -87,13 +98,30 @@ class Side(NamedTuple):
     sign: float
 
 
-def named_bounds(circuits: int, W: Floats) -> Bounds:
-    """The records in the flat array W of the bounds of a joint with this many circuits."""
+class Bound(NamedTuple):
+    """What one bound's state makes of a stretch or a rotation."""
+
+    value: float
+    slope: float  # its derivative by the tension
+    margin: float  # what the truth may lie beyond it
+
+
+class Turning(NamedTuple):
+    """The greatest rotation of a chain's output [rad]: per rad by which output wraps are turned, per rad of a shift
+    of all end values by mu per rad, per N."""
+
+    turning: float
+    shifting: float
+    compliance: float
+
+
+def named_bounds(circuits: int, numbers: Floats) -> Bounds:
+    """The records in the flat array of the bounds of a joint with this many circuits."""
     cables_at = N_BOUNDS + circuits * N_CIRCUIT
     return Bounds(
-        W[:N_BOUNDS].view(BOUNDS)[0],
-        W[N_BOUNDS:cables_at].view(BOUNDS_CIRCUIT),
-        W[cables_at:].view(BOUNDS_CABLE),
+        numbers[:N_BOUNDS].view(BOUNDS)[0],
+        numbers[N_BOUNDS:cables_at].view(BOUNDS_CIRCUIT),
+        numbers[cables_at:].view(BOUNDS_CABLE),
     )
 
 
@@ -102,33 +130,42 @@ bounds_of = inlined_kernel(named_bounds)
 
 def bounds_numbers(model: Model, past_low: float, past_high: float) -> Floats:
     """The bounds' flat array before their start; past = least and greatest ln(T/T0) that any cable has borne."""
-    size = model.named(model.S, model.J).size
-    W = np.zeros(N_BOUNDS + size.circuits * N_CIRCUIT + size.cables * N_CABLE)
-    whole = named_bounds(size.circuits, W).whole
-    whole.steepest, whole.past_low, whole.past_high = steepest(model.L), past_low, past_high
-    return W
+    size = model.named(model.memory, model.heights).size
+    numbers = np.zeros(N_BOUNDS + size.circuits * N_CIRCUIT + size.cables * N_CABLE)
+    whole = named_bounds(size.circuits, numbers).whole
+    whole.steepest, whole.past_low, whole.past_high = steepest(model.laws), past_low, past_high
+    return numbers
 
 
-def steepest(L: Floats | None) -> float:
+def steepest(laws: Floats | None) -> float:
     """Greatest factor by which a law table (None = plain) raises friction over mu, by place and by tension
     (e^-2..e^2)."""
-    if L is None or L[0, 0, 0] != TABLED:
+    if laws is None or laws[0, HEAD, MODE] != TABLED:
         return 1.0
-    place = float(np.max(np.diff(L[:, 2]) / L[:, 0, 5:6]))
-    u = L[0, 1]
-    tension = float(np.max((np.diff(u) / L[0, 0, 2])[np.abs(u[1:]) < 2.0]))
+    place = float(np.max(np.diff(laws[:, G_OF_Y]) / laws[:, HEAD, Y_STEP, None]))
+    u = laws[0, U_OF_V]
+    tension = float(np.max((np.diff(u) / laws[0, HEAD, V_STEP])[np.abs(u[1:]) < 2.0]))
     return max(place, 1.0) * max(tension, 1.0)
 
 
 @kernel
-def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, SU: Floats, JU: Ints) -> None:
+def sides_start(
+    fixed: Floats,
+    layout: Ints,
+    laws: Floats,
+    numbers: Floats,
+    memory_low: Floats,
+    heights_low: Ints,
+    memory_up: Floats,
+    heights_up: Ints,
+) -> None:
     """Fill all wraps of two started joints with the least and the greatest tension of the past; the first step
     cuts them to what friction admits."""
-    low, up = drive(P, I, SL, JL), drive(P, I, SU, JU)
-    b = bounds_of(low.size.circuits, W)
-    W[N_BOUNDS:] = 0.0
-    _fill(low, L, b.whole.past_low)
-    _fill(up, L, b.whole.past_high)
+    low, up = drive(fixed, layout, memory_low, heights_low), drive(fixed, layout, memory_up, heights_up)
+    b = bounds_of(low.size.circuits, numbers)
+    numbers[N_BOUNDS:] = 0.0
+    _fill(low, laws, b.whole.past_low)
+    _fill(up, laws, b.whole.past_high)
     for c in range(low.size.cables):
         b.cables[c].eps = EPS_START
     for ic in range(low.size.circuits):
@@ -136,13 +173,14 @@ def sides_start(P: Floats, I: Ints, L: Floats, W: Floats, SL: Floats, JL: Ints, 
 
 
 @inner_kernel
-def _fill(d: Drive, L: Floats, past: float) -> None:
-    G = d.profiles
+def _fill(d: Drive, laws: Floats, past: float) -> None:
     for c in range(d.size.cables):
         for end in range(2):
             wrap, law = 2 * c + end, d.cables[c].law[end]
-            w = G[wrap, Y, d.heights[wrap] - 1]
-            d.heights[wrap] = wrap_fill(G, L, law, wrap, w, v_of_tau(L, law, math.exp(past)), 0.0)
+            w = d.profiles[wrap, d.heights[wrap] - 1].y
+            d.heights[wrap] = wrap_fill(
+                d.profiles[wrap], laws, law, w, v_of_tau(laws, law, math.exp(past)), 0.0
+            )
 
 
 @inner_kernel
@@ -156,25 +194,25 @@ def side_follow(d: Drive, nominal: Drive, first: bool) -> None:
 
 
 @inner_kernel
-def side_retension(d: Drive, nominal: Drive, L: Floats) -> None:
+def side_retension(d: Drive, nominal: Drive, laws: Floats) -> None:
     """Bring one bound to the pretension that the nominal state took on when it committed."""
     for c in range(d.size.cables):
-        retension(d, L, c, nominal.states[c].pretension)
+        retension(d, laws, c, nominal.states[c].pretension)
 
 
 @inner_kernel
 def _cable(
-    b: Bounds, L: Floats, side: Side, c: int, tension: float, x_in: float, x_out: float, eps_in: float
-) -> tuple[float, float, float]:
-    """Stretch [m] of cable c and its derivative by the tension, kept as pending; and the margin [m] that covers
-    the cable between the possible departure points and what merging of pieces did."""
+    b: Bounds, laws: Floats, side: Side, c: int, tension: float, x_in: float, x_out: float, eps_in: float
+) -> Bound:
+    """Stretch [m] of cable c, kept as pending; the margin covers the cable between the possible departure points
+    and what merging of pieces did."""
     d, sign = side.drive, side.sign
-    cable, state, G = d.cables[c], d.states[c], d.profiles
+    cable, state = d.cables[c], d.states[c]
     t0 = cable.T0 * state.pretension * state.stiffness
     tau = tension / t0
-    v = v_of_tau(L, 2, tau)
-    e, a = strain_of_tau(L, 2, tau)
-    dv = dv_dtau(L, 2, tau, v)
+    v = v_of_tau(laws, ELSEWHERE, tau)
+    e, a = strain_of_tau(laws, ELSEWHERE, tau)
+    dv = dv_dtau(laws, ELSEWHERE, tau, v)
     total = cable.length * e
     slope = cable.length * a
     margin = 0.0
@@ -186,26 +224,26 @@ def _cable(
         eps = b.cables[c].eps if end == OUT else eps_in
         shift = mu * eps * b.whole.steepest
         end_v = v + sign * shift
-        end_tau = tau_of_v(L, 2, end_v)
-        meet = wrap_eval(G, L, cable.law[end], wrap, d.heights[wrap], w, end_v, end_tau, mu)
+        end_tau = tau_of_v(laws, 2, end_v)
+        meet = wrap_eval(d.profiles[wrap], laws, cable.law[end], d.heights[wrap], w, end_v, end_tau, mu)
         step = d.steps[wrap]
         set_pending(step, meet)
-        step.w, step.end, step.tau = w, end_v, end_tau
+        step.w, step.end_v, step.end_tau = w, end_v, end_tau
         radius = cable.radius[end]
         total += radius * meet.total
         slope += radius * meet.slope * dv
-        merged = G[wrap, B, d.heights[wrap] - 1]
+        merged = d.profiles[wrap, d.heights[wrap] - 1].stretch_error
         margin += radius * (eps * (abs(e) + 4.0 * shift * (1.0 + abs(e))) + 1.05 * merged)
     unit = cable.T0 * state.pretension / cable.EA
-    return total * unit - state.offset, slope * unit / t0, margin * unit
+    return Bound(total * unit - state.offset, slope * unit / t0, margin * unit)
 
 
 @inner_kernel
 def chain_bound(
-    b: Bounds, nominal: Drive, L: Floats, side: Side, first: int, count: int, tension: float, x_in: float, x_out: float,
-    eps_in: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Rotation [rad] of a chain's output shaft in one bound's state, its derivative by the output tension, its margin.
+    b: Bounds, nominal: Drive, laws: Floats, side: Side, first: int, count: int, tension: float, x_in: float,
+    x_out: float, eps_in: float,
+) -> Bound:  # fmt: skip
+    """Rotation [rad] of a chain's output shaft in one bound's state.
 
     All wraps stand at the nominal state's shaft angles; the side's `shaft` gets what its state adds to each
     shaft's angle.
@@ -215,20 +253,19 @@ def chain_bound(
     for c in range(first, first + count):
         cable = side.drive.cables[c]
         shaft = x_out if c == first + count - 1 else nominal.states[c].shaft
-        stretch, a, more = _cable(b, L, side, c, tension * cable.scale, x, shaft, eps)
-        theta += cable.weight * stretch
-        slope += cable.weight * cable.scale * a
-        margin += cable.weight * more
-        own = cable.ratio * own + cable.sign * stretch / cable.radius[OUT]
+        stretch = _cable(b, laws, side, c, tension * cable.scale, x, shaft, eps)
+        theta += cable.weight * stretch.value
+        slope += cable.weight * cable.scale * stretch.slope
+        margin += cable.weight * stretch.margin
+        own = cable.ratio * own + cable.sign * stretch.value / cable.radius[OUT]
         side.drive.states[c].shaft = own
         x, eps = shaft, b.cables[c].eps
-    return theta, slope, margin
+    return Bound(theta, slope, margin)
 
 
 @inner_kernel
-def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> tuple[float, float, float]:
-    """Out of a state's pending evaluation: rotation [rad] of the chain's output per rad by which output wraps
-    are turned, at most; the same for a shift of all end values by mu per rad; and its greatest compliance [rad/N]."""
+def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> Turning:
+    """What a chain's pending evaluation can give way at most."""
     turning = shifting = compliance = 0.0
     for c in range(first, first + count):
         cable, state = d.cables[c], d.states[c]
@@ -240,16 +277,16 @@ def chain_turning(b: Bounds, d: Drive, first: int, count: int) -> tuple[float, f
             radius = cable.radius[end]
             slid = unit * radius * mu * (step.total + step.w)
             shifting += slid
-            turning += slid + unit * radius * abs(step.tau - 1.0)
+            turning += slid + unit * radius * abs(step.end_tau - 1.0)
             soft += radius * b.whole.steepest * math.expm1(mu * step.w) / mu
         compliance += soft * unit / (cable.T0 * state.pretension * state.stiffness) * cable.scale
-    return turning, shifting, compliance
+    return Turning(turning, shifting, compliance)
 
 
 @inner_kernel
-def chain_commit(d: Drive, L: Floats, first: int, count: int) -> None:
+def chain_commit(d: Drive, laws: Floats, first: int, count: int) -> None:
     """Make the last evaluation of a chain its bound's state."""
     for c in range(first, first + count):
         for end in range(2):
             wrap, law = 2 * c + end, d.cables[c].law[end]
-            d.heights[wrap] = wrap_commit(d.profiles, L, law, wrap, d.heights[wrap], d.steps[wrap], MERGE)
+            d.heights[wrap] = wrap_commit(d.profiles[wrap], laws, law, d.heights[wrap], d.steps[wrap], MERGE)

@@ -11,7 +11,8 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.mechanics.assemble import Model
-from cablecomp.mechanics.profile import ROWS, Floats, Ints
+from cablecomp.mechanics.profile import Floats, Ints, Points
+from cablecomp.mechanics.records import POINT, floats
 
 MAGIC = b"CABLECMP"
 VERSION = 2
@@ -29,10 +30,13 @@ def pack(
         struct.pack("<d", last_time),
     ]
     parts += [row.tobytes() for row in numbers]
-    for S, J in states:
-        d = model.named(S, J)
-        parts += [J.astype("<i8").tobytes(), S[: d.size.steps_at].tobytes()]
-        parts += [np.ascontiguousarray(d.profiles[k, :, : J[k]]).tobytes() for k in range(len(J))]
+    for memory, heights in states:
+        d = model.named(memory, heights)
+        parts += [heights.astype("<i8").tobytes(), memory[: d.size.steps_at].tobytes()]
+        parts += [
+            np.ascontiguousarray(_by_field(d.profiles[k, : heights[k]]).T).tobytes()
+            for k in range(len(heights))
+        ]
     body = b"".join(parts)
     return body + hashlib.sha256(body).digest()
 
@@ -76,22 +80,29 @@ def _fill(body: bytes, model: Model, states: Sequence[State], numbers: Sequence[
     for row in numbers:
         row[:] = np.frombuffer(body, "<f8", len(row), place)
         place += 8 * len(row)
-    for S, J in states:
-        d = model.named(S, J)
+    for memory, heights in states:
+        d = model.named(memory, heights)
         small = int(d.size.steps_at)
-        J[:] = np.frombuffer(body, "<i8", len(J), place)
-        if J.min() < 0 or J.max() > d.size.capacity:
+        heights[:] = np.frombuffer(body, "<i8", len(heights), place)
+        if heights.min() < 0 or heights.max() > d.size.capacity:
             raise ValueError("profile longer than its room")
-        place += 8 * len(J)
-        S[:small] = np.frombuffer(body, "<f8", small, place)
+        place += 8 * len(heights)
+        memory[:small] = np.frombuffer(body, "<f8", small, place)
         place += 8 * small
-        for stack in range(len(J)):
-            used = ROWS * int(J[stack])
-            d.profiles[stack, :, : J[stack]] = np.frombuffer(body, "<f8", used, place).reshape(ROWS, -1)
+        for stack in range(len(heights)):
+            used = floats(POINT) * int(heights[stack])
+            fields = np.frombuffer(body, "<f8", used, place).reshape(floats(POINT), -1)
+            _by_field(d.profiles[stack, : heights[stack]])[:] = fields.T
             place += 8 * used
     if place != len(body):
         raise ValueError("bytes left over")
     return float(last_time)
+
+
+def _by_field(points: Points) -> Floats:
+    """The numbers of these points, one row a point; a snapshot holds them field by field."""
+    rows: Floats = points.view("f8").reshape(len(points), floats(POINT))
+    return rows
 
 
 def _joint_key(config: JointConfig) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from cablecomp.mechanics.drive import Drive, Terms, drive, terms_of
 from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
@@ -16,7 +17,7 @@ from cablecomp.mechanics.joint import (
 )
 from cablecomp.mechanics.pointer import call_walk
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
-from cablecomp.mechanics.records import IN
+from cablecomp.mechanics.records import IN, OTHERS
 from cablecomp.mechanics.status import (
     STATUS_BACKWARD,
     STATUS_BREAKS,
@@ -29,14 +30,7 @@ from cablecomp.mechanics.status import (
     STATUS_UNREACHABLE,
     STATUS_UNWOUND,
 )
-
-# one row of inputs
-IN_TIME, IN_MOTOR, IN_LOAD, IN_JOINT, IN_TEMPERATURE, IN_OTHER = range(6)
-# one row of outputs
-(
-    OUT_JOINT, OUT_DRIVE, OUT_LOAD, OUT_T_H, OUT_T_L, OUT_COMPLIANCE, OUT_T_H_IN, OUT_T_L_IN, OUT_MOTOR_TORQUE,
-    OUT_STRENGTH, OUT_WIDTH,
-) = range(11)  # fmt: skip
+from cablecomp.observer.rows import answer_in, readings_in
 
 
 @inner_kernel
@@ -65,85 +59,93 @@ def smooth(d: Drive, dt: float, motor: float, load: float) -> tuple[float, float
 
 
 @inner_kernel
-def admissible(d: Drive, row: Floats) -> int:
-    """Whether a row of readings can be taken at all: started state, finite readings, time that does not run
+def admissible(d: Drive, read: Any) -> int:
+    """Whether a record of readings can be taken at all: started state, finite readings, time that does not run
     backwards."""
     if d.heights[0] < 2:
         return STATUS_UNKNOWN
-    if not (math.isfinite(row[IN_MOTOR]) and math.isfinite(row[IN_LOAD]) and math.isfinite(row[IN_TIME])):
+    if not (math.isfinite(read.motor) and math.isfinite(read.load) and math.isfinite(read.time)):
         return STATUS_NAN
-    for j in range(IN_TEMPERATURE, row.shape[0]):
-        if math.isinf(row[j]):
+    if math.isinf(read.temperature):
+        return STATUS_NAN
+    for j in range(OTHERS):
+        if math.isinf(read.other[j]):
             return STATUS_NAN
-    return STATUS_OK if row[IN_TIME] >= d.context.time else STATUS_BACKWARD
+    return STATUS_OK if read.time >= d.context.time else STATUS_BACKWARD
 
 
 @inlined_kernel
-def motor_side(d: Drive, out: Floats) -> None:
+def motor_side(d: Drive, answer: Any) -> None:
     """Tensions at the input pulley (NaN for a cable that is not there) and the torque that turns it.
 
     tau_motor = -r (T_h - T_l) + what friction before the cable takes, both tensions at the input pulley.
     """
     circuit = d.circuits[0]
     pull = d.states[circuit.first[0]].tension_in
-    out[OUT_T_H_IN] = pull
-    out[OUT_T_L_IN] = math.nan
+    answer.tension_h_in = pull
+    answer.tension_l_in = math.nan
     if circuit.chains == 2:
         tension_l = d.states[circuit.first[1]].tension_in
-        out[OUT_T_L_IN] = tension_l
+        answer.tension_l_in = tension_l
         pull -= tension_l
     radius = d.cables[circuit.first[0]].radius[IN]
-    out[OUT_MOTOR_TORQUE] = -radius * pull + d.context.motor_moment
+    answer.motor_torque = -radius * pull + d.context.motor_moment
 
 
 @inlined_kernel
-def predict(d: Drive, terms: Terms, L: Floats, row: Floats, out: Floats) -> int:
-    """Solve the joint for one row of readings without committing it; `out` gets the outputs. Returns a status.
+def predict(d: Drive, terms: Terms, laws: Floats, read: Any, answer: Any) -> int:
+    """Solve the joint for one record of readings without committing it; `answer` gets what it says. Returns a status.
 
     The scalar state is left pending in any case: whoever commits nothing puts it back (`keep`, `put_back`).
     """
-    status = admissible(d, row)
+    status = admissible(d, read)
     if status != STATUS_OK:
         return status
     x = d.context
-    raw = (row[IN_LOAD] - d.sensor.offset) / d.sensor.gain
-    motor, load = smooth(d, row[IN_TIME] - x.time, row[IN_MOTOR], raw)
-    advance(d, row[IN_TIME], motor, load, row[IN_TEMPERATURE])
-    for j in range(row.shape[0] - IN_OTHER):
-        x.other[j] = row[IN_OTHER + j]
-    status = joint_solve(d, terms, L)
+    raw = (read.load - d.sensor.offset) / d.sensor.gain
+    motor, load = smooth(d, read.time - x.time, read.motor, raw)
+    advance(d, read.time, motor, load, read.temperature)
+    for j in range(OTHERS):
+        x.other[j] = read.other[j]
+    status = joint_solve(d, terms, laws)
     ready = joint_ready(d)
     if status == STATUS_OK or (status == STATUS_DIVERGED and ready == STATUS_UNWOUND):
         status = ready
     if d.size.terms > 0 and not terms_sane(d):
         status = STATUS_EFFECT
-    angle = x.joint + x.rigid * (row[IN_MOTOR] - motor)
-    out[OUT_DRIVE] = angle
-    out[OUT_JOINT] = angle + x.reading
-    out[OUT_LOAD] = row[IN_LOAD]
-    out[OUT_T_H] = x.tension_h
-    out[OUT_T_L] = x.tension_l
-    out[OUT_COMPLIANCE] = x.compliance
-    motor_side(d, out)
-    out[OUT_STRENGTH] = 0.0
+    answer.drive = x.joint + x.rigid * (read.motor - motor)
+    answer.joint = answer.drive + x.reading
+    answer.load = read.load
+    answer.tension_h = x.tension_h
+    answer.tension_l = x.tension_l
+    answer.compliance = x.compliance
+    motor_side(d, answer)
+    answer.strength = 0.0
     return status
 
 
 @inner_kernel
-def keep(d: Drive, S: Floats) -> None:
+def keep(d: Drive, memory: Floats) -> None:
     """Copy everything but the profiles (which nothing but a commit touches) aside."""
-    copy_floats(S, 0, S, d.size.spare_at, d.size.steps_at)
+    copy_floats(memory, 0, memory, d.size.spare_at, d.size.steps_at)
 
 
 @inner_kernel
-def put_back(d: Drive, S: Floats) -> None:
+def put_back(d: Drive, memory: Floats) -> None:
     """Undo what happened since `keep`, bit for bit."""
-    copy_floats(S, d.size.spare_at, S, 0, d.size.steps_at)
+    copy_floats(memory, d.size.spare_at, memory, 0, d.size.steps_at)
 
 
 @kernel
 def walk(
-    P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats, commit: bool
+    fixed: Floats,
+    layout: Ints,
+    memory: Floats,
+    heights: Ints,
+    laws: Floats,
+    rows: Floats,
+    outs: Floats,
+    commit: bool,
 ) -> tuple[int, int]:
     """Step through a block of rows; returns how many were done and the status of the row that stopped it.
 
@@ -151,16 +153,16 @@ def walk(
     without, nothing is kept of any (and a cable that would break is no reason to refuse a prediction). All that steps
     the observer goes through this one function, as it is long to compile.
     """
-    d, terms = drive(P, I, S, J), terms_of(P, I, S)
+    d, terms = drive(fixed, layout, memory, heights), terms_of(fixed, layout, memory)
     for k in range(rows.shape[0]):
-        out = outs[k]
-        keep(d, S)
-        status = predict(d, terms, L, rows[k], out)
+        answer = answer_in(outs[k])
+        keep(d, memory)
+        status = predict(d, terms, laws, readings_in(rows[k]), answer)
         if commit and status == STATUS_OK:
-            out[OUT_STRENGTH] = strength_used(d)
-            status = joint_commit(d, terms, L) if out[OUT_STRENGTH] <= 1.0 else STATUS_BREAKS
+            answer.strength = strength_used(d)
+            status = joint_commit(d, terms, laws) if answer.strength <= 1.0 else STATUS_BREAKS
         if status != STATUS_OK or not commit:
-            put_back(d, S)
+            put_back(d, memory)
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK
@@ -168,27 +170,34 @@ def walk(
 
 @kernel
 def find_load(
-    walk_at: int, P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats
+    walk_at: int,
+    fixed: Floats,
+    layout: Ints,
+    memory: Floats,
+    heights: Ints,
+    laws: Floats,
+    rows: Floats,
+    outs: Floats,
 ) -> int:
-    """The load [N m] under which the joint encoder would read the only row's IN_JOINT, by Newton's method;
-    written to its IN_LOAD. `walk_at`: where the machine code of `walk` lies.
+    """The load [N m] under which the joint encoder would read the only row's `joint`, by Newton's method;
+    written to its `load`. `walk_at`: where the machine code of `walk` lies.
 
     Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
     are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a load that the joint
     cannot take (an open circuit's cable slack, a drum unwound): if that is what the angle asks for, it is refused.
     """
-    row, out = rows[0], outs[0]
-    if not math.isfinite(row[IN_JOINT]):
+    read, answer = readings_in(rows[0]), answer_in(outs[0])
+    if not math.isfinite(read.joint):
         return STATUS_NAN
-    d = drive(P, I, S, J)
+    d = drive(fixed, layout, memory, heights)
     low, high = -1e300, 1e300
     below = above = STATUS_OK  # what is wrong with the loads at the ends of the bracket
     load = d.context.load * d.sensor.gain + d.sensor.offset
     reach = d.circuits[0].radius * d.cables[0].T0
     taken = 0.0  # the last load that the joint could take
     for _ in range(200):
-        row[IN_LOAD] = load
-        _, status = call_walk(walk_at, P, I, S, J, L, rows, outs, False)
+        read.load = load
+        _, status = call_walk(walk_at, fixed, layout, memory, heights, laws, rows, outs, False)
         if status in (STATUS_SLACK, STATUS_UNWOUND, STATUS_DIVERGED):
             reach *= 2.0
             if status == STATUS_SLACK or load < taken:
@@ -200,7 +209,7 @@ def find_load(
         elif status != STATUS_OK:
             return status
         else:
-            miss = out[OUT_JOINT] - row[IN_JOINT]
+            miss = answer.joint - read.joint
             taken = load
             if abs(miss) < 1e-13:
                 return STATUS_OK
@@ -208,7 +217,7 @@ def find_load(
                 high, above = load, STATUS_OK
             else:
                 low, below = load, STATUS_OK
-            new = load - miss / max(out[OUT_COMPLIANCE], 1e-12)
+            new = load - miss / max(answer.compliance, 1e-12)
         if not low < new < high:
             new = 0.5 * (low + high)
         if abs(new - load) <= 1e-14 + 1e-13 * abs(load):
@@ -221,14 +230,22 @@ def find_load(
 
 @kernel
 def walk_inverse(
-    walk_at: int, P: Floats, I: Ints, S: Floats, J: Ints, L: Floats, rows: Floats, outs: Floats, commit: bool
+    walk_at: int,
+    fixed: Floats,
+    layout: Ints,
+    memory: Floats,
+    heights: Ints,
+    laws: Floats,
+    rows: Floats,
+    outs: Floats,
+    commit: bool,
 ) -> tuple[int, int]:
     """As `walk`, with every row's load found from both encoders."""
     for k in range(rows.shape[0]):
         row, out = rows[k : k + 1], outs[k : k + 1]
-        status = find_load(walk_at, P, I, S, J, L, row, out)
+        status = find_load(walk_at, fixed, layout, memory, heights, laws, row, out)
         if status == STATUS_OK:
-            _, status = call_walk(walk_at, P, I, S, J, L, row, out, commit)
+            _, status = call_walk(walk_at, fixed, layout, memory, heights, laws, row, out, commit)
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
 from cablecomp.mechanics.assemble import Model
-from cablecomp.mechanics.profile import Floats, Ints, V, Y
-from cablecomp.mechanics.tables import tau_of_v
+from cablecomp.mechanics.profile import Floats, Ints
+from cablecomp.mechanics.tables import ELSEWHERE, tau_of_v
 
 
 class WrapProfile(NamedTuple):
@@ -21,17 +21,17 @@ class WrapProfile(NamedTuple):
     tension_N: NDArray[np.float64]
 
 
-def wrap_profiles(config: JointConfig, model: Model, S: Floats, J: Ints) -> list[WrapProfile]:
-    """The tension profile on every wrap in the state S, J, termination first."""
-    d = model.named(S, J)
+def wrap_profiles(config: JointConfig, model: Model, memory: Floats, heights: Ints) -> list[WrapProfile]:
+    """The tension profile on every wrap in the state `memory`, `heights`, termination first."""
+    d = model.named(memory, heights)
     result = []
     for wrap in range(2 * d.size.cables):
         cable, state = d.cables[wrap // 2], d.states[wrap // 2]
-        n = int(J[wrap])
+        n = int(heights[wrap])
         t0 = cable.T0 * state.pretension * state.stiffness
-        tau = np.array([tau_of_v(model.L, 2, v) for v in d.profiles[wrap, V, :n]])
+        tau = np.array([tau_of_v(model.laws, ELSEWHERE, v) for v in d.profiles[wrap, :n]["v"]])
         name = _wrap_name(config, wrap, cable.sign)
-        result.append(WrapProfile(name, d.profiles[wrap, Y, :n].copy(), t0 * tau))
+        result.append(WrapProfile(name, d.profiles[wrap, :n]["y"].copy(), t0 * tau))
     return result
 
 

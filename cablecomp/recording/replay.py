@@ -35,7 +35,7 @@ Progress = Callable[[float, int], None]
 class StreamObserver(Protocol):
     """The observer as replay uses it: state inside, one block of samples at a time, in order."""
 
-    def run(self, columns: dict[str, FloatArray], bounds: bool) -> dict[str, FloatArray]:
+    def run(self, columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
         """Predict a block; raises InputError("sample k: ...") with k counted in this block."""
 
     def profiles(self) -> Sequence[WrapProfile]:
@@ -76,7 +76,6 @@ def replay(
     progress: Progress | None = None,
     *,
     config: JointConfig,
-    bounds: bool = True,
     clock: Callable[[], float] = time.perf_counter,
 ) -> ReplaySummary:
     """Stream a recording through the observer and every block into the sinks; see `ReplaySummary`.
@@ -84,7 +83,7 @@ def replay(
     Raises InputError with the file's line where the recording or the joint does not allow a prediction.
     """
     recording.require(required_channels(config), f"with [observer] load = {config.observer.load!r}")
-    run = _Run(recording, observer, config, bounds, clock)
+    run = _Run(recording, observer, config, clock)
     started = clock()
     for block in recording.blocks():
         replayed = run.block(block)
@@ -103,11 +102,10 @@ class _Run:
         recording: Recording,
         observer: StreamObserver,
         config: JointConfig,
-        bounds: bool,
         clock: Callable[[], float],
     ) -> None:
         self._recording, self._observer, self._config = recording, observer, config
-        self._bounds, self._clock = bounds, clock
+        self._clock = clock
         self._instants, self._snapshots = Instants(), dict[str, Snapshot]()
         self._log = RemarkLog(recording.line_word)
         self._residual, self._fit = Moments(), LineFit()
@@ -178,7 +176,7 @@ class _Run:
     def _observe(self, block: Block) -> dict[str, FloatArray]:
         started = self._clock()
         try:
-            predicted = self._observer.run(block.columns, self._bounds)
+            predicted = self._observer.run(block.columns)
         except InputError as error:
             raise InputError(self._located(str(error), block)) from None
         self._busy += self._clock() - started

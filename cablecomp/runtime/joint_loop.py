@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 from cablecomp.config import JointConfig
 from cablecomp.control.command import FULL, Command, Feed, Reference
@@ -48,6 +49,17 @@ class JointSetup:
     reference: References
 
 
+class Seen(NamedTuple):
+    """One cycle: its sample, and what was made of it."""
+
+    now_s: float
+    sample: Sample
+    estimate: Estimate
+    command: Command
+    reference: Reference
+    flags: int
+
+
 class JointLoop:
     """Runs one joint on one link, cycle by cycle; `stop_reason` says why it wants the run stopped ("" = it
     does not)."""
@@ -65,7 +77,7 @@ class JointLoop:
         self._link = link
         self._folder = folder
         self._events = events
-        self._seen: tuple[float, Sample, Estimate, Command, Reference, int] | None = None
+        self._seen: Seen | None = None
         self._sent = SafeCommand(nan, 0.0, 0.0, 0)
         self._predicted = nan
         self._flags = 0
@@ -85,9 +97,10 @@ class JointLoop:
         seen = self._seen
         if seen is None:
             return None
-        now_s, sample, estimate, command, reference, flags = seen
         name, phase = self.setup.name, self.degraded.phase
-        return View(name, now_s, phase, sample, estimate, command, reference, flags)
+        return View(
+            name, seen.now_s, phase, seen.sample, seen.estimate, seen.command, seen.reference, seen.flags
+        )
 
     @property
     def enabled(self) -> bool:
@@ -212,7 +225,7 @@ class JointLoop:
         estimate = compensator.estimate
         if estimate is not None:
             self._predicted = estimate.joint_position_rad
-            self._seen = (now_s, checked.sample, estimate, command, reference, checked.flags)
+            self._seen = Seen(now_s, checked.sample, estimate, command, reference, checked.flags)
         if told and checked.flags != self._flags:
             self._note(checked.flags, now_s)
         return command
@@ -222,13 +235,13 @@ class JointLoop:
         seen, checked = self._seen, self.checked
         if seen is None or checked is None:
             return
-        _, sample, estimate, _, reference, _ = seen
+        sample, estimate = seen.sample, seen.estimate
         self.tally.phases[self.degraded.phase] += 1
         if since_s is not None and not self._refused:
             self.tally.add(self._last_reference, sample.joint_position_rad - self._offset, estimate)
         if self._folder is not None and self.setup.compensator.observed:
             self._record(self._folder, sample, estimate, command, checked, since_s is not None)
-        self._last_reference = reference
+        self._last_reference = seen.reference
 
     def _judge(self, checked: Checked, now_s: float, *, drive: bool = True) -> None:
         before, s = self.degraded.phase, self.setup

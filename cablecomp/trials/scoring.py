@@ -8,7 +8,7 @@ from typing import Any
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.conformal import deficits
-from cablecomp.effects.catalogue import acts_through
+from cablecomp.effects.catalogue import acts_through, catalogue
 from cablecomp.trials.reference import Yardstick
 from cablecomp.trials.row import Bound, Estimate, Named, Row
 from cablecomp.trials.sealed import TrueEffect, Truth
@@ -220,17 +220,18 @@ def _in_terms_of(
     """True parameters as the verdict counts them: a pretension at another reference temperature is another
     pretension and another coefficient."""
     true = {k: float(v) for k, v in effect.parameters.items() if not isinstance(v, str)}
-    if effect.id == "thermal_pretension":
-        entry = stated.get("reference_degC")
-        reference = entry["value"] if isinstance(entry, Mapping) else entry
-        if isinstance(reference, float | int):
-            factor = 1.0 + true["coefficient_per_K"] * (float(reference) - true["reference_degC"])
-            calibration["pretension_N"] *= factor
-            true = {"coefficient_per_K": true["coefficient_per_K"] / factor}
-        else:
-            calibration.pop("pretension_N", None)
-            true = {}
-    return true
+    known = catalogue().get(effect.id)
+    reference = known.of_role("reference") if known else None
+    if known is None or known.at_reference is None or reference is None:
+        return true
+    entry = stated.get(reference.name)
+    value = entry["value"] if isinstance(entry, Mapping) else entry
+    if not isinstance(value, float | int):
+        calibration.pop("pretension_N", None)
+        return {}
+    law = known.at_reference(true, float(value))
+    calibration["pretension_N"] *= law.pretension
+    return dict(law.values)
 
 
 def _number(value: object) -> float:

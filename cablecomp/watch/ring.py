@@ -31,14 +31,8 @@ class Ring:
     def __len__(self) -> int:
         return self._count
 
-    def push(self, row: Sequence[float]) -> None:
-        """Keep one row (in the order of `channels`); the oldest one goes when the ring is full."""
-        self._rows[self._next] = row
-        self._next = (self._next + 1) % len(self._rows)
-        self._count = min(self._count + 1, len(self._rows))
-
     def extend(self, rows: FloatArray) -> None:
-        """Keep several rows, an array of (rows, channels), oldest first."""
+        """Keep rows, an array of (rows, channels), oldest first; the oldest go when the ring is full."""
         rows = rows[-len(self._rows) :]
         self._rows[(self._next + np.arange(len(rows))) % len(self._rows)] = rows
         self._next = (self._next + len(rows)) % len(self._rows)

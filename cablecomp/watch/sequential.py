@@ -85,7 +85,6 @@ class Usual:
     inflation: float
     rms: float
     threshold: float
-    short_memory: bool
     idle_mean: float
     idle_root: float
 
@@ -194,7 +193,6 @@ def _usual(values: FloatArray, duration_s: float, config: WatchConfig) -> Usual:
         1.0 + 2.5 / sqrt(2.0 * blocks),
         rms,
         log(max(config.between_false_alarms_s / block_s, 2.0)),
-        wanted <= n // _FEWEST_BLOCKS,
         config.indifference * rms / mean_sd,
         float(np.cbrt(root**3 + (config.indifference * rms) ** 2) - root) / root_sd,
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from firmware_sim.plant.cable import lumped_extension, lumped_slope
 from firmware_sim.plant.columns import (
     JOINT_TORQUE,
     MOTOR_TORQUE,
@@ -34,6 +33,7 @@ from firmware_sim.plant.shafts import (
     shaft_slope,
     shaft_torque,
 )
+from firmware_sim.plant.tension import lumped_extension, lumped_slope
 
 
 def winding_out_of(c: Any, q: float) -> float:

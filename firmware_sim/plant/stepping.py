@@ -6,19 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from firmware_sim.plant.cable import (
-    carry_along,
-    find_contacts,
-    guess_tension,
-    lumped_extension,
-    lumped_slope,
-    move_nodes,
-    refresh_tension,
-    settle_cable,
-    solve_cable,
-    update_modes,
-)
+from firmware_sim.plant.cable import carry_along, move_nodes, solve_cable, update_modes
 from firmware_sim.plant.columns import MOTOR_ANGLE, PRETENSION_H
+from firmware_sim.plant.contact import find_contacts
 from firmware_sim.plant.jit import njit, part
 from firmware_sim.plant.network import (
     apply_surroundings,
@@ -30,6 +20,13 @@ from firmware_sim.plant.network import (
 )
 from firmware_sim.plant.records import Drive, Floats, Nodes
 from firmware_sim.plant.shafts import bdf, settle_bearing, update_bearing
+from firmware_sim.plant.tension import (
+    guess_tension,
+    lumped_extension,
+    lumped_slope,
+    refresh_tension,
+    settle_cable,
+)
 
 MAX_ITERATIONS = 400
 RUSH_ITERATIONS = 12  # so many with the rush of `update_modes`, so many without, and so on

@@ -30,9 +30,9 @@ def test_every_number_of_the_state_has_one_name(
 ) -> None:
     joint = model(name, *effects)
     S = np.arange(float(len(joint.S)))
-    d = joint.named(S, joint.J)
+    d = joint.named(S, joint.heights)
     parts = [d.states, d.steps, d.grids, np.atleast_1d(d.context), np.atleast_1d(d.filter)]
-    seen = np.concatenate([*(part.view("f8").ravel() for part in parts), d.profiles.ravel()])
+    seen = np.concatenate([*(part.view("f8").ravel() for part in parts), d.profiles.view("f8").ravel()])
     assert len(np.unique(seen)) == len(seen)
     unnamed = np.setdiff1d(S[: d.size.spare_at], seen)
     head_room = 0 if d.size.grids else 16 * d.size.cables
@@ -44,19 +44,19 @@ def test_every_number_of_the_state_has_one_name(
 def test_what_is_written_by_name_lies_in_the_array() -> None:
     joint = model("snow-closed-rig")
     S = joint.S.copy()
-    d = joint.named(S, joint.J)
+    d = joint.named(S, joint.heights)
     d.states[1].tension = 17.0
     d.context.load = 19.0
-    again = joint.named(S, joint.J)
+    again = joint.named(S, joint.heights)
     assert (again.states[1].tension, again.context.load) == (17.0, 19.0)
-    assert joint.named(joint.S, joint.J).states[1].tension == 0.0
+    assert joint.named(joint.S, joint.heights).states[1].tension == 0.0
 
 
 @pytest.mark.parametrize("name", names("joints"))
 def test_circuits_multiply_to_the_rigid_drive_and_chains_pull_against_each_other(name: str) -> None:
     config = load_joint(name)
     joint = model(name)
-    d = joint.named(joint.S, joint.J)
+    d = joint.named(joint.S, joint.heights)
     assert math.prod(c.ratio for c in d.circuits) == pytest.approx(config.drive.ratio, rel=1e-15)
     assert sum(c.count * c.chains for c in d.circuits) == len(d.cables)
     for circuit in d.circuits:

@@ -12,38 +12,38 @@ from wrap_energy import friction_work_J, stored_J
 
 from cablecomp.mechanics import arc
 from cablecomp.mechanics.cable import span_play
-from cablecomp.mechanics.profile import ROWS, Meet, V, Y, set_pending, wrap_commit, wrap_eval, wrap_fill
-from cablecomp.mechanics.records import STEP
+from cablecomp.mechanics.profile import Meet, Points, set_pending, wrap_commit, wrap_eval, wrap_fill
+from cablecomp.mechanics.records import POINT, STEP
 
 Array = NDArray[np.float64]
 
 
-def one_wrap(values: list[tuple[float, float]], start_rad: float, mu: float) -> tuple[Array, int]:
+def one_wrap(values: list[tuple[float, float]], start_rad: float, mu: float) -> tuple[Points, int]:
     """A single wrap through (wrap angle, end value) steps from uniform tension."""
-    G = np.zeros((1, ROWS, 512))
-    n = wrap_fill(G, None, 0, 0, start_rad, 0.0, 0.0)
+    p = np.zeros(512, POINT)
+    n = wrap_fill(p, None, 0, start_rad, 0.0, 0.0)
     for w, v in values:
-        n, _ = moved(G, n, w, v, mu)
-    return G[0], n
+        n, _ = moved(p, n, w, v, mu)
+    return p, n
 
 
-def moved(G: Array, n: int, w: float, v: float, mu: float) -> tuple[int, Meet]:
-    """One step of the only wrap in G; its new number of points, and the step's evaluation."""
+def moved(p: Points, n: int, w: float, v: float, mu: float) -> tuple[int, Meet]:
+    """One step of the wrap p; its new number of points, and the step's evaluation."""
     step = np.zeros(1, STEP)[0]
-    step.w, step.end, step.tau = w, v, float(np.exp(v))
-    meet = wrap_eval(G, None, 0, 0, n, w, v, step.tau, mu)
+    step.w, step.end_v, step.end_tau = w, v, float(np.exp(v))
+    meet = wrap_eval(p, None, 0, n, w, v, step.end_tau, mu)
     set_pending(step, meet)
-    return wrap_commit(G, None, 0, 0, n, step, 0.0), meet
+    return wrap_commit(p, None, 0, n, step, 0.0), meet
 
 
-def turned(G: Array, n: int, turn: float, v: float) -> int:
+def turned(p: Points, n: int, turn: float, v: float) -> int:
     """A pulley turns: cable arrives at the near end of its only arc at v, as much leaves at the far end."""
-    y, width = G[0, Y, :n].copy(), G[0, Y, n - 1]
+    y, width = p[:n]["y"].copy(), p[n - 1]["y"]
     inside = int(np.searchsorted(y, width - turn))
-    last = np.interp(width - turn, y, G[0, V, :n])
+    last = np.interp(width - turn, y, p[:n]["v"])
     places = [0.0, *(y[:inside] + turn), width]
-    values = [v, *G[0, V, :inside], last]
-    G[0, Y, : len(places)], G[0, V, : len(places)] = places, values
+    values = [v, *p[:inside]["v"], last]
+    p[: len(places)]["y"], p[: len(places)]["v"] = places, values
     return len(places)
 
 
@@ -56,29 +56,29 @@ def test_unwinding_moves_the_corner_by_half_and_erases_the_bump(now: float) -> N
     for unwound in np.linspace(0.1, 0.95, 5) * min(erased_by, 2.0 * corner):
         steps = [(w, np.log(peak)), (w, np.log(now))]
         steps += [(w - b, np.log(now)) for b in np.linspace(0.0, unwound, 50)[1:]]
-        G, n = one_wrap(steps, w, mu)
-        top = int(np.argmax(G[V, :n]))
-        assert (w - unwound) - G[Y, top] == pytest.approx(corner - unwound / 2.0, abs=1e-9)  # (2-72)
+        p, n = one_wrap(steps, w, mu)
+        top = int(np.argmax(p[:n]["v"]))
+        assert (w - unwound) - p[top].y == pytest.approx(corner - unwound / 2.0, abs=1e-9)  # (2-72)
     if now > 1.0:
         steps = [(w, np.log(peak)), (w, np.log(now)), (w - 1.0001 * erased_by, np.log(now))]
-        G, n = one_wrap(steps, w, mu)
-        assert np.max(G[V, :n]) <= np.log(now) + 1e-9
+        p, n = one_wrap(steps, w, mu)
+        assert np.max(p[:n]["v"]) <= np.log(now) + 1e-9
 
 
 def test_a_belt_pulley_loses_what_slip_at_its_exit_takes() -> None:
     mu, width, low, high = 0.2, 3.0, np.log(0.8), np.log(1.15)
-    G = np.zeros((1, ROWS, 400))
-    n = arc.arc_fill(G, 0, width, 0.0)
+    p = np.zeros(400, POINT)
+    n = arc.arc_fill(p, width, 0.0)
     turn = 0.005
     for _ in range(1500):
-        n = turned(G, n, turn, low)
-        n = arc.arc_commit(G, 0, n, low, high, mu)
-    y, tension = G[0, Y, :n], np.exp(G[0, V, :n])
+        n = turned(p, n, turn, low)
+        n = arc.arc_commit(p, n, low, high, mu)
+    y, tension = p[:n]["y"], np.exp(p[:n]["v"])
     slips = width - float(y[np.argmax(tension > np.exp(low) * (1.0 + 1e-9)) - 1])
     assert slips == pytest.approx((high - low) / mu, rel=1e-3)  # (2-99), at the exit only
     # work of friction per radian turned, from the profile: force dT times slip, strain beyond the entry's
     fine = np.linspace(0.0, width, 200001)
-    T = np.exp(np.interp(fine, y, G[0, V, :n]))
+    T = np.exp(np.interp(fine, y, p[:n]["v"]))
     loss = float(np.sum(np.diff(T) * (0.5 * (T[1:] + T[:-1]) - T[0])))
     assert loss == pytest.approx((T[-1] - T[0]) ** 2 / 2.0, rel=1e-3)  # (2-113) in units of R T0^2/EA
     strain = 1e-3  # T0/EA: two such pulleys make the drive's efficiency limit (2-118)
@@ -88,16 +88,16 @@ def test_a_belt_pulley_loses_what_slip_at_its_exit_takes() -> None:
 
 def test_work_in_is_what_is_stored_and_what_slip_takes() -> None:
     mu, w, radius, stiffness = 0.15, 20.0, 0.04, 25000.0
-    G = np.zeros((1, ROWS, 512))
-    n = wrap_fill(G, None, 0, 0, w, 0.0, 0.0)
+    p = np.zeros(512, POINT)
+    n = wrap_fill(p, None, 0, w, 0.0, 0.0)
     corners = [0.0, 0.6, -0.4, 0.3, -0.1, 0.5, 0.0]
     values = np.concatenate([np.linspace(a, b, 151)[1:] for a, b in pairwise(corners)])
     work = taken = 0.0
-    before, tension, length = (G[0, Y, :n].copy(), np.exp(G[0, V, :n])), 1.0, 0.0
+    before, tension, length = (p[:n]["y"].copy(), np.exp(p[:n]["v"])), 1.0, 0.0
     first = stored_J(before[0], before[1], radius, stiffness)
     for v in values:
-        n, meet = moved(G, n, w, v, mu)
-        after = (G[0, Y, :n].copy(), np.exp(G[0, V, :n]))
+        n, meet = moved(p, n, w, v, mu)
+        after = (p[:n]["y"].copy(), np.exp(p[:n]["v"]))
         work += 0.5 * (tension + np.exp(v)) * (meet.total - length) * radius / stiffness
         taken += friction_work_J(before, after, radius, stiffness)
         before, tension, length = after, float(np.exp(v)), meet.total

@@ -44,4 +44,4 @@ def knots(values: Sequence[float], per_segment: int = 12) -> Array:
 def run(observer: Observer, load: Array, motor: Array, start: float = 0.0) -> dict[str, Array]:
     """Run an observer through loads [N m] and motor angles [rad], 1 ms apart."""
     time = start + 1e-3 * np.arange(len(load))
-    return observer.run({"time_s": time, "motor_position_rad": motor, "joint_torque_Nm": load}, bounds=True)
+    return observer.run({"time_s": time, "motor_position_rad": motor, "joint_torque_Nm": load})

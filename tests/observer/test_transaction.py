@@ -14,7 +14,6 @@ from observer_joints import joint, pull_unit
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError, InternalError
-from cablecomp.mechanics.profile import Y
 from cablecomp.observer import Observer, Refusal, SampleRefused
 from cablecomp.signals import Estimate, Sample
 
@@ -223,7 +222,9 @@ def test_an_impossible_state_is_told_and_no_snapshot_of_it_is_taken_up() -> None
         poisoned.step(sample)
         sound.step(sample)
     before = sound.snapshot()
-    poisoned.model.named(poisoned._S, poisoned._J).profiles[0, Y, 1] += 1e-3  # the first wrap's second point
+    poisoned.model.named(poisoned._memory, poisoned._heights).profiles[
+        0, 1
+    ].y += 1e-3  # the first wrap's second point
     with pytest.raises(InternalError, match="profile 0"):
         poisoned.check_state()
     with pytest.raises(InputError, match="impossible state"):

@@ -33,7 +33,7 @@ class PlayObserver:
         self.play = 0.0
         self.calls = 0
 
-    def run(self, columns: dict[str, np.ndarray], bounds: bool) -> dict[str, np.ndarray]:
+    def run(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         self.calls += 1
         load, motor = columns["joint_torque_Nm"], columns["motor_position_rad"]
         deflection = np.empty(len(load))
@@ -70,7 +70,7 @@ def _columns(count: int = 1500) -> dict[str, np.ndarray]:
     time = np.arange(count) * 1e-3
     load = 5.0 * np.sin(7.0 * time) * np.exp(-time)
     motor = np.sin(3.0 * time)
-    truth = PlayObserver().run({"joint_torque_Nm": load, "motor_position_rad": motor}, False)
+    truth = PlayObserver().run({"joint_torque_Nm": load, "motor_position_rad": motor})
     noise = 1e-4 * np.random.default_rng(2).standard_normal(count)
     return {
         "time_s": time,
@@ -89,7 +89,7 @@ def test_numbers_equal_an_independent_calculation(tmp_path: Path) -> None:
     columns = _columns()
     config = joint(sensors={"joint_position_offset_rad": 5e-5})
     summary = replay(_recording(tmp_path, columns), PlayObserver(), [], config=config)
-    truth = PlayObserver().run(columns, False)
+    truth = PlayObserver().run(columns)
     residual = columns["joint_position_rad"] - truth["joint_position_rad"] - 5e-5
     deflection = columns["joint_position_rad"] - columns["motor_position_rad"] - 5e-5
     slope, offset = np.polyfit(columns["joint_torque_Nm"], deflection, 1)
@@ -109,7 +109,7 @@ def test_stops_for_snapshots_do_not_change_the_prediction(tmp_path: Path) -> Non
     columns = _columns()
     kept, observer = Kept(), PlayObserver()
     summary = replay(_recording(tmp_path, columns), observer, [kept], config=joint())
-    whole = PlayObserver().run(columns, False)
+    whole = PlayObserver().run(columns)
     assert observer.calls > 1
     for name in ("deflection_rad", "joint_position_rad"):
         assert kept.predicted(name).tobytes() == whole[name].tobytes()
@@ -123,7 +123,7 @@ def test_stops_for_snapshots_do_not_change_the_prediction(tmp_path: Path) -> Non
     assert rows["back through zero"] == top + int(np.argmax(load[top:] <= 0.0))
     for snapshot in summary.snapshots:
         follower = PlayObserver()
-        follower.run({name: values[: snapshot.row + 1] for name, values in columns.items()}, False)
+        follower.run({name: values[: snapshot.row + 1] for name, values in columns.items()})
         assert snapshot.profiles[0].tension_N[0] == follower.play
         assert snapshot.load_Nm == load[snapshot.row]
         assert snapshot.time_s == columns["time_s"][snapshot.row]
@@ -149,7 +149,7 @@ def test_a_live_recording_replays_to_the_same_bits(tmp_path: Path) -> None:
     with Recorder(tmp_path / "live.csv", list(columns), rows_per_write=64) as recorder:
         for k in range(500):
             sample = {name: values[k : k + 1] for name, values in columns.items()}
-            predicted.append(float(live.run(sample, False)["deflection_rad"][0]))
+            predicted.append(float(live.run(sample)["deflection_rad"][0]))
             recorder.append([float(values[0]) for values in sample.values()])
     kept = Kept()
     replay(open_recording(tmp_path / "live.csv"), PlayObserver(), [kept], config=joint())

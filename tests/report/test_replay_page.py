@@ -31,7 +31,7 @@ class Spring:
     def __init__(self) -> None:
         self.load = 0.0
 
-    def run(self, columns: dict[str, np.ndarray], bounds: bool) -> dict[str, np.ndarray]:
+    def run(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         load = columns["joint_torque_Nm"]
         if load.max() > 90.0:
             raise InputError(f"sample {int(load.argmax())}: too much")

@@ -90,8 +90,8 @@ def test_unusable_promises_are_refused() -> None:
 
 def test_the_ring_keeps_the_last_rows_in_order() -> None:
     ring = Ring(("time_s", "x"), 5)
-    for i in range(12):
-        ring.push((float(i), 2.0 * i))
+    for i in range(4):
+        ring.extend(np.array([(float(k), 2.0 * k) for k in range(3 * i, 3 * i + 3)]))
     assert len(ring) == 5
     assert list(ring.columns()["time_s"]) == [7.0, 8.0, 9.0, 10.0, 11.0]
     with pytest.raises(InputError, match="time_s"):
@@ -104,8 +104,7 @@ def test_an_alarm_can_be_located_from_the_ring() -> None:
     noise = SIGMA * np.random.default_rng(3).standard_normal(len(load))
     given["residual_rad"] = 4.0 * SIGMA * (load**2 - np.mean(load**2)) + noise
     ring = Ring(tuple(given), 4_000)
-    for row in zip(*given.values(), strict=True):
-        ring.push(row)
+    ring.extend(np.column_stack(tuple(given.values())))
     location = locate_in_ring(ring, SIGMA, np.random.default_rng(0))
     assert location.mismatch[0].covariate == "load"
     with pytest.raises(InputError, match="residual_rad"):

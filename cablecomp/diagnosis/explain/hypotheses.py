@@ -11,12 +11,10 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.effects import Effect, Parameter, catalogue
-from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
+from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_effect
 
-PHASE = "phase_rad"
-INSTANT = "time_s"
 INSTANTS = 24
 """Instants at which an event is asked for at first, over all recordings."""
 EDGE = 0.06
@@ -46,12 +44,24 @@ class Hypothesis:
     @property
     def has_instant(self) -> bool:
         """Whether it is an event."""
-        return any(p.name == INSTANT for p in self.effect.parameters)
+        return self.effect.of_role("instant") is not None
 
     @property
     def has_phase(self) -> bool:
         """Whether it has a phase, which goes with the amount as a pair."""
-        return any(p.name == PHASE for p in self.effect.parameters)
+        return self.effect.of_role("phase") is not None
+
+    @property
+    def instant(self) -> str:
+        """The name of the event's instant."""
+        found = self.effect.of_role("instant")
+        return found.name if found else ""
+
+    @property
+    def phase(self) -> str:
+        """The name of its phase."""
+        found = self.effect.of_role("phase")
+        return found.name if found else ""
 
     @property
     def trades(self) -> bool:
@@ -84,8 +94,8 @@ class Hypothesis:
     def free(self, values: Mapping[str, float | str], config: JointConfig) -> tuple[Free, ...]:
         """The parameters to fit, from these values; a second amount that starts neutral may grow."""
         numbers = {k: v for k, v in values.items() if not isinstance(v, str)}
-        held = _held(self.effect)
-        return of_effect(self.effect, {k: v for k, v in numbers.items() if k not in held}, config)
+        fitted = {k: v for k, v in numbers.items() if not self.effect.parameter(k).held}
+        return of_effect(self.effect, fitted, config)
 
 
 def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
@@ -100,9 +110,7 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
 
 
 def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
-    if effect.id == "thermal_pretension" and not _varies(evidence, "temperature_degC"):
-        return []
-    if effect.id == "motor_friction" and not all(MOTOR in e.counted for e in evidence):
+    if not all(_tells(evidence, channel) for channel in effect.needs):
         return []
     channels: list[str | None] = [None]
     if effect.texts:
@@ -135,18 +143,18 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
 
 def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tuple[float, ...]:
     low, high = p.bounds(config)
-    if p.name == PHASE:
+    if p.role == "phase":
         return (0.0, 0.5 * math.pi)
-    if p.name == INSTANT:
+    if p.role == "instant":
         return instants(evidence)
-    if p.name == "reference_degC":
+    if p.role == "reference":
         means = [
             float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns
         ]
         return (float(np.mean(means)) if means else 20.0,)
-    if p.name == "arc_length_m":
+    if p.role == "length":
         return (0.02 * high, 0.25 * high)
-    if p.name == "presliding_rad":
+    if p.role == "presliding":
         reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
         return tuple(
             float(v) for v in np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
@@ -181,14 +189,14 @@ def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
 def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
     """The same event asked for at these instants."""
     base = h.starts[0].values
-    return replace(h, starts=tuple(Start({**base, INSTANT: float(t)}) for t in instants))
+    return replace(h, starts=tuple(Start({**base, h.instant: float(t)}) for t in instants))
 
 
-def _held(effect: Effect) -> tuple[str, ...]:
-    """Parameters that a diagnosis leaves where they start: a bearing's growth with load (the load's own friction grows
-    with it already), the reference of a temperature (the pretension's other half)."""
-    further = [p for p in effect.parameters if not p.shape][1:] + [p for p in effect.parameters if p.shape]
-    return tuple(p.name for p in further if p.name in ("load_coefficient", "reference_degC"))
+def _tells(evidence: Sequence[Evidence], channel: str) -> bool:
+    """Whether the recordings have the channel as an effect needs it."""
+    if channel in OUTPUTS:
+        return all(channel in e.counted for e in evidence)
+    return _varies(evidence, channel)
 
 
 def _varies(evidence: Sequence[Evidence], channel: str) -> bool:

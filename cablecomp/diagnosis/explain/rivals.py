@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import ask_dependences
-from cablecomp.diagnosis.explain.hypotheses import INSTANT, Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, placed, without
 from cablecomp.diagnosis.explain.scores import (
     Groups,
@@ -62,7 +62,7 @@ def rivals(
         differences[a.hypothesis.name] = score_difference(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
     if term.has_instant:
-        instant = float(model.fit.values[f"effect.{term.effect.id}.{INSTANT}"])
+        instant = float(model.fit.values[f"effect.{term.effect.id}.{term.instant}"])
         step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
         if step.gain < 0.0:
             differences[ZERO_STEP] = step

@@ -17,6 +17,7 @@ from math import sqrt
 import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.catalogue import role_of
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
@@ -193,7 +194,7 @@ def _free(fit: Fit) -> IntArray:
     place it."""
     low, high = fit.problem.bounds()
     margin = 1e-4 * (high - low)
-    instant = np.array([p.base.endswith(".time_s") for p in fit.problem.parameters], dtype=np.bool_)
+    instant = np.array([role_of(p.base) == "instant" for p in fit.problem.parameters], dtype=np.bool_)
     return np.flatnonzero((fit.x > low + margin) & (fit.x < high - margin) & ~instant)
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.config import EffectEntry
-from cablecomp.diagnosis.explain.hypotheses import INSTANT, PHASE, Hypothesis, Start, at_instants
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, approach, solve
@@ -81,15 +81,15 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
         return _ask_pair(here, h)
     best = _best(here, h)
     if best is not None and h.has_instant:
-        t = float(best[1][INSTANT])
-        times = sorted(float(s.values[INSTANT]) for s in h.starts)
+        t = float(best[1][h.instant])
+        times = sorted(float(s.values[h.instant]) for s in h.starts)
         width = times[1] - times[0]
         for _ in range(2 if here.fit.problem.fine else 4):
             width *= 0.5
             closer = _best(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
             if closer is not None and closer[0] < best[0]:
                 best = closer
-                t = float(best[1][INSTANT])
+                t = float(best[1][h.instant])
         if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
             mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
             other = _best(here, mirrored)
@@ -130,7 +130,7 @@ def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], F
 def _turned(h: Hypothesis, t: float) -> Start:
     """The event at t with the other sign."""
     base = h.starts[0].values
-    return Start({**base, INSTANT: t, h.amount.name: -float(base[h.amount.name])})
+    return Start({**base, h.instant: t, h.amount.name: -float(base[h.amount.name])})
 
 
 def contribution(
@@ -204,7 +204,7 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
     size, phase = float(np.hypot(*pair)), float(np.arctan2(pair[1], pair[0]))
     if not size > 0.0:
         return None
-    values = {**h.starts[0].values, h.amount.name: size, PHASE: phase}
+    values = {**h.starts[0].values, h.amount.name: size, h.phase: phase}
     d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
     return _answer(here, h, values, cost, d, size)
 

@@ -1,0 +1,97 @@
+"""What physics beyond the thesis's drive changes in it: compiled terms, factors of friction, the cable's path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.mechanics.tables import Floats, law_table, plain_law, stiffening_law
+
+Factor = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A compiled term: its address, its parameters, the size of its state."""
+
+    address: int
+    parameters: tuple[float, ...]
+    state_size: int
+
+
+@dataclass(frozen=True)
+class Change:
+    """What an effect, or several together, do to the drive; every default is neutral."""
+
+    terms: tuple[Term, ...] = ()
+    tension_factor: Factor | None = None
+    """mu/mu0 as a function of tau = T/T0, vectorised."""
+    joint_angle_factor: Factor | None = None
+    """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs there."""
+    stiffening: float = 0.0
+    guide_angle: float = 0.0
+    guide_length_m: float = 0.0
+    extra_length_m: float = 0.0
+    """Free cable beyond the stage's own free length."""
+    play_share: float = 0.0
+    play_yield_N: float = 0.0
+    viscous_Ns_per_m_rad: float = 0.0
+    moves_pretension: bool = False
+    """Set where a term writes the pretension factors: what lies on the drums then has to follow."""
+
+
+def together(changes: Sequence[Change]) -> Change:
+    """All of these changes as one: terms run in this order, factors multiply, lengths, angles and shares add."""
+    return Change(
+        terms=tuple(t for c in changes for t in c.terms),
+        tension_factor=_product([c.tension_factor for c in changes]),
+        joint_angle_factor=_product([c.joint_angle_factor for c in changes]),
+        stiffening=sum(c.stiffening for c in changes),
+        guide_angle=sum(c.guide_angle for c in changes),
+        guide_length_m=sum(c.guide_length_m for c in changes),
+        extra_length_m=sum(c.extra_length_m for c in changes),
+        play_share=sum(c.play_share for c in changes),
+        play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
+        viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
+        moves_pretension=any(c.moves_pretension for c in changes),
+    )
+
+
+def _product(factors: Sequence[Factor | None]) -> Factor | None:
+    given = [f for f in factors if f is not None]
+
+    def product(x: Floats) -> Floats:
+        total = np.ones_like(x)
+        for factor in given:
+            total = total * factor(x)
+        return total
+
+    return product if given else None
+
+
+def law_tables(change: Change, config: JointConfig) -> Floats | None:
+    """Law tables (`tables.py`) for the output drums of chain h and l and for all other places.
+
+    None where terms are all that is added: the kernel then runs the plain drive's own, quicker code.
+    """
+    by_tension, by_angle = change.tension_factor, change.joint_angle_factor
+    if by_tension is None and by_angle is None:
+        if change.stiffening != 0.0:
+            return np.stack([stiffening_law(change.stiffening)] * 3)
+        inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
+        return np.stack([plain_law()] * 3) if inside or change.moves_pretension else None
+    stage = config.drive.stage[-1]
+    widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
+    tables = []
+    for sign in (1.0, -1.0, 0.0):  # ON_H, ON_L, ELSEWHERE
+
+        def groove(y: Floats, sign: float = sign) -> Floats:
+            if by_angle is None or sign == 0.0:
+                return np.ones_like(y)
+            return by_angle(sign * (y - stage.wrap_output_rad))
+
+        tables.append(law_table(by_tension or np.ones_like, groove, widest, change.stiffening))
+    return np.stack(tables)
