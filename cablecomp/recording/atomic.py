@@ -46,8 +46,8 @@ def check_directory(out: Path) -> None:
             return
         if os.path.lexists(place):
             what = "is a file" if place.exists() else "is a link that leads nowhere"
-            where = "" if place == out else f" ({place})"
-            raise InputError(f"{out}: {what}{where}; --out takes a directory, which is made if it is missing")
+            where = "" if place == out else f"{place} "
+            raise InputError(f"{out}: {where}{what}; --out takes a directory, which is made if it is missing")
 
 
 @contextmanager

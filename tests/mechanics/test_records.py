@@ -29,34 +29,34 @@ def test_every_number_of_the_state_has_one_name(
     name: str, effects: tuple[tuple[str, dict[str, float]], ...]
 ) -> None:
     joint = model(name, *effects)
-    S = np.arange(float(len(joint.S)))
-    d = joint.named(S, joint.heights)
+    memory = np.arange(float(len(joint.memory)))
+    d = joint.named(memory, joint.heights)
     parts = [d.states, d.steps, d.grids, np.atleast_1d(d.context), np.atleast_1d(d.filter)]
     seen = np.concatenate([*(part.view("f8").ravel() for part in parts), d.profiles.view("f8").ravel()])
     assert len(np.unique(seen)) == len(seen)
-    unnamed = np.setdiff1d(S[: d.size.spare_at], seen)
+    unnamed = np.setdiff1d(memory[: d.size.spare_at], seen)
     head_room = 0 if d.size.grids else 16 * d.size.cables
     assert len(unnamed) == head_room  # no terms here, whose states have names of their own
-    assert len(S) - d.size.spare_at == d.size.steps_at
-    assert len(joint.P) == d.size.sensor_at + records.floats(records.SENSOR)
+    assert len(memory) - d.size.spare_at == d.size.steps_at
+    assert len(joint.fixed) == d.size.sensor_at + records.floats(records.SENSOR)
 
 
 def test_what_is_written_by_name_lies_in_the_array() -> None:
     joint = model("snow-closed-rig")
-    S = joint.S.copy()
-    d = joint.named(S, joint.heights)
+    memory = joint.memory.copy()
+    d = joint.named(memory, joint.heights)
     d.states[1].tension = 17.0
     d.context.load = 19.0
-    again = joint.named(S, joint.heights)
+    again = joint.named(memory, joint.heights)
     assert (again.states[1].tension, again.context.load) == (17.0, 19.0)
-    assert joint.named(joint.S, joint.heights).states[1].tension == 0.0
+    assert joint.named(joint.memory, joint.heights).states[1].tension == 0.0
 
 
 @pytest.mark.parametrize("name", names("joints"))
 def test_circuits_multiply_to_the_rigid_drive_and_chains_pull_against_each_other(name: str) -> None:
     config = load_joint(name)
     joint = model(name)
-    d = joint.named(joint.S, joint.heights)
+    d = joint.named(joint.memory, joint.heights)
     assert math.prod(c.ratio for c in d.circuits) == pytest.approx(config.drive.ratio, rel=1e-15)
     assert sum(c.count * c.chains for c in d.circuits) == len(d.cables)
     for circuit in d.circuits:
