@@ -1,7 +1,8 @@
 """An arc with two free ends: belt pulley, idler, fixed guide or a stretch of sheath.
 
 The same profile law as a drum's wrap, clamped by a friction cone from either end: v(y) on 0 <= y <= width, y = 0 the
-near end. When the cones exclude each other the whole arc slides, and |v_1 - v_2| = mu width.
+near end. When the cones exclude each other the whole arc slides, and |v_1 - v_2| = mu width. The cable's laws are those
+of all places but the joint's own drums (`tables.ELSEWHERE`).
 """
 
 from __future__ import annotations
@@ -9,17 +10,16 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cablecomp.mechanics.jit import kernel
-from cablecomp.mechanics.profile import Points, clear, piece_plain
+from cablecomp.mechanics.jit import inner_kernel, kernel
+from cablecomp.mechanics.profile import STRAIGHT, Floats, Points, clear, piece
+from cablecomp.mechanics.tables import ELSEWHERE, strain_of_tau, tau_of_v
 
 
 class ArcMeet(NamedTuple):
-    """An arc at new end values, evaluated."""
+    """Where the slip zones of an arc at new end values end, and its near side evaluated."""
 
-    total: float  # integral of exp(v) - 1
-    change: float  # of that integral, between the near end and the point that does not slip
+    change: float  # of the integral of the strain e(v) between the near end and the point that does not slip
     by_near: float  # derivative of the integral by the near end's value
-    by_far: float  # by the far end's
     near: float  # where the cone of the near end meets the profile
     far: float  # that of the far end; the same where the slip zones touch
     swap: (
@@ -27,25 +27,30 @@ class ArcMeet(NamedTuple):
     )
 
 
-@kernel
-def line(y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
-    """Integral of exp(v) - 1, and of exp(v), over a straight piece."""
-    return piece_plain(y2 - y1, v2 - v1, math.exp(v1), math.exp(v2))
+@inner_kernel
+def line(laws: Floats, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
+    """Integral of e(v), and of its derivative, over a straight piece."""
+    return piece(laws, ELSEWHERE, y1, v1, math.exp(v1), y2, v2, math.exp(v2))
 
 
-@kernel
-def integral_to(p: Points, n: int, y: float) -> float:
-    """Integral of exp(v) - 1 from the near end to y, over the committed profile."""
+@inner_kernel
+def _strain(laws: Floats, v: float) -> float:
+    return strain_of_tau(laws, ELSEWHERE, tau_of_v(laws, ELSEWHERE, v))[0]
+
+
+@inner_kernel
+def integral_to(p: Points, laws: Floats, n: int, y: float) -> float:
+    """Integral of e(v) from the near end to y, over the committed profile."""
     for k in range(n - 1):
         if y <= p[k + 1].y:
             share = (y - p[k].y) / (p[k + 1].y - p[k].y)
             v = p[k].v + share * (p[k + 1].v - p[k].v)
-            part, _ = line(p[k].y, p[k].v, y, v)
+            part, _ = line(laws, p[k].y, p[k].v, y, v)
             return p[k].stretch + part
     return p[n - 1].stretch
 
 
-@kernel
+@inner_kernel
 def _value(p: Points, n: int, y: float) -> float:
     """v of the committed profile at y."""
     k = 0
@@ -55,7 +60,7 @@ def _value(p: Points, n: int, y: float) -> float:
     return p[k].v + share * (p[k + 1].v - p[k].v)
 
 
-@kernel
+@inner_kernel
 def _near_meet(p: Points, n: int, v: float, steep: float, s: float) -> float:
     """Where the cone from the near end meets the profile; beyond the far end if nowhere."""
     y_before, over_before = 0.0, v - p[0].v
@@ -67,7 +72,7 @@ def _near_meet(p: Points, n: int, v: float, steep: float, s: float) -> float:
     return 1e300
 
 
-@kernel
+@inner_kernel
 def _far_meet(p: Points, n: int, v: float, steep: float, s: float) -> float:
     """Where the cone from the far end meets the profile; below zero if nowhere."""
     width = p[n - 1].y
@@ -80,40 +85,50 @@ def _far_meet(p: Points, n: int, v: float, steep: float, s: float) -> float:
     return -1e300
 
 
-@kernel
-def arc_eval(p: Points, n: int, v1: float, v2: float, mu: float) -> ArcMeet:
+@inner_kernel
+def arc_meet(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float) -> ArcMeet:
     """The arc at end values v1 (near) and v2 (far), |v1 - v2| <= mu width, without committing it."""
     width = p[n - 1].y
-    s1 = 0.0 if v1 == p[0].v else (1.0 if v1 > p[0].v else -1.0)
-    s2 = 0.0 if v2 == p[n - 1].v else (1.0 if v2 > p[n - 1].v else -1.0)
+    s1, s2 = _side(v1, p[0].v), _side(v2, p[n - 1].v)
     near = 0.0 if s1 == 0.0 else _near_meet(p, n, v1, s1 * mu, s1)
     far = width if s2 == 0.0 else _far_meet(p, n, v2, s2 * mu, s2)
     swap = 0.0
     if near > far:
         if s1 * s2 > 0.0:  # both cones from the same side: they form a tent (or a valley)
             near = min(max(0.5 * (width + (v1 - v2) / (s1 * mu)), 0.0), width)
-            swap = (math.exp(v1 - s1 * mu * near) - math.exp(_value(p, n, near))) / (2.0 * s1 * mu)
+            tent = v1 - s1 * mu * near
+            swap = (_strain(laws, tent) - _strain(laws, _value(p, n, near))) / (2.0 * s1 * mu)
         else:  # the whole arc slides one way
             near = width if abs(v1 - p[0].v) > abs(v2 - p[n - 1].v) else 0.0
         far = near
-    old_near = integral_to(p, n, near)
-    grown1 = grown2 = 0.0
-    total = 0.0
+    slipped = by_near = 0.0
     if near > 0.0:
-        total, grown1 = line(0.0, v1, near, v1 - s1 * mu * near)
-    change = total - old_near
-    total += integral_to(p, n, far) - old_near
+        slipped, by_near = line(laws, 0.0, v1, near, v1 - s1 * mu * near)
+    return ArcMeet(slipped - integral_to(p, laws, n, near), by_near, near, far, swap)
+
+
+@inner_kernel
+def arc_total(p: Points, laws: Floats, n: int, v2: float, mu: float, meet: ArcMeet) -> tuple[float, float]:
+    """Integral of e(v) over the whole arc that has been met, and its derivative by the far end's value."""
+    width, far = p[n - 1].y, meet.far
+    total, by_far = meet.change + integral_to(p, laws, n, far), 0.0
     if far < width:
-        part, grown2 = line(far, v2 - s2 * mu * (width - far), width, v2)
-        total += part
-    return ArcMeet(total, change, grown1, grown2, near, far, swap)
+        slipped, by_far = line(laws, far, v2 - _side(v2, p[n - 1].v) * mu * (width - far), width, v2)
+        total += slipped
+    return total, by_far
+
+
+@inner_kernel
+def _side(new: float, old: float) -> float:
+    """On which side of the committed value an end stands: +1 above, -1 below, 0 on it."""
+    return 0.0 if new == old else (1.0 if new > old else -1.0)
 
 
 @kernel
-def arc_commit(p: Points, n: int, v1: float, v2: float, mu: float) -> int:
+def arc_commit(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float) -> int:
     """Clamp the arc's profile to its new end values; returns the new number of points."""
     width = p[n - 1].y
-    meet = arc_eval(p, n, v1, v2, mu)
+    meet = arc_meet(p, laws, n, v1, v2, mu)
     near, far = meet.near, meet.far
     s1 = 1.0 if v1 > p[0].v else -1.0
     s2 = 1.0 if v2 > p[n - 1].v else -1.0
@@ -142,32 +157,32 @@ def arc_commit(p: Points, n: int, v1: float, v2: float, mu: float) -> int:
     if near < width:
         _put(p, m, width, v2)
         m += 1
-    return _tidy(p, m)
+    return _tidy(p, laws, m)
 
 
 @kernel
-def arc_fill(p: Points, width: float, v: float) -> int:
+def arc_fill(p: Points, laws: Floats, width: float, v: float) -> int:
     """Start an arc at uniform tension."""
     clear(p)
     _put(p, 0, 0.0, v)
     _put(p, 1, width, v)
-    return _tidy(p, 2)
+    return _tidy(p, laws, STRAIGHT)
 
 
-@kernel
+@inner_kernel
 def _put(p: Points, k: int, y: float, v: float) -> None:
     p[k].y = y
     p[k].v = v
 
 
-@kernel
+@inner_kernel
 def _copy(p: Points, source: int, target: int) -> None:
     p[target].y = p[source].y
     p[target].v = p[source].v
 
 
-@kernel
-def _tidy(p: Points, n: int) -> int:
+@inner_kernel
+def _tidy(p: Points, laws: Floats, n: int) -> int:
     """Join pieces that lie on one line (and, when memory runs out, those that nearly do); renew the running
     integrals."""
     limit = 1e-13
@@ -189,7 +204,7 @@ def _tidy(p: Points, n: int) -> int:
     p[0].tau = math.exp(p[0].v)
     for k in range(1, n):
         p[k].tau = math.exp(p[k].v)
-        part, _ = piece_plain(p[k].y - p[k - 1].y, p[k].v - p[k - 1].v, p[k - 1].tau, p[k].tau)
+        part, _ = piece(laws, ELSEWHERE, p[k - 1].y, p[k - 1].v, p[k - 1].tau, p[k].y, p[k].v, p[k].tau)
         p[k].stretch = p[k - 1].stretch + part
         p[k].merged = p[k].stretch_error = 0.0
     return n

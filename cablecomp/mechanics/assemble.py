@@ -19,7 +19,7 @@ from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.records import floats
 from cablecomp.mechanics.tables import ELSEWHERE, ON_H, ON_L
 
-HEAD = 8  # numbers of a grid before its nodes
+BEFORE_NODES = 8  # numbers of a grid before its nodes
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
 
 
@@ -84,7 +84,7 @@ def assemble(config: JointConfig, change: Change | None = None) -> Model:
     size.grids_at = size.filter_at + floats(records.FILTER) + sum(t.state_size for t in extra.terms)
     # without grids the room of their heads is left, as snapshots have it
     size.steps_at = size.grids_at + (
-        size.grids * floats(records.GRID) if size.grids else 2 * len(cables) * HEAD
+        size.grids * floats(records.GRID) if size.grids else 2 * len(cables) * BEFORE_NODES
     )
     size.profiles_at = size.steps_at + 2 * len(cables) * floats(records.STEP)
     size.spare_at = size.profiles_at + size.stacks * size.capacity * floats(records.POINT)

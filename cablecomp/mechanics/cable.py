@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.guide import guide_commit, guide_split
-from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Wound, set_pending, wrap_commit, wrap_eval
 from cablecomp.mechanics.records import IN, OUT
 from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, v_of_tau
@@ -104,7 +104,7 @@ def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
     return z, 0.0
 
 
-@inner_kernel
+@inlined_kernel
 def cable_commit(d: Drive, laws: Floats, c: int) -> None:
     """Make the last evaluation of cable c its state, and renew the bound on what merging has done to its stretch.
 
@@ -116,7 +116,7 @@ def cable_commit(d: Drive, laws: Floats, c: int) -> None:
     if laws is not None:
         state.play = state.play_try
         if cable.guide > 0.0:
-            guide_commit(d, c)
+            guide_commit(d, laws, c)
         if cable.viscous > 0.0:
             viscous_commit(d.grids[2 * c])
             if cable.guide == 0.0:

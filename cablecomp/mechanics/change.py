@@ -85,13 +85,13 @@ def law_tables(change: Change, config: JointConfig) -> Floats | None:
         return np.stack([plain_law()] * 3) if inside or change.moves_pretension else None
     stage = config.drive.stage[-1]
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
-    tables = []
-    for sign in (1.0, -1.0, 0.0):  # ON_H, ON_L, ELSEWHERE
 
-        def groove(y: Floats, sign: float = sign) -> Floats:
-            if by_angle is None or sign == 0.0:
-                return np.ones_like(y)
-            return by_angle(sign * (y - stage.wrap_output_rad))
+    def table(groove: Factor) -> Floats:
+        return law_table(by_tension or np.ones_like, groove, widest, change.stiffening)
 
-        tables.append(law_table(by_tension or np.ones_like, groove, widest, change.stiffening))
-    return np.stack(tables)
+    elsewhere = table(np.ones_like)
+    if by_angle is None:
+        return np.stack([elsewhere] * 3)
+    on_h = table(lambda y: by_angle(y - stage.wrap_output_rad))
+    on_l = table(lambda y: by_angle(stage.wrap_output_rad - y))
+    return np.stack([on_h, on_l, elsewhere])  # ON_H, ON_L, ELSEWHERE

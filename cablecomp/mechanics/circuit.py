@@ -135,7 +135,7 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
     return Solved(x, 0.0, STATUS_DIVERGED)
 
 
-@inner_kernel
+@inlined_kernel
 def circuit_commit(d: Drive, laws: Floats, ic: int) -> None:
     """Make the last solution of circuit `ic` its state."""
     circuit = d.circuits[ic]
@@ -158,7 +158,6 @@ def circuit_commit(d: Drive, laws: Floats, ic: int) -> None:
         last_l.miss = 0.0 if miss * before <= 0.0 else (miss if abs(miss) < abs(before) else before)
         last_l.kept = last_l.tension + share * pull
         last_l.reference = share
-    for j in range(count):
-        cable_commit(d, laws, first_h + j)
-        if circuit.chains == 2:
-            cable_commit(d, laws, first_l + j)
+    for chain in range(circuit.chains):
+        for j in range(count):
+            cable_commit(d, laws, circuit.first[chain] + j)

@@ -25,6 +25,16 @@ N_SIZES, N_SENSOR, N_CABLE = floats(SIZES), floats(SENSOR), floats(CABLE)
 N_CONTEXT, N_FILTER, N_GRID = floats(CONTEXT), floats(FILTER), floats(GRID)
 
 
+class Arrays(NamedTuple):
+    """The flat arrays of one joint (`assemble.Model`), as compiled code and what it calls hand them on."""
+
+    fixed: Floats
+    layout: Ints
+    memory: Floats
+    heights: Ints
+    laws: Floats
+
+
 class Drive(NamedTuple):
     """Records of one joint, named as in `records.py`; they lie in its arrays, so writing to them writes there."""
 
@@ -52,8 +62,9 @@ class Terms(NamedTuple):
 def named(fixed: Floats, layout: Ints, memory: Floats, heights: Ints) -> Drive:
     """The records in a joint's arrays (`assemble.Model`).
 
-    Kernels that Python calls take the flat arrays: one tuple of them would cost 1.5 us a call to recognise. The law
-    tables go beside them, as the compiler leaves out what a plain drive does not need by an argument that is None.
+    Kernels that Python calls for every sample take the flat arrays one by one: a tuple of them (`Arrays`) would cost
+    1.5 us a call to recognise. The law tables go beside them, as the compiler leaves out what a plain drive does not
+    need by an argument that is None.
     """
     size = layout[:N_SIZES].view(SIZES)[0]
     return Drive(

@@ -1,21 +1,20 @@
 """A fixed guide, idler row or sheath in the middle of the free span: its cable rubs on both sides of what sticks.
 
 While part of the cable on the guide sticks, it parts the cable into two sides that do not know of each other: the input
-side's stretch follows the input drum alone. When the whole guide slides, the end tensions stand at the capstan ratio,
-ln(T_out/T_in) = -+ mu Theta, and cable passes from one side to the other.
+side's stretch follows the input drum alone. When the whole guide slides, v_out - v_in = -+ mu Theta (the capstan ratio
+of the end tensions; v as in `profile.py`), and cable passes from one side to the other.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-from cablecomp.mechanics.arc import ArcMeet, arc_commit, arc_eval
+from cablecomp.mechanics.arc import ArcMeet, arc_commit, arc_meet, arc_total
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import inner_kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, set_pending, wrap_eval
 from cablecomp.mechanics.records import IN
-from cablecomp.mechanics.tables import ELSEWHERE, strain_of_tau, tau_of_v
+from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, tau_of_v
 
 
 class Split(NamedTuple):
@@ -28,7 +27,7 @@ class Split(NamedTuple):
 
 @inner_kernel
 def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in: float) -> Split:
-    """Input side of cable c when the guide's output end stands at v_out = ln(T/T0).
+    """Input side of cable c when the guide's output end stands at v_out (ln(T/T0) for the plain cable).
 
     The input drum's pending step is kept.
     """
@@ -45,7 +44,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     least, most = low, high
     v_in = min(max(state.guide_end, low), high)
     side = by_v = 0.0
-    on_guide = ArcMeet(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    on_guide = ArcMeet(0.0, 0.0, 0.0, 0.0, 0.0)
     slides = False
     step = d.steps[wrap]
     step.w = w_in
@@ -57,10 +56,10 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
         )
         set_pending(step, on_drum)
         step.end_v, step.end_tau = v_in, tau_in
-        on_guide = arc_eval(d.profiles[arc], d.heights[arc], v_in, v_out, 1.0)
+        on_guide = arc_meet(d.profiles[arc], laws, d.heights[arc], v_in, v_out, 1.0)
         strain, strain_slope = strain_of_tau(laws, ELSEWHERE, tau_in)
         side = radius * on_drum.total + span * strain
-        by_v = radius * on_drum.slope + span * strain_slope * tau_in
+        by_v = radius * on_drum.slope + span * strain_slope / dv_dtau(laws, ELSEWHERE, tau_in, v_in)
         miss = side + per_turn * on_guide.change - target
         slides = (v_in >= high and miss < 0.0) or (v_in <= low and miss > 0.0)
         if slides:
@@ -84,16 +83,17 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     follow = 1.0
     if not slides:
         follow = per_turn * on_guide.swap / (by_v + per_turn * (on_guide.by_near + on_guide.swap))
-    slope = per_turn * on_guide.by_far + follow * (by_v + per_turn * on_guide.by_near)
-    return Split(side + per_turn * on_guide.total, slope, math.exp(v_in))
+    total, by_far = arc_total(d.profiles[arc], laws, d.heights[arc], v_out, 1.0, on_guide)
+    slope = per_turn * by_far + follow * (by_v + per_turn * on_guide.by_near)
+    return Split(side + per_turn * total, slope, tau_of_v(laws, ELSEWHERE, v_in))
 
 
-@inner_kernel
-def guide_commit(d: Drive, c: int) -> None:
+@inlined_kernel
+def guide_commit(d: Drive, laws: Floats, c: int) -> None:
     """Make the last split the state of cable c's guide."""
     state = d.states[c]
     arc = 2 * d.size.cables + c
     state.side = state.side_try
     state.guide_end = state.guide_try
     state.shaft_in = state.shaft_in_try
-    d.heights[arc] = arc_commit(d.profiles[arc], d.heights[arc], state.guide_try, state.guide_far, 1.0)
+    d.heights[arc] = arc_commit(d.profiles[arc], laws, d.heights[arc], state.guide_try, state.guide_far, 1.0)

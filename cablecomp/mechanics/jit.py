@@ -10,9 +10,10 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -60,6 +61,14 @@ drop_cut_short(CACHE)
 def is_compiled() -> bool:
     """True if an earlier run left compiled kernels of these very sources on disk."""
     return any(CACHE.rglob("*.nbi"))
+
+
+def constant(value: int) -> int:
+    """A constant that compiled functions take as they take any integer.
+
+    For a plain one numba compiles the function it is handed to, and all that this calls, once more for that very value.
+    """
+    return cast(int, np.int64(value))
 
 
 def cached(decorate: Callable[[], F]) -> F:

@@ -133,7 +133,7 @@ def advance(d: Drive, time: float, motor: float, load: float, temperature: float
     x.commit = 0.0
 
 
-@inner_kernel
+@inlined_kernel
 def _follow_pretension(d: Drive, laws: Floats) -> None:
     """Let the pretension of all cables follow the terms' factors; the next sample finds it."""
     x = d.context
@@ -145,9 +145,12 @@ def _follow_pretension(d: Drive, laws: Floats) -> None:
 
 
 @inner_kernel
-def terms_sane(d: Drive) -> bool:
-    """True if the terms' answers are finite and all factors positive."""
+def terms_sane(d: Drive, laws: Floats) -> bool:
+    """True if the terms' answers are finite and all factors positive; a pretension that moves needs law tables."""
     x = d.context
+    if laws is None:
+        if x.pretension_h != 1.0 or x.pretension_l != 1.0:
+            return False
     sums = x.moment + x.length_h + x.length_l + x.reading + x.motor_moment
     factors = x.pretension_h + x.pretension_l + x.stiffness_h + x.stiffness_l
     positive = x.pretension_h > 0.0 and x.pretension_l > 0.0 and x.stiffness_h > 0.0 and x.stiffness_l > 0.0
@@ -188,12 +191,13 @@ def joint_commit(d: Drive, terms: Terms, laws: Floats) -> int:
         x.commit = 1.0
         run_terms(d, terms)
         x.commit = 0.0
-        if not terms_sane(d):
+        if not terms_sane(d, laws):
             return STATUS_EFFECT
     for ic in range(d.size.circuits):
         circuit_commit(d, laws, ic)
-    if d.size.terms > 0:
-        _follow_pretension(d, laws)
+    if laws is not None:
+        if d.size.terms > 0:
+            _follow_pretension(d, laws)
     x.motor_old = x.motor
     x.load_old = x.load
     x.joint_older = x.joint_old

@@ -32,36 +32,40 @@ def call_term(address: int, context: Any, parameters: Any, state: Any) -> None:
     _call(address, context.ctypes.data, parameters.ctypes.data, state.ctypes.data)
 
 
-@intrinsic  # type: ignore[untyped-decorator]  # numba is not typed
-def call_walk(
-    typing: Any,
-    address: Any,
-    fixed: Any,
-    layout: Any,
-    memory: Any,
-    heights: Any,
-    laws: Any,
-    rows: Any,
-    outs: Any,
-    commit: Any,
-) -> Any:
-    """Run the kernel `walk` whose machine code lies at `address` (`kernel_address`): rows done, status.
+def _caller(result: Any) -> Any:
+    """A function (address, arguments) for compiled code that runs a kernel of this result by its address.
 
-    An ordinary call would link the callee's code into the caller's and compile all of it once more.
+    The arguments are a tuple, tuples in it are handed on member by member. An ordinary call would link the callee's
+    code into the caller's and compile all of it once more.
     """
-    kinds = (fixed, layout, memory, heights, laws, rows, outs, commit)
-    result = types.UniTuple(types.int64, 2)
 
-    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        convention = context.call_conv
-        function = convention.get_function_type(result, kinds)
-        target = builder.inttoptr(args[0], function.as_pointer())
-        status, value = convention.call_function(builder, target, result, kinds, args[1:])
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return value
+    def call(_typing: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+            kinds, values = zip(*_members(builder, arguments, args[1]), strict=True)
+            convention = context.call_conv
+            function = convention.get_function_type(result, kinds)
+            target = builder.inttoptr(args[0], function.as_pointer())
+            status, value = convention.call_function(builder, target, result, kinds, values)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return value
 
-    return result(types.int64, *kinds), generate
+        return result(address, arguments), generate
+
+    return intrinsic(call)
+
+
+def _members(builder: Any, kind: Any, value: Any) -> Any:
+    """Types and values of a tuple's members, those of tuples in it included."""
+    if not isinstance(kind, types.BaseTuple):
+        yield types.unliteral(kind), value
+        return
+    for member, part in zip(kind.types, cgutils.unpack_tuple(builder, value), strict=True):
+        yield from _members(builder, member, part)
+
+
+call_walk = _caller(types.UniTuple(types.int64, 2))
+call_bounds_step = _caller(types.UniTuple(types.float64, 2))
 
 
 def kernel_address(kernel: Any, *arguments: Any) -> int:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import inner_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
 from cablecomp.mechanics.profile import Floats, Points, accumulate
 from cablecomp.mechanics.records import WET_NODES
 from cablecomp.mechanics.tables import ELSEWHERE, between, groove, tau_of_v, v_of_tau
@@ -49,7 +49,7 @@ def retension(d: Drive, laws: Floats, c: int, factor: float) -> None:
         state.guide_end = d.profiles[arc, 0].v
 
 
-@kernel
+@inner_kernel
 def _moved(tau: float, ratio: float) -> float:
     return max(1.0 + (tau - 1.0) / ratio, LEAST_TAU)
 
@@ -65,7 +65,7 @@ def _shift(d: Drive, laws: Floats, law: int, stack: int, mu: float, ratio: float
     accumulate(p, laws, law, n)
 
 
-@kernel
+@inlined_kernel
 def _split(p: Points, laws: Floats, law: int, n: int) -> int:
     """Divide long pieces, which would not stay straight; returns the new number of points."""
     k = n - 1
@@ -87,7 +87,7 @@ def _split(p: Points, laws: Floats, law: int, n: int) -> int:
     return n
 
 
-@kernel
+@inlined_kernel
 def _let_slip(p: Points, laws: Floats, law: int, n: int, mu: float) -> None:
     """Let every zone slide that is steeper than friction holds."""
     k = 0
@@ -99,7 +99,7 @@ def _let_slip(p: Points, laws: Floats, law: int, n: int, mu: float) -> None:
             k = _slide(p, laws, law, k, n, mu if rise > 0.0 else -mu)
 
 
-@kernel
+@inlined_kernel
 def _slide(p: Points, laws: Floats, law: int, k: int, n: int, steep: float) -> int:
     """Give the zone around piece k the slope `steep`, as wide as its stretch asks for; returns its outer
     point.
@@ -134,7 +134,7 @@ def _slide(p: Points, laws: Floats, law: int, k: int, n: int, steep: float) -> i
     return b
 
 
-@kernel
+@inner_kernel
 def _over(p: Points, laws: Floats, law: int, k: int, steep: float) -> float:
     """By how much piece k is steeper than `steep`, in its direction."""
     rise = p[k].v - p[k - 1].v
@@ -142,7 +142,7 @@ def _over(p: Points, laws: Floats, law: int, k: int, steep: float) -> float:
     return rise - held if steep > 0.0 else held - rise
 
 
-@kernel
+@inner_kernel
 def _level(p: Points, laws: Floats, law: int, a: int, b: int, steep: float) -> float:
     """Height at groove coordinate 0 of the line of slope `steep` that keeps the stretch of points a..b."""
     total = weights = 0.0
@@ -155,7 +155,7 @@ def _level(p: Points, laws: Floats, law: int, a: int, b: int, steep: float) -> f
     return total / weights
 
 
-@kernel
+@inner_kernel
 def _crossing(p: Points, laws: Floats, law: int, j: int, k: int, level: float, steep: float) -> float:
     """Groove coordinate at which the zone's line meets the piece from j to k."""
     g1, g2 = groove(laws, law, p[j].y), groove(laws, law, p[k].y)
@@ -165,7 +165,7 @@ def _crossing(p: Points, laws: Floats, law: int, j: int, k: int, level: float, s
     return (level - p[j].v + slope * g1) / (slope - steep)
 
 
-@kernel
+@inner_kernel
 def _place(laws: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
     low, high = groove(laws, law, y_low), groove(laws, law, y_high)
     if high <= low:

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.mechanics.jit import kernel, leaf_kernel
+from cablecomp.mechanics.jit import constant, inner_kernel, kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
     GROOVED,
     HEAD,
@@ -42,6 +42,7 @@ Points: TypeAlias = Any
 """An array of records `POINT`."""
 
 LEAST_WRAP = 1e-3  # [rad] of cable that a drum has to keep
+STRAIGHT = constant(2)  # points of a straight profile: its ends
 
 # 8-point Gauss-Legendre on [0, 1]
 _x, _w = np.polynomial.legendre.leggauss(8)
@@ -108,7 +109,7 @@ def piece_plain(dy: float, d: float, tau1: float, tau2: float) -> tuple[float, f
     return grown - dy, grown
 
 
-@kernel
+@inner_kernel
 def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float]:
     """`piece` for a cable that stiffens under plain friction: Gauss-Legendre quadrature, 3 points on short pieces."""
     total = slope = 0.0
@@ -127,7 +128,7 @@ def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float
     return total * dy, slope * dy
 
 
-@kernel
+@inner_kernel
 def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
     """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no
     place."""
@@ -270,7 +271,7 @@ def wrap_commit(p: Points, laws: Floats, law: int, n: int, step: Any, tolerance:
     return n
 
 
-@kernel
+@inner_kernel
 def _merge_error(p: Points, laws: Floats, law: int, n: int, w: float, v: float) -> float:
     """Distance in v of the last point from the straight piece that would replace it."""
     y0, y1 = p[n - 2].y, p[n - 1].y
@@ -279,7 +280,7 @@ def _merge_error(p: Points, laws: Floats, law: int, n: int, w: float, v: float) 
     return abs(p[n - 2].v + share * (v - p[n - 2].v) - p[n - 1].v)
 
 
-@kernel
+@inner_kernel
 def compact(p: Points, laws: Floats, law: int, n: int) -> int:
     """Halve the list by dropping the points that a straight piece replaces best; the error made is kept in
     `merged` and `stretch_error`.
@@ -315,7 +316,7 @@ def compact(p: Points, laws: Floats, law: int, n: int) -> int:
     return n
 
 
-@kernel
+@inner_kernel
 def accumulate(p: Points, laws: Floats, law: int, n: int) -> None:
     """Recompute the running integrals `stretch` and `stretch_error`."""
     p[0].stretch = 0.0
@@ -343,5 +344,5 @@ def wrap_fill(p: Points, laws: Floats, law: int, w: float, v: float, slope: floa
     clear(p)
     p[0].v = v - slope * (groove(laws, law, w) - groove(laws, law, 0.0))
     p[1].y, p[1].v = w, v
-    accumulate(p, laws, law, 2)
-    return 2
+    accumulate(p, laws, law, STRAIGHT)
+    return STRAIGHT

@@ -53,7 +53,7 @@ def joint_start(
                         viscous_fill(d.grids[wrap], w_kept, max(cable.wrap[end] + VISCOUS_TRAVEL, w + 1.0))
                 if d.size.stacks > 2 * d.size.cables:
                     arc = 2 * d.size.cables + c
-                    heights[arc] = arc_fill(d.profiles[arc], cable.guide, 0.0)
+                    heights[arc] = arc_fill(d.profiles[arc], laws, cable.guide, 0.0)
                 state.shaft_in = shaft
                 state.shaft = after
                 state.pretension = state.stiffness = 1.0

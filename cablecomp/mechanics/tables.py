@@ -19,15 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from cablecomp.mechanics.jit import kernel, leaf_kernel
+from cablecomp.mechanics.jit import constant, inner_kernel, leaf_kernel
 
 Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
 LEAST_U, MOST_U = -7.0, 2.5
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
-ON_H, ON_L, ELSEWHERE = 0, 1, 2  # laws: of the joint's own drum in chain h and l, of all other places
-HEAD, U_OF_V, G_OF_Y, V_OF_U = range(4)  # rows
+ON_H, ON_L, ELSEWHERE = map(
+    constant, range(3)
+)  # laws: of the joint's own drum in chain h and l, of all other places
+HEAD, U_OF_V, G_OF_Y, V_OF_U = map(constant, range(4))  # rows
 (
     MODE,
     V_LOW, V_STEP,  # grids: their first value, and from one to the next
@@ -84,7 +86,7 @@ def _integral(x: Floats, f: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-@kernel
+@inner_kernel
 def look_up(laws: Floats, law: int, row: int, low: float, step: float, x: float) -> float:
     """Cubic interpolation on an even grid (Catmull-Rom); straight beyond its ends."""
     p = (x - low) / step
@@ -107,7 +109,7 @@ def look_up(laws: Floats, law: int, row: int, low: float, step: float, x: float)
     )
 
 
-@kernel
+@inner_kernel
 def look_up_slope(laws: Floats, law: int, row: int, low: float, step: float, x: float) -> tuple[float, float]:
     """As `look_up`, with its derivative by x."""
     p = (x - low) / step
@@ -147,7 +149,7 @@ def between(laws: Floats, law: int, y_low: float, y_high: float, share: float) -
     return groove_inverse(laws, law, low + share * (groove(laws, law, y_high) - low), y_low, y_high)
 
 
-@kernel
+@inner_kernel
 def groove_inverse(laws: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
     """The y between y_low and y_high with groove coordinate g (secant, then bisection where it leaves the bracket)."""
     lo, hi = y_low, y_high
@@ -194,7 +196,7 @@ def dv_dtau(laws: Floats, law: int, tau: float, v: float) -> float:
     return _slope_table(laws, law, tau, v)
 
 
-@kernel
+@inner_kernel
 def _slope_table(laws: Floats, law: int, tau: float, v: float) -> float:
     return 1.0 / (
         tau * look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)[1]
@@ -221,7 +223,7 @@ def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
     return stiffening_strain(laws[law, HEAD, STIFFENING], tau)
 
 
-@kernel
+@inner_kernel
 def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
     """The same for the stiffening coefficient b."""
     if b == 0.0:
@@ -233,7 +235,7 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
     return math.log1p(b * (tau - 1.0)) / b, 1.0 / stiffness
 
 
-@kernel
+@inner_kernel
 def strain(laws: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
     u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)

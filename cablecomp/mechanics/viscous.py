@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import inner_kernel, kernel
+from cablecomp.mechanics.jit import inner_kernel
 from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
@@ -32,7 +32,7 @@ def viscous_fill(grid: Any, w: float, reach: float) -> None:
     grid.right[:] = 1.0
 
 
-@kernel
+@inner_kernel
 def _free_nodes(w: float, h: float) -> int:
     """Number of grid nodes well inside the wrap; the departure point itself is one node more."""
     return min(max(int((w - 0.3 * h) / h) + 1, 1), WET_NODES)
@@ -126,7 +126,7 @@ class Face(NamedTuple):
     by_b: float
 
 
-@kernel
+@inner_kernel
 def _face(a: float, b: float, distance: float, mu: float) -> Face:
     steep = (b - a) / distance
     limit = mu * 0.5 * (a + b)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
 
 from cablecomp.mechanics.assemble import Model
+from cablecomp.mechanics.drive import Arrays
+from cablecomp.mechanics.pointer import kernel_address
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.start import joint_start
 from cablecomp.observer.bounded_run import run_bounded
 from cablecomp.observer.bounds_circuit import bounds_step
 from cablecomp.observer.bounds_kernel import bounds_numbers, sides_start
 
-Kernel: TypeAlias = tuple[Any, Any, Any, Any, Any]
 EXTREME = 30.0  # |ln(T/T0)| beyond anything
 
 
@@ -48,19 +48,19 @@ class BoundPair:
         for memory, heights in self.states():
             memory[:], heights[:] = self._model.memory, self._model.heights
 
-    def step(self, memory: Floats) -> tuple[float, float]:
+    def step(self, joint: Arrays) -> tuple[float, float]:
         """Follow a step that the observer's own state has just committed: lowest and highest joint angle [rad]."""
-        m = self._model
-        low, high = bounds_step(m.fixed, m.layout, m.laws, memory, self.numbers, *self._low, *self._up)
+        low, high = bounds_step(*joint, self.numbers, *self._low, *self._up)
         return float(low), float(high)
 
     def run(
-        self, walk_at: int, kernel: Kernel, rows: Floats, outs: Floats, interval: Floats
+        self, walk_at: int, joint: Arrays, rows: Floats, outs: Floats, interval: Floats
     ) -> tuple[int, int]:
         """Step the observer's own state (by `walk`, whose machine code lies at `walk_at`) and the bounds
         through rows of readings; `interval` gets lowest and highest joint angle. Returns rows done and the
         status that stopped it."""
-        return run_bounded(walk_at, *kernel, rows, outs, self.numbers, *self._low, *self._up, interval)
+        step_at = kernel_address(bounds_step, *joint, self.numbers, *self._low, *self._up)
+        return run_bounded(walk_at, step_at, joint, rows, outs, self.numbers, self._low, self._up, interval)
 
     def states(self) -> list[tuple[Floats, Ints]]:
         """The two histories, for a snapshot (with `numbers`)."""

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from cablecomp.mechanics.drive import Drive, drive
-from cablecomp.mechanics.jit import inner_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.records import OUT
 from cablecomp.observer.bounds_kernel import (
@@ -100,7 +100,7 @@ def pair_root(
     return tension
 
 
-@inner_kernel
+@inlined_kernel
 def tension_interval(
     b: Bounds,
     nominal: Drive,
@@ -157,7 +157,7 @@ def floor_tension(nominal: Drive, ic: int, pull: float) -> float:
     return floor if pull >= 0.0 else floor - pull
 
 
-@inner_kernel
+@inlined_kernel
 def _comparable(b: Bounds, nominal: Drive, ic: int, low: Side) -> bool:
     """True where surplus and deficit carry over from the last step: same factors, less cable wound on than is free."""
     circuit = nominal.circuits[ic]
@@ -172,7 +172,7 @@ def _comparable(b: Bounds, nominal: Drive, ic: int, low: Side) -> bool:
     return True
 
 
-@inner_kernel
+@inlined_kernel
 def closed_interval(
     b: Bounds, nominal: Drive, laws: Floats, ic: int, low: Side, up: Side, pull: float, x: Shafts
 ) -> tuple[float, float]:
@@ -207,7 +207,7 @@ def _part(mixed: float, least: float, most: float, pull: float, by_h: float, by_
     return by_h if pull >= 0.0 else by_l
 
 
-@inner_kernel
+@inlined_kernel
 def circuit_interval(
     b: Bounds, nominal: Drive, laws: Floats, ic: int, low: Side, up: Side, moment: float, x: Shafts
 ) -> tuple[float, float]:
@@ -236,7 +236,7 @@ def circuit_interval(
     return math.nan, math.nan
 
 
-@inner_kernel
+@inlined_kernel
 def _eps_hold(
     b: Bounds, nominal: Drive, ic: int, low: Side, up: Side, theta_low: float, theta_high: float, x: Shafts
 ) -> bool:
@@ -268,7 +268,7 @@ def _eps_hold(
     return held
 
 
-@inner_kernel
+@inlined_kernel
 def circuit_keep(
     b: Bounds, nominal: Drive, laws: Floats, ic: int, low: Side, up: Side, pull: float, x_in: float
 ) -> None:
@@ -291,12 +291,12 @@ def circuit_keep(
 
 @kernel
 def bounds_step(
-    fixed: Floats, layout: Ints, laws: Floats, memory: Floats, numbers: Floats,
+    fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats, numbers: Floats,
     memory_low: Floats, heights_low: Ints, memory_up: Floats, heights_up: Ints,
 ) -> tuple[float, float]:  # fmt: skip
     """Follow the last committed step of the nominal state `memory`; lowest and highest possible joint angle [rad] of
     the drive."""
-    nominal = drive(fixed, layout, memory, heights_low)  # its profiles' lengths are not looked at
+    nominal = drive(fixed, layout, memory, heights)
     low, up = (
         Side(drive(fixed, layout, memory_low, heights_low), -1.0),
         Side(drive(fixed, layout, memory_up, heights_up), 1.0),
@@ -319,6 +319,7 @@ def bounds_step(
             return least, most
         circuit_keep(b, nominal, laws, ic, low, up, share / circuit.radius, x_in)
         x_in, eps = x_out, max(most - x_out, x_out - least)
-    side_retension(low.drive, nominal, laws)
-    side_retension(up.drive, nominal, laws)
+    if laws is not None:
+        side_retension(low.drive, nominal, laws)
+        side_retension(up.drive, nominal, laws)
     return least, most

@@ -200,7 +200,7 @@ def side_retension(d: Drive, nominal: Drive, laws: Floats) -> None:
         retension(d, laws, c, nominal.states[c].pretension)
 
 
-@inner_kernel
+@inlined_kernel
 def _cable(
     b: Bounds, laws: Floats, side: Side, c: int, tension: float, x_in: float, x_out: float, eps_in: float
 ) -> Bound:
@@ -224,7 +224,7 @@ def _cable(
         eps = b.cables[c].eps if end == OUT else eps_in
         shift = mu * eps * b.whole.steepest
         end_v = v + sign * shift
-        end_tau = tau_of_v(laws, 2, end_v)
+        end_tau = tau_of_v(laws, ELSEWHERE, end_v)
         meet = wrap_eval(d.profiles[wrap], laws, cable.law[end], d.heights[wrap], w, end_v, end_tau, mu)
         step = d.steps[wrap]
         set_pending(step, meet)

@@ -16,6 +16,7 @@ from cablecomp.effects import extend
 from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError, InternalError
 from cablecomp.mechanics.assemble import Model, assemble
+from cablecomp.mechanics.drive import Arrays
 from cablecomp.mechanics.invariants import heights_fit, profile_violations, violations
 from cablecomp.mechanics.pointer import kernel_address
 from cablecomp.mechanics.profile import Floats, Ints
@@ -23,7 +24,7 @@ from cablecomp.mechanics.start import joint_start
 from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import stepper as st
 from cablecomp.observer.block import block_of, estimates
-from cablecomp.observer.bounds import BoundPair, Kernel
+from cablecomp.observer.bounds import BoundPair
 from cablecomp.observer.refusal import refused
 from cablecomp.observer.rows import answers, readings
 from cablecomp.observer.snapshot import pack, unpack
@@ -50,7 +51,7 @@ class Observer:
         self.channels = other_channels(config)
         self._memory, self._heights = m.memory.copy(), m.heights.copy()
         # every array is written in place for good, so one tuple serves all calls
-        self._arrays: Kernel = (m.fixed, m.layout, self._memory, self._heights, m.laws)
+        self._arrays = Arrays(m.fixed, m.layout, self._memory, self._heights, m.laws)
         self._reading = readings(1, len(self.channels))
         outs, self._answer = answers(1)
         self._out = outs[0]
@@ -314,7 +315,7 @@ class Observer:
         self._last_time = sample.time_s
         low, high = NAN, NAN
         if self._bounds is not None:
-            low, high = self._bounds.step(self._memory)
+            low, high = self._bounds.step(self._arrays)
         return self._estimate(sample, low, high)
 
     def _peeked(self, sample: Sample, status: int, fresh: bool) -> Estimate:

@@ -32,8 +32,8 @@ REASONS = {
     "reading; leave it out or mend the channel",
     Refusal.BACKWARD: "comes after a later one; time must not run backwards",
     Refusal.BREAKS: "loads a cable beyond its breaking force; lower the load or check breaking_force_N",
-    Refusal.EFFECT: "makes an effect of the configuration give no finite answer; check "
-    "its parameters and the channels it reads",
+    Refusal.EFFECT: "makes an effect of the configuration give no finite answer, or move a pretension "
+    "without `moves_pretension`; check its parameters and the channels it reads",
     Refusal.UNREACHABLE: "no load that the joint can take brings it to this joint angle; "
     "check the encoders' zeros and the pretension",
     Refusal.UNKNOWN: "comes before any other: nothing is known of the joint yet; step a first sample",

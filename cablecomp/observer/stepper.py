@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cablecomp.mechanics.drive import Drive, Terms, drive, terms_of
+from cablecomp.mechanics.drive import Arrays, Drive, Terms, drive, terms_of
 from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.joint import (
     advance,
@@ -111,7 +111,7 @@ def predict(d: Drive, terms: Terms, laws: Floats, read: Any, answer: Any) -> int
     ready = joint_ready(d)
     if status == STATUS_OK or (status == STATUS_DIVERGED and ready == STATUS_UNWOUND):
         status = ready
-    if d.size.terms > 0 and not terms_sane(d):
+    if d.size.terms > 0 and not terms_sane(d, laws):
         status = STATUS_EFFECT
     answer.drive = x.joint + x.rigid * (read.motor - motor)
     answer.joint = answer.drive + x.reading
@@ -138,20 +138,15 @@ def put_back(d: Drive, memory: Floats) -> None:
 
 @kernel
 def walk(
-    fixed: Floats,
-    layout: Ints,
-    memory: Floats,
-    heights: Ints,
-    laws: Floats,
-    rows: Floats,
-    outs: Floats,
-    commit: bool,
-) -> tuple[int, int]:
+    fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats,
+    rows: Floats, outs: Floats, commit: bool,
+) -> tuple[int, int]:  # fmt: skip
     """Step through a block of rows; returns how many were done and the status of the row that stopped it.
 
     With `commit` every row becomes the state, or is refused, and the state is what it was before that row, bit for bit;
     without, nothing is kept of any (and a cable that would break is no reason to refuse a prediction). All that steps
-    the observer goes through this one function, as it is long to compile.
+    the observer goes through this one function, as it is long to compile. Its arrays stand one by one because a
+    tuple of them costs each call from Python 1.5 us (`mechanics.drive.named`).
     """
     d, terms = drive(fixed, layout, memory, heights), terms_of(fixed, layout, memory)
     for k in range(rows.shape[0]):
@@ -168,17 +163,8 @@ def walk(
     return rows.shape[0], STATUS_OK
 
 
-@kernel
-def find_load(
-    walk_at: int,
-    fixed: Floats,
-    layout: Ints,
-    memory: Floats,
-    heights: Ints,
-    laws: Floats,
-    rows: Floats,
-    outs: Floats,
-) -> int:
+@inner_kernel
+def find_load(walk_at: int, joint: Arrays, rows: Floats, outs: Floats) -> int:
     """The load [N m] under which the joint encoder would read the only row's `joint`, by Newton's method;
     written to its `load`. `walk_at`: where the machine code of `walk` lies.
 
@@ -189,7 +175,7 @@ def find_load(
     read, answer = readings_in(rows[0]), answer_in(outs[0])
     if not math.isfinite(read.joint):
         return STATUS_NAN
-    d = drive(fixed, layout, memory, heights)
+    d = drive(joint.fixed, joint.layout, joint.memory, joint.heights)
     low, high = -1e300, 1e300
     below = above = STATUS_OK  # what is wrong with the loads at the ends of the bracket
     load = d.context.load * d.sensor.gain + d.sensor.offset
@@ -197,7 +183,7 @@ def find_load(
     taken = 0.0  # the last load that the joint could take
     for _ in range(200):
         read.load = load
-        _, status = call_walk(walk_at, fixed, layout, memory, heights, laws, rows, outs, False)
+        _, status = call_walk(walk_at, (joint, rows, outs, False))
         if status in (STATUS_SLACK, STATUS_UNWOUND, STATUS_DIVERGED):
             reach *= 2.0
             if status == STATUS_SLACK or load < taken:
@@ -230,22 +216,16 @@ def find_load(
 
 @kernel
 def walk_inverse(
-    walk_at: int,
-    fixed: Floats,
-    layout: Ints,
-    memory: Floats,
-    heights: Ints,
-    laws: Floats,
-    rows: Floats,
-    outs: Floats,
-    commit: bool,
-) -> tuple[int, int]:
+    walk_at: int, fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats,
+    rows: Floats, outs: Floats, commit: bool,
+) -> tuple[int, int]:  # fmt: skip
     """As `walk`, with every row's load found from both encoders."""
+    joint = Arrays(fixed, layout, memory, heights, laws)
     for k in range(rows.shape[0]):
         row, out = rows[k : k + 1], outs[k : k + 1]
-        status = find_load(walk_at, fixed, layout, memory, heights, laws, row, out)
+        status = find_load(walk_at, joint, row, out)
         if status == STATUS_OK:
-            _, status = call_walk(walk_at, fixed, layout, memory, heights, laws, row, out, commit)
+            _, status = call_walk(walk_at, (joint, row, out, commit))
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK

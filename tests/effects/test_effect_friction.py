@@ -11,6 +11,8 @@ from effect_cases import excitation, joint, run, still
 from scipy.integrate import quad, solve_ivp
 
 from cablecomp.config import JointConfig
+from cablecomp.effects import with_effects
+from cablecomp.observer import Observer
 
 Law = Callable[[float, float], float]  # mu at (tension ratio, angle from the departure point)
 
@@ -168,3 +170,52 @@ def test_closed_circuit_tensions_with_pressure_dependence() -> None:
         return float(quad(lambda t: (t - 1.0) * t ** (n - 1.0), 1.0, tau, epsrel=1e-12)[0])
 
     assert wrap(tau_h) == pytest.approx(wrap(tau_l), rel=2e-3)  # l winds off a little, h on
+
+
+def strain(stiffening: float, tau: float) -> float:
+    """EA/T0 times the strain beyond that at T0 of a cable of tangent stiffness EA (1 + b (T/T0 - 1))."""
+    return math.log1p(stiffening * (tau - 1.0)) / stiffening if stiffening else tau - 1.0
+
+
+def slid(tau: float, width: float, mu: float, exponent: float, stiffening: float) -> tuple[float, float]:
+    """int strain dθ over cable whose tension rises from tau by dT/dθ = mu (T/T0)^-n T, at most up to T0 or over
+    `width`; T/T0 at its end."""
+
+    def slope(_: float, state: np.ndarray) -> list[float]:
+        return [mu * state[0] ** (1.0 - exponent), strain(stiffening, state[0])]
+
+    def at_rest(_: float, state: np.ndarray) -> float:
+        return float(state[0] - 1.0)
+
+    at_rest.terminal = True
+    found = solve_ivp(slope, (0.0, width), [tau, 0.0], rtol=1e-11, atol=1e-13, events=at_rest)
+    return float(found.y[1, -1]), float(found.y[0, -1])
+
+
+@pytest.mark.parametrize("mu_angle", [0.2, 1.5])  # slides through; holds
+@pytest.mark.parametrize(("exponent", "stiffening"), [(0.4, 0.0), (0.0, 0.6), (-0.3, 0.3)])
+def test_a_guide_where_friction_or_stiffness_depends_on_tension(
+    mu_angle: float, exponent: float, stiffening: float
+) -> None:
+    """What lies on the guide obeys the cable's own laws; so does what its friction leaves to the input drum."""
+    config = joint("snow-open-rig")
+    stage = config.drive.stage[0]
+    columns = unloading(config)
+    effects = [("routing_friction", {"mu_angle": mu_angle, "arc_length_m": 0.02})]
+    effects += [("pressure_dependent_friction", {"exponent": exponent})] if exponent else []
+    effects += [("nonlinear_cable", {"stiffening": stiffening})] if stiffening else []
+    observer = Observer(with_effects(config, effects))
+    found = observer.run(columns)
+    observer.check_state()
+    tau = 0.5
+    on_guide, tau_in = slid(tau, mu_angle, 1.0, exponent, stiffening)
+    total = 0.5 * stage.free_length_m * (strain(stiffening, tau) + strain(stiffening, tau_in))
+    total += on_guide * 0.02 / mu_angle
+    for end, wrap, mu, radius in (
+        (tau, stage.wrap_output_rad, stage.mu_output, stage.output_radius_m),
+        (tau_in, stage.wrap_input_rad, stage.mu_input, stage.input_radius_m),
+    ):
+        total += radius * slid(end, wrap, mu, exponent, stiffening)[0]
+    expected = total * stage.pretension_N / stage.EA_N / stage.output_radius_m
+    assert found["deflection_rad"][-1] == pytest.approx(expected, rel=1e-6)
+    assert found["tension_h_input_N"][-1] == pytest.approx(tau_in * stage.pretension_N, rel=1e-7)

@@ -13,6 +13,7 @@ from effect_cases import excitation, joint, run
 from cablecomp.effects import catalogue, load_effects, with_effects
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer
+from cablecomp.observer.refusal import SampleRefused
 
 EXAMPLE = Path(__file__).with_name("user_effect_example.py")
 GUIDE = Path(__file__).parents[2] / "cablecomp/guide/effects.md"
@@ -57,6 +58,22 @@ def test_neutral_is_the_plain_drive_and_a_snapshot_works() -> None:
     second.restore(first.snapshot())
     rest = {key: value[200:] for key, value in columns.items()}
     assert np.array_equal(first.run(rest)["joint_position_rad"], second.run(rest)["joint_position_rad"])
+
+
+def test_a_pretension_that_moves_without_a_word_is_refused(tmp_path: Path) -> None:
+    """A plain drive's code does not move what lies on the drums; an effect that says what it does gets the code that
+    does."""
+    text = EXAMPLE.read_text(encoding="utf-8").replace("c.moment += p.drag * rate", "c.pretension_h *= 0.9")
+    for name, said in (("silent", ""), ("outspoken", ", moves_pretension=True")):
+        path = tmp_path / f"{name}.py"
+        path.write_text(text.replace("seal_drag", name).replace('"]))', f'"]){said})'), encoding="utf-8")
+        load_effects(path)
+    config = joint()
+    columns = excitation(config)
+    values = {"drag_Nms_per_rad": 0.5}
+    assert np.all(run(config, columns, ("outspoken", values))["tension_h_N"] > 0.0)
+    with pytest.raises(SampleRefused, match="moves_pretension"):
+        run(config, columns, ("silent", values))
 
 
 def test_an_id_that_exists_is_refused(tmp_path: Path) -> None:

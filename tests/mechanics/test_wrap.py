@@ -68,11 +68,11 @@ def test_unwinding_moves_the_corner_by_half_and_erases_the_bump(now: float) -> N
 def test_a_belt_pulley_loses_what_slip_at_its_exit_takes() -> None:
     mu, width, low, high = 0.2, 3.0, np.log(0.8), np.log(1.15)
     p = np.zeros(400, POINT)
-    n = arc.arc_fill(p, width, 0.0)
+    n = arc.arc_fill(p, None, width, 0.0)
     turn = 0.005
     for _ in range(1500):
         n = turned(p, n, turn, low)
-        n = arc.arc_commit(p, n, low, high, mu)
+        n = arc.arc_commit(p, None, n, low, high, mu)
     y, tension = p[:n]["y"], np.exp(p[:n]["v"])
     slips = width - float(y[np.argmax(tension > np.exp(low) * (1.0 + 1e-9)) - 1])
     assert slips == pytest.approx((high - low) / mu, rel=1e-3)  # (2-99), at the exit only
