@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 from string import Template
+from tempfile import TemporaryDirectory
 from typing import Final
 
 from cablecomp.config import JointConfig
@@ -106,11 +107,13 @@ def write_fmu(config: JointConfig, found: Plays, out: Path) -> Path:
     source = _SLAVE.substitute(
         _words(config, found), lost="\n".join(LOST), cls=cls, version="2", package="pythonfmu", real="Real"
     )
-    with atomic_directory(out) as folder:
-        script = folder / f"{cls.lower()}.py"
+    with (
+        TemporaryDirectory() as sources,
+        atomic_directory(out) as folder,
+    ):  # building imports it and leaves traces
+        script = Path(sources) / f"{cls.lower()}.py"
         script.write_text(source, encoding="utf-8")
         FmuBuilder.build_FMU(script, dest=folder)
-        script.unlink()
     return out / f"{cls}.fmu"
 
 

@@ -76,6 +76,7 @@ def test_c_has_the_loops_of_the_plays(tmp_path: Path) -> None:
 def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Inputs and outputs by name in its description; its own code steps as the plays do."""
     pytest.importorskip("pythonfmu", reason="pythonfmu is not installed")
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)  # as on any machine
     path = write_fmu(JOINT, PLAYS, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["WristCapstan.fmu"]
     with zipfile.ZipFile(path) as unit:
