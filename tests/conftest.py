@@ -5,11 +5,17 @@ first; what runs in real time stays with one of them.
 
 from __future__ import annotations
 
+import gc
+import os
 from collections import Counter
 from typing import Any
 
 import pytest
 from hypothesis import settings
+
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # the workers share the cores; threads of each would only wait
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
@@ -43,6 +49,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return next((k for k, begin in enumerate(FIRST) if item.nodeid.startswith(begin)), len(FIRST))
 
     items.sort(key=place)
+
+
+def pytest_collection_finish() -> None:
+    """What is loaded by now stays: the garbage collector need not look through it again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)

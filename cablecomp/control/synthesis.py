@@ -164,11 +164,11 @@ class DesignWork:
         stiffness.
         """
         slow = np.exp(2j * pi * np.geomspace(0.1, 3.0, 12) * self.period)
-        candidates = []
+        answer, candidates = self._motor_answer(slow), []
         for f in _FILTERS_HZ if filter_Hz is None else (filter_Hz,):
             tau = 1.0 / (2.0 * pi * f)
             for lead in tuple(x * tau for x in _LEADS) if lead_s is None else (lead_s,):
-                G = self._passed(f, lead, slow)
+                G = self._passed(f, lead, slow, answer)
                 candidates.append((float(np.sqrt(np.mean(np.abs(1.0 - G) ** 2))), f, lead))
         for _, f, lead in sorted(candidates):
             if allowed(f, lead):
@@ -176,13 +176,15 @@ class DesignWork:
         _, slowest, lead = min(candidates, key=lambda c: (c[1], c[2]))
         return slowest, lead  # its margins are shown as they are
 
-    def _passed(self, filter_Hz: float, lead_s: float, z: Complex) -> Complex:
-        """G: share of the deflection that the motor makes up for, at z."""
+    def _motor_answer(self, z: Complex) -> Complex:
+        """The motor's answer at z to its targets, the cable's pull known and fed forward: a motor that carries nothing
+        but itself."""
+        return response(pick(self.model(1e-9), [MOTOR], [0, 1]), z)[:, 0, :]
+
+    def _passed(self, filter_Hz: float, lead_s: float, z: Complex, answer: Complex) -> Complex:
+        """G: share of the deflection that the motor makes up for, at z, where it answers its targets so."""
         k = self.range[-1]
         target = response(self.path(k, filter_Hz, lead_s), z)[:, :, 0]
-        # the motor's answer with the cable's pull known and fed forward: a motor that carries nothing
-        # but itself
-        answer = response(pick(self.model(1e-9), [MOTOR], [0, 1]), z)[:, 0, :]
         found: Complex = -self.ratio * k * (answer[:, 0] * target[:, 0] + answer[:, 1] * target[:, 1])
         return found
 
@@ -190,7 +192,8 @@ class DesignWork:
 
     def compensation(self, gains: Gains, hertz: NDArray[np.float64]) -> Complex:
         """G at frequencies in Hz."""
-        return self._passed(gains.load_filter_Hz, gains.load_lead_s, np.exp(2j * pi * hertz * self.period))
+        z = np.exp(2j * pi * hertz * self.period)
+        return self._passed(gains.load_filter_Hz, gains.load_lead_s, z, self._motor_answer(z))
 
     def loops(self, gains: Gains) -> tuple[Loop, ...]:
         """Margins of every loop in use, at every stiffness of the range."""

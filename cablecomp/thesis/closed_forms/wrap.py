@@ -24,12 +24,15 @@ def gap(excess: Number) -> Array:
     """Return `x - ln(1 + x)` without cancellation for small x; x > -1."""
     x = np.asarray(excess, dtype=float)
     small = np.abs(x) < 0.06
-    y = np.where(small, x, 0.0)
-    series = np.zeros_like(y)
-    for coefficient in _SERIES[::-1]:  # x^2/2 - x^3/3 + x^4/4 - ...
-        series = coefficient - y * series
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(small, y * y * series, x - np.log1p(x)))
+        found = np.asarray(x - np.log1p(x))
+    if np.any(small):
+        y = x[small]
+        series = np.zeros_like(y)
+        for coefficient in _SERIES[::-1]:  # x^2/2 - x^3/3 + x^4/4 - ...
+            series = coefficient - y * series
+        found[small] = y * y * series
+    return found
 
 
 def loading_shape(tau: Number, mu_wrap: Number = math.inf) -> Array:
