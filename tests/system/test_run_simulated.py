@@ -59,7 +59,11 @@ REACH = parse_protocol(
 
 
 def simulated_run(
-    out: Path | None, duration_s: float, mode: ControlMode = ControlMode.POSITION, **changes: object
+    out: Path | None,
+    duration_s: float,
+    mode: ControlMode = ControlMode.POSITION,
+    faults: tuple[str, ...] = (),
+    **changes: object,
 ) -> RunReport:
     """A run in stepped time on a joint exactly as configured."""
     joint, control = load_joint(JOINT), load_control(CONTROL)
@@ -68,7 +72,7 @@ def simulated_run(
         load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
     )
     protocol = force_protocol(joint, 5, 8.0) if mode is ControlMode.FORCE else REACH
-    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
+    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3, faults=faults))
     if mode is ControlMode.FORCE:
         simulation.set_wall(1, 0.0)
     try:
@@ -133,6 +137,23 @@ def test_the_run_says_how_time_and_data_were_kept(finished: RunReport) -> None:
     assert timing["lost_frames"] == 0
     assert len(timing["policy"]) == 3
     assert timing["step"]["p50_s"] < timing["step"]["p99_s"] <= timing["step"]["max_s"]
+
+
+@pytest.mark.parametrize("node", ["drive", "sensor"])
+@pytest.mark.parametrize("after_the_stop", [False, True])
+def test_silence_is_an_event_under_control_and_none_of_a_drive_that_was_stopped(
+    node: str, after_the_stop: bool, tmp_path: Path
+) -> None:
+    silent_s, duration_s = (0.36, 0.25) if after_the_stop else (0.2, 1.0)
+    report = simulated_run(tmp_path, duration_s, faults=(f"silent:node={node},start={silent_s}",))
+    stopped_s = next(t for t, _, what in report.events if what.startswith("stop: "))
+    assert (stopped_s < silent_s) is after_the_stop
+    assert any("stale" in what for _, _, what in report.events) is not after_the_stop
+    assert ("stale" in report.stop_reason) is not after_the_stop
+    cycles = pl.read_csv(tmp_path / "cycles.csv", infer_schema_length=None)
+    last = cycles.row(-1, named=True)  # what came of it is recorded all the same
+    assert last["time_s"] > stopped_s + 0.09
+    assert last["motor_age_s" if node == "drive" else "load_age_s"] > 0.05
 
 
 def test_force_is_made_without_a_torque_sensor(tmp_path: Path) -> None:
