@@ -3,7 +3,8 @@
 Imports what it asks of a plant (`plantlike.py`) and errors alone. Start reading at `drive.py`.
 """
 
-from firmware_sim.firmware.drive import Drive, DriveConfig, DriveReport
+from firmware_sim.firmware.drive import Drive, DriveReport
+from firmware_sim.firmware.drive_config import DriveConfig
 from firmware_sim.firmware.records import (
     DriveFlag,
     DriveState,

@@ -1,75 +1,21 @@
-"""A motor drive: state table, command watchdog, limits, index search, error flags, and the torque it
-commands."""
+"""A motor drive: what it may be asked, command watchdog, limits, index search, error flags."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
-from firmware_sim.errors import SimError
+from firmware_sim.firmware.drive_config import DriveConfig
 from firmware_sim.firmware.index_search import IndexSearch
+from firmware_sim.firmware.laws import Brake, MotionLaw
 from firmware_sim.firmware.records import FAULTS, DriveFlag, DriveState, Mode, Request, Setpoint
 from firmware_sim.firmware.shaping import InputMode, Shaper
+from firmware_sim.firmware.states import TABLE
 from firmware_sim.plantlike import Readings
 
 _SEARCH_INTEGRATOR_PER_S = 20.0
 """Integral over proportional gain of a search for the index: what holds the motor back is overcome bit by bit."""
-
-# What a request does in each state; a pair that is missing is refused and leaves everything as it is.
-TABLE: dict[tuple[DriveState, Request], DriveState] = {
-    (DriveState.DISABLED, Request.DISABLE): DriveState.DISABLED,
-    (DriveState.DISABLED, Request.CALIBRATE): DriveState.CALIBRATING,
-    (DriveState.DISABLED, Request.ENABLE): DriveState.ENABLED,
-    (DriveState.DISABLED, Request.CLEAR_FAULTS): DriveState.DISABLED,
-    (DriveState.DISABLED, Request.SET_ZERO): DriveState.DISABLED,
-    (DriveState.CALIBRATING, Request.DISABLE): DriveState.DISABLED,
-    (DriveState.ENABLED, Request.DISABLE): DriveState.DISABLED,
-    (DriveState.ENABLED, Request.ENABLE): DriveState.ENABLED,
-    (DriveState.ENABLED, Request.CLEAR_FAULTS): DriveState.ENABLED,
-    (DriveState.FAULT, Request.CLEAR_FAULTS): DriveState.DISABLED,
-    **{(state, Request.STOP): DriveState.FAULT for state in DriveState},
-    **{(state, Request.RESET): DriveState.DISABLED for state in DriveState},
-}
-
-
-@dataclass(frozen=True)
-class DriveConfig:
-    """Parameters of the drive; angles and torques at the input pulley.
-
-    `index_position_rad` is where the index of an incremental encoder lies (one a turn); None = absolute
-    encoder, at home from the start. `timeout_faults`: a drive that hears nothing for `command_timeout_s` ends
-    in a fault; False = it makes no torque until it hears again, as MIT firmware does. `calibrate_on_enable`:
-    asked to enable before the index was found, the drive searches it first, then enables.
-    `fault_damping_Nms_per_rad` brakes the motor in a fault (shorted windings); 0 lets it coast.
-    `brake_Nm_per_rad` > 0: a holding brake of that stiffness, closed while the drive is neither enabled nor
-    calibrating (damped by the same), as one-sided loads need it.
-    """
-
-    torque_limit_Nm: float = 18.0
-    velocity_limit_rad_s: float = 50.0
-    position_min_rad: float = -math.inf
-    position_max_rad: float = math.inf
-    command_timeout_s: float = 0.1
-    timeout_faults: bool = True
-    temperature_limit_degC: float = 90.0
-    index_position_rad: float | None = None
-    search_velocity_rad_s: float = 1.0
-    search_range_rad: float = 2.0 * math.pi
-    calibrate_on_enable: bool = True
-    fault_damping_Nms_per_rad: float = 0.0
-    brake_Nm_per_rad: float = 0.0
-    position_gain_per_s: float = 20.0
-    velocity_gain_Nms_per_rad: float = 0.05
-    velocity_integrator_Nm_per_rad: float = 0.0
-    mode: Mode = Mode.IMPEDANCE
-
-    def __post_init__(self) -> None:
-        for name in ("torque_limit_Nm", "velocity_limit_rad_s", "search_velocity_rad_s", "search_range_rad"):
-            if not getattr(self, name) > 0.0:
-                raise SimError(f"drive: {name} is {getattr(self, name)!r}; a number above 0 is accepted")
-        if not self.position_min_rad < self.position_max_rad:
-            raise SimError("drive: position_min_rad must lie below position_max_rad; exchange them")
 
 
 class DriveReport(NamedTuple):
@@ -111,8 +57,8 @@ class Drive:
         self._last_command_s = now_s
         self._last_raw: float | None = None
         self._checked_raw: float | None = None
-        self._braked_at: float | None = None
-        self._integral_Nm = 0.0
+        self._brake = Brake()
+        self._law = MotionLaw()
         self._index = self._new_search(now_s)
         self._enable_when_homed = False
         self._torque_command = 0.0
@@ -204,28 +150,18 @@ class Drive:
         if self.state is DriveState.CALIBRATING:
             wanted = self._search(dt_s, now_s)
         elif self.state is DriveState.ENABLED:
-            wanted = 0.0 if self._unheard else self._law(dt_s)
+            wanted = 0.0 if self._unheard else self._follow(dt_s)
         else:
-            wanted = self._brake()
+            in_fault = self.state is DriveState.FAULT
+            wanted = self._brake.torque_Nm(self.config, in_fault, self._last_raw, self.velocity_rad_s)
         if self.state in (DriveState.CALIBRATING, DriveState.ENABLED):
-            self._braked_at = None
+            self._brake.open()
         limit = self.config.torque_limit_Nm
         if abs(wanted) > limit:
             self.flags |= DriveFlag.OVER_TORQUE
             wanted = math.copysign(limit, wanted)
         self._torque_command = wanted
         return wanted
-
-    def _brake(self) -> float:
-        """Torque on a motor that is let go."""
-        c, raw = self.config, self._last_raw
-        damped = self.state is DriveState.FAULT or c.brake_Nm_per_rad > 0.0
-        wanted = -c.fault_damping_Nms_per_rad * self.velocity_rad_s if damped else 0.0
-        if raw is None or c.brake_Nm_per_rad == 0.0:
-            return wanted
-        if self._braked_at is None:
-            self._braked_at = raw
-        return wanted + c.brake_Nm_per_rad * (self._braked_at - raw)
 
     def observe(self, readings: Readings) -> None:
         """Take in readings without acting on them; what `report` then tells is as fresh as they are."""
@@ -280,14 +216,14 @@ class Drive:
             self._enable_when_homed = False
         if target is DriveState.CALIBRATING:
             self._index = self._new_search(now_s)
-            self._integral_Nm = 0.0
+            self._law.reset()
         if target is DriveState.ENABLED and self.state is not DriveState.ENABLED:
             self._hold()
         self.state = target
         self._last_command_s = now_s
 
     def _hold(self) -> None:
-        self._integral_Nm = 0.0
+        self._law.reset()
         self.setpoint = Setpoint(position_rad=self.position_rad)
         self.shaper.hold(self.position_rad)
 
@@ -321,26 +257,11 @@ class Drive:
         if found & FAULTS:
             self._fault(found)
 
-    def _law(self, dt_s: float) -> float:
-        c, s = self.config, self.shaper.step(self.setpoint, dt_s)
-        position = min(max(s.position_rad, c.position_min_rad), c.position_max_rad)
-        if self.mode is Mode.TORQUE:
-            return s.torque_Nm
-        if self.mode is Mode.IMPEDANCE:
-            spring = s.kp_Nm_per_rad * (position - self.position_rad)
-            return spring + s.kd_Nms_per_rad * (s.velocity_rad_s - self.velocity_rad_s) + s.torque_Nm
-        velocity = s.velocity_rad_s
-        if self.mode is Mode.POSITION:
-            velocity += c.position_gain_per_s * (position - self.position_rad)
-        return self._velocity_loop(velocity, dt_s, c.velocity_integrator_Nm_per_rad) + s.torque_Nm
-
-    def _velocity_loop(self, wanted_rad_s: float, dt_s: float, integrator: float) -> float:
-        c = self.config
-        wanted = min(max(wanted_rad_s, -c.velocity_limit_rad_s), c.velocity_limit_rad_s)
-        error = wanted - self.velocity_rad_s
-        self._integral_Nm += integrator * error * dt_s
-        self._integral_Nm = min(max(self._integral_Nm, -c.torque_limit_Nm), c.torque_limit_Nm)
-        return c.velocity_gain_Nms_per_rad * error + self._integral_Nm
+    def _follow(self, dt_s: float) -> float:
+        wanted = self.shaper.step(self.setpoint, dt_s)
+        return self._law.torque_Nm(
+            self.mode, wanted, self.position_rad, self.velocity_rad_s, self.config, dt_s
+        )
 
     def _new_search(self, now_s: float) -> IndexSearch:
         return IndexSearch(self.config.index_position_rad, self.config.search_range_rad, now_s)
@@ -361,6 +282,6 @@ class Drive:
             self._fault(DriveFlag.INDEX_NOT_FOUND)
             return 0.0
         if index.sign != sign:
-            self._integral_Nm = 0.0
+            self._law.reset()
         gain = _SEARCH_INTEGRATOR_PER_S * c.velocity_gain_Nms_per_rad
-        return self._velocity_loop(index.sign * c.search_velocity_rad_s, dt_s, gain)
+        return self._law.turn(index.sign * c.search_velocity_rad_s, self.velocity_rad_s, gain, c, dt_s)

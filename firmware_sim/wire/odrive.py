@@ -1,7 +1,8 @@
-"""ODrive CANSimple, device side: identifier = node << 5 | command, little-endian, angles in turns.
+"""ODrive CANSimple, device side: what it hears, and when it tells what. Identifier = node << 5 | command,
+little-endian, angles in turns.
 
 Two firmwares, which share most messages but not all: 0.5 (ODrive v3.x, both axes nodes of their own) and 0.6
-(Pro, S1, Micro). What differs lies in `Firmware`: error bits, the heartbeat's last three bytes, what 0x03 to
+(Pro, S1, Micro). What differs (here and in `odrive_errors.py`, `odrive_messages.py`): error bits, the heartbeat's last three bytes, what 0x03 to
 0x06, 0x0A, 0x15, 0x19, 0x1C and 0x1D mean, and which messages feed the watchdog. Every cyclic message also
 answers a remote request, or an empty frame in its place.
 
@@ -12,7 +13,6 @@ parameter access.
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -22,8 +22,6 @@ from firmware_sim.errors import SimError
 from firmware_sim.firmware import (
     Drive,
     DriveFlag,
-    DriveReport,
-    DriveState,
     InputMode,
     Mode,
     Request,
@@ -32,17 +30,24 @@ from firmware_sim.firmware import (
 from firmware_sim.wire.base import Answer, Heard
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.odrive_endpoints import serve
-from firmware_sim.wire.odrive_errors import V05, V06, Codes
+from firmware_sim.wire.odrive_errors import V05, V06
+from firmware_sim.wire.odrive_messages import (
+    CLOSED_LOOP,
+    COUNTS_PER_TURN,
+    IDLE,
+    INVALID_STATE,
+    NOT_CALIBRATED,
+    SUCCESS,
+    TELL_05,
+    TELL_06,
+    TURN,
+    Axis,
+)
 
-TURN = 2.0 * math.pi
-IDLE, INDEX_SEARCH, CLOSED_LOOP = 1, 6, 8
 CALIBRATIONS = (3, 4, 6, 7)
 MODES = {1: Mode.TORQUE, 2: Mode.VELOCITY, 3: Mode.POSITION}
-SUCCESS, BUSY, DISARMED, INVALID_STATE, NOT_CALIBRATED = 0, 1, 3, 13, 14
 BROADCAST = 0x3F
 ADDRESS, REBOOT, CLEAR = 0x06, 0x16, 0x18
-COUNTS_PER_TURN = 8192
-BUS_V = 24.0
 
 FirmwareName = Literal["0.5", "0.6"]
 
@@ -76,28 +81,25 @@ class OdriveWire:
     ) -> None:
         if not 0 <= node <= BROADCAST:
             raise SimError(f"odrive: node {node}; 0 to 63 is accepted")
-        self.node = self._saved_node = node
-        self.serial = 0x3000_0000_0000 + node if serial is None else serial
+        codes = {"0.5": V05, "0.6": V06}[firmware]
+        self.axis = Axis(node, 0x3000_0000_0000 + node if serial is None else serial, torque_constant, codes)
+        self._saved_node = node
         self.rates = OdriveRates() if rates is None else rates
-        self.torque_constant = torque_constant
-        self.codes: Codes = {"0.5": V05, "0.6": V06}[firmware]
         self._old = firmware == "0.5"
         self._hear = HEAR_05 if self._old else HEAR_06
         self._tell = TELL_05 if self._old else TELL_06
-        self._disarm_reason = 0
-        self._result = SUCCESS
         self.reset()
 
     def reset(self) -> None:
         """Power cycle: counts start again."""
         self._samples = 0
         self._told: tuple[int, int] | None = None
-        self._result = SUCCESS
-        self.node = self._saved_node
+        self.axis.result = SUCCESS
+        self.axis.node = self._saved_node
 
     def identifiers(self) -> Iterable[int]:
         """Every command of the node."""
-        return (self.node << 5 | command for command in range(32))
+        return (self.axis.node << 5 | command for command in range(32))
 
     def broadcasts(self) -> Iterable[int]:
         """Addressing, reboot and identification of all nodes (firmware 0.6)."""
@@ -108,7 +110,7 @@ class OdriveWire:
     def hear(self, frame: Frame, drive: Drive, now_s: float) -> Heard:
         """Apply one frame; a request is answered, a frame too short for its command is counted as bad."""
         command = frame.identifier & 0x1F
-        fed = command in self.codes.feeding or self._old
+        fed = command in self.axis.codes.feeding or self._old
         if fed and not (frame.remote and not self._old):
             drive.feed_watchdog(now_s)
         asks = frame.remote or not frame.data
@@ -119,9 +121,9 @@ class OdriveWire:
             if command not in self._tell:
                 drive.flags |= DriveFlag.BAD_FRAME
             return Heard()
-        before = self.node
+        before = self.axis.node
         answers = action[1](self, frame.data, drive, now_s)
-        return Heard(answers or (), command in (0x0C, 0x0D, 0x0E), self.node != before)
+        return Heard(answers or (), command in (0x0C, 0x0D, 0x0E), self.axis.node != before)
 
     def _stop(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.request(Request.STOP, now_s)
@@ -132,13 +134,13 @@ class OdriveWire:
 
     def _address(self, data: bytes, drive: Drive, now_s: float) -> None:
         wanted, serial = data[0], int.from_bytes(data[1:7], "little")
-        if serial == self.serial:
-            self.node = wanted & 0x3F
-        elif wanted == self.node:
-            self.node = BROADCAST  # another drive is given this number: make room
+        if serial == self.axis.serial:
+            self.axis.node = wanted & 0x3F
+        elif wanted == self.axis.node:
+            self.axis.node = BROADCAST  # another drive is given this number: make room
 
     def _node_id(self, data: bytes, drive: Drive, now_s: float) -> None:
-        self.node = self._saved_node = struct.unpack_from("<I", data)[0] & 0x3F
+        self.axis.node = self._saved_node = struct.unpack_from("<I", data)[0] & 0x3F
 
     def _axis_state(self, data: bytes, drive: Drive, now_s: float) -> tuple[Answer, ...]:
         (wanted,) = struct.unpack_from("<I", data)
@@ -150,9 +152,9 @@ class OdriveWire:
             accepted = drive.request(Request.ENABLE, now_s)
         else:
             accepted = False
-        self._result = SUCCESS if accepted else INVALID_STATE
+        self.axis.result = SUCCESS if accepted else INVALID_STATE
         if drive.flags & DriveFlag.NOT_CALIBRATED:
-            self._result = NOT_CALIBRATED
+            self.axis.result = NOT_CALIBRATED
         return (Answer.STATUS,)
 
     def _controller_mode(self, data: bytes, drive: Drive, now_s: float) -> tuple[Answer, ...]:
@@ -177,7 +179,7 @@ class OdriveWire:
 
     def _limits(self, data: bytes, drive: Drive, now_s: float) -> None:
         velocity, current = struct.unpack_from("<ff", data)
-        drive.set_limits(velocity * TURN, current * self.torque_constant)
+        drive.set_limits(velocity * TURN, current * self.axis.torque_constant)
 
     def _trajectory_velocity(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.shaper.config.trajectory_velocity_rad_s = struct.unpack_from("<f", data)[0] * TURN
@@ -193,7 +195,7 @@ class OdriveWire:
     def _reboot(self, data: bytes, drive: Drive, now_s: float) -> None:
         action = data[0] if data else 0
         if action == 1:
-            self._saved_node = self.node
+            self._saved_node = self.axis.node
         elif action == 2:
             self._saved_node = BROADCAST
         drive.request(Request.RESET, now_s)
@@ -201,7 +203,7 @@ class OdriveWire:
 
     def _clear(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.request(Request.CLEAR_FAULTS, now_s)
-        self._disarm_reason, self._result = 0, SUCCESS
+        self.axis.disarm_reason, self.axis.result = 0, SUCCESS
 
     def _absolute(self, data: bytes, drive: Drive, now_s: float) -> None:
         drive.set_position(struct.unpack_from("<f", data)[0] * TURN)
@@ -222,7 +224,7 @@ class OdriveWire:
         """The message asked for; a change of state is answered by a heartbeat."""
         command = 0x01 if answer is Answer.STATUS else frame.identifier & 0x1F
         if command == 0x04 and not self._old:
-            return None if self._sdo_answer is None else Frame(self.node << 5 | 0x05, self._sdo_answer)
+            return None if self._sdo_answer is None else Frame(self.axis.node << 5 | 0x05, self._sdo_answer)
         return self._message(command, drive)
 
     _sdo_answer: bytes | None = None
@@ -230,7 +232,7 @@ class OdriveWire:
     def cyclic(self, drive: Drive, now_s: float) -> list[Frame]:
         """Messages that are due at this sample; the heartbeat also at once when state or errors change."""
         report = drive.report()
-        state = (report.state, self.codes.axis(report))
+        state = (report.state, self.axis.codes.axis(report))
         count, rates = self._samples, self.rates
         self._samples += 1
         due = []
@@ -244,75 +246,10 @@ class OdriveWire:
         return [self._message(command, drive) for command in due]
 
     def _message(self, command: int, drive: Drive) -> Frame:
-        return Frame(self.node << 5 | command, self._tell[command](self, drive, drive.report()))
-
-    def _tell_version(self, drive: Drive, report: DriveReport) -> bytes:
-        return bytes((2, 4, 4, 58, 0, 6, 10, 0))
-
-    def _axis(self, report: DriveReport) -> tuple[int, int]:
-        state = {DriveState.ENABLED: CLOSED_LOOP, DriveState.CALIBRATING: INDEX_SEARCH}.get(
-            report.state, IDLE
-        )
-        errors = self.codes.axis(report)
-        if errors:
-            self._disarm_reason = errors
-        return errors, state
-
-    def _tell_heartbeat(self, drive: Drive, report: DriveReport) -> bytes:
-        errors, state = self._axis(report)
-        result = DISARMED if errors else BUSY if state == INDEX_SEARCH else self._result
-        return struct.pack("<IBBBB", errors, state, result, drive.shaper.trajectory_done, 0)
-
-    def _tell_heartbeat_05(self, drive: Drive, report: DriveReport) -> bytes:
-        errors, state = self._axis(report)
-        c = self.codes
-        controller = (c.controller(report) != 0) | drive.shaper.trajectory_done << 7
-        return struct.pack("<IBBBB", errors, state, c.motor(report) != 0, c.encoder(report) != 0, controller)
-
-    def _tell_error(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<II", self.codes.axis(report), self._disarm_reason)
-
-    def _tell_motor_error(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<Q", self.codes.motor(report))
-
-    def _tell_encoder_error(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<II", self.codes.encoder(report), 0)
-
-    def _tell_controller_error(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<II", self.codes.controller(report), 0)
-
-    def _tell_nothing(self, drive: Drive, report: DriveReport) -> bytes:
-        return bytes(8)  # sensorless estimator and its errors: there is none here
-
-    def _tell_address(self, drive: Drive, report: DriveReport) -> bytes:
-        return bytes((self.node,)) + self.serial.to_bytes(6, "little") + b"\x00"
-
-    def _tell_encoder(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<ff", report.position_rad / TURN, report.velocity_rad_s / TURN)
-
-    def _tell_count(self, drive: Drive, report: DriveReport) -> bytes:
-        count = round(report.position_rad / TURN * COUNTS_PER_TURN)
-        return struct.pack("<ii", count, count % COUNTS_PER_TURN)
-
-    def _tell_iq(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<ff", report.torque_command_Nm / self.torque_constant, report.current_A)
-
-    def _tell_temperature(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<ff", report.temperature_degC, report.temperature_degC)
-
-    def _tell_bus(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<ff", BUS_V, report.torque_Nm * report.velocity_rad_s / BUS_V)
-
-    def _tell_torques(self, drive: Drive, report: DriveReport) -> bytes:
-        return struct.pack("<ff", report.torque_command_Nm, report.torque_Nm)
-
-    def _tell_powers(self, drive: Drive, report: DriveReport) -> bytes:
-        power = report.torque_Nm * report.velocity_rad_s
-        return struct.pack("<ff", power, power)  # the simulated motor loses nothing
+        return Frame(self.axis.node << 5 | command, self._tell[command](self.axis, drive, drive.report()))
 
 
 Hear = Callable[[OdriveWire, bytes, Drive, float], tuple[Answer, ...] | None]
-Tell = Callable[[OdriveWire, Drive, DriveReport], bytes]
 _HEAR: dict[int, tuple[int, Hear]] = {
     0x02: (0, OdriveWire._stop),
     0x07: (4, OdriveWire._axis_state),
@@ -335,29 +272,4 @@ HEAR_06: dict[int, tuple[int, Hear]] = {
     0x04: (4, OdriveWire._sdo),
     0x06: (7, OdriveWire._address),
     0x19: (4, OdriveWire._absolute),
-}
-_TELL: dict[int, Tell] = {
-    0x09: OdriveWire._tell_encoder,
-    0x14: OdriveWire._tell_iq,
-    0x17: OdriveWire._tell_bus,
-}
-TELL_05: dict[int, Tell] = {
-    **_TELL,
-    0x01: OdriveWire._tell_heartbeat_05,
-    0x03: OdriveWire._tell_motor_error,
-    0x04: OdriveWire._tell_encoder_error,
-    0x05: OdriveWire._tell_nothing,
-    0x0A: OdriveWire._tell_count,
-    0x15: OdriveWire._tell_nothing,
-    0x1D: OdriveWire._tell_controller_error,
-}
-TELL_06: dict[int, Tell] = {
-    **_TELL,
-    0x00: OdriveWire._tell_version,
-    0x01: OdriveWire._tell_heartbeat,
-    0x03: OdriveWire._tell_error,
-    0x06: OdriveWire._tell_address,
-    0x15: OdriveWire._tell_temperature,
-    0x1C: OdriveWire._tell_torques,
-    0x1D: OdriveWire._tell_powers,
 }

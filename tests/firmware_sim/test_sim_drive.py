@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sim_two_mass import TwoMass
 
 from firmware_sim.firmware import Drive, DriveConfig, DriveFlag, DriveState, Mode, Request, Setpoint
-from firmware_sim.firmware.drive import TABLE
+from firmware_sim.firmware.states import TABLE
 from firmware_sim.plantlike import Readings
 from firmware_sim.scenario import Scenario, plant_maker
 
