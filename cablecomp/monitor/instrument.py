@@ -49,7 +49,7 @@ class Instrument:
         view = joint.view
         if view is None or loop.stage is not Stage.RUNNING:
             return
-        e, s, t = view.estimate, view.sample, loop.times
+        e, s, t = view.estimate, view.sample, loop.accounts.times
         events = loop.events.last
         vector = getattr(joint.setup.compensator.observer, "vector", None)
         scalars = {

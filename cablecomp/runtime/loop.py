@@ -15,11 +15,10 @@ from time import perf_counter
 from cablecomp.errors import DeviceError
 from cablecomp.links.link import Link
 from cablecomp.links.records import BusState, DriveState, Mode
+from cablecomp.runtime.accounts import Accounts
 from cablecomp.runtime.clock import Clock, SteppedClock, Tick, Ticker
-from cablecomp.runtime.histogram import CycleTimes
 from cablecomp.runtime.joint_loop import JointLoop, JointSetup
 from cablecomp.runtime.log import EventLog
-from cablecomp.runtime.minutes import Minutes
 from cablecomp.runtime.priority import QUIET, Granted, Policy, armed
 from cablecomp.runtime.timing import TimingReport
 
@@ -84,8 +83,7 @@ class Loop:
         self.stage = Stage.LISTENING
         self.stop_reason = ""
         self.failures: list[str] = []
-        self.times = CycleTimes()
-        self.minutes = Minutes()
+        self.accounts = Accounts(period_s)
         self.events = EventLog(None if folder is None else folder / "events.jsonl")
         folders = [None if folder is None else _folder_of(folder, s, len(setups)) for s in setups]
         self.joints = tuple(JointLoop(s, link, f, self.events) for s, f in zip(setups, folders, strict=True))
@@ -96,18 +94,14 @@ class Loop:
         self._granted = Granted()
         self._stage_s = options.begin_s
         self._armed_s = 0.0
-        self._last_begin = -inf
-        self._first_tick: Tick | None = None
-        self._last_tick: Tick | None = None
         self._asked_to_stop = ""
         self._stopped_s = -inf
         self._backlogs = (0, 0)
-        self._ticks = 0
 
     @property
     def since_s(self) -> float:
         """Time since control began (0 before), as of the last tick."""
-        return max(self._last_begin - self._armed_s, 0.0) if self.stage is Stage.RUNNING else 0.0
+        return max(self.accounts.last_s - self._armed_s, 0.0) if self.stage is Stage.RUNNING else 0.0
 
     def ask_to_stop(self, why: str) -> None:
         """End the run at the next tick, safely; may be called from another thread or a signal handler."""
@@ -130,32 +124,9 @@ class Loop:
 
     def report(self) -> TimingReport:
         """How time and data were kept so far."""
-        t, status = self.times, self.link.status()
-        first, last = self._first_tick, self._last_tick
-        span = 0.0 if first is None or last is None else last.now_s - first.now_s
-        return TimingReport(
-            rate_Hz=(self._ticks - 1) / span if span > 0.0 else 0.0,
-            asked_Hz=1.0 / self.period_s,
-            ticks=self._ticks,
-            skipped=self._skipped,
-            misses=t.misses,
-            period=t.period.spread(),
-            jitter=t.jitter.spread(),
-            poll=t.poll.spread(),
-            step=t.step.spread(),
-            cycle=t.cycle.spread(),
-            data_age=t.data_age.spread(),
-            frames=status.frames,
-            lost_frames=status.lost,
-            invalid_frames=status.invalid,
-            foreign_frames=status.foreign,
-            repeated_frames=status.repeated,
-            reordered_frames=status.reordered,
-            dropped_frames=status.dropped,
-            send_failures=status.send_failures,
-            policy=tuple(self._granted.lines),
-            minutes=tuple(self.minutes.done),
-            stepped=isinstance(self._clock, SteppedClock),
+        stepped = isinstance(self._clock, SteppedClock)
+        return self.accounts.report(
+            self.link.status(), self._skipped, tuple(self._granted.lines), stepped=stepped
         )
 
     # ---- inside ----------------------------------------------------------------------------------
@@ -262,8 +233,8 @@ class Loop:
         since = now - self._armed_s
         for joint in self.joints:
             joint.run(now, since)
-        if since >= self.minutes.due_s:
-            minute = self.minutes.close(self.times, self._skipped, self.link.status())
+        minute = self.accounts.minute(since, self._skipped, self.link)
+        if minute is not None:
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
         if tick.number % LOOK_EVERY == 0:
             self._backlogs = (self._backlogs[1], self.link.backlogs)
@@ -314,26 +285,12 @@ class Loop:
         self.stage, self._stage_s = stage, now
 
     def _account(self, tick: Tick, begin: float, polled: float, end: float) -> None:
-        t = self.times
-        self._ticks += 1
-        if self._first_tick is None:
-            self._first_tick = tick
-        else:
-            t.period.add(tick.now_s - self._last_begin)
-        self._last_tick, self._last_begin = tick, tick.now_s
+        self.accounts.tick(tick)
         if self.stage is not Stage.RUNNING:
             return
-        t.jitter.add(tick.late_s)
-        t.poll.add(polled - begin)
-        t.cycle.add(end - begin)
+        self.accounts.cycle(tick, begin, polled, end)
         for joint in self.joints:
-            t.step.add(joint.step_s)
-            checked = joint.checked
-            if checked is not None:
-                age = max(checked.motor_age_s, checked.load_age_s)
-                t.data_age.add(min(age, 1e9))
-        if end - begin + tick.late_s > self.period_s:
-            t.misses += 1
+            self.accounts.joint(joint.step_s, joint.checked)
         if tick.number % COLLECT_EVERY == 0 and not gc.isenabled() and end - begin < 0.5 * self.period_s:
             gc.collect(0)
 
@@ -343,7 +300,7 @@ class Loop:
             if self.stage is not Stage.STOPPING:
                 self.link.stop()
                 self.stop_reason = self.stop_reason or "ended by an error"
-                self.events.add(self._last_begin, "", f"stop: {self.stop_reason}")
+                self.events.add(self.accounts.last_s, "", f"stop: {self.stop_reason}")
         finally:
             with ExitStack() as all_of_them:
                 all_of_them.callback(self.link.close)

@@ -115,7 +115,7 @@ def _row(joint: JointLoop, view: View) -> tuple[RenderableType, ...]:
 
 
 def _timing(loop: Loop) -> Text:
-    t = loop.times
+    t = loop.accounts.times
     if t.cycle.count == 0:
         return Text(f"{loop.stage.name.lower()} …", style="bold")
     us = 1e6

@@ -2,9 +2,9 @@
 little-endian, angles in turns.
 
 Two firmwares, which share most messages but not all: 0.5 (ODrive v3.x, both axes nodes of their own) and 0.6
-(Pro, S1, Micro). What differs (here and in `odrive_errors.py`, `odrive_messages.py`): error bits, the heartbeat's last three bytes, what 0x03 to
-0x06, 0x0A, 0x15, 0x19, 0x1C and 0x1D mean, and which messages feed the watchdog. Every cyclic message also
-answers a remote request, or an empty frame in its place.
+(Pro, S1, Micro). What differs (here, in `odrive_errors.py`, in `odrive_messages.py`): error bits, the heartbeat's
+last three bytes, what 0x03 to 0x06, 0x0A, 0x15, 0x19, 0x1C and 0x1D mean, and which messages feed the watchdog.
+Every cyclic message also answers a remote request, or an empty frame in its place.
 
 Sources: ODrive's message tables (`odrive-cansimple.dbc`) of 0.5.6 and 0.6.10; ODrive's documentation, "CAN
 Protocol" of both; 0.5's published firmware (`can_simple.cpp`); ODrive's own CAN examples for addressing and
