@@ -40,7 +40,7 @@ from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, Watch, run_joint
-from cablecomp.runtime.setup import matched, same_joint
+from cablecomp.runtime.setup import matched, same_joint, stated_gains
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
 from cablecomp.runtime.ways_out import WaysOut
@@ -107,8 +107,9 @@ def run(
     `replay` accepts.
     """
     joint = read_joint(config, effects)
-    wanted = control_of(control, joint)
-    bus, wanted = matched(load_link(DEMO_LINK if link is None else link), wanted, own_link=not sim)
+    bus = load_link(DEMO_LINK if link is None else link)
+    wanted = control_of(control, joint, None if sim else stated_gains(bus))
+    bus, wanted = matched(bus, wanted, own_link=not sim)
     if link is None and not sim:
         raise InputError("--link is missing; give a link file, or --sim for a simulated joint")
     if link is None:

@@ -22,6 +22,7 @@ from cablecomp.config import JointConfig, doubts, load_joint
 from cablecomp.examples import resolve
 
 if TYPE_CHECKING:
+    from cablecomp.control.motors import DriveGains
     from cablecomp.control.options import ControlConfig
 
 DEMO_LINK = "wrist-virtual"
@@ -103,12 +104,12 @@ def _plain(value: Any) -> Any:
     )
 
 
-def control_of(path: Path | None, joint: JointConfig) -> ControlConfig:
-    """The control file, or what the joint itself suggests if there is none."""
+def control_of(path: Path | None, joint: JointConfig, stated: DriveGains | None = None) -> ControlConfig:
+    """The control file, or what the joint and what its drive is told suggest if there is none."""
     if path is None:
         from cablecomp.control.motors import control_for
 
-        return control_for(joint)
+        return control_for(joint, stated)
     from cablecomp.control.options import load_control
 
     return load_control(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi, sqrt
+from typing import NamedTuple
 
 from cablecomp.config import JointConfig
 from cablecomp.control.gate import GateLimits
@@ -18,9 +19,16 @@ _YIELDS_RAD = 0.1  # in impedance mode, under the greatest load
 _STIFFEST = 3000.0  # Nm/rad: about what drives can be told
 
 
-def control_for(config: JointConfig) -> ControlConfig:
+class DriveGains(NamedTuple):
+    """What a drive's own loop is told, at the input pulley."""
+
+    stiffness_Nm_per_rad: float
+    damping_Nms_per_rad: float
+
+
+def control_for(config: JointConfig, stated: DriveGains | None = None) -> ControlConfig:
     """A control file made up: a link that swings at 110 Hz on the unloaded cable, a drive whose own
-    loop has 95 Hz.
+    loop has 95 Hz, or a motor that `stated` gains move well damped.
 
     Good for simulation and for a first look at a design; for hardware, state the real values.
     """
@@ -38,6 +46,9 @@ def control_for(config: JointConfig) -> ControlConfig:
         most = _SHAKE * torque / (step * 2.0 * pi * MotorModel().velocity_bandwidth_Hz)
         swing = min(swing, most / (2.0 * _DAMPING * rotor))
     rotor = min(rotor, _STIFFEST / swing**2)
+    if stated is not None:
+        swing = 2.0 * _DAMPING * stated.stiffness_Nm_per_rad / stated.damping_Nms_per_rad
+        rotor = stated.stiffness_Nm_per_rad / swing**2
     coulomb = 0.005 * torque
     motor = MotorModel(
         inertia_kgm2=rotor,

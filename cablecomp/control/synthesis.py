@@ -71,7 +71,8 @@ class DesignWork:
                 raise InputError(
                     f"motor: the drive's own loop (stiffness {self.motor.stiffness_Nm_per_rad:g} Nm/rad, "
                     f"damping {self.motor.damping_Nms_per_rad:g} Nms/rad) is unstable on a cable of "
-                    f"{k:.4g} Nm/rad; give it more damping"
+                    f"{k:.4g} Nm/rad, with a motor of {self.motor.inertia_kgm2:.3g} kgm2: state the motor's inertia "
+                    "and delay in a control file, or other gains"
                 )
 
     # ---- the loops ---------------------------------------------------------------------------------

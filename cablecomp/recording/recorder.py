@@ -47,6 +47,11 @@ class TableLog:
         """Rows appended so far."""
         return self._store.rows
 
+    @property
+    def waiting(self) -> int:
+        """Rows that have been appended and not yet been handed over."""
+        return self._store.waiting
+
     def append(self, row: Sequence[float]) -> None:
         """Take in one row: values in the order of the columns."""
         self._store.append(row)
@@ -112,23 +117,23 @@ class _Store:
         self._columns = columns
         self._shape = (rows, len(columns))
         self._buffer: FloatArray = np.empty(self._shape)
-        self._filled = 0
+        self.waiting = 0
         self._queue: queue.SimpleQueue[FloatArray | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._drain, name="table log", daemon=True)
         self._thread.start()
 
     def append(self, row: Sequence[float]) -> None:
-        self._buffer[self._filled] = row
-        self._filled += 1
+        self._buffer[self.waiting] = row
+        self.waiting += 1
         self.rows += 1
-        if self._filled == len(self._buffer):
+        if self.waiting == len(self._buffer):
             self.hand_over()
 
     def hand_over(self) -> None:
-        if self._filled:
-            self._queue.put(self._buffer[: self._filled])
+        if self.waiting:
+            self._queue.put(self._buffer[: self.waiting])
             self._buffer = np.empty(self._shape)
-            self._filled = 0
+            self.waiting = 0
 
     def finish(self) -> None:
         self.hand_over()

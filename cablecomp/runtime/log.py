@@ -66,6 +66,11 @@ class JointLog:
         """Samples recorded so far."""
         return self._recorder.rows
 
+    @property
+    def waiting(self) -> int:
+        """Samples that a process killed now would not leave behind."""
+        return self._recorder.waiting
+
     def append(
         self,
         sample: Sample,

@@ -157,7 +157,7 @@ class Loop:
             if self._after is not None:
                 self._after(tick, self.stage)
             for joint in self.joints:
-                joint.keep()
+                joint.keep(tick.now_s)
             if done:
                 return
 

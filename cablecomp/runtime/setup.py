@@ -12,6 +12,7 @@ from cablecomp.control.command import Reference
 from cablecomp.control.compensator import Compensator, Gains
 from cablecomp.control.degrade import DegradeTimes
 from cablecomp.control.gate import GateLimits
+from cablecomp.control.motors import DriveGains
 from cablecomp.control.options import CompensatorOptions, ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol
 from cablecomp.errors import InputError
@@ -57,6 +58,15 @@ def matched(link: LinkConfig, control: ControlConfig, *, own_link: bool) -> tupl
     }
     ends = link.joint[0].model_copy(update={"motor": motor.model_copy(update=gains)})
     return link.model_copy(update={"joint": (ends, *link.joint[1:])}), control
+
+
+def stated_gains(link: LinkConfig) -> DriveGains | None:
+    """What the link file tells its first drive's own loop, if it does."""
+    motor = link.joint[0].motor
+    if motor is None or motor.mode != "impedance":
+        return None
+    stated = DriveGains(motor.stiffness_Nm_per_rad, motor.damping_Nms_per_rad)
+    return stated if min(stated) > 0.0 else None
 
 
 def same_joint(link: LinkConfig, names: Sequence[str]) -> LinkConfig:

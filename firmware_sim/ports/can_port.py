@@ -9,6 +9,9 @@ import can
 
 from firmware_sim.wire.frame import Frame
 
+MALFORMED = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError)
+"""What python-can's reading of a datagram that is no frame ends in."""
+
 
 class CanPort:
     """Frames through one `can.BusABC`; `sent`, `received` and `errors` count."""
@@ -36,22 +39,22 @@ class CanPort:
             self._waiting.append(frame)
 
     def _receive(self, timeout_s: float) -> Frame | None:
-        try:
-            message = self.bus.recv(timeout_s)
-        except can.CanError:
+        """The next sound frame; what is none is counted and left out."""
+        while True:
+            try:
+                message = self.bus.recv(timeout_s)
+            except (can.CanError, *MALFORMED):
+                self.errors += 1
+                return None
+            if message is None:
+                return None
+            if message.is_error_frame:
+                continue
+            frame = sound(message)
+            if frame is not None:
+                self.received += 1
+                return frame
             self.errors += 1
-            return None
-        if message is None or message.is_error_frame:
-            return None
-        self.received += 1
-        return Frame(
-            message.arbitration_id,
-            bytes(message.data),
-            message.is_remote_frame,
-            message.is_extended_id,
-            message.is_fd,
-            message.bitrate_switch,
-        )
 
     def send(self, frames: list[Frame], now_s: float) -> None:
         """Send; a driver that refuses is counted, as a node's error counter would."""
@@ -82,3 +85,24 @@ class CanPort:
         if not self._closed:
             self._closed = True
             self.bus.shutdown()
+
+
+def sound(message: Any) -> Frame | None:
+    """The message as a frame; None where it is none that a bus could carry, as a datagram from elsewhere can be."""
+    identifier, data = message.arbitration_id, message.data
+    fits = (
+        type(identifier) is int
+        and 0 <= identifier < (1 << 29 if message.is_extended_id else 1 << 11)
+        and isinstance(data, bytes | bytearray)
+        and len(data) <= (64 if message.is_fd else 8)
+    )
+    if not fits:
+        return None
+    return Frame(
+        identifier,
+        bytes(data),
+        bool(message.is_remote_frame),
+        bool(message.is_extended_id),
+        bool(message.is_fd),
+        bool(message.bitrate_switch),
+    )

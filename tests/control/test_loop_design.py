@@ -13,6 +13,7 @@ import pytest
 from cablecomp.config import load_joint
 from cablecomp.control.design import LoopDesign, design_loop
 from cablecomp.control.margins import grid_for, highest_gain, modulus_for
+from cablecomp.control.motors import DriveGains, control_for
 from cablecomp.control.options import ControlConfig, MotorModel, load_control
 from cablecomp.control.plant_model import (
     ahead_filter,
@@ -25,7 +26,10 @@ from cablecomp.control.plant_model import (
 )
 from cablecomp.control.shaping import Ahead, Slope
 from cablecomp.control.stiffness import Hysteresis, stiffness_range
+from cablecomp.control.synthesis import DesignWork
 from cablecomp.errors import InputError
+from cablecomp.links.load import load_link
+from cablecomp.runtime.setup import stated_gains
 from cablecomp.thesis.design import design_sheet
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -168,3 +172,23 @@ def test_a_drive_that_cannot_be_stable_is_refused() -> None:
         design_loop(JOINT, 1000.0, bad)
     with pytest.raises(InputError, match="rate"):
         design_loop(JOINT, 0.0)
+
+
+@pytest.mark.parametrize("stated", [DriveGains(200.0, 2.0), DriveGains(40.0, 0.1), DriveGains(3.0, 0.01)])
+def test_where_a_link_states_gains_a_motor_is_made_up_that_they_hold(stated: DriveGains) -> None:
+    """Four fifths of critical damping, and stable on every cable."""
+    wanted = control_for(JOINT, stated)
+    motor = wanted.motor
+    assert (motor.stiffness_Nm_per_rad, motor.damping_Nms_per_rad) == pytest.approx(stated)
+    critical = 2.0 * (stated.stiffness_Nm_per_rad * motor.inertia_kgm2) ** 0.5
+    assert stated.damping_Nms_per_rad / critical == pytest.approx(0.8)
+    DesignWork(JOINT, T, wanted, stiffness_range(JOINT)).check_drive()
+
+
+def test_the_simulated_wrist_can_be_run_over_the_link_that_the_guide_names() -> None:
+    link = load_link("mit-udp")
+    gains = stated_gains(link)
+    assert gains is not None
+    simulated = control_for(JOINT).motor.inertia_kgm2
+    assert control_for(JOINT, gains).motor.inertia_kgm2 == pytest.approx(simulated, rel=0.5)
+    assert stated_gains(load_link("odrive-virtual")) is None

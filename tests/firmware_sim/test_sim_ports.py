@@ -3,6 +3,7 @@ pseudo-terminal."""
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import can
+import msgpack
 import pytest
 import serial
 from sim_two_mass import TwoMass
@@ -95,6 +97,37 @@ def test_udp_multicast() -> None:
     ):
         can_conversation(bus)
         assert thread.bench.port.describe()["hop_limit"] == 0
+
+
+@pytest.mark.skipif(not multicast_works(), reason="this computer has no route for multicast")
+def test_datagrams_that_are_no_frames_end_no_simulation() -> None:
+    sound = {
+        "timestamp": 0.0, "arbitration_id": 1, "is_extended_id": False, "is_remote_frame": False,
+        "is_error_frame": False, "channel": None, "dlc": 2, "data": b"ab", "is_fd": False,
+        "bitrate_switch": False, "error_state_indicator": False,
+    }  # fmt: skip
+    values = (None, "x", -1, 1 << 40, 1.5, [1], {}, float("nan"), True, b"123456789")
+    damaged = [
+        msgpack.packb({**sound, name: value}) for name in ("arbitration_id", "data") for value in values
+    ]
+    damaged += [
+        msgpack.packb({k: v for k, v in sound.items() if k != name}) for name in ("data", "arbitration_id")
+    ]
+    damaged += [b"", b"\xc1", msgpack.packb([1, 2, 3]), msgpack.packb(sound)[:20], msgpack.packb("x" * 60)]
+    with (
+        served(UDP, stepped=False) as thread,
+        can.Bus(interface="udp_multicast", channel="239.74.163.7", port=43907, hop_limit=0) as bus,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+    ):
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        for payload in damaged:
+            sender.sendto(payload, ("239.74.163.7", 43907))
+        bus.send(can.Message(arbitration_id=1, data=ENTER, is_extended_id=False))
+        end = time.monotonic() + 10.0
+        while thread.bench.joints[0].drive.state is not DriveState.ENABLED and time.monotonic() < end:
+            time.sleep(0.01)
+        assert thread.bench.joints[0].drive.state is DriveState.ENABLED
+        assert thread.bench.port.errors >= len(damaged) - 4  # `True` and such stand for numbers
 
 
 def test_slcan_with_python_cans_own_interface() -> None:

@@ -5,6 +5,7 @@ nothing shared makes it so.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,7 @@ def simulated_run(
     duration_s: float,
     mode: ControlMode = ControlMode.POSITION,
     faults: tuple[str, ...] = (),
+    watch: Callable[[Loop, Tick], None] | None = None,
     **changes: object,
 ) -> RunReport:
     """A run in stepped time on a joint exactly as configured."""
@@ -72,11 +74,13 @@ def simulated_run(
         load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
     )
     protocol = force_protocol(joint, 5, 8.0) if mode is ControlMode.FORCE else REACH
-    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3, faults=faults))
+    simulation = start_simulation(
+        JOINT, SimulationWish(link, control, off_nominal=False, seed=3, faults=faults)
+    )
     if mode is ControlMode.FORCE:
         simulation.set_wall(1, 0.0)
     try:
-        return run_joint(joint, link, control, protocol, RunOptions(duration_s, True, out), simulation)
+        return run_joint(joint, link, control, protocol, RunOptions(duration_s, True, out), simulation, watch)
     finally:
         simulation.close()
 
@@ -137,6 +141,18 @@ def test_the_run_says_how_time_and_data_were_kept(finished: RunReport) -> None:
     assert timing["lost_frames"] == 0
     assert len(timing["policy"]) == 3
     assert timing["step"]["p50_s"] < timing["step"]["p99_s"] <= timing["step"]["max_s"]
+
+
+def test_a_tenth_of_a_second_at_most_waits_to_be_written(tmp_path: Path) -> None:
+    """What waits is what a process that is killed does not leave behind; the link keeps 1 kHz."""
+    waiting: list[int] = []
+
+    def watch(loop: Loop, tick: Tick) -> None:
+        waiting.extend(joint.log.waiting for joint in loop.joints if joint.log is not None)
+
+    simulated_run(tmp_path, 0.5, watch=watch)
+    assert len(waiting) > 500
+    assert 90 <= max(waiting) <= 101
 
 
 @pytest.mark.parametrize("node", ["drive", "sensor"])
