@@ -11,6 +11,7 @@ from cablecomp.cli import main
 from cablecomp.control.options import load_control
 from cablecomp.errors import InputError
 from cablecomp.links import load_link
+from firmware_sim.scenario import load_scenario
 
 LOADERS = {"joints": load_joint, "links": load_link, "control": load_control}
 
@@ -51,6 +52,21 @@ def test_a_file_that_differs_is_not_overwritten(tmp_path: Path) -> None:
     assert main(["example", "wrist-virtual", "--out", str(tmp_path)]) == 2
     assert mine.read_text(encoding="utf-8") == "mine"
     assert [p.name for p in tmp_path.iterdir()] == [mine.name]
+
+
+def test_the_simulated_wrist_has_the_motor_and_the_link_that_its_control_file_states() -> None:
+    stated = load_control("wrist-capstan").motor
+    simulated = load_scenario(examples.example("scenarios", "wrist"))
+    told = load_link("mit-udp").joint[0].motor
+    assert told is not None
+    assert simulated.motor["rotor_inertia_kgm2"] == stated.inertia_kgm2
+    assert simulated.motor["viscous_Nms_per_rad"] == stated.viscous_Nms_per_rad
+    assert simulated.motor["coulomb_Nm"] == stated.coulomb_Nm
+    assert simulated.motor["current_bandwidth_Hz"] == stated.torque_bandwidth_Hz
+    assert simulated.link["inertia_kgm2"] == stated.output_inertia_kgm2
+    assert simulated.link["viscous_Nms_per_rad"] == stated.output_viscous_Nms_per_rad
+    assert told.stiffness_Nm_per_rad == stated.stiffness_Nm_per_rad
+    assert told.damping_Nms_per_rad == stated.damping_Nms_per_rad
 
 
 def test_every_example_is_listed_with_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
