@@ -55,7 +55,7 @@ def test_a_file_that_differs_is_not_overwritten(tmp_path: Path) -> None:
 
 
 def test_the_simulated_wrist_has_the_motor_and_the_link_that_its_control_file_states() -> None:
-    stated = load_control("wrist-capstan").motor
+    stated = load_control(examples.example("control", "wrist-capstan")).motor
     simulated = load_scenario(examples.example("scenarios", "wrist"))
     told = load_link("mit-udp").joint[0].motor
     assert told is not None
