@@ -72,8 +72,10 @@ class Bench:
         if out:
             self.port.send(out, now_s)
 
-    def pump(self) -> int:
-        """Stepped time: hear what arrived; returns the number of steps taken."""
+    def pump(self, late: dict[int, list[Asked]] | None = None) -> int:
+        """Stepped time: hear what arrived; returns the number of steps taken. `late` takes what is to be answered once
+        the caller has stepped the joint, by its number; without it that is answered at once.
+        """
         before = self.steps
         for frame in self.port.poll(self.time_s):
             if frame.identifier == SYNC_ID and self.stepping == "sync":
@@ -83,6 +85,8 @@ class Bench:
                 heard = self._hear(joint, frame)
                 if heard.steps and self.stepping == "command":
                     self._step((joint,), {joint.number: heard.asked})
+                elif late is not None:
+                    late.setdefault(joint.number, []).extend(heard.asked)
                 else:
                     self.port.send(joint.render(heard.asked), self.time_s)
         return self.steps - before

@@ -11,9 +11,11 @@ import numpy as np
 
 from firmware_sim.build import FD_PROTOCOLS, BenchConfig, make_bench
 from firmware_sim.faults import Fault
+from firmware_sim.joint import Asked
 from firmware_sim.plant import NORMAL, LinkSpec, MotorSpec, Plant, PlantConfig, PlantReadings, Resolution
 from firmware_sim.plantlike import Readings, readings_of
 from firmware_sim.ports import open_port
+from firmware_sim.wire.frame import Frame
 
 OFF_NOMINAL = ("EA_N", "pretension_N", "mu_output", "mu_input")
 
@@ -107,12 +109,17 @@ class HostedJoints:
         on the way, or none was sent) goes on all the same. `periods` more than 1: the host left out
         ticks, time went on.
         """
-        self.bench.pump()
+        late: dict[int, list[Asked]] = {}
+        self.bench.pump(late)
         self._periods += periods
         for joint in self.bench.joints:
             due = self._periods * joint.timing.sample_s
+            frames: list[Frame] = []
             if joint.time_s < due - 0.5 * joint.timing.sample_s:
-                self.bench.port.send(joint.advance_to(due), due)
+                frames = joint.advance_to(due)
+            frames += joint.render(late.get(joint.number, ()))
+            if frames:
+                self.bench.port.send(frames, due)
 
     def truth(self, number: int) -> Truth:
         """What joint `number` really does, at the end of its last step."""

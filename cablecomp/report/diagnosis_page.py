@@ -46,7 +46,7 @@ def diagnosis_page(d: Diagnosis, augmented_toml: str = "", concealed: Mapping[st
     `concealed` is what `cablecomp prove --in` found of physics concealed in the same recordings."""
     many = len(d.sessions) > 1
     count = f"{len(d.recordings)} recording{'s' if len(d.recordings) > 1 else ''}"
-    lead = f"{count}{f' in {len(d.sessions)} sessions' if many else ''}; {d.runtime_s:.0f} s."
+    lead = f"{count}{f' in {len(d.sessions)} sessions' if many else ''}; diagnosed in {d.runtime_s:.0f} s."
     return page.page(f"Diagnosis: {d.config.name}", lead, _sections(d, augmented_toml, concealed))
 
 

@@ -88,14 +88,15 @@ def code(text: str) -> str:
     return f"<pre>{escape(text)}</pre>"
 
 
-def figure(fig: Any, caption: str = "") -> str:
+def figure(fig: Any, caption: str = "", least_px: int = 0) -> str:
     """Return a plotly figure as HTML; the page around it draws it where it stands, one folded away once it is
-    opened."""
+    opened. `least_px`: on a narrower screen it keeps that width and scrolls."""
     data = _figure_data(fig)
     height = int(fig.layout.height or 450)
     note = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    width, scrolls = (f";min-width:{least_px}px", ' class="scroll"') if least_px else ("", "")
     return (
-        f'<figure><div class="plot" style="height:{height}px"></div>'
+        f'<figure{scrolls}><div class="plot" style="height:{height}px{width}"></div>'
         f'<script type="text/plain" class="plot-data">{data}</script>{note}</figure>'
     )
 

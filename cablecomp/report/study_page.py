@@ -80,6 +80,7 @@ def study_page(study: Study, command: str) -> str:
                 ratios_figure(study),
                 "Line: the thesis's number (Table 3.1, trials 136 to 150); shaded: the side it reports without a "
                 "number (M_pk < 0). Dotted: the plain drive.",
+                least_px=900,
             ),
         ),
         Section(

@@ -134,6 +134,7 @@ class Health:
         self._motor_changed_s = nan
         self._motor_heard_s = inf
         self._target_then = nan
+        self._stuck_since_s = nan
 
     def check(
         self, readings: JointReadings, now_s: float, predicted_rad: float = nan, target_rad: float = nan
@@ -224,15 +225,20 @@ class Health:
 
     def _who_is_stuck(self, now_s: float) -> int:
         """Joint and prediction are far apart: the encoder whose reading does not change at all is the
-        one that lies. A motor that says nothing is stale, not stuck.
+        one that lies, and goes on lying until it does; a motor may rest where it turns back. A motor that says
+        nothing is stale, not stuck.
         """
         if now_s - self.motor.arrived_s > self._fresh_s:
             return ENCODERS_DISAGREE
         motor_still = now_s - self.motor.changed_s > _STILL_S
         joint_still = now_s - self.joint.changed_s > _STILL_S
-        if motor_still != joint_still:
-            return MOTOR_STUCK if motor_still else JOINT_STUCK
-        return ENCODERS_DISAGREE
+        if joint_still and not motor_still:
+            self._stuck_since_s = self.joint.changed_s
+        elif motor_still and not joint_still:
+            return MOTOR_STUCK
+        elif self.joint.changed_s != self._stuck_since_s:
+            return ENCODERS_DISAGREE
+        return JOINT_STUCK
 
     def _torques(self, motor_torque: float, now_s: float) -> int:
         flags, torque = 0, self.torque.value

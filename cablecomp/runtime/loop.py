@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import IntEnum
-from math import inf
 from pathlib import Path
 from time import perf_counter
 
@@ -40,7 +39,8 @@ class Stage(IntEnum):
 @dataclass(frozen=True)
 class LoopOptions:
     """How long things may take (s): until data have come that can be believed for `settle_s`, enabling, the
-    run itself, watching after the stop, in which the stop is sent again every `stop_again_s`.
+    run itself, watching after the stop, in which the stop is sent again every tick, so that the drive goes on
+    telling where it is.
 
     `begin_s`: the time that the run's clock starts from, for an observer that goes on from a snapshot.
     """
@@ -49,7 +49,6 @@ class LoopOptions:
     listen_s: float = 2.0
     enable_s: float = 3.0
     settle_s: float = 0.05
-    stop_again_s: float = 0.01
     after_s: float = 0.1
     mode: Mode = Mode.IMPEDANCE
     policy: Policy = QUIET
@@ -95,7 +94,6 @@ class Loop:
         self._stage_s = options.begin_s
         self._armed_s = 0.0
         self._asked_to_stop = ""
-        self._stopped_s = -inf
         self._backlogs = (0, 0)
 
     @property
@@ -170,8 +168,7 @@ class Loop:
         elif self.stage is Stage.RUNNING:
             self._run(tick)
         else:
-            if now - self._stopped_s >= self.options.stop_again_s:
-                self._tell_to_stop(now)
+            self.link.stop()
             for joint in self.joints:
                 joint.stand(now)
             return now - self._stage_s >= self.options.after_s
@@ -271,14 +268,10 @@ class Loop:
         return f"bus is {state.name.lower()}: {self.link.status().fault}"
 
     def _stop(self, why: str, now: float) -> None:
-        self._tell_to_stop(now)
+        self.link.stop()
         self.stop_reason = why
         self.events.add(now, "", f"stop: {why}")
         self._go(Stage.STOPPING, now)
-
-    def _tell_to_stop(self, now: float) -> None:
-        self.link.stop()
-        self._stopped_s = now
 
     def _go(self, stage: Stage, now: float) -> None:
         self.events.add(now, "", f"{self.stage.name.lower()} -> {stage.name.lower()}")

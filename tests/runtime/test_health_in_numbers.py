@@ -178,6 +178,22 @@ def test_of_two_encoders_far_apart_the_one_that_rests_lies(motor: float, joint: 
         assert not checked.flags & flag
 
 
+def test_a_joint_encoder_that_is_known_to_be_stuck_stays_so_while_the_motor_rests() -> None:
+    """As it does where it turns back; not once the joint's reading changes."""
+    fed = Fed(options(joint_residual_rad=1 / 64))
+
+    def cycle(motor: float, joint: float = 0.0) -> int:
+        return fed.cycle(motor=motor, torque=0.0, joint=joint, predicted=0.2).flags & (
+            h.JOINT_STUCK | h.MOTOR_STUCK | h.ENCODERS_DISAGREE
+        )
+
+    moving = [cycle(0.01 * k) for k in range(20)]
+    assert moving[-8:] == [h.JOINT_STUCK] * 8
+    assert [cycle(0.19) for _ in range(20)] == [h.JOINT_STUCK] * 20
+    assert cycle(0.20, 0.01) == h.ENCODERS_DISAGREE
+    assert [cycle(0.20, 0.01) for _ in range(20)] == [h.ENCODERS_DISAGREE] * 20
+
+
 def test_a_motor_that_lags_for_long_is_fatal() -> None:
     fed, near = Fed(options(lead_rad=0.25)), Fed(options(lead_rad=0.25))
     for k in range(12):

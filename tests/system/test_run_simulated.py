@@ -120,6 +120,21 @@ def test_every_cycle_is_recorded_once(finished: RunReport) -> None:
     assert np.allclose(steps, 1e-3)
 
 
+def test_what_is_recorded_after_the_stop_is_as_good_as_what_was_before(finished: RunReport) -> None:
+    """The drive lets go and the joint swings freely; where the motor is has to be known all the same."""
+    assert finished.folder is not None
+    cycles, seen = (
+        pl.read_csv(finished.folder / name, infer_schema_length=None)
+        for name in ("cycles.csv", "prediction.csv")
+    )
+    before = cycles["controlled"].to_numpy() > 0.0
+    after = cycles["time_s"].to_numpy() > cycles["time_s"].to_numpy()[before][-1] + 0.002
+    assert after.sum() > 90
+    assert cycles["motor_age_s"].to_numpy()[after].max() < 1e-9
+    residual = seen["residual_rad"].to_numpy()
+    assert np.std(residual[after]) < 3.0 * np.std(residual[before])
+
+
 def test_the_snapshot_goes_on_where_the_run_ended(finished: RunReport) -> None:
     assert finished.folder is not None
     config = load_joint(finished.folder / "joint.toml")
