@@ -52,7 +52,7 @@
       const [from, to] = layout[key].domain;
       layout[key].domain = [from > 0.2 ? from + 0.06 : from, to < 0.8 ? to - 0.05 : to];
     }
-    if (layout.legend?.orientation === "v") layout.legend = { orientation: "h", x: 0, y: -0.2, yanchor: "top" };
+    if (layout.legend?.orientation === "v") layout.legend = { orientation: "h", x: 0, y: -0.32, yanchor: "top" };
   };
 
   const notes = [...document.querySelectorAll("script.plot-data")];
