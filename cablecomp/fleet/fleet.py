@@ -114,7 +114,10 @@ def _story(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
         if row.get("missing"):
             yield _named(row["missing"]), f"{row['night']}: {row['missing'].replace('_', ' ')}"
     if len(rows) < FEWEST and any(row.get("zero_rad") is not None for row in rows):
-        yield "", f"{len(rows)} nights: too few to tell a change from scatter ({FEWEST} are)"
+        yield (
+            "",
+            f"{len(rows)} night{'s' if len(rows) != 1 else ''}: too few to tell a change from scatter ({FEWEST} are)",
+        )
 
 
 def _zeros(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:

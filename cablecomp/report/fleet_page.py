@@ -83,9 +83,10 @@ def _curve(fleet: Fleet, joint: str) -> tuple[list[str], Any]:
 
 def _over_nights(fleet: Fleet, joint: str) -> Any:
     nights, values = _curve(fleet, joint)
-    fig = style.figure(300)
     number = np.arange(1, len(nights) + 1)
     name = "zero" if fleet.work == "replay" else "error before"
+    fig = style.axes(style.figure(300), "night", style.label(name, "mrad"))
+    fig.update_xaxes(dtick=-(-len(nights) // 10))  # whole nights
     fig.add_scatter(
         x=number, y=1e3 * values, mode="lines+markers", name=f"{name} / mrad", hovertext=nights,
         line={"color": style.PREDICTED, "width": 2},
@@ -101,7 +102,7 @@ def _over_nights(fleet: Fleet, joint: str) -> Any:
             yaxis2={"overlaying": "y", "side": "right", "showgrid": False, "title": "compliance / %"}
         )
         fig.update_layout(margin={"r": 64})
-    return style.axes(fig, "night", style.label(name, "mrad"))
+    return fig
 
 
 def _all_rows(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -15,7 +15,7 @@ from cablecomp.fleet.change import EVIDENCE, change
 from cablecomp.fleet.fleet import run_fleet
 from cablecomp.fleet.places import Night, nights
 from cablecomp.fleet.rows import Compliance, Parts
-from cablecomp.report.fleet_page import FLAGS, fleet_page, fleet_table
+from cablecomp.report.fleet_page import FLAGS, _over_nights, fleet_page, fleet_table
 
 rng = np.random.default_rng(7)
 
@@ -67,6 +67,11 @@ def test_each_joint_is_told_by_what_it_does(tmp_path: Path, made_up: list[str]) 
     text = fleet_page(found, "cablecomp replay in --workers 2")
     assert all(word in text for word in (*FLAGS, "is cut off", "night-04.csv on"))
     assert fleet_table(found).row_count == 4
+    layout = _over_nights(found, "fraying").layout
+    assert [axis.title.text.partition(" /")[0] for axis in (layout.xaxis, layout.yaxis, layout.yaxis2)] == [
+        "night", "zero", "compliance",
+    ]  # fmt: skip
+    assert layout.xaxis.dtick == 1
 
     made_up.clear()  # again: only what failed, or was changed meanwhile, is worked on
     (place / "drifting/night-00.csv").write_text("time_s\n0\n1\n", encoding="utf-8")
