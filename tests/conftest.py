@@ -27,6 +27,7 @@ LIVE = (  # in real time, or by processes and ports
     "tests/firmware_sim/test_sim_third_party.py",
     "tests/links/test_can_fd.py",
     "tests/links/test_foreign_frames.py",
+    "tests/links/test_line_ports.py",
     "tests/links/test_link_ports.py",
     "tests/runtime/",
     "tests/system/test_ways_out.py",

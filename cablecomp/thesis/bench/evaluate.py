@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.config import Drive, JointConfig
+from cablecomp.effects.series_compliance import EFFECT as IN_SERIES
 from cablecomp.errors import InputError
 from cablecomp.signal.noise import reading_sigma
 from cablecomp.thesis.bench.friction import BenchData, branch_of, weighted_mean
@@ -105,8 +106,8 @@ def _prepare(recording: BenchRecording, config: JointConfig, sensor_stiffness: f
     loading, unloading, notes = _phases(segments, smoothed)
     twist = sensor_deflection_rad(smoothed.value, config.drive.ratio, sensor_stiffness)
     for entry in config.effect:
-        if entry.id == "series_compliance":
-            twist = twist + float(entry.parameters.get("compliance_rad_per_Nm", 0.0)) * smoothed.value
+        if entry.id == IN_SERIES.id:  # like the sensor's own twist
+            twist = twist + float(entry.parameters.get(IN_SERIES.parameters[0].name, 0.0)) * smoothed.value
     deflection = np.asarray(recording.deflection_rad - twist, dtype=float)
     peak_segment = loading[-1]
     middle = smoothed.value[trimmed(peak_segment, smoothed.window)]

@@ -96,6 +96,7 @@ def study(
     return Study(tuple(findings), tuple(together), misfit(plain))
 
 
+# suspects that together may give what none gives alone, in the bench's sizes (`suspects.py`)
 _TOGETHER: Final[tuple[dict[str, tuple[float, ...]], ...]] = (
     {"viscous_slip": (1.0, 1.7, 3.0), "bearing_friction": (0.01, 0.02, 0.04)},
     {"viscous_slip": (1.0, 1.7, 3.0), "pressure_dependent_friction": (0.1, 0.2, 0.3)},

@@ -1,4 +1,7 @@
-"""What may stand behind the thesis's open questions: every effect of the catalogue, sized for its bench."""
+"""What may stand behind the thesis's open questions: every effect of the catalogue, sized for its bench.
+
+Effects are named one by one, as how much of each there may have been is a fact of that bench, not of the effect.
+"""
 
 from __future__ import annotations
 
