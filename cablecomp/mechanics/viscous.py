@@ -90,21 +90,27 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
 
 @inner_kernel
 def _relax(s: Slide) -> float:
-    """Implicit step of all nodes by Newton's method; returns the derivative of the integral by the end value."""
-    first = s.nodes
+    """Implicit step of all nodes; returns the derivative of the integral by the end value.
+
+    The equations are linear as long as no face begins or ceases to slip: Newton's method is there after one step once
+    it knows which faces do.
+    """
+    first, by_end = s.nodes, 0.0
     for _ in range(60):
         first = _front(s)
         if first == s.nodes:
             return 0.5 * s.gap
-        if _newton(s, first, False) <= 1e-13:
+        by_end = _newton(s, first)
+        if _unbalanced(s, max(first - 1, 0)) <= 1e-13:
             break
-    # linear answer to a change of the end value
-    _newton(s, first, True)
-    slope = 0.5 * s.gap * (1.0 + s.right[s.nodes - 1])
-    for j in range(first, s.nodes - 1):
-        slope += 0.5 * s.h * (s.right[j] + s.right[j + 1])
+    # only the last node feels the end itself; the others follow as the elimination says
+    slope = 0.5 * s.gap * (1.0 + by_end)
+    for j in range(s.nodes - 1, first, -1):
+        inward = -s.upper[j - 1] * by_end
+        slope += 0.5 * s.h * (by_end + inward)
+        by_end = inward
     if first > 0:
-        slope += 0.5 * s.h * s.right[first]
+        slope += 0.5 * s.h * by_end
     return slope
 
 
@@ -112,10 +118,14 @@ def _relax(s: Slide) -> float:
 def _front(s: Slide) -> int:
     """The deepest node that moves, or their number if none does; deep cable may still creep while the cable outside of
     it sticks."""
-    for j in range(s.nodes):
-        if _outward(s, j).slip != 0.0 or s.new[j] != s.old[j]:
+    half = 0.5 * s.mu * s.h
+    for j in range(s.nodes - 1):
+        a, b = s.new[j], s.new[j + 1]
+        if abs(b - a) > half * (a + b) or a != s.old[j]:
             return j
-    return s.nodes
+    last = s.nodes - 1
+    a, b = s.new[last], s.tau
+    return last if abs(b - a) > 0.5 * s.mu * s.gap * (a + b) or a != s.old[last] else s.nodes
 
 
 class Face(NamedTuple):
@@ -127,69 +137,77 @@ class Face(NamedTuple):
 
 
 @inner_kernel
-def _face(a: float, b: float, distance: float, mu: float) -> Face:
-    steep = (b - a) / distance
+def _face(a: float, b: float, per_distance: float, mu: float) -> Face:
+    steep = (b - a) * per_distance
     limit = mu * 0.5 * (a + b)
     if steep > limit:
-        return Face(steep - limit, -1.0 / distance - 0.5 * mu, 1.0 / distance - 0.5 * mu)
+        return Face(steep - limit, -per_distance - 0.5 * mu, per_distance - 0.5 * mu)
     if steep < -limit:
-        return Face(steep + limit, -1.0 / distance + 0.5 * mu, 1.0 / distance + 0.5 * mu)
+        return Face(steep + limit, -per_distance + 0.5 * mu, per_distance + 0.5 * mu)
     return Face(0.0, 0.0, 0.0)
 
 
 @inner_kernel
-def _outward(s: Slide, j: int) -> Face:
+def _outward(s: Slide, j: int, per_h: float, per_gap: float) -> Face:
     """The face on the outer side of node j; beyond the last node lies the departure point."""
     if j == s.nodes - 1:
-        return _face(s.new[j], s.tau, s.gap, s.mu)
-    return _face(s.new[j], s.new[j + 1], s.h, s.mu)
-
-
-class Row(NamedTuple):
-    """A node's conservation law: its residual, and the derivatives of that by the nodes below, itself, above."""
-
-    residual: float
-    below: float
-    own: float
-    above: float
+        return _face(s.new[j], s.tau, per_gap, s.mu)
+    return _face(s.new[j], s.new[j + 1], per_h, s.mu)
 
 
 @inner_kernel
-def _row(s: Slide, j: int) -> Row:
-    size = 0.5 * s.h if j == 0 else s.h
-    if j == s.nodes - 1:
-        size = (0.0 if j == 0 else 0.5 * s.h) + 0.5 * s.gap
-    k = s.rate / size
-    out, inner = _outward(s, j), Face(0.0, 0.0, 0.0)
-    if j > 0:
-        inner = _face(s.new[j - 1], s.new[j], s.h, s.mu)
-    residual = s.new[j] - s.old[j] - k * (out.slip - inner.slip)
-    return Row(residual, k * inner.by_a, 1.0 - k * (out.by_a - inner.by_b), -k * out.by_b)
+def _share(s: Slide, j: int) -> float:
+    """What the slip's difference over node j changes there: diffusion in this step over the length it stands for."""
+    if j < s.nodes - 1:
+        return s.rate / (0.5 * s.h if j == 0 else s.h)
+    return s.rate / ((0.0 if j == 0 else 0.5 * s.h) + 0.5 * s.gap)
 
 
 @inner_kernel
-def _newton(s: Slide, first: int, linear: bool) -> float:
-    """One Newton step for the nodes from `first` on (Thomas algorithm), and its largest change.
-
-    With `linear` nothing moves: `right` gets the nodes' derivatives by the end value instead.
-    """
+def _newton(s: Slide, first: int) -> float:
+    """One Newton step for the nodes from `first` on (Thomas algorithm); returns the derivative of the last node by the
+    end value. `upper` keeps the elimination."""
+    per_h, per_gap = 1.0 / s.h, 1.0 / s.gap
+    inside = s.rate * per_h
+    inner = Face(0.0, 0.0, 0.0)
+    if first > 0:
+        inner = _face(s.new[first - 1], s.new[first], per_h, s.mu)
     for j in range(first, s.nodes):
-        row = _row(s, j)
-        own, target = row.own, -row.residual
-        if linear:
-            target = -row.above if j == s.nodes - 1 else 0.0
+        outer = _outward(s, j, per_h, per_gap)
+        share = inside if 0 < j < s.nodes - 1 else _share(s, j)
+        own = 1.0 - share * (outer.by_a - inner.by_b)
+        target = share * (outer.slip - inner.slip) - (s.new[j] - s.old[j])
         if j > first:
-            own -= row.below * s.upper[j - 1]
-            target -= row.below * s.right[j - 1]
-        s.upper[j] = row.above / own
-        s.right[j] = target / own
+            below = share * inner.by_a
+            own -= below * s.upper[j - 1]
+            target -= below * s.right[j - 1]
+        per_own = 1.0 / own
+        s.upper[j] = -share * outer.by_b * per_own
+        s.right[j] = target * per_own
+        inner = outer
+    by_end = -s.upper[s.nodes - 1]
+    for j in range(s.nodes - 1, first - 1, -1):
+        if j < s.nodes - 1:
+            s.right[j] -= s.upper[j] * s.right[j + 1]
+        s.new[j] = max(s.new[j] + s.right[j], 1e-9)
+    return by_end
+
+
+@inner_kernel
+def _unbalanced(s: Slide, first: int) -> float:
+    """The largest residual of the conservation laws of the nodes from `first` on, as a change of the nodes."""
+    per_h, per_gap = 1.0 / s.h, 1.0 / s.gap
+    inside = s.rate * per_h
+    inner = 0.0
+    if first > 0:
+        inner = _face(s.new[first - 1], s.new[first], per_h, s.mu).slip
     largest = 0.0
-    for j in range(s.nodes - 2, first - 1, -1):
-        s.right[j] -= s.upper[j] * s.right[j + 1]
-    if not linear:
-        for j in range(first, s.nodes):
-            largest = max(largest, abs(s.right[j]))
-            s.new[j] = max(s.new[j] + s.right[j], 1e-9)
+    for j in range(first, s.nodes):
+        outer = _outward(s, j, per_h, per_gap).slip
+        share = inside if 0 < j < s.nodes - 1 else _share(s, j)
+        own = 1.0 + share * (per_h + (per_gap if j == s.nodes - 1 else per_h))
+        largest = max(largest, abs(s.new[j] - s.old[j] - share * (outer - inner)) / own)
+        inner = outer
     return largest
 
 
