@@ -28,7 +28,7 @@ from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
-from cablecomp.diagnosis.explain.model import Model, bears, without
+from cablecomp.diagnosis.explain.model import Model, Term, bears, placed, stripped
 from cablecomp.diagnosis.explain.rounds import Progress
 from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
 from cablecomp.diagnosis.explain.selection import select
@@ -40,6 +40,7 @@ from cablecomp.diagnosis.locate.repeatability import repeatability
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.result import Diagnosis, Errors, Law
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, rms_left, solve, weighed
 
@@ -77,13 +78,13 @@ def diagnose(
     groups = make_groups(begin_fit)
     selection = select(begin_fit, nominal, pool, groups, rng, progress)
     progress("last fit", 0.9)
-    selection = replace(selection, final=_settled(selection.final, drive, groups))
-    final = selection.final
+    final = _settled(selection.final.terms, selection.final.fit, drive, groups)
+    selection = replace(selection, final=final)
     if not whole and final.terms:
         everything = final.fit.problem.with_evidence(drive.fit.problem.evidence)
         groups = make_groups(drive.fit)
         fit = solve(everything, final.fit.x, 8)
-        final = _settled(Model(final.terms, fit, left_out(fit, groups)), drive, groups)
+        final = _settled(final.terms, fit, drive, groups)
     after = series_of(final.fit, seen, drive.floor_rad)
     rest = locate(after, rng, sensitivities(final.fit))
     share_left = _share_left(drive, final)
@@ -174,31 +175,30 @@ def _at_start(fit: Fit) -> Fit:
     return Fit(problem, x, problem.residual(x), problem.jacobian(x))
 
 
-def _settled(model: Model, drive: Calibrated, groups: Groups) -> Model:
-    """The model fitted with weights that its own remainder asks for, so that its uncertainties mean something."""
-    fit = model.fit
+def _settled(terms: tuple[Term, ...], fit: Fit, drive: Calibrated, groups: Groups) -> Model:
+    """The fit with weights that its own remainder asks for, so that its uncertainties mean something."""
     for _ in range(2):
         fit = refit(fit, weighed(fit, drive.floor), 6)
-    return replace(model, fit=fit, left_out=left_out(fit, groups))
+    return Model(terms, fit, left_out(fit, groups))
 
 
 def _without_effects(model: Model, drive: Calibrated, groups: Groups) -> Model:
     """The model with no effect in it: what differs between sessions or with a condition stays where it is the drive's
     own; the calibrated drive where nothing does."""
-    kept = model
-    while True:
-        effects = [t for t in kept.terms if isinstance(t, Hypothesis)]
-        if not effects:
-            break
-        for term in (t for t in kept.terms if isinstance(t, Dependence) and t.belongs_to(effects[0])):
-            kept = replace(kept, terms=tuple(t for t in kept.terms if t is not term))
-        smaller = without(kept, effects[0], groups)
-        if smaller is None:
-            break
-        kept = smaller
-    if kept.terms and not any(isinstance(t, Hypothesis) for t in kept.terms):
-        return kept if kept is model else _settled(kept, drive, groups)
-    return Model((), drive.fit, left_out(drive.fit, groups))
+    own = tuple(t for t in model.terms if isinstance(t, Dependence) and t.of_drive)
+    calibrated = Model((), drive.fit, left_out(drive.fit, groups))
+    if not own:
+        return calibrated
+    if own == model.terms:
+        return model
+    problem = model.fit.problem
+    for effect in (t for t in model.terms if isinstance(t, Hypothesis)):
+        problem = stripped(problem, effect)
+    try:
+        fit = solve(problem, placed(model.fit, problem), LIMITS.settled, LIMITS.tolerance)
+    except InputError:
+        return calibrated
+    return _settled(own, fit, drive, groups)
 
 
 def _share_left(drive: Calibrated, final: Model) -> float:

@@ -37,6 +37,11 @@ class Dependence:
         """For lists and pages."""
         return f"{self.parameter} by {self.on}"
 
+    @property
+    def of_drive(self) -> bool:
+        """Whether it is a parameter of the drive's own."""
+        return not self.parameter.startswith("effect.")
+
     def belongs_to(self, term: Any) -> bool:
         """Whether it is a parameter of this effect."""
         return hasattr(term, "effect") and self.parameter.startswith(f"effect.{term.effect.id}.")

@@ -3,7 +3,9 @@ tell apart."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,14 +34,24 @@ ZERO_STEP = "a step of the joint encoder's zero"
 OWN = "a pretension of each session's own"
 
 
+class Rivals(NamedTuple):
+    """What was tried in a term's place."""
+
+    effects: tuple[str, ...] = ()
+    """Those that stand in for it as well: its model confidence set, itself left out."""
+    plain: tuple[str, ...] = ()
+    """What is no effect and explains as much: a step of a zero, a drive mounted anew."""
+    differences: Mapping[str, ScoreDifference] = MappingProxyType({})
+    """The term's score against each that was tried."""
+
+
 def rivals(
     model: Model, term: Hypothesis, pool: Sequence[Hypothesis], groups: Groups, rng: np.random.Generator
-) -> tuple[tuple[str, ...], dict[str, ScoreDifference]]:
-    """Effects that stand in for a term as well (its model confidence set, itself left out), and the term's
-    score against each that was tried in its place."""
+) -> Rivals:
+    """Every effect that promises something, and for an event what is none, fitted in a term's place."""
     base = without(model, term, groups)
     if base is None:
-        return (), {}
+        return Rivals()
     here = anchor(base.fit)
     names = {t.name for t in model.terms}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
@@ -61,17 +73,24 @@ def rivals(
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         differences[a.hypothesis.name] = score_difference(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
-    if term.has_instant:
-        instant = float(model.fit.values[f"effect.{term.effect.id}.{term.instant}"])
-        step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
-        if step.gain < 0.0:
-            differences[ZERO_STEP] = step
-        for other in _by_session(base, groups):
-            step = score_difference(model.left_out, other.left_out, groups)
-            if step.z < LIMITS.z:
-                differences[OWN] = step
     kept = confidence_set(losses, rng)
-    return tuple(n for n in kept if n != term.name), differences
+    plain = _plain(model, base, term, groups) if term.has_instant else {}
+    effects = tuple(n for n in kept if n != term.name)
+    return Rivals(effects, tuple(plain), {**differences, **plain})
+
+
+def _plain(model: Model, base: Model, event: Hypothesis, groups: Groups) -> dict[str, ScoreDifference]:
+    """What is no effect and explains as much as an event does, with the event's score against it."""
+    found: dict[str, ScoreDifference] = {}
+    instant = float(model.fit.values[f"effect.{event.effect.id}.{event.instant}"])
+    step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
+    if step.gain < 0.0:
+        found[ZERO_STEP] = step
+    for other in _by_session(base, groups):
+        step = score_difference(model.left_out, other.left_out, groups)
+        if step.z < LIMITS.z:
+            found[OWN] = step
+    return found
 
 
 def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
@@ -99,7 +118,7 @@ def _by_session(base: Model, groups: Groups) -> list[Model]:
     between two looks like an instant."""
     found = []
     for dependence, _, problem in ask_dependences(base.fit, base.terms, groups.by):
-        if dependence.on != "session" or dependence.parameter.startswith("effect."):
+        if dependence.on != "session" or not dependence.of_drive:
             continue
         try:
             fit = solve(problem, placed(base.fit, problem), 10, LIMITS.tolerance)

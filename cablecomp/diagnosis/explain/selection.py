@@ -93,18 +93,23 @@ def _reigning(
     what is left of the right one a little more closely."""
     if best.fit.problem.fine != carried[0].fit.problem.fine:
         return carried[0]
-    rival, base = reweighed(best, sharper, groups), reweighed(baseline, sharper, groups)
+    rival = reweighed(best, sharper, groups)
     mine = {t.name for t in best.terms}
     for m in carried:
         if not _better(m, rival, groups):
             continue
-        size = common([m], groups)
-        left, before = loss(rival, size, groups), loss(base, size, groups)
-        if mine <= {t.name for t in m.terms} or left - loss(m, size, groups) > LIMITS.dethrone * (
-            before - left
+        if mine <= {t.name for t in m.terms} or _dethrones(
+            m, rival, reweighed(baseline, sharper, groups), groups
         ):
             return m
     return best
+
+
+def _dethrones(model: Model, best: Model, baseline: Model, groups: Groups) -> bool:
+    """Whether a model takes off so much of what the best one leaves that it may do without that one's effects."""
+    size = common([model], groups)
+    left = loss(best, size, groups)
+    return left - loss(model, size, groups) > LIMITS.dethrone * (loss(baseline, size, groups) - left)
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:

@@ -11,7 +11,7 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
-from cablecomp.diagnosis.explain.rivals import OWN, ZERO_STEP, rivals
+from cablecomp.diagnosis.explain.rivals import rivals
 from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -60,9 +60,11 @@ def weigh(
             if bare is not None
             else ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
         )
-        kept, differences = rivals(final, term, [h for h in pool if h.name in able], groups, rng)
+        instead = rivals(final, term, [h for h in pool if h.name in able], groups, rng)
         nearest = min(
-            differences.values(), key=lambda v: v.z, default=ScoreDifference(1.0, 10.0, 10.0, np.zeros(1))
+            instead.differences.values(),
+            key=lambda v: v.z,
+            default=ScoreDifference(1.0, 10.0, 10.0, np.zeros(1)),
         )
         follows = _follows(term, remainder)
         evidence = features(
@@ -74,7 +76,7 @@ def weigh(
             lead_z=nearest.z,
             share_left=share_left,
             share_total=_share_of_baseline(selection, bare, final),
-            rivals=len(kept),
+            rivals=len(instead.effects),
             follows=follows,
             unsteady=_unsteady(final, term, groups),
             at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in bounds),
@@ -86,8 +88,8 @@ def weigh(
         depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
         found.append(
             Weighed(
-                term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, kept, nearest,
-                _against((*kept, *(n for n in differences if n in (ZERO_STEP, OWN))), follows, own, evidence)
+                term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, instead.effects, nearest,
+                _against((*instead.effects, *instead.plain), follows, own, evidence)
                 if told
                 else "its amount is not told from none",
                 max(evidence["share_total"], _alone(selection, term)),
@@ -173,10 +175,12 @@ def _follows(term: Hypothesis, remainder: Location) -> float:
     return max(shares, default=0.0)
 
 
-def _against(kept: Sequence[str], follows: float, own: ScoreDifference, evidence: Mapping[str, float]) -> str:
+def _against(
+    instead: Sequence[str], follows: float, own: ScoreDifference, evidence: Mapping[str, float]
+) -> str:
     reasons = []
-    if kept:
-        reasons.append(f"{', '.join(kept)} in its place explains data left out as well")
+    if instead:
+        reasons.append(f"{', '.join(instead)} in its place explains data left out as well")
     if follows > 0.3:
         reasons.append(f"{follows:.0%} of what is left still follows the covariate that it acts through")
     if own.z < LIMITS.z:
