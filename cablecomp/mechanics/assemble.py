@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig, Stage, ratios_to_last
 from cablecomp.errors import InputError
@@ -53,86 +52,123 @@ def assemble(config: JointConfig, change: Change | None = None) -> Model:
     ratios = ratios_to_last(stages)
     if chained:
         _check_pretensions(config, ratios)
-    circuits = np.zeros(len(groups), records.CIRCUIT)
+    rows = []
     chains: list[tuple[float, list[Stage]]] = []  # of cables, each with its sign
     first = 0
-    for circuit, group, ratio in zip(circuits, groups, ratios, strict=False):
-        circuit.first = first, first + closed * len(group)
-        circuit.count, circuit.chains = len(group), 1 + closed
-        circuit.ratio = math.prod(stage.ratio for stage in group)
-        circuit.share = 1.0 if chained else ratio
-        circuit.radius = group[-1].output_radius_m
-        circuit.slack = SLACK * group[-1].pretension_N
+    for group, ratio in zip(groups, ratios, strict=False):
+        rows.append(
+            _row(
+                records.CIRCUIT,
+                first=(first, first + closed * len(group)),
+                count=len(group),
+                chains=1 + closed,
+                ratio=math.prod(stage.ratio for stage in group),
+                share=1.0 if chained else ratio,
+                radius=group[-1].output_radius_m,
+                slack=SLACK * group[-1].pretension_N,
+            )
+        )
         chains += [(1.0, group), (-1.0, group)][: 1 + closed]
         first += len(group) * (1 + closed)
-    cables = np.concatenate([_chain(group, sign, config, extra) for sign, group in chains])
-    sensor = np.zeros(1, records.SENSOR)
-    sensor["gain"] = config.sensors.joint_torque_gain
-    sensor["offset"] = config.sensors.joint_torque_offset_Nm
-    sensor["cutoff"] = 2.0 * np.pi * config.observer.input_filter_Hz
-    size = np.zeros(1, records.SIZES)[0]
-    size.circuits, size.cables, size.terms = len(circuits), len(cables), len(extra.terms)
-    size.stacks = (3 if extra.guide_angle > 0.0 else 2) * len(cables)
-    size.capacity = config.observer.max_pieces
-    size.grids = 2 * len(cables) if extra.viscous_Ns_per_m_rad > 0.0 else 0
-    size.cables_at = len(circuits) * floats(records.CIRCUIT)
-    size.sensor_at = (
-        size.cables_at + len(cables) * floats(records.CABLE) + sum(len(t.parameters) for t in extra.terms)
+    circuits = np.array(rows, records.CIRCUIT)
+    cables = np.array(
+        [row for sign, group in chains for row in _chain(group, sign, config, extra)], records.CABLE
     )
-    size.context_at = len(cables) * floats(records.STATE)
-    size.filter_at = size.context_at + floats(records.CONTEXT)
-    size.grids_at = size.filter_at + floats(records.FILTER) + sum(t.state_size for t in extra.terms)
-    # without grids the room of their heads is left, as snapshots have it
-    size.steps_at = size.grids_at + (
-        size.grids * floats(records.GRID) if size.grids else 2 * len(cables) * BEFORE_NODES
+    sensor = _row(
+        records.SENSOR,
+        gain=config.sensors.joint_torque_gain,
+        offset=config.sensors.joint_torque_offset_Nm,
+        cutoff=2.0 * np.pi * config.observer.input_filter_Hz,
     )
-    size.profiles_at = size.steps_at + 2 * len(cables) * floats(records.STEP)
-    size.spare_at = size.profiles_at + size.stacks * size.capacity * floats(records.POINT)
-    terms = np.zeros(len(extra.terms), records.TERM)
+    n = len(cables)
+    stacks = (3 if extra.guide_angle > 0.0 else 2) * n
+    capacity = config.observer.max_pieces
+    grids = 2 * n if extra.viscous_Ns_per_m_rad > 0.0 else 0
+    cables_at = len(circuits) * floats(records.CIRCUIT)
+    parameters_at = cables_at + n * floats(records.CABLE)
+    context_at = n * floats(records.STATE)
+    filter_at = context_at + floats(records.CONTEXT)
+    states_at = filter_at + floats(records.FILTER)
+    calls: list[tuple[Any, ...]] = []
     parameters: list[float] = []
-    state_at = size.filter_at + floats(records.FILTER)
-    for call, term in zip(terms, extra.terms, strict=True):
-        call.address = term.address
-        call.parameters_at = size.cables_at + len(cables) * floats(records.CABLE) + len(parameters)
-        call.state_at = state_at
+    grids_at = states_at
+    for term in extra.terms:
+        calls.append(
+            _row(
+                records.TERM,
+                address=term.address,
+                parameters_at=parameters_at + len(parameters),
+                state_at=grids_at,
+            )
+        )
         parameters += term.parameters
-        state_at += term.state_size
-    fixed = np.concatenate([circuits.view("f8"), cables.view("f8"), parameters, sensor.view("f8")])
-    layout = np.concatenate([size.reshape(1).view("i8"), terms.view("i8")])
-    model = Model(
-        fixed,
-        layout,
-        np.zeros(size.spare_at + size.steps_at),
-        np.zeros(size.stacks, dtype=np.int64),
+        grids_at += term.state_size
+    # without grids the room of their heads is left, as snapshots have it
+    steps_at = grids_at + (grids * floats(records.GRID) if grids else 2 * n * BEFORE_NODES)
+    profiles_at = steps_at + 2 * n * floats(records.STEP)
+    spare_at = profiles_at + stacks * capacity * floats(records.POINT)
+    size = _row(
+        records.SIZES,
+        circuits=len(circuits),
+        cables=n,
+        stacks=stacks,
+        terms=len(calls),
+        capacity=capacity,
+        grids=grids,
+        cables_at=cables_at,
+        sensor_at=parameters_at + len(parameters),
+        context_at=context_at,
+        filter_at=filter_at,
+        grids_at=grids_at,
+        steps_at=steps_at,
+        profiles_at=profiles_at,
+        spare_at=spare_at,
+    )
+    memory = np.zeros(spare_at + steps_at)
+    memory[context_at:filter_at].view(records.CONTEXT)["radius"] = stages[-1].output_radius_m
+    return Model(
+        np.concatenate([circuits.view("f8"), cables.view("f8"), parameters, sensor]),
+        np.concatenate(
+            [np.array([size], records.SIZES).view("i8"), np.array(calls, records.TERM).view("i8")]
+        ),
+        memory,
+        np.zeros(stacks, dtype=np.int64),
         law_tables(extra, config),
     )
-    model.named(model.memory, model.heights).context.radius = stages[-1].output_radius_m
-    return model
 
 
-def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Change) -> NDArray[Any]:
+def _row(record: np.dtype[Any], **values: Any) -> tuple[Any, ...]:
+    """One record by the names of its fields; setting them one by one in numpy's records took most of the time."""
+    return tuple(values[name] for name in record.names or ())
+
+
+def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Change) -> list[tuple[Any, ...]]:
     """Records of the cables of one chain, input side first."""
-    cables = np.zeros(len(group), records.CABLE)
     last = group[-1]
-    for cable, stage, n_i in zip(cables, group, ratios_to_last(group), strict=True):
-        cable.radius = stage.output_radius_m, stage.input_radius_m
-        cable.mu = stage.mu_output, stage.mu_input
-        cable.wrap = stage.wrap_output_rad, stage.wrap_input_rad
-        cable.law = ELSEWHERE, ELSEWHERE
-        if stage is config.drive.stage[-1]:
-            cable.law = (ON_H if sign > 0.0 else ON_L), ELSEWHERE
-        cable.length = stage.free_length_m + extra.extra_length_m
-        cable.EA, cable.T0 = stage.EA_N, stage.pretension_N
-        cable.scale = n_i * last.output_radius_m / stage.output_radius_m
-        cable.weight = n_i / stage.output_radius_m
-        cable.sign = sign
-        cable.ratio = stage.ratio
-        cable.guide, cable.guide_length = extra.guide_angle, extra.guide_length_m
-        cable.play_share, cable.play_yield = extra.play_share, extra.play_yield_N
-        cable.viscous = extra.viscous_Ns_per_m_rad
-        cable.merge = config.observer.merge_tolerance
-        cable.per_breaking = 0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N
-    return cables
+    return [
+        _row(
+            records.CABLE,
+            radius=(stage.output_radius_m, stage.input_radius_m),
+            mu=(stage.mu_output, stage.mu_input),
+            wrap=(stage.wrap_output_rad, stage.wrap_input_rad),
+            law=((ON_H if sign > 0.0 else ON_L) if stage is config.drive.stage[-1] else ELSEWHERE, ELSEWHERE),
+            length=stage.free_length_m + extra.extra_length_m,
+            EA=stage.EA_N,
+            T0=stage.pretension_N,
+            scale=n_i * last.output_radius_m / stage.output_radius_m,
+            weight=n_i / stage.output_radius_m,
+            sign=sign,
+            ratio=stage.ratio,
+            guide=extra.guide_angle,
+            guide_length=extra.guide_length_m,
+            play_share=extra.play_share,
+            play_yield=extra.play_yield_N,
+            viscous=extra.viscous_Ns_per_m_rad,
+            merge=config.observer.merge_tolerance,
+            per_breaking=0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N,
+        )
+        for stage, n_i in zip(group, ratios_to_last(group), strict=True)
+    ]
 
 
 def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:

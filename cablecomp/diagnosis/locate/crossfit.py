@@ -52,35 +52,46 @@ def block_sums(basis: FloatArray, residual: FloatArray, weight: FloatArray, bloc
     return BlockSums(gram, moment, fold, np.asarray(energy, dtype=np.float64))
 
 
-def gains(sums: BlockSums, signs: FloatArray | None = None) -> FloatArray:
-    """Return how much of each block's energy the fit on the other folds removes there (b, or s x b with
-    signs).
+def gains(sums: BlockSums) -> FloatArray:
+    """Return how much of each block's energy the fit on the other folds removes there (b)."""
+    total, ridge = _normal(sums)
+    whole = sums.moment.sum(axis=0)
+    out = np.zeros(sums.blocks)
+    for here in _folds(sums):
+        train = total - sums.gram[here].sum(axis=0) + ridge
+        c = np.linalg.solve(train, whole - sums.moment[here].sum(axis=0))
+        out[here] = 2.0 * sums.moment[here] @ c - np.einsum("k,bkl,l->b", c, sums.gram[here], c)
+    return out
 
-    `signs` (s x b): block-wise signs of surrogate residuals. Ridge: a thousandth of each regressor's own
-    energy, so that a regressor absent from the other folds predicts nothing.
-    """
-    surrogates = np.ones((1, sums.blocks)) if signs is None else signs
+
+def surrogate_gains(sums: BlockSums, signs: FloatArray) -> FloatArray:
+    """Return the same, summed over all blocks, for residuals whose blocks have these signs (s x b): s."""
+    total, ridge = _normal(sums)
+    whole = signs @ sums.moment
+    out = np.zeros(len(signs))
+    for here in _folds(sums):
+        held = sums.gram[here].sum(axis=0)
+        moments = signs[:, here] @ sums.moment[here]
+        c = np.linalg.solve(total - held + ridge, (whole - moments).T).T
+        out += np.sum((2.0 * moments - c @ held) * c, axis=1)
+    return out
+
+
+def _normal(sums: BlockSums) -> tuple[FloatArray, FloatArray]:
+    """The normal matrix of all blocks, and its ridge: a thousandth of each regressor's own energy, so that a regressor
+    absent from the other folds predicts nothing."""
     total = sums.gram.sum(axis=0)
     scale = np.diag(total)
-    ridge = np.diag(_RIDGE * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
-    out = np.zeros((len(surrogates), sums.blocks))
-    whole = surrogates @ sums.moment
-    for fold in range(FOLDS):
-        here = np.flatnonzero(sums.fold == fold)
-        if not len(here):
-            continue
-        train = total - sums.gram[here].sum(axis=0) + ridge
-        moments = whole - surrogates[:, here] @ sums.moment[here]
-        coefficients = np.linalg.solve(train, moments.T).T
-        cross = np.einsum("sk,bk->sb", coefficients, sums.moment[here]) * surrogates[:, here]
-        square = np.einsum("sk,bkl,sl->sb", coefficients, sums.gram[here], coefficients, optimize=True)
-        out[:, here] = 2.0 * cross - square
-    return out[0] if signs is None else out
+    return total, np.diag(_RIDGE * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
+
+
+def _folds(sums: BlockSums) -> list[IntArray]:
+    """The blocks of each fold that has any."""
+    found = [np.flatnonzero(sums.fold == fold) for fold in range(FOLDS)]
+    return [here for here in found if len(here)]
 
 
 def coefficients(sums: BlockSums) -> FloatArray:
     """Return the coefficients of the (ridge) fit over all blocks."""
-    total = sums.gram.sum(axis=0)
-    scale = np.diag(total)
-    ridge = np.diag(_RIDGE * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
+    total, ridge = _normal(sums)
     return np.asarray(np.linalg.solve(total + ridge, sums.moment.sum(axis=0)), dtype=np.float64)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, coefficients, gains
+from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, coefficients, gains, surrogate_gains
 from cablecomp.diagnosis.locate.segments import segment
 from cablecomp.diagnosis.locate.series import Series, blocks_of, thin
 from cablecomp.diagnosis.locate.views import View, load_path, views
@@ -114,8 +114,8 @@ def locate(
     signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, plain.blocks))
     looped = _sums(ground, _with_path(ground))
     bases = {
-        False: _Base(gains(plain), gains(plain, signs)),
-        True: _Base(gains(looped), gains(looped, signs)),
+        False: _Base(gains(plain), surrogate_gains(plain, signs)),
+        True: _Base(gains(looped), surrogate_gains(looped, signs)),
     }
     energy = float(plain.energy.sum())
     answers: list[_Answer] = []
@@ -126,7 +126,7 @@ def locate(
         per_block = gains(sums) - base.gain
         total = float(per_block.sum())
         strength = float(_strength(total, energy))
-        null = _strength((gains(sums, signs) - base.null).sum(axis=1), energy)
+        null = _strength(surrogate_gains(sums, signs) - base.null, energy)
         # the lower tail is long where a fit extrapolates: the scale is that of the upper one
         centre, upper = (float(value) for value in np.quantile(null, (0.5, 0.95)))
         scale = max(upper - centre, 1e-12)
@@ -291,14 +291,10 @@ def _intervals(
         return ()
     descending = np.sort(energy)[::-1]
     level = descending[int(np.searchsorted(np.cumsum(descending), _ENERGY_SHARE * energy.sum()))]
-    found: list[tuple[int, int]] = []
     gap = max(2, int(np.bincount(ground.block).min() // 3))
-    for index in np.flatnonzero(energy >= level):
-        crosses = found and np.any((starts > found[-1][1]) & (starts <= index))
-        if found and index - found[-1][1] <= gap and not crosses:
-            found[-1] = (found[-1][0], int(index))
-        else:
-            found.append((int(index), int(index)))
+    strong = np.flatnonzero(energy >= level)
+    parted = (np.diff(strong) > gap) | (np.diff(np.searchsorted(starts, strong, side="right")) > 0)
+    found = [(int(part[0]), int(part[-1])) for part in np.split(strong, np.flatnonzero(parted) + 1)]
     found.sort(key=lambda pair: -float(energy[pair[0] : pair[1] + 1].sum()))
     kept = sorted(found[:_MOST_INTERVALS])
     return tuple((float(time[a]), float(time[b])) for a, b in kept)
