@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -158,10 +159,16 @@ def calibrate(
     sessions: Sessions | None = None,
     mapping: Mapped = None,
     progress: Progress = lambda what, share: None,
+    budget_s: float = inf,
 ) -> CalibrationResult:
-    """Fit EA, pretension, friction, ratio and zeros of the nominal drive to one recording or several."""
+    """Fit EA, pretension, friction, ratio and zeros of the nominal drive to one recording or several.
+
+    After `budget_s` [s] no further step begins: the best so far is given, and a warning says so.
+    """
     joint, data = _joint(config), columns_of(recordings, _mapping(mapping))
-    return CalibrationResult(_calibrate(joint, data, seed, sessions, progress), _doubts(joint, data))
+    return CalibrationResult(
+        _calibrate(joint, data, seed, sessions, progress, budget_s), _doubts(joint, data)
+    )
 
 
 def diagnose(
@@ -172,10 +179,14 @@ def diagnose(
     sessions: Sessions | None = None,
     mapping: Mapped = None,
     progress: Progress = lambda what, share: None,
+    budget_s: float = inf,
 ) -> DiagnosisResult:
-    """Find the physics that the configuration lacks in one recording or several."""
+    """Find the physics that the configuration lacks in one recording or several.
+
+    After `budget_s` [s] no further hypothesis is begun: what was found by then is weighed, and a warning says so.
+    """
     joint, data = _joint(config), columns_of(recordings, _mapping(mapping))
-    return DiagnosisResult(_diagnose(joint, data, progress, seed, sessions), _doubts(joint, data))
+    return DiagnosisResult(_diagnose(joint, data, progress, seed, sessions, budget_s), _doubts(joint, data))
 
 
 class _Rows:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from enum import StrEnum
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -26,6 +27,7 @@ from cablecomp.cli.sources import Reading, read_moving, reads_recordings
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
+from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
@@ -57,6 +59,9 @@ def diagnose_recordings(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of surrogates and resampling")] = 0,
+    budget: Annotated[
+        float, typer.Option(min=0.0, help="seconds after which no hypothesis is begun: the best so far")
+    ] = inf,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
     reading: Reading,
@@ -70,6 +75,11 @@ def diagnose_recordings(
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:
+        if session is not None or effects is not None or seed or budget < inf:
+            raise InputError(
+                "--session, --seed, --budget, --effects: of a fleet every night is diagnosed by itself, as its joint's "
+                "configuration says; leave them out"
+            )
         work_fleet("diagnose", recordings, config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)
@@ -77,7 +87,7 @@ def diagnose_recordings(
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
     with share_bar() as told:
-        found = diagnose(joint, data, told, seed, None if session is None else session.value)
+        found = diagnose(joint, data, told, seed, None if session is None else session.value, budget)
     found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         write_diagnosis(found, folder)

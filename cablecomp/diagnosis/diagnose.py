@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.model import Model, Term, bears, placed, stripped
-from cablecomp.diagnosis.explain.rounds import Progress
+from cablecomp.diagnosis.explain.pace import Pace, Progress
 from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
@@ -44,6 +45,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, rms_left, solve, weighed
 
+OUT_OF_TIME = "the {:g} s were over before all hypotheses were tried: what is named is the best so far"
 NO_BETTER = "the joint's angle is predicted no better by it on data left out"
 
 
@@ -53,11 +55,13 @@ def diagnose(
     progress: Progress = lambda what, share: None,
     seed: int = 0,
     sessions: Sessions | None = None,
+    budget_s: float = inf,
 ) -> Diagnosis:
     """Find out what physics the configuration lacks to explain the recordings (name or path -> canonical channels).
 
     `sessions`: how recordings belong together ("folder", "each", "one"; None = as `[[session]]` says, else by folder).
-    `progress` is told what is being done and the share done. Raises InputError for recordings that lack a
+    `progress` is told what is being done and the share done. After `budget_s` no further hypothesis is begun: what was
+    found by then is weighed, and a warning says so. Raises InputError for recordings that lack a
     channel or that the nominal joint cannot follow.
     """
     begin = time.monotonic()
@@ -76,7 +80,9 @@ def diagnose(
     begin_fit = drive.fit if whole else _about(drive.fit, searched)
     nominal = drive.nominal if whole else _at_start(begin_fit)
     groups = make_groups(begin_fit)
-    selection = select(begin_fit, nominal, pool, groups, rng, progress)
+    pace = Pace(progress, begin + budget_s)
+    selection = select(begin_fit, nominal, pool, groups, rng, pace)
+    cut = (OUT_OF_TIME.format(budget_s),) if pace.over else ()
     progress("last fit", 0.9)
     final = _settled(selection.final.terms, selection.final.fit, drive, groups)
     selection = replace(selection, final=final)
@@ -148,7 +154,7 @@ def diagnose(
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, seen)),
         runtime_s=time.monotonic() - begin,
-        warnings=_warnings(kept),
+        warnings=(*cut, *_warnings(kept)),
     )
 
 

@@ -130,3 +130,12 @@ def test_a_pretension_that_differs_between_sessions_is_no_event() -> None:
     assert found["tuesday"] / found["monday"] == pytest.approx(1.05 / 0.95, rel=0.02)
     assert d.verdict in ("consistent", "recalibrate")
     assert d.augmented.heldout_rmse_rad < 0.8 * d.baseline.heldout_rmse_rad
+
+
+def test_a_budget_that_is_over_ends_the_search_with_what_there_is_and_says_so(nothing: Diagnosis) -> None:
+    found = diagnose(joint(), {"small/1": recording([BEARING])}, budget_s=0.0)
+    assert any("0 s were over" in line for line in found.warnings)
+    assert not found.named
+    assert found.tested == ()
+    assert found.augmented.rmse_rad == found.baseline.rmse_rad
+    assert not any("were over" in line for line in nothing.warnings)

@@ -6,7 +6,7 @@ Besides effects, a round tries dependences: a parameter that is each session's o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, is_told, loss, placed
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
+from cablecomp.diagnosis.explain.pace import Pace
 from cablecomp.diagnosis.explain.scores import (
     Groups,
     demanded,
@@ -32,8 +33,6 @@ from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.parameter import DECADE, by_condition
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -54,14 +53,14 @@ def one_round(
     pool: Sequence[Hypothesis],
     groups: Groups,
     rng: np.random.Generator,
-    progress: Progress,
+    pace: Pace,
     number: int,
     cold: Mapping[str, float] | None,
     known: Sequence[Model],
 ) -> tuple[Round, tuple[Answer, ...]]:
     """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to
     begin from where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin
-    from as well."""
+    from as well. Once the time is up nothing further is begun but the most promising fit."""
     anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
     names = {t.name for t in model.terms}
     ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
@@ -69,8 +68,8 @@ def one_round(
     done = number / LIMITS.rounds
 
     def answer(h: Hypothesis) -> list[Answer]:
-        progress(f"asking {h.name}", done)
-        return ask_all(anchors, h)
+        pace.tell(f"asking {h.name}", done)
+        return [] if pace.over else ask_all(anchors, h)
 
     answers = [a for a in side_by_side(answer, left) if a]
     before = 0.5 * float(model.fit.residual @ model.fit.residual)
@@ -96,7 +95,9 @@ def one_round(
     promising = max(LIMITS.promising - 2 * number, LIMITS.promising // 2)
 
     def begin(a: list[Answer]) -> list[Fit]:
-        progress(f"trying {a[0].hypothesis.name}", done)
+        pace.tell(f"trying {a[0].hypothesis.name}", done)
+        if pace.over:
+            return []
         further = _further(a[0].hypothesis, model, known, cold) if a[0].hypothesis.trades else []
         return rough(a, LIMITS.rough, further)
 
@@ -123,7 +124,9 @@ def one_round(
     chosen += [c for c in second if c.terms[0].name in taken and c.cost < LIMITS.hopeless * top]
 
     def finish(c: Begun) -> Model | None:
-        progress(f"fitting {c.terms[0].name}", done)
+        pace.tell(f"fitting {c.terms[0].name}", done)
+        if pace.over and c is not chosen[0]:
+            return None
         try:
             fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
         except InputError:

@@ -22,7 +22,8 @@ from cablecomp.diagnosis.explain.model import (
     searching,
     without,
 )
-from cablecomp.diagnosis.explain.rounds import Progress, cold_starts, one_round
+from cablecomp.diagnosis.explain.pace import Pace
+from cablecomp.diagnosis.explain.rounds import cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -36,13 +37,13 @@ def select(
     pool: Sequence[Hypothesis],
     groups: Groups,
     rng: np.random.Generator,
-    progress: Progress,
+    pace: Pace,
 ) -> Selection:
     """Add what data left out demand, one at a time, `LIMITS.beam` models side by side; then leave out what is
     not missed.
 
     `nominal`: the drive as configured, evaluated: where calibration has paid for a missing effect, the way to
-    the effect begins there.
+    the effect begins there. Once the time is up no further round begins.
     """
     sharp = searching(baseline)
     first = reweighed(Model((), baseline, left_out(baseline, groups)), sharp, groups)
@@ -55,10 +56,12 @@ def select(
     cold = cold_starts(pool, baseline)
     best = first
     for number in range(0 if quiet(baseline) else LIMITS.rounds):
+        if pace.over and number:
+            break
         candidates: list[tuple[Round, Tried]] = []
         for model, start in beam:
             known = [t.model for r in rounds for t in r.tried]
-            round_, answered = one_round(model, start, pool, groups, rng, progress, number, cold, known)
+            round_, answered = one_round(model, start, pool, groups, rng, pace, number, cold, known)
             answers = answers or answered
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
