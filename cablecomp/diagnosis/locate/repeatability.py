@@ -13,8 +13,10 @@ from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray
 
 REACH = 0.02
-"""How alike two rows have to be in each coordinate, as a share of its range."""
-FEWEST = 30
+"""How alike two rows have to be in each coordinate, as a share of its range; a load that is two percent off still
+moves a soft cable by far more than the noise, so what is left apart is accounted for."""
+FEWEST = 100
+"""Pairs of alike rows below which nothing is said: neighbours on one stroke make many that say the same."""
 
 
 def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]) -> float | None:
@@ -34,10 +36,19 @@ def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]
         if len(near) < FEWEST:
             continue
         joint = e.at_rows(JOINT)
-        gain = np.polyfit(v["motor_angle"], joint, 1)[0] if np.ptp(v["motor_angle"]) > 0.0 else 0.0
         a, b = near[:, 0], near[:, 1]
-        difference = joint[a] - joint[b] - gain * (v["motor_angle"][a] - v["motor_angle"][b])
-        squares.append(difference**2)
+        alike = used.sum()
+        squares.append(_beside(points[a, :alike] - points[b, :alike], joint[a] - joint[b]) ** 2)
     if not squares:
         return None
     return float(np.sqrt(0.5 * np.median(np.concatenate(squares)) / 0.455))
+
+
+def _beside(apart: FloatArray, difference: FloatArray) -> FloatArray:
+    """What is left of the differences once what the states still lie apart is taken off by a straight line; pairs
+    whose past differs further back do not draw it."""
+    found = np.linalg.lstsq(apart, difference, rcond=None)[0]
+    left = np.abs(difference - apart @ found)
+    kept = left <= 4.5 * np.median(left)
+    found = np.linalg.lstsq(apart[kept], difference[kept], rcond=None)[0]
+    return np.asarray(difference - apart @ found, dtype=np.float64)

@@ -1,0 +1,44 @@
+"""What a machine repeats, against a joint whose scatter is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from joints import SMALL, SMALL_TOLERANCE, closed
+
+from cablecomp.config import parse_joint
+from cablecomp.diagnosis.locate.remainders import covariates_of
+from cablecomp.diagnosis.locate.repeatability import repeatability
+from cablecomp.estimation.evidence import gather
+
+CONFIG = parse_joint({**closed(SMALL, "small"), "tolerance": SMALL_TOLERANCE}, "small")
+
+
+def repeated(amplitudes: np.ndarray, compliance: float, sigma: float) -> float | None:
+    """Of a joint that yields to its load and has no memory: one cycle per amplitude of the load."""
+    rng = np.random.default_rng(11)
+    time = np.arange(0.0, 8.0 * len(amplitudes), 0.02)
+    size = np.interp(time, 8.0 * (np.arange(len(amplitudes)) + 0.5), amplitudes)
+    motor = 0.8 * np.sin(2.0 * np.pi * time / 8.0)
+    load = size * np.sin(2.0 * np.pi * time / 8.0 + 0.7)
+    joint = motor + compliance * load + sigma * rng.standard_normal(len(time))
+    columns = {
+        "time_s": time,
+        "motor_position_rad": motor,
+        "joint_torque_Nm": load,
+        "joint_position_rad": joint,
+    }
+    evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
+    return repeatability([evidence], [covariates_of(CONFIG, evidence)])
+
+
+@pytest.mark.parametrize("compliance", [0.0, 0.01])
+def test_the_scatter_of_a_joint_is_found_whatever_its_load_differs_by(compliance: float) -> None:
+    sigma = 1e-5  # a load that is two percent off moves the joint by 2e-4
+    amplitudes = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 1.0])
+    found = repeated(amplitudes, compliance, sigma)
+    assert found == pytest.approx(sigma, rel=0.25)
+
+
+def test_nothing_is_said_where_nothing_repeats() -> None:
+    assert repeated(np.array([0.2, 0.6, 1.0]), 0.01, 1e-5) is None
