@@ -11,7 +11,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, placed, without
+from cablecomp.diagnosis.explain.model import Model, placed
 from cablecomp.diagnosis.explain.scores import (
     Groups,
     ScoreDifference,
@@ -46,12 +46,15 @@ class Rivals(NamedTuple):
 
 
 def rivals(
-    model: Model, term: Hypothesis, pool: Sequence[Hypothesis], groups: Groups, rng: np.random.Generator
+    model: Model,
+    term: Hypothesis,
+    base: Model,
+    pool: Sequence[Hypothesis],
+    groups: Groups,
+    rng: np.random.Generator,
 ) -> Rivals:
-    """Every effect that promises something, and for an event what is none, fitted in a term's place."""
-    base = without(model, term, groups)
-    if base is None:
-        return Rivals()
+    """Every effect that promises something, and for an event what is none, fitted in a term's place: beside `base`,
+    the model without it."""
     here = anchor(base.fit)
     names = {t.name for t in model.terms}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)

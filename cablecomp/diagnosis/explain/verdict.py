@@ -11,7 +11,7 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
-from cablecomp.diagnosis.explain.rivals import rivals
+from cablecomp.diagnosis.explain.rivals import Rivals, rivals
 from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -60,7 +60,11 @@ def weigh(
             if bare is not None
             else ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
         )
-        instead = rivals(final, term, [h for h in pool if h.name in able], groups, rng)
+        instead = (
+            Rivals()
+            if bare is None
+            else rivals(final, term, bare, [h for h in pool if h.name in able], groups, rng)
+        )
         nearest = min(
             instead.differences.values(),
             key=lambda v: v.z,
