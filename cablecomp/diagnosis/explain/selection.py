@@ -98,12 +98,14 @@ def _reigning(
         return carried[0]
     rival = reweighed(best, sharper, groups)
     mine = {t.name for t in best.terms}
+    base: Model | None = None
     for m in carried:
         if not _better(m, rival, groups):
             continue
-        if mine <= {t.name for t in m.terms} or _dethrones(
-            m, rival, reweighed(baseline, sharper, groups), groups
-        ):
+        if mine <= {t.name for t in m.terms}:
+            return m
+        base = base or reweighed(baseline, sharper, groups)
+        if _dethrones(m, rival, base, groups):
             return m
     return best
 
