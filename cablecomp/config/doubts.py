@@ -80,7 +80,8 @@ def _of_stage(stage: Stage, tolerance: dict[str, float]) -> Iterator[str]:
     for side in ("output", "input"):
         hold = getattr(stage, f"mu_{side}") * getattr(stage, f"wrap_{side}_rad")
         if hold > 20.0:
-            yield f"mu_{side} x wrap_{side}_rad = {hold:.3g} lets the cable hold {exp(min(hold, 700.0)):.1g} times its load"
+            times = exp(min(hold, 700.0))
+            yield f"mu_{side} x wrap_{side}_rad = {hold:.3g} lets the cable hold {times:.1g} times its load"
 
 
 def _reach(config: JointConfig) -> Iterator[str]:

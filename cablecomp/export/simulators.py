@@ -24,13 +24,16 @@ def mujoco_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> s
   <option timestep="0.0005" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody>
     <body name="motor">
-      <joint name="motor" type="hinge" axis="0 0 1" armature="{motor.inertia_kgm2:.6g}" damping="{motor.viscous_Nms_per_rad:.6g}"/>
-      <geom type="cylinder" size="{config.drive.stage[0].input_radius_m:.6g} 0.01" mass="1e-6" contype="0" conaffinity="0"/>
+      <joint name="motor" type="hinge" axis="0 0 1" armature="{motor.inertia_kgm2:.6g}"
+             damping="{motor.viscous_Nms_per_rad:.6g}"/>
+      <geom type="cylinder" size="{config.drive.stage[0].input_radius_m:.6g} 0.01" mass="1e-6"
+            contype="0" conaffinity="0"/>
     </body>
     <body name="joint" pos="0.2 0 0">
       <joint name="joint" type="hinge" axis="0 0 1" armature="{motor.output_inertia_kgm2:.6g}"
              damping="{motor.output_viscous_Nms_per_rad:.6g}"{_range(config)}/>
-      <geom type="cylinder" size="{config.drive.stage[-1].output_radius_m:.6g} 0.01" mass="1e-6" contype="0" conaffinity="0"/>
+      <geom type="cylinder" size="{config.drive.stage[-1].output_radius_m:.6g} 0.01" mass="1e-6"
+            contype="0" conaffinity="0"/>
     </body>
   </worldbody>
   <tendon>
@@ -59,9 +62,12 @@ def urdf_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> str
     speed = config.limits.motor_velocity_max_rad_s
     limit = f'{bounds}effort="{found.most_Nm:.6g}" velocity="{100.0 if speed is None else speed * found.ratio:.6g}"'
     J = motor.output_inertia_kgm2
+    remarks = _remarks(
+        config, found, "no stiffness and no backlash: the format has neither (see the numbers above)"
+    )
     return f"""<?xml version="1.0"?>
 <robot name={quoteattr(config.name)}>
-{_remarks(config, found, "no stiffness and no backlash: the format has neither (see the numbers above)")}  <link name="base"/>
+{remarks}  <link name="base"/>
   <link name="output">
     <inertial>
       <mass value="0.001"/>

@@ -49,7 +49,10 @@ def open_bag(path: Path) -> MessageLog:
             stream = iter(bag.messages(wanted)) if wanted else iter(())
             while (found := _guarded(path, lambda: next(stream, None))) is not None:
                 connection, logged, data = found
-                content = _guarded(path, lambda: bag.deserialize(data, connection.msgtype))  # noqa: B023  # called at once
+                content = _guarded(
+                    path,
+                    lambda: bag.deserialize(data, connection.msgtype),  # noqa: B023  # called at once
+                )
                 message = Message(connection.topic, int(logged), stamp_of(content), numbers(content))
                 yield message, min((logged - first) / span, 1.0)
         finally:

@@ -9,7 +9,8 @@ from typing import Final
 from cablecomp.errors import InputError
 
 SUFFIXES: Final = (
-    ".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".npz", ".mat", ".mcap", ".bag", ".db3", ".blf", ".asc", ".trc", ".mf4",
+    ".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".npz", ".mat", ".mcap", ".bag", ".db3",
+    ".blf", ".asc", ".trc", ".mf4",
 )  # fmt: skip
 """Endings by which a file in a folder is taken for a recording; a file that is given itself may have any."""
 _BAG: Final = "metadata.yaml"

@@ -13,7 +13,10 @@ from typing import Final, NamedTuple
 from cablecomp.recording.channels import OTHER
 
 _TIME: Final = "builtin_interfaces/Time stamp\nstring frame_id\n"
-_HEADER: Final = f"{'=' * 80}\nMSG: std_msgs/Header\n{_TIME}{'=' * 80}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+_BAR: Final = "=" * 80
+_HEADER: Final = (
+    f"{_BAR}\nMSG: std_msgs/Header\n{_TIME}{_BAR}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
 JOINT_STATES: Final = "/joint_states"
 DYNAMIC_JOINT_STATES: Final = "/dynamic_joint_states"
 TYPES: Final = {

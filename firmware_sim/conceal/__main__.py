@@ -53,7 +53,8 @@ def _write(folder: Path, trial: Trial, joint: str) -> None:
     (folder / "recordings").mkdir(parents=True, exist_ok=True)
     (folder / JOINT_FILE).write_text(joint, encoding="utf-8")
     for k, table in enumerate(trial.recordings, start=1):
-        np.savez(folder / "recordings" / f"recording-{k}.npz", **table)  # type: ignore[arg-type]  # numpy's stub takes `**` for `allow_pickle`, a bool
+        path = folder / "recordings" / f"recording-{k}.npz"
+        np.savez(path, **table)  # type: ignore[arg-type]  # numpy's stub takes `**` for `allow_pickle`, a bool
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -37,7 +37,8 @@ main(commands["replay"][:-1] + ["warm"])  # whatever is compiled is compiled now
 answers = {}
 for name, arguments in commands.items():
     out, error = io.StringIO(), io.StringIO()
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200 if name in ("inspect", "example", "init") else 20_000, resource.RLIM_INFINITY))
+    most = 200 if name in ("inspect", "example", "init") else 20_000
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
         code = main(arguments)
     resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))

@@ -70,7 +70,8 @@ def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:
     steps = (g.block[:, None] == np.arange(BLOCKS)).astype(np.float64)
     plain = linear(y, np.ones((len(y), 1)), 1.5)
     fitted = linear(y, np.column_stack([np.ones(len(y)), steps]), 1.0)
-    step = score_difference(left_out(fitted, g), left_out(plain, g), g)  # type: ignore[arg-type]  # a stand-in for a fit
+    left = left_out(fitted, g), left_out(plain, g)  # type: ignore[arg-type]  # a stand-in for a fit
+    step = score_difference(*left, g)
     assert np.mean(fitted.residual[: len(y)] ** 2) < np.mean(plain.residual[: len(y)] ** 2)
     assert step.gain < 0.02
 

@@ -56,7 +56,8 @@ BENT = {
     "condition": {"bend_rad": "other_bend"},
     "effect": [{"id": "routing_friction", "mu_angle": 0.3, "arc_length_m": 0.01}],
     "depends": [
-        {"parameter": "effect.routing_friction.mu_angle", "on": "bend_rad", "per_unit": 0.2, "at": 0.0, "seen": [0.0, 2.0]}
+        {"parameter": "effect.routing_friction.mu_angle", "on": "bend_rad", "per_unit": 0.2, "at": 0.0,
+         "seen": [0.0, 2.0]}
     ],
     "session": [{"name": "straight", "recordings": ["straight.csv"], "values": {"pretension_N": 70.0}}],
 }  # fmt: skip

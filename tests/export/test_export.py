@@ -84,7 +84,8 @@ def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.Monk
     description = ET.parse(tmp_path / "unit/modelDescription.xml").getroot()
     kinds = {v.get("name"): v.get("causality") for v in description.iter("ScalarVariable")}
     assert kinds == {
-        "motor_position_rad": "input", "joint_torque_Nm": "input", "joint_position_rad": "output", "deflection_rad": "output",
+        "motor_position_rad": "input", "joint_torque_Nm": "input",
+        "joint_position_rad": "output", "deflection_rad": "output",
     }  # fmt: skip
     spec = importlib.util.spec_from_file_location("unit", tmp_path / "unit/resources/wristcapstan.py")
     assert spec is not None

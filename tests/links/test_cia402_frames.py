@@ -73,9 +73,9 @@ def device(rigs: Any) -> Device:
     return found
 
 
-def control(device: Device, command: MotorCommand = MotorCommand()) -> int:  # noqa: B008  # immutable: one serves every call
+def control(device: Device, command: MotorCommand | None = None) -> int:
     device.listen()
-    device.rig.link.send(0, command)
+    device.rig.link.send(0, command or MotorCommand())
     (word,) = (struct.unpack_from("<H", data)[0] for i, data in device.listen() if i == 0x201)
     return int(word)
 

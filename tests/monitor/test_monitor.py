@@ -35,7 +35,8 @@ def made_up(k: int) -> Frame:
         {
             "time_s": 0.04 * k, "joint": "wrist", "phase": "normal", "load_Nm": load, "deflection_rad": 1e-3 * load,
             "deflection_low_rad": -1.0, "deflection_high_rad": 1.0, "residual_rad": 1e-5, "cycle_p99_s": 1e-4,
-            "late_p99_s": float("nan"), "misses": 0, "alarms": ["motor position is stale"] if k == 60 else [], "dropped": 0,
+            "late_p99_s": float("nan"), "misses": 0, "alarms": ["motor position is stale"] if k == 60 else [],
+            "dropped": 0,
         },
         [WRAP],
     )  # fmt: skip

@@ -23,7 +23,8 @@ from cablecomp.recording.reader import open_recording, read_all
 peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 def read(whole):
     try:
-        rows = len(read_all(sys.argv[1]).columns['time_s']) if whole else sum(b.rows for b in open_recording(sys.argv[1]).blocks())
+        path = sys.argv[1]
+        rows = len(read_all(path).columns['time_s']) if whole else sum(b.rows for b in open_recording(path).blocks())
         print(f'{rows} rows')
     except InputError as error:
         print(f'refused: {error}')

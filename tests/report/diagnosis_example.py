@@ -56,7 +56,8 @@ def example(samples: int = 2_400) -> Diagnosis:
     named = Named(
         effect.id, effect.statement, effect.equation,
         {"coefficient_Ns_per_m_rad": Value("coefficient_Ns_per_m_rad", 118.4, 3.1)},
-        {"parameter": "viscous_slip.coefficient_Ns_per_m_rad", "on": "session", "values": {"rig-1": 118.4, "rig-2": 131.0}},
+        {"parameter": "viscous_slip.coefficient_Ns_per_m_rad", "on": "session",
+         "values": {"rig-1": 118.4, "rig-2": 131.0}},
         1.0 - (left / before) ** 2, 0.97, {"z": 9.3, "selected_in": 1.0}, effect.acts_through,
     )  # fmt: skip
     skew = catalogue()["clock_skew"]
@@ -89,7 +90,9 @@ def example(samples: int = 2_400) -> Diagnosis:
         candidates=(candidate,),
         not_excluded=((("series_compliance", "nonlinear_cable"), "both bend the same curve under these loads"),),
         empirical=(Law("ripple_by_motor_angle", "motor_angle", 0.31, 6.0),),
-        next_experiment=("A ramp to 4 N·m at two rates separates the two", "load ramp 0 -> 4 N·m in 2 s\nload hold 5 s"),
+        next_experiment=(
+            "A ramp to 4 N·m at two rates separates the two", "load ramp 0 -> 4 N·m in 2 s\nload hold 5 s",
+        ),
         could_be_unseen=(
             {"effect": "bearing_friction", "parameter": "torque_Nm", "below": 0.0041, "unit": "N·m", "why": ""},
             {"effect": "clamp_slip", "parameter": "slip_m", "below": None, "unit": "m", "why": "could be any size"},

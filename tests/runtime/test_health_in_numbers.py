@@ -321,7 +321,7 @@ def test_the_first_value_is_taken_wherever_it_is() -> None:
 def test_a_condition_lasts_from_its_first_step() -> None:
     held = Sustained(4.0 * T)
     ages = [(held.step(k >= 2, k * T), held.age_s / T) for k in range(9)]
-    assert ages == [(False, 0), (False, 0), (False, 0), (False, 0), (False, 0), (False, 0), (True, 0), (True, 1), (True, 2)]  # fmt: skip
+    assert ages == 6 * [(False, 0)] + [(True, 0), (True, 1), (True, 2)]
     assert held.begun
     assert not held.step(False, 9.0 * T)
     assert not held.begun

@@ -51,7 +51,8 @@ def in_child(command, wanted: dict) -> int:
     for number in range(3):
         os.dup2(handle, number)
     # what Python opened on a file believes that it can seek; a terminal cannot
-    sys.stdout, sys.stderr = (open(n, "w", 1, encoding="utf-8", closefd=False) for n in (1, 2))  # noqa: SIM115 -- open to the end
+    streams = (open(n, "w", 1, encoding="utf-8", closefd=False) for n in (1, 2))  # noqa: SIM115 -- open to the end
+    sys.stdout, sys.stderr = streams
     if wanted.get("file_limit"):
         import resource
 

@@ -1,5 +1,4 @@
-"""With true parameters and noisy sensors the prediction stands at the joint encoder's noise floor (sheet,
-section 1.2)."""
+"""With true parameters and noisy sensors the prediction stands at the joint encoder's noise floor."""
 
 from __future__ import annotations
 
