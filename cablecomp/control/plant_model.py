@@ -143,7 +143,7 @@ def parts(system: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def response(system: Any, z: Complex) -> Complex:
-    """C (zI - A)^-1 B + D at every z at once: array [z, output, input]."""
+    """C (zI - A)^-1 B + D: array [z, output, input]; at every z at once, where python-control solves one by one."""
     A, B, C, D = parts(system)
     shifted = z[:, None, None] * np.eye(A.shape[0]) - A
     found: Complex = C @ np.linalg.solve(shifted, np.broadcast_to(B.astype(complex), (len(z), *B.shape))) + D

@@ -61,7 +61,7 @@ def urdf_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> str
     kind = "revolute" if bounds else "continuous"
     speed = config.limits.motor_velocity_max_rad_s
     limit = f'{bounds}effort="{found.most_Nm:.6g}" velocity="{100.0 if speed is None else speed * found.ratio:.6g}"'
-    J = motor.output_inertia_kgm2
+    inertia = motor.output_inertia_kgm2
     remarks = _remarks(
         config, found, "no stiffness and no backlash: the format has neither (see the numbers above)"
     )
@@ -71,7 +71,7 @@ def urdf_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> str
   <link name="output">
     <inertial>
       <mass value="0.001"/>
-      <inertia ixx="{J:.6g}" ixy="0" ixz="0" iyy="{J:.6g}" iyz="0" izz="{J:.6g}"/>
+      <inertia ixx="{inertia:.6g}" ixy="0" ixz="0" iyy="{inertia:.6g}" iyz="0" izz="{inertia:.6g}"/>
     </inertial>
   </link>
   <link name="motor"/>

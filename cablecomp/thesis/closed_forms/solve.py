@@ -1,4 +1,4 @@
-"""Root of an increasing function, elementwise: Newton's method kept inside a bracket."""
+"""Root of an increasing function, elementwise: Newton's method in a bracket; own code, SciPy's on arrays keeps none."""
 
 from __future__ import annotations
 
