@@ -94,6 +94,20 @@ def test_a_channel_is_stale_after_two_periods_and_a_half(silent: str, flag: int)
         assert not checked.fatal
 
 
+@pytest.mark.parametrize(
+    ("channel", "floor", "flag"),
+    [("motor", 0.002, h.MOTOR_JUMP), ("torque", 0.05, h.TORQUE_JUMP), ("joint", 0.002, h.JOINT_JUMP)],
+)
+def test_however_slow_a_channel_may_be_its_floor_passes_and_no_more(
+    channel: str, floor: float, flag: int
+) -> None:
+    rates = dict.fromkeys(("motor_rate_rad_s", "torque_rate_Nm_s", "joint_rate_rad_s"), 1e-06)
+    for share, expected in ((0.98, 0), (1.02, flag)):
+        fed = Fed(options(**rates))
+        fed.cycle(**ALL)
+        assert fed.cycle(**{**ALL, channel: share * floor}).flags == expected
+
+
 def test_a_channel_is_fresh_up_to_its_time_and_that_included() -> None:
     fed = Fed()
     fed.health = h.Health(options(), N, 2.0 * T, T)
