@@ -33,7 +33,7 @@ UNTOLD = 0.9
 TIED = 0.9
 """Correlation from which on two values are said to be known only together."""
 
-OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure than the recordings allow"
+OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure"
 
 Progress = Callable[[str, float], None]
 
