@@ -16,7 +16,7 @@ from cablecomp.runtime.compare import LINEAR, MOTOR_ALONE, NAMES, OBSERVER, QUIC
 from cablecomp.runtime.results import RunReport
 
 _COLOURS = {MOTOR_ALONE: style.BASELINE, LINEAR: style.RESIDUAL, OBSERVER: style.PREDICTED}
-_POINTS: Final = 3000
+_POINTS: Final = 2400
 """Rows of a run that are drawn."""
 _WORDS = {
     MOTOR_ALONE: "motor-side control alone",
