@@ -18,7 +18,7 @@ from cablecomp.report.run_data import Floats, RunData, load_run
 from cablecomp.runtime.results import JointResult, RunReport
 
 TIME = style.label("time", "s")
-BAND = "The band holds the truth for every admissible history before the run; where it is wider than the curves it is cut."
+BAND = "The band holds the truth whatever went before the run; where it is wider than the curves it is cut."
 
 
 def write_run_page(report: RunReport, config_text: str) -> Path:

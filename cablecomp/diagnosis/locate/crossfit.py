@@ -1,4 +1,5 @@
-"""Cross-fitted regressions on contiguous blocks, kept as block sums so that surrogates cost little."""
+"""Cross-fitted regressions on contiguous blocks, kept as block sums so that surrogates cost little; own code, as
+scikit-learn's cross-validation would fit every fold of every surrogate from the rows again."""
 
 from __future__ import annotations
 
