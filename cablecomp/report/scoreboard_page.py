@@ -84,7 +84,11 @@ def scoreboard_page(board: Scoreboard) -> str:
             "How good the models are",
             page.columns(
                 page.figure(figures.ratios(board)),
-                page.figure(figures.deviations(board), "Values that fall outside are drawn at the edge."),
+                page.figure(figures.deviations(board), "Values that fall outside are drawn at the edge.")
+                if any(r.estimates for r in board.rows)
+                else page.paragraph(
+                    "No value was stated that has a true one: laws of other forms have other parameters."
+                ),
             ),
         ),
         Section("Trials that went wrong", _wrong(board) or page.paragraph("None.")),
@@ -162,7 +166,7 @@ def _trial(r: Row) -> tuple[object, ...]:
         r.case or r.kind,
         ", ".join(r.forms),
         ", ".join(r.imperfections),
-        100.0 * r.size,
+        f"{100.0 * r.size:.2g}",
         r.excitation,
         r.verdict,
         named + (f" tied: {tied}" if tied else ""),

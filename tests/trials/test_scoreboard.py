@@ -228,6 +228,8 @@ def test_page_and_table_hold_every_trial_and_json_no_nan() -> None:
     assert "no luck" in text
     assert "abababababab" in text
     assert "--imperfections some" in text
+    assert "(stated − true) / stated sd" not in text
+    assert "No value was stated that has a true one" in text
     assert scoreboard_table(board).row_count == len(board.targets)
     assert json.loads(json.dumps(as_json(board), allow_nan=False))["confusion"]["a pair"] == {"failed": 1}
     assert target(rows, "nothing missing: a wrong name") == 1.0
