@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import can
+import numpy as np
 
 from firmware_sim.wire.frame import Frame
 
@@ -91,7 +92,7 @@ def sound(message: Any) -> Frame | None:
     """The message as a frame; None where it is none that a bus could carry, as a datagram from elsewhere can be."""
     identifier, data = message.arbitration_id, message.data
     fits = (
-        type(identifier) is int
+        isinstance(identifier, int | np.integer)
         and 0 <= identifier < (1 << 29 if message.is_extended_id else 1 << 11)
         and isinstance(data, bytes | bytearray)
         and len(data) <= (64 if message.is_fd else 8)
@@ -99,7 +100,7 @@ def sound(message: Any) -> Frame | None:
     if not fits:
         return None
     return Frame(
-        identifier,
+        int(identifier),
         bytes(data),
         bool(message.is_remote_frame),
         bool(message.is_extended_id),

@@ -12,6 +12,7 @@ from typing import Any
 
 import can
 import msgpack
+import numpy as np
 import pytest
 import serial
 from sim_two_mass import TwoMass
@@ -21,6 +22,7 @@ from firmware_sim.errors import SimError
 from firmware_sim.faults import parse_fault
 from firmware_sim.firmware import DriveState, Setpoint
 from firmware_sim.ports import PtyPort, SerialPort, SlcanPort, open_port
+from firmware_sim.ports.can_port import sound
 from firmware_sim.runner import BenchThread, run_real_time
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.mit import MODELS, encode_command
@@ -277,3 +279,9 @@ def test_unknown_buses_are_one_line(bus: str) -> None:
     with pytest.raises(SimError) as caught:
         open_port(bus)
     assert "\n" not in str(caught.value)
+
+
+def test_an_identifier_that_a_client_computed_with_numpy_is_one() -> None:
+    frame = sound(can.Message(arbitration_id=np.int64(0x17FFF01), is_extended_id=True, data=b"\x01"))
+    assert frame is not None
+    assert (frame.identifier, type(frame.identifier)) == (0x17FFF01, int)
