@@ -36,6 +36,7 @@ TESTS = {
         "tests/runtime/test_health_watch.py",
     ],
     "cablecomp.runtime.channel": [
+        "tests/runtime/test_channel_in_numbers.py",
         "tests/runtime/test_health_in_numbers.py",
         "tests/runtime/test_health_watch.py",
     ],
