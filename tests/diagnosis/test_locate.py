@@ -9,6 +9,7 @@ import pytest
 from planted import SIGMA, autoregressive, causes, columns, recording
 
 from cablecomp.diagnosis.locate.covariates import Covariates, covariates
+from cablecomp.diagnosis.locate.crossfit import FOLDS, block_sums, gains, surrogate_gains
 from cablecomp.diagnosis.locate.location import locate
 from cablecomp.diagnosis.locate.segments import segment
 from cablecomp.diagnosis.locate.series import make_series, thin
@@ -111,3 +112,41 @@ def test_thinning_keeps_means_and_recordings_apart() -> None:
 def test_a_residual_of_another_length_is_refused() -> None:
     with pytest.raises(InputError, match="same samples"):
         make_series(np.zeros(5), SIGMA, bench("sweep")[0])
+
+
+def rows_of_blocks() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Regressors, residual, weight and block (of uneven lengths) of 700 rows that depend on the first regressor."""
+    rng = np.random.default_rng(11)
+    block = np.sort(rng.integers(0, 13, 700))
+    basis = rng.standard_normal((700, 3)) * np.array([1.0, 20.0, 0.1])
+    residual = 0.8 * basis[:, 0] + rng.standard_normal(700)
+    return basis, residual, rng.uniform(0.5, 2.0, 700), block
+
+
+def test_a_surrogate_is_the_residual_with_the_signs_of_its_blocks() -> None:
+    """Its gain is that of rows fitted by NumPy, a thousandth of each regressor's energy as ridge; none flipped, or all,
+    leave the fit what it is."""
+    basis, residual, weight, block = rows_of_blocks()
+    sums = block_sums(basis, residual, weight, block)
+    signs = np.random.default_rng(2).choice([-1.0, 1.0], size=(6, sums.blocks))
+    signs[0], signs[1] = 1.0, -1.0
+    found = surrogate_gains(sums, signs)
+    assert found[:2] == pytest.approx([gains(sums).sum()] * 2, rel=1e-12)
+    expected = [gain_of_rows(basis, residual * flipped[block], weight, block) for flipped in signs]
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert np.ptp(found) > 0.1 * found[0]
+
+
+def gain_of_rows(basis: FloatArray, residual: FloatArray, weight: FloatArray, block: FloatArray) -> float:
+    """Energy that least squares on the rows of the other folds take off those of each fold."""
+    root = np.sqrt(weight)
+    rows, target = basis * root[:, None], residual * root
+    energy = np.sum(rows**2, axis=0)
+    ridge = np.diag(np.sqrt(1e-3 * energy + 1e-12 * energy.max()))
+    gain = 0.0
+    for fold in range(FOLDS):
+        here = block % FOLDS == fold
+        stacked = np.concatenate((rows[~here], ridge))
+        c = np.linalg.lstsq(stacked, np.concatenate((target[~here], np.zeros(len(ridge)))), rcond=None)[0]
+        gain += float(np.sum(target[here] ** 2) - np.sum((target[here] - rows[here] @ c) ** 2))
+    return gain
