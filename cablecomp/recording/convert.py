@@ -112,6 +112,7 @@ def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Blo
         parts = list(blocks)
         whole = {n: np.concatenate([b.columns[n] for b in parts]) for n in names} if parts else {}
         if ending == ".npz":
-            np.savez_compressed(path, **whole)  # type: ignore[arg-type]  # its stub takes `allow_pickle` for an array
+            # numpy's stub takes `**` for `allow_pickle`, a bool
+            np.savez_compressed(path, **whole)  # type: ignore[arg-type]
         else:
             write_parquet(path, whole)

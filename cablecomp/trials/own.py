@@ -94,7 +94,8 @@ def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
         folder = pieces / f"{k:05d}"
         folder.mkdir(parents=True, exist_ok=True)
         for n, table in enumerate(piece(own.recordings, wish.seconds, wish.seed, k), start=1):
-            np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]  # its stub takes no such names
+            # numpy's stub takes `**` for `allow_pickle`, a bool
+            np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]
     (pieces / JOINT_FILE).write_text(own.joint, encoding="utf-8")
     return own.conceal(pieces, wish.seed, own.out, lambda done, of: tell("concealing", done, of))
 

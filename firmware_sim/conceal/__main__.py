@@ -54,7 +54,8 @@ def _write(folder: Path, trial: Trial, joint: str) -> None:
     (folder / JOINT_FILE).write_text(joint, encoding="utf-8")
     for k, table in enumerate(trial.recordings, start=1):
         path = folder / "recordings" / f"recording-{k}.npz"
-        np.savez(path, **table)  # type: ignore[arg-type]  # numpy's stub takes `**` for `allow_pickle`, a bool
+        # numpy's stub takes `**` for `allow_pickle`, a bool
+        np.savez(path, **table)  # type: ignore[arg-type]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
