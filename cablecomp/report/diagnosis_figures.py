@@ -18,7 +18,11 @@ from cablecomp.signal.smoothing import FloatArray
 
 BEFORE: Final = style.RESIDUAL
 AFTER: Final = style.PREDICTED
-NAMED, WEAK, NOT = style.CABLE_L, style.WARN, style.translucent(style.BASELINE, 0.6)
+_OUTCOMES: Final = {
+    "named": style.CABLE_L,
+    "candidate": style.WARN,
+    "not needed": style.translucent(style.BASELINE, 0.6),
+}
 _MEASURED: Final = style.translucent(style.MEASURED, 0.45)
 _UNSEEN: Final = style.translucent(style.LOAD, 0.10)
 _TIME: Final = style.label("time", "s")
@@ -183,7 +187,7 @@ def tried(entries: Sequence[Tested], rounds: Mapping[str, int]) -> Any:
     """
     shown = sorted(entries, key=lambda t: (rounds[t.beside], -t.heldout_gain))[:_MOST_TRIED][::-1]
     fig = style.figure(96 + 24 * len(shown), margin={"l": 270, "r": 50, "t": 50, "b": 46})
-    for outcome, colour in (("named", NAMED), ("candidate", WEAK), ("not needed", NOT)):
+    for outcome, colour in _OUTCOMES.items():
         own = [t for t in shown if t.outcome == outcome]
         if own:
             fig.add_bar(
