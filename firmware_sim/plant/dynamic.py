@@ -214,11 +214,6 @@ class Plant:
         end["wall_loss"] = self.link.wall_loss_s_per_rad
 
     @property
-    def holding_torque_Nm(self) -> float:
-        """Motor torque at present, after limit and current loop."""
-        return self._torque
-
-    @property
     def iterations(self) -> int:
         """Solver iterations so far, for timing studies."""
         return int(self._joint.drive.surround["iterations"][0])

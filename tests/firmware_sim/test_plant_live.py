@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,9 +28,9 @@ LINK = LinkSpec(0.01)
 
 
 def hold(plant: Plant, target: float, readings: PlantReadings | None, stiffness: float) -> float:
-    """Torque of a stiff, well damped hold of the motor."""
+    """Torque of a stiff, well damped hold of the motor; none before its first reading."""
     if readings is None:
-        return plant.holding_torque_Nm
+        return 0.0
     truth = readings.truth
     damping = 2 * math.sqrt(stiffness * plant.motor.rotor_inertia_kgm2)
     return stiffness * (target - truth.motor_position_rad) - damping * truth.motor_velocity_rad_s
@@ -125,14 +126,15 @@ def test_motor_friction_limit_and_current_loop() -> None:
 
 
 def test_it_starts_at_rest_and_stays_there_under_its_holding_torque() -> None:
+    """A motor whose current loop never answers keeps the torque that it starts with."""
+    unanswering = replace(MOTOR, current_bandwidth_Hz=0.0)
     for config in (joint(), joint("open")):
-        plant = Plant(config, MOTOR, LinkSpec(0.01, gravity_Nm=0.5, gravity_phase_rad=math.pi / 2))
-        hold_torque = plant.holding_torque_Nm
-        seen = truths(plant, np.full(300, hold_torque))
+        plant = Plant(config, unanswering, LinkSpec(0.01, gravity_Nm=0.5, gravity_phase_rad=math.pi / 2))
+        seen = truths(plant, np.zeros(300))
         # weight pulls the joint back; the motor carries it, and in an open circuit the preload too
         s = config.stages[0]
         preload = -s.input_radius_m * s.pretension_N if config.circuit == "open" else 0.0
-        assert hold_torque == pytest.approx(0.5 * config.ratio + preload, rel=0.02)
+        assert seen[0].motor_torque_Nm == pytest.approx(0.5 * config.ratio + preload, rel=0.02)
         assert np.ptp([t.motor_position_rad for t in seen]) < 1e-3
         assert seen[-1].joint_torque_Nm == pytest.approx(-0.5, rel=0.01)
 
