@@ -11,7 +11,8 @@ import math
 from typing import NamedTuple
 
 from cablecomp.mechanics.jit import inner_kernel, kernel
-from cablecomp.mechanics.profile import STRAIGHT, Floats, Points, clear, piece
+from cablecomp.mechanics.piece import piece
+from cablecomp.mechanics.profile import STRAIGHT, Floats, Points, clear
 from cablecomp.mechanics.tables import ELSEWHERE, strain_of_tau, tau_of_v
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from cablecomp.mechanics.assemble import Model
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints, piece
+from cablecomp.mechanics.piece import piece
+from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints
 from cablecomp.mechanics.records import IN, OUT, WET_NODES
 from cablecomp.mechanics.tables import ELSEWHERE, HEAD, MODE, PLAIN, groove
 

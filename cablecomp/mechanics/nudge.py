@@ -11,7 +11,8 @@ from typing import Any
 
 from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
-from cablecomp.mechanics.profile import Points, piece_plain
+from cablecomp.mechanics.piece import piece_plain
+from cablecomp.mechanics.profile import Points
 from cablecomp.mechanics.records import IN, OUT
 
 SMALL = 1e-7  # greatest step, as a share of the tension and in rad

@@ -23,18 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.mechanics.jit import constant, inner_kernel, kernel, leaf_kernel
-from cablecomp.mechanics.tables import (
-    GROOVED,
-    HEAD,
-    MODE,
-    PLAIN,
-    STIFF,
-    STIFFENING,
-    between,
-    groove,
-    stiffening_strain,
-    strain,
-)
+from cablecomp.mechanics.piece import piece
+from cablecomp.mechanics.tables import between, groove
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
@@ -43,18 +33,6 @@ Points: TypeAlias = Any
 
 LEAST_WRAP = 1e-3  # [rad] of cable that a drum has to keep
 STRAIGHT = constant(2)  # points of a straight profile: its ends
-
-# Gauss-Legendre on [0, 1], of 3, 5 and 8 points
-_x, _w = np.polynomial.legendre.leggauss(8)
-GAUSS_X = (_x + 1.0) / 2.0
-GAUSS_W = _w / 2.0
-_x, _w = np.polynomial.legendre.leggauss(5)
-MIDDLE_X = (_x + 1.0) / 2.0
-MIDDLE_W = _w / 2.0
-_x, _w = np.polynomial.legendre.leggauss(3)
-SHORT_X = (_x + 1.0) / 2.0
-SHORT_W = _w / 2.0
-F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
 class Meet(NamedTuple):
@@ -83,89 +61,6 @@ def copy_floats(source: Floats, i: int, target: Floats, j: int, n: int) -> None:
     """target[j : j + n] = source[i : i + n], forwards and in place."""
     for k in range(n):
         target[j + k] = source[i + k]
-
-
-@leaf_kernel
-def piece(
-    laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
-) -> tuple[float, float]:
-    """Integral of e(v) over y1..y2 and of de/dv; e = strain * EA/T0 = tau - 1 for the plain cable, whose tau
-    are tau1, tau2."""
-    dy = y2 - y1
-    d = v2 - v1
-    if laws is None:
-        return piece_plain(dy, d, tau1, tau2)
-    if laws[0, HEAD, MODE] == PLAIN:
-        return piece_plain(dy, d, tau1, tau2)
-    if laws[0, HEAD, MODE] == STIFF:
-        return _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, d)
-    return piece_table(laws, law, y1, v1, y2, v2)
-
-
-@leaf_kernel
-def piece_plain(dy: float, d: float, tau1: float, tau2: float) -> tuple[float, float]:
-    """`piece` in closed form: exp(v) over a straight piece that rises by d."""
-    if abs(d) > 0.1:
-        grown = dy * (tau2 - tau1) / d
-    else:  # (1 - exp(-d))/d as a series: the difference of the exponentials would cancel
-        grown = dy * tau2 * (1.0 - d * (F2 - d * (F3 - d * (F4 - d * (F5 - d * (F6 - d * (F7 - d * F8)))))))
-    return grown - dy, grown
-
-
-@inner_kernel
-def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float]:
-    """`piece` for a cable that stiffens under plain friction: Gauss-Legendre quadrature, its error below 1e-13 of the
-    strain with 3 points on short pieces, with 5 on middling ones."""
-    if abs(d) < 0.05:
-        total, slope = _stiff_sums(SHORT_X, SHORT_W, b, v1, d)
-    elif abs(d) < 0.4:
-        total, slope = _stiff_sums(MIDDLE_X, MIDDLE_W, b, v1, d)
-    else:
-        total, slope = _stiff_sums(GAUSS_X, GAUSS_W, b, v1, d)
-    return total * dy, slope * dy
-
-
-@inner_kernel
-def _stiff_sums(x: Floats, weights: Floats, b: float, v1: float, d: float) -> tuple[float, float]:
-    """Weighted sums of e(v1 + d x) and of its derivative for the stiffening coefficient b."""
-    total = slope = 0.0
-    for j in range(len(x)):
-        tau = math.exp(v1 + d * x[j])
-        e, de = stiffening_strain(b, tau)
-        total += weights[j] * e
-        slope += weights[j] * de * tau
-    return total, slope
-
-
-@inner_kernel
-def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
-    """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no
-    place."""
-    dy = y2 - y1
-    d = v2 - v1
-    total = 0.0
-    slope = 0.0
-    if laws[law, HEAD, GROOVED] == 0.0:
-        if abs(d) < 0.05:
-            for j in range(3):
-                e, de = strain(laws, law, v1 + d * SHORT_X[j])
-                total += SHORT_W[j] * e
-                slope += SHORT_W[j] * de
-        else:
-            for j in range(8):
-                e, de = strain(laws, law, v1 + d * GAUSS_X[j])
-                total += GAUSS_W[j] * e
-                slope += GAUSS_W[j] * de
-        return total * dy, slope * dy
-    s1 = groove(laws, law, y1)
-    span = groove(laws, law, y2) - s1
-    for j in range(8):
-        y = y1 + dy * GAUSS_X[j]
-        share = (groove(laws, law, y) - s1) / span if span > 0.0 else 0.0
-        e, de = strain(laws, law, v1 + d * share)
-        total += GAUSS_W[j] * e
-        slope += GAUSS_W[j] * de
-    return total * dy, slope * dy
 
 
 @leaf_kernel
