@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from cablecomp.mechanics.drive import Drive, named
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.records import floats
 from cablecomp.mechanics.tables import ELSEWHERE, ON_H, ON_L
+
+Row: TypeAlias = tuple[Any, ...]
+"""A record by the order of its fields."""
 
 BEFORE_NODES = 8  # numbers of a grid before its nodes
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
@@ -45,6 +48,32 @@ def assemble(config: JointConfig, change: Change | None = None) -> Model:
     """Arrays of the joint in `config` with the physics of `change`; raises InputError for pretensions that
     cannot settle."""
     extra = change or Change()
+    circuits, chains = _circuits(config)
+    cables = [row for sign, group in chains for row in _chain(group, sign, config, extra)]
+    size = _places(len(circuits), len(cables), config.observer.max_pieces, extra)
+    fixed = np.concatenate(
+        [
+            np.array(circuits, records.CIRCUIT).view("f8"),
+            np.array(cables, records.CABLE).view("f8"),
+            [parameter for term in extra.terms for parameter in term.parameters],
+            _sensor(config),
+        ]
+    )
+    layout = np.concatenate(
+        [
+            np.array([_row(records.SIZES, **size)], records.SIZES).view("i8"),
+            np.array(_terms(extra, size), records.TERM).view("i8"),
+        ]
+    )
+    memory = np.zeros(size["spare_at"] + size["steps_at"])
+    context = memory[size["context_at"] : size["filter_at"]].view(records.CONTEXT)
+    context["radius"] = config.drive.stage[-1].output_radius_m
+    heights = np.zeros(size["stacks"], dtype=np.int64)
+    return Model(fixed, layout, memory, heights, law_tables(extra, config))
+
+
+def _circuits(config: JointConfig) -> tuple[list[Row], list[tuple[float, list[Stage]]]]:
+    """Records of the circuits in series, and the chains of cables in them, each with its sign."""
     stages = config.drive.stage
     closed = int(config.drive.circuit == "closed")
     chained = closed == 0 or config.drive.arrangement == "parallel"
@@ -52,8 +81,8 @@ def assemble(config: JointConfig, change: Change | None = None) -> Model:
     ratios = ratios_to_last(stages)
     if chained:
         _check_pretensions(config, ratios)
-    rows = []
-    chains: list[tuple[float, list[Stage]]] = []  # of cables, each with its sign
+    rows: list[Row] = []
+    chains: list[tuple[float, list[Stage]]] = []
     first = 0
     for group, ratio in zip(groups, ratios, strict=False):
         rows.append(
@@ -70,79 +99,68 @@ def assemble(config: JointConfig, change: Change | None = None) -> Model:
         )
         chains += [(1.0, group), (-1.0, group)][: 1 + closed]
         first += len(group) * (1 + closed)
-    circuits = np.array(rows, records.CIRCUIT)
-    cables = np.array(
-        [row for sign, group in chains for row in _chain(group, sign, config, extra)], records.CABLE
-    )
-    sensor = _row(
+    return rows, chains
+
+
+def _places(circuits: int, cables: int, capacity: int, extra: Change) -> dict[str, int]:
+    """How much there is of everything, and where it begins in the flat arrays: the fields of `records.SIZES`."""
+    stacks = (3 if extra.guide_angle > 0.0 else 2) * cables
+    grids = 2 * cables if extra.viscous_Ns_per_m_rad > 0.0 else 0
+    # without grids the room of their heads is left, as snapshots have it
+    grids_room = grids * floats(records.GRID) if grids else 2 * cables * BEFORE_NODES
+    cables_at = circuits * floats(records.CIRCUIT)
+    parameters_at = cables_at + cables * floats(records.CABLE)
+    context_at = cables * floats(records.STATE)
+    filter_at = context_at + floats(records.CONTEXT)
+    grids_at = filter_at + floats(records.FILTER) + sum(term.state_size for term in extra.terms)
+    steps_at = grids_at + grids_room
+    profiles_at = steps_at + 2 * cables * floats(records.STEP)
+    return {
+        "circuits": circuits,
+        "cables": cables,
+        "stacks": stacks,
+        "terms": len(extra.terms),
+        "capacity": capacity,
+        "grids": grids,
+        "cables_at": cables_at,
+        "sensor_at": parameters_at + sum(len(term.parameters) for term in extra.terms),
+        "context_at": context_at,
+        "filter_at": filter_at,
+        "grids_at": grids_at,
+        "steps_at": steps_at,
+        "profiles_at": profiles_at,
+        "spare_at": profiles_at + stacks * capacity * floats(records.POINT),
+    }
+
+
+def _terms(extra: Change, size: Mapping[str, int]) -> list[Row]:
+    """Records of the terms, their parameters one behind the other before the sensor, their states before the grids."""
+    parameters_at = size["cables_at"] + size["cables"] * floats(records.CABLE)
+    state_at = size["filter_at"] + floats(records.FILTER)
+    rows = []
+    for term in extra.terms:
+        rows.append(_row(records.TERM, address=term.address, parameters_at=parameters_at, state_at=state_at))
+        parameters_at += len(term.parameters)
+        state_at += term.state_size
+    return rows
+
+
+def _sensor(config: JointConfig) -> Row:
+    """Record of the torque sensor and of the input filter."""
+    return _row(
         records.SENSOR,
         gain=config.sensors.joint_torque_gain,
         offset=config.sensors.joint_torque_offset_Nm,
         cutoff=2.0 * np.pi * config.observer.input_filter_Hz,
     )
-    n = len(cables)
-    stacks = (3 if extra.guide_angle > 0.0 else 2) * n
-    capacity = config.observer.max_pieces
-    grids = 2 * n if extra.viscous_Ns_per_m_rad > 0.0 else 0
-    cables_at = len(circuits) * floats(records.CIRCUIT)
-    parameters_at = cables_at + n * floats(records.CABLE)
-    context_at = n * floats(records.STATE)
-    filter_at = context_at + floats(records.CONTEXT)
-    states_at = filter_at + floats(records.FILTER)
-    calls: list[tuple[Any, ...]] = []
-    parameters: list[float] = []
-    grids_at = states_at
-    for term in extra.terms:
-        calls.append(
-            _row(
-                records.TERM,
-                address=term.address,
-                parameters_at=parameters_at + len(parameters),
-                state_at=grids_at,
-            )
-        )
-        parameters += term.parameters
-        grids_at += term.state_size
-    # without grids the room of their heads is left, as snapshots have it
-    steps_at = grids_at + (grids * floats(records.GRID) if grids else 2 * n * BEFORE_NODES)
-    profiles_at = steps_at + 2 * n * floats(records.STEP)
-    spare_at = profiles_at + stacks * capacity * floats(records.POINT)
-    size = _row(
-        records.SIZES,
-        circuits=len(circuits),
-        cables=n,
-        stacks=stacks,
-        terms=len(calls),
-        capacity=capacity,
-        grids=grids,
-        cables_at=cables_at,
-        sensor_at=parameters_at + len(parameters),
-        context_at=context_at,
-        filter_at=filter_at,
-        grids_at=grids_at,
-        steps_at=steps_at,
-        profiles_at=profiles_at,
-        spare_at=spare_at,
-    )
-    memory = np.zeros(spare_at + steps_at)
-    memory[context_at:filter_at].view(records.CONTEXT)["radius"] = stages[-1].output_radius_m
-    return Model(
-        np.concatenate([circuits.view("f8"), cables.view("f8"), parameters, sensor]),
-        np.concatenate(
-            [np.array([size], records.SIZES).view("i8"), np.array(calls, records.TERM).view("i8")]
-        ),
-        memory,
-        np.zeros(stacks, dtype=np.int64),
-        law_tables(extra, config),
-    )
 
 
-def _row(record: np.dtype[Any], **values: Any) -> tuple[Any, ...]:
+def _row(record: np.dtype[Any], **values: Any) -> Row:
     """One record by the names of its fields; setting them one by one in numpy's records took most of the time."""
     return tuple(values[name] for name in record.names or ())
 
 
-def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Change) -> list[tuple[Any, ...]]:
+def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Change) -> list[Row]:
     """Records of the cables of one chain, input side first."""
     last = group[-1]
     return [
