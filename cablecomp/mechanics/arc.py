@@ -138,19 +138,19 @@ def arc_commit(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float)
         if near < p[k].y < far:
             keep_from = min(keep_from, k)
             keep_to = k
-    tail = max(keep_to - keep_from + 1, 0)
-    lead = 1 + (1 if near > 0.0 else 0)
-    shift = lead - keep_from
-    if tail > 0 and shift <= 0:
+    kept = max(keep_to - keep_from + 1, 0)
+    kept_at = 1 + (1 if near > 0.0 else 0)
+    shift = kept_at - keep_from
+    if kept > 0 and shift <= 0:
         for k in range(keep_from, keep_to + 1):
             _copy(p, k, k + shift)
-    elif tail > 0:
+    elif kept > 0:
         for k in range(keep_to, keep_from - 1, -1):
             _copy(p, k, k + shift)
     _put(p, 0, 0.0, v1)
     if near > 0.0:
         _put(p, 1, near, v1 - s1 * mu * near)
-    m = lead + tail
+    m = kept_at + kept
     if far < width and (far > near or near == 0.0):
         if far > p[m - 1].y:
             _put(p, m, far, v2 - s2 * mu * (width - far))

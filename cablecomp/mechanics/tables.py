@@ -26,10 +26,10 @@ Floats: TypeAlias = NDArray[np.float64]
 SIZE = 4096
 LEAST_U, MOST_U = -7.0, 2.5
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
-ON_H, ON_L, ELSEWHERE = map(
-    constant, range(3)
-)  # laws: of the joint's own drum in chain h and l, of all other places
-HEAD, U_OF_V, G_OF_Y, V_OF_U = map(constant, range(4))  # rows
+# laws: of the joint's own drum in chain h and l, of all other places
+ON_H, ON_L, ELSEWHERE = constant(0), constant(1), constant(2)
+# rows
+HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3)
 (
     MODE,
     V_LOW, V_STEP,  # grids: their first value, and from one to the next
