@@ -15,7 +15,7 @@ from cablecomp.thesis.closed_forms import open as open_
 from cablecomp.thesis.closed_forms.stage import EquivalentStage, WrapShare, effective_mu
 
 R, SMALL, L, EA, T0, MU_R, MU_r = 0.04, 0.015, 0.03, 2.5e4, 60.0, 0.12, 0.18
-MU = effective_mu(R, SMALL, MU_R, MU_r)
+MU = effective_mu(SMALL / R, MU_R, MU_r)
 GFS = [0.0, 1e-6, 0.006, 0.1, 1.0, 3.0, 10.0, 1e4]
 
 

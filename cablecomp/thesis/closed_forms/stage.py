@@ -76,9 +76,9 @@ class EquivalentStage:
         return replace(self, mu_eff=self.mu_eff * factor, wraps=wraps)
 
 
-def effective_mu(output_radius_m: float, input_radius_m: float, mu_output: float, mu_input: float) -> float:
-    """Effective coefficient of friction of two pulleys, 1/mu_eff = 1/mu_R + (r/R)/mu_r (3-8)."""
-    return 1.0 / (1.0 / mu_output + input_radius_m / output_radius_m / mu_input)
+def effective_mu(ratio: float, mu_output: float, mu_input: float) -> float:
+    """Effective coefficient of friction of two pulleys of `ratio` r/R, 1/mu_eff = 1/mu_R + (r/R)/mu_r (3-8)."""
+    return 1.0 / (1.0 / mu_output + ratio / mu_input)
 
 
 def settled_pretensions_N(drive: Drive) -> Array:
@@ -92,7 +92,7 @@ def settled_pretensions_N(drive: Drive) -> Array:
 
 def equivalent_of(stage: Stage) -> EquivalentStage:
     """One stage as the closed forms need it, with its finite wraps."""
-    mu = effective_mu(stage.output_radius_m, stage.input_radius_m, stage.mu_output, stage.mu_input)
+    mu = effective_mu(stage.ratio, stage.mu_output, stage.mu_input)
     return EquivalentStage(
         stage.output_radius_m,
         stage.free_length_m,
@@ -101,10 +101,7 @@ def equivalent_of(stage: Stage) -> EquivalentStage:
         mu,
         (
             WrapShare(mu / stage.mu_output, stage.mu_output * stage.wrap_output_rad),
-            WrapShare(
-                mu * stage.input_radius_m / stage.output_radius_m / stage.mu_input,
-                stage.mu_input * stage.wrap_input_rad,
-            ),
+            WrapShare(mu * stage.ratio / stage.mu_input, stage.mu_input * stage.wrap_input_rad),
         ),
     )
 
