@@ -8,7 +8,7 @@ InputError, with the words of the command line; what hardly fits the drive stand
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -23,6 +23,7 @@ from cablecomp.diagnosis.body import Sessions
 from cablecomp.diagnosis.calibrate import Calibration
 from cablecomp.diagnosis.calibrate import calibrate as _calibrate
 from cablecomp.diagnosis.diagnose import diagnose as _diagnose
+from cablecomp.diagnosis.pace import Progress
 from cablecomp.diagnosis.result import Diagnosis, report_json
 from cablecomp.estimation.belief import Suspicion, suspicions
 from cablecomp.estimation.standing import as_it_stood
@@ -35,7 +36,6 @@ from cablecomp.recording.replay_summary import ReplaySummary
 from cablecomp.recording.table import FloatArray
 from cablecomp.report import style
 
-Progress = Callable[[str, float], None]
 Mapped = ColumnMap | Path | str | None
 """What foreign columns mean: a mapping, its file, or words such as `joint_torque_Nm=tau,sign=-1`."""
 

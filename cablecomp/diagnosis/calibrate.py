@@ -6,7 +6,7 @@ nominal, and its tolerance, and it is said why and which motion would tell it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from time import monotonic
@@ -21,6 +21,7 @@ from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.calibration.every_sample import on_every_sample
 from cablecomp.diagnosis.calibration.motion import Advice, what_would_tell
 from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Value
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
@@ -34,8 +35,6 @@ TIED = 0.9
 """Correlation from which on two values are said to be known only together."""
 
 OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure"
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -85,19 +84,15 @@ def calibrate(
 
     Raises InputError for recordings that lack a channel or that the nominal joint cannot follow.
     """
-    end = monotonic() + budget_s
-
-    def in_time() -> bool:
-        return monotonic() < end
-
-    progress("cleaning the recordings", 0.0)
+    pace = Pace(progress, monotonic() + budget_s)
+    pace.tell("cleaning the recordings", 0.0)
     body = gather_body(config, recordings, sessions)
-    progress("a quick fit on thinned rows", 0.1)
+    pace.tell("a quick fit on thinned rows", 0.1)
     drive = calibrate_drive(config, _everything(body), np.random.default_rng(seed))
-    progress("the fit on every sample", 0.3)
-    fit = on_every_sample(drive, recordings, in_time)
-    cut = () if in_time() else (OUT_OF_TIME.format(budget_s),)
-    progress("what could not be told", 0.9)
+    pace.tell("the fit on every sample", 0.3)
+    fit = on_every_sample(drive, recordings, pace)
+    cut = (OUT_OF_TIME.format(budget_s),) if pace.over else ()
+    pace.tell("what could not be told", 0.9)
     unknown = _not_told(fit)
     spread, tied = _spread(fit), _tied(fit)
     fit = _without(fit, tuple(unknown))

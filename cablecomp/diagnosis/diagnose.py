@@ -30,7 +30,6 @@ from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.model import Model, Term, bears, placed, stripped
-from cablecomp.diagnosis.explain.pace import Pace, Progress
 from cablecomp.diagnosis.explain.scores import Groups, left_out, make_groups
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
@@ -39,6 +38,7 @@ from cablecomp.diagnosis.locate.location import Location, locate
 from cablecomp.diagnosis.locate.remainders import covariates_of, sensitivities, series_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
 from cablecomp.diagnosis.locate.series import Series
+from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Diagnosis, Errors, Law
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError

@@ -9,7 +9,7 @@ such an error lasts as long as the deflection does, and is counted so, beside wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from cablecomp.diagnosis.body import Columns
 from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.pace import Pace
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, gather
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
@@ -33,13 +34,11 @@ SPIKE: Final = 8.0
 """Sensor noises beyond which a raw reading is left cleaned."""
 
 
-def on_every_sample(
-    drive: Calibrated, recordings: Mapping[str, Columns], in_time: Callable[[], bool] = lambda: True
-) -> Fit:
-    """The drive's fit, carried on from where it is on all samples (canonical channels, by name), or as far as `in_time`
-    lets it: it is asked before each of the steps."""
+def on_every_sample(drive: Calibrated, recordings: Mapping[str, Columns], pace: Pace) -> Fit:
+    """The drive's fit, carried on from where it is on all samples (canonical channels, by name), or as far as the pace
+    lets it: each step begins only in time."""
     floor = Weighing(dict.fromkeys(drive.fit.problem.channels, 1e-12), drive.floor.zero_sd)
-    if not in_time():
+    if pace.over:
         return settled(drive.fit, floor)
     total = sum(len(c["time_s"]) for c in recordings.values())
     group = max(1, -(-total // MOST))
@@ -48,7 +47,7 @@ def on_every_sample(
     raw = [_with_raw_inputs(e, recordings[e.name], group) for e in cleaned]
     best: Fit | None = None
     for evidence in (cleaned, raw):
-        if best is not None and not in_time():
+        if best is not None and pace.over:
             break
         try:
             fit = solve(thin.with_evidence(evidence).finely(), drive.fit.x, 6)
@@ -58,7 +57,7 @@ def on_every_sample(
             best = fit
     if best is None:
         return drive.fit
-    return settled(best, floor, 2 if in_time() else 1)
+    return settled(best, floor, 1 if pace.over else 2)
 
 
 def settled(fit: Fit, floor: Weighing, times: int = 1) -> Fit:

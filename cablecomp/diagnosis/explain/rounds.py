@@ -15,7 +15,6 @@ from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, is_told, loss, placed
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
-from cablecomp.diagnosis.explain.pace import Pace
 from cablecomp.diagnosis.explain.scores import (
     Groups,
     demanded,
@@ -25,6 +24,7 @@ from cablecomp.diagnosis.explain.scores import (
     selected_in,
 )
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
+from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import MOTOR

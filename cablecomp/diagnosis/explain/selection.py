@@ -22,10 +22,10 @@ from cablecomp.diagnosis.explain.model import (
     searching,
     without,
 )
-from cablecomp.diagnosis.explain.pace import Pace
 from cablecomp.diagnosis.explain.rounds import cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.screening import Answer
+from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.problem import Weighing

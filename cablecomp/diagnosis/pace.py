@@ -1,4 +1,4 @@
-"""How long a search may go on, and who is told how far it is."""
+"""How long a diagnosis or a calibration may go on, and who is told how far it is."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Pace:
-    """A search's progress and its end by the monotonic clock [s]; after that nothing further is begun."""
+    """Its progress and its end by the monotonic clock [s]; after that nothing further is begun."""
 
     tell: Progress
     end_s: float = inf
