@@ -25,7 +25,7 @@ from cablecomp.diagnosis.answer.said import (
 )
 from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body, spread
-from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
+from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive, without_history
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
@@ -70,7 +70,7 @@ def diagnose(
     body = gather_body(config, recordings, sessions)
     progress("calibrating the drive", 0.02)
     drive = calibrate_drive(config, body.used, rng)
-    body = replace(body, final=_from_where(body, drive.fit.problem.evidence))
+    body = replace(body, final=_from_where(body, drive.fit))
     seen = [covariates_of(config, e) for e in drive.fit.problem.evidence]
     before = series_of(drive.fit, seen, drive.floor_rad)
     location = locate(before, rng, sensitivities(drive.fit))
@@ -161,12 +161,9 @@ def diagnose(
 # --- steps ------------------------------------------------------------------------------------------------------------
 
 
-def _from_where(body: Body, cut: Sequence[Evidence]) -> tuple[Evidence, ...]:
-    """The recordings kept for the end, counted from where the ones used are: a full swing in."""
-    if body.final_by == "block":
-        return body.final
-    first = int(np.median([int(np.argmax(e.counted[JOINT])) for e in cut]))
-    return tuple(e.counting_from(min(first, len(e.rows) // 2)) for e in body.final)
+def _from_where(body: Body, fit: Fit) -> tuple[Evidence, ...]:
+    """The recordings kept for the end, counted from where their pasts are forgotten, as the ones used are."""
+    return body.final if body.final_by == "block" else tuple(without_history(fit, body.final)[0])
 
 
 def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:

@@ -44,7 +44,8 @@ class Parameter:
     `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where
     a scale is given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`:
     a diagnosis leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in
-    the parameter's unit, is what the law can take; beyond it a configuration is refused.
+    the parameter's unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a
+    configuration leaves it out (None: it has to be given).
     """
 
     name: str
@@ -59,6 +60,7 @@ class Parameter:
     scale: Callable[[JointConfig], float] | None = None
     minimum: float = -math.inf
     maximum: float = math.inf
+    omitted: float | None = None
 
     @property
     def shape(self) -> bool:

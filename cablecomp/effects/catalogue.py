@@ -143,7 +143,7 @@ def _look_up(name: str) -> Effect:
 def _values(effect: Effect, entry: EffectEntry, config: JointConfig) -> dict[str, float]:
     """The parameters of one entry, complete and finite; a channel becomes its place among the others."""
     allowed = {p.name for p in effect.parameters} | set(effect.texts)
-    values: dict[str, float] = {}
+    values = {p.name: p.omitted for p in effect.parameters if p.omitted is not None}
     for key, value in entry.parameters.items():
         if key not in allowed:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Clock skew: the joint encoder's readings are stamped late (or early) against the other channels."""
+"""Clock skew: the joint encoder's or the torque's readings are stamped late (or early) against the other channels."""
 
 from __future__ import annotations
 
@@ -13,19 +13,25 @@ SLOTS = 256
 STEPS_PER_DELAY = 200.0
 
 
-@term(parameters=("delay",), state=("count", "newest", "cursor", ("times", SLOTS), ("readings", SLOTS)))
+@term(
+    parameters=("delay", "of_load"),
+    state=("count", "newest", "cursor", ("times", SLOTS), ("readings", SLOTS)),
+)
 def _look_back(c: Any, p: Any, s: Any) -> None:
-    """p: delay [s]; s: count, place of the newest, of the last one read, times and readings in a ring.
+    """p: delay [s], whether of the deflection alone; s: count, place of the newest, of the last one read, times and
+    readings in a ring.
 
-    Positive delay: straight interpolation of the past; before the first sample, that one. Negative delay:
-    straight on by the mean velocity over a delay's length, which hardly amplifies noise.
+    Positive delay: straight interpolation of the past; before the first sample, that one. Negative delay: straight
+    on by the mean velocity over a delay's length, which hardly amplifies noise. A torque that is stamped late gives
+    the right tensions late: the deflection is carried on as an early reading is. Were the torque itself carried on,
+    each of its corners would leave a bump that never was.
     """
     span = abs(p.delay)
     if span == 0.0:
         return
     times, readings = s.times, s.readings
     now = c.time
-    value = c.joint + c.reading
+    value = c.joint + c.reading if p.of_load == 0.0 else c.joint - c.rigid * c.motor
     count, newest, cursor = int(s.count), int(s.newest), int(s.cursor)
     wanted = now - span
     past, past_time = value, now
@@ -56,14 +62,16 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_look_back(delay=values["delay_s"]))
+    of_load, of_joint = -values["load_delay_s"], values["delay_s"]
+    terms = _look_back(delay=of_load, of_load=1.0) if of_load else ()
+    return Change(terms=(*terms, *(_look_back(delay=of_joint, of_load=0.0) if of_joint else ())))
 
 
 EFFECT = Effect(
     id="clock_skew",
-    statement="The joint encoder's samples are stamped late against motor and torque: what is read now was "
-    "true a moment ago.",
-    equation="joint(t) = joint_true(t - Δ)",
+    statement="Channels are stamped late against each other, or filtered: what the joint encoder or the torque sensor "
+    "reads now was true a moment ago.",
+    equation="joint(t) = joint_true(t - Δ), M(t) = M_true(t - Δ_M)",
     source="pure delay between channels; a negative one is met by extrapolation along the last Δ",
     parameters=(
         Parameter(
@@ -76,8 +84,19 @@ EFFECT = Effect(
             minimum=-1.0,
             maximum=1.0,
         ),
+        Parameter(
+            "load_delay_s",
+            "s",
+            0.0,
+            -0.1,
+            0.1,
+            "Δ_M, positive if the torque's stamps are late; 0 if left out",
+            minimum=-1.0,
+            maximum=1.0,
+            omitted=0.0,
+        ),
     ),
-    acts_through=("velocity",),
+    acts_through=("velocity", "load_rate"),
     bounded=False,
     change=_change,
     rank=100,

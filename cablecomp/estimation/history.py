@@ -1,6 +1,6 @@
 """What the history before the first sample, which nobody recorded, may still do to a prediction.
 
-The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke);
+The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke, both);
 rows count from where these runs agree but for a constant, and how far the constants differ is how far a
 recording's zero may depart from its session's. What they still differ by from there on is estimated with the
 zeros, each with a prior.
@@ -8,8 +8,9 @@ zeros, each with a prior.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,8 +20,8 @@ from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
 
-CUTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
-"""Shares of a recording that may be given up."""
+CUTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)
+"""Shares of a recording that may be given up: what lasts longer is estimated."""
 LEG = 12
 """Rows of one leg of an assumed past."""
 FAINT = 0.02
@@ -39,22 +40,53 @@ class Forgotten:
     past: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
-def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
-    """Assumed pasts (motor angle, load): to the greatest load seen and back either way, in from either end of
-    the stroke."""
-    motor = recording.columns["motor_position_rad"]
-    load = np.broadcast_to(
-        np.asarray(load_of(problem.config, recording.columns), dtype=np.float64), motor.shape
+@dataclass(frozen=True)
+class Reach:
+    """How far the joint has been or may have been: motor angles [rad], greatest load either way [N m]."""
+
+    low_rad: float
+    high_rad: float
+    load_Nm: float
+
+
+def reaches(problem: Problem) -> tuple[Reach, ...]:
+    """As far as any of the recordings goes, and, where that is further, as the joint's limits let it."""
+    motors = [e.columns["motor_position_rad"] for e in problem.evidence]
+    loads = [load_of(problem.config, e.columns) for e in problem.evidence]
+    seen = Reach(
+        min(float(np.min(q)) for q in motors),
+        max(float(np.max(q)) for q in motors),
+        max(float(np.max(np.abs(m))) for m in loads),
     )
-    q, m = float(motor[0]), float(load[0])
-    top = float(np.max(np.abs(load)))
-    for side in (top, -top):
-        if top > 0.0 and side != m:
-            legs = np.concatenate([np.linspace(0.0, side, LEG), np.linspace(side, m, LEG)])
-            yield np.column_stack((np.full(len(legs), q), legs))
-    for end in (float(motor.max()), float(motor.min())):
-        if abs(end - q) > 1e-9:
-            yield np.column_stack((np.linspace(end, q, 2 * LEG), np.full(2 * LEG, m)))
+    limits = problem.config.limits
+    low, high, most = limits.motor_position_min_rad, limits.motor_position_max_rad, limits.joint_torque_max_Nm
+    allowed = Reach(
+        min(seen.low_rad, seen.low_rad if low is None else low),
+        max(seen.high_rad, seen.high_rad if high is None else high),
+        max(seen.load_Nm, most or 0.0) if seen.load_Nm > 0.0 else 0.0,
+    )
+    return (seen,) if allowed == seen else (seen, allowed)
+
+
+def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
+    """Assumed pasts (motor angle, load) of a recording: loaded as far as it goes and back, either way; in from
+    either end of the stroke; loaded at that end and wound in under load; loaded, wound there and back."""
+    q = float(recording.columns["motor_position_rad"][0])
+    m = float(np.ravel(load_of(problem.config, recording.columns))[0])
+    for reach in reaches(problem):
+        loads = [side for side in (reach.load_Nm, -reach.load_Nm) if reach.load_Nm > 0.0 and side != m]
+        ends = [end for end in (reach.high_rad, reach.low_rad) if abs(end - q) > 1e-9]
+        for side in loads:
+            yield _path([(q, 0.0), (q, side), (q, m)])
+        for end in ends:
+            yield _path([(end, m), (q, m)])
+            for side in loads:
+                yield _path([(end, 0.0), (end, side), (q, side), (q, m)])
+                yield _path([(q, 0.0), (q, side), (end, side), (q, m)])
+
+
+def _path(corners: Sequence[tuple[float, float]]) -> FloatArray:
+    return np.concatenate([np.linspace(a, b, LEG) for a, b in pairwise(corners)])
 
 
 def full_swing(problem: Problem, recording: Evidence, most: float) -> int:

@@ -231,25 +231,25 @@ class Problem:
 
     def left(self, x: FloatArray, channel: str = JOINT, own_zero: bool = True) -> list[FloatArray]:
         """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions') taken off."""
-        misfits, zeros = self.misfits(x)[channel], self.zeros(x)[channel]
-        pasts = self._pasts(channel, self.bases[channel].solve(self._rows(channel, misfits)))
+        misfits, zeros, pasts = self.misfits(x)[channel], self.zeros(x)[channel], self.pasts(x, channel)
         parts = []
-        for r, m, past in zip(self.evidence, misfits, pasts, strict=True):
+        for r, m in zip(self.evidence, misfits, strict=True):
             zero = zeros[r.name if own_zero else r.session]
             line = zero[0] + (zero[1] * r.at_rows("motor_position_rad") if len(zero) > 1 else 0.0)
-            parts.append(m - line - past)
+            parts.append(m - line - pasts[r.name])
         return parts
 
-    def _pasts(self, channel: str, solved: FloatArray) -> list[FloatArray]:
-        """What each recording's past adds to its judged rows."""
+    def pasts(self, x: FloatArray, channel: str = JOINT) -> dict[str, FloatArray]:
+        """What each recording's past adds to its judged rows, by name, in the channel's unit."""
+        solved = self.bases[channel].solve(self._rows(channel, self.misfits(x)[channel]))
         first = (2 if channel == MOTOR else 1) * len(self.sessions) + (
             len(self.evidence) if self.departs else 0
         )
-        found = []
+        found = {}
         for r in self.evidence:
             columns = r.past.get(channel) if channel in r.counted else None
             count = 0 if columns is None else columns.shape[1]
-            found.append(
+            found[r.name] = (
                 np.zeros(len(r.rows)) if columns is None else columns @ solved[first : first + count]
             )
             first += count

@@ -124,7 +124,7 @@ def test_effects_at_their_neutral_value_cost_nothing() -> None:
 def test_covariates_of_crosstalk_name_its_channel() -> None:
     rich = with_effects(joint(), [("crosstalk", LEAK), ("clock_skew", {"delay_s": 0.0})])
     assert acts_through(rich.effect[0]) == ("other:neighbour_Nm",)
-    assert acts_through(rich.effect[1]) == ("velocity",)
+    assert acts_through(rich.effect[1]) == ("velocity", "load_rate")
 
 
 def test_bounds_are_promised_only_where_order_is_preserved() -> None:

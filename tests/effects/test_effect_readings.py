@@ -91,6 +91,44 @@ def test_an_early_encoder_is_met_by_going_straight_on() -> None:
     assert np.abs(error[20:-20]).max() <= 1.1 * acceleration * 0.01**2
 
 
+@pytest.mark.parametrize("moving", [0.0, 0.4])
+def test_a_late_torque_is_met_by_carrying_the_deflection_on(moving: float) -> None:
+    """What a torque read late makes of the joint, against the joint under the torque as it was."""
+    config, delay = joint(), 0.05
+    time = np.linspace(0.0, 16.0, 3200)
+    load = lambda t: 1.2 * np.arcsin(np.sin(1.6 * t))  # noqa: E731  corners, as a crane's test course has them
+    motor = moving * np.sin(1.2 * time)
+    true = run(config, still(time, load(time), motor=motor))["joint_position_rad"]
+    columns = still(time, load(time - delay), motor=motor)
+    plain = run(config, columns)["joint_position_rad"]
+    late_load = ("clock_skew", {"delay_s": 0.0, "load_delay_s": delay})
+    found = run(config, columns, late_load)["joint_position_rad"]
+    later = time > 4.0
+    assert np.std((found - true)[later]) < 0.4 * np.std((plain - true)[later])
+    assert found[later] == pytest.approx(true[later], abs=1.2 * np.abs(plain - true)[later].max())
+
+
+def test_a_late_torque_leaves_nothing_where_the_load_rests() -> None:
+    """No corner of the torque leaves a bump that was not there."""
+    config = joint()
+    time = np.linspace(0.0, 3.0, 600)
+    columns = still(time, np.minimum(5.0 * time, 1.0))
+    found = run(config, columns, ("clock_skew", {"delay_s": 0.0, "load_delay_s": 0.05}))["joint_position_rad"]
+    plain = run(config, columns)["joint_position_rad"]
+    assert found[time > 0.3] == pytest.approx(plain[time > 0.3], abs=1e-14)
+    assert np.abs(found - plain)[time < 0.2].max() > 1e-5
+
+
+def test_a_delay_of_the_torque_may_be_left_out() -> None:
+    config = joint()
+    columns = excitation(config, 300)
+    both = {"delay_s": 0.02, "load_delay_s": 0.0}
+    one, two = (
+        run(config, columns, ("clock_skew", v))["joint_position_rad"] for v in ({"delay_s": 0.02}, both)
+    )
+    assert np.array_equal(one, two)
+
+
 def test_a_resting_joint_does_not_show_its_clock() -> None:
     config = joint()
     time = np.linspace(0.0, 1.0, 200)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from turning import JOINT, recorded
 
-from cablecomp.config import with_values
+from cablecomp.config import JointConfig, Limits, with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.least_squares import covariance, solve, weighed
@@ -19,6 +19,7 @@ from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
 SIGMA, SPREAD = 2e-5, 1e-4
+UNLIMITED = JOINT.model_copy(update={"limits": Limits()})
 ANGLE = "joint_position_rad"
 
 
@@ -35,8 +36,8 @@ def three() -> tuple[Evidence, ...]:
     )
 
 
-def problem(parts: tuple[Evidence, ...], spread: float = SPREAD) -> Problem:
-    return Problem(JOINT, of_drive(JOINT), parts, Weighing({ANGLE: SIGMA}, {ANGLE: spread} if spread else {}))
+def problem(parts: tuple[Evidence, ...], spread: float = SPREAD, joint: JointConfig = JOINT) -> Problem:
+    return Problem(joint, of_drive(joint), parts, Weighing({ANGLE: SIGMA}, {ANGLE: spread} if spread else {}))
 
 
 def test_zeros_projected_out_are_those_of_an_explicit_least_squares_fit(three: tuple[Evidence, ...]) -> None:
@@ -133,23 +134,27 @@ def test_coordinates_turn_into_values_and_back(p: Parameter) -> None:
     assert p.value(p.x(2.0 * p.high)) == pytest.approx(p.high)
 
 
-def held(load: FloatArray) -> dict[str, FloatArray]:
-    """A load course with the motor at rest."""
-    time = 0.02 * np.arange(len(load))
-    columns = {"time_s": time, "motor_position_rad": np.zeros(len(load)), "joint_torque_Nm": load}
+def moved(motor: FloatArray, load: FloatArray) -> dict[str, FloatArray]:
+    """A course of motor angles and loads, the joint's angle without noise."""
+    columns = {"time_s": 0.02 * np.arange(len(load)), "motor_position_rad": motor, "joint_torque_Nm": load}
     return {**columns, "joint_position_rad": Observer(JOINT).run(columns)["joint_position_rad"]}
 
 
+def held(load: FloatArray) -> dict[str, FloatArray]:
+    """A load course with the motor at rest."""
+    return moved(np.zeros(len(load)), load)
+
+
 def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_as_ever() -> None:
-    """Return-point memory: a swing to both extremes wipes out every smaller one before it."""
-    ramp = np.linspace(0.0, 1.0, 60)
-    swing = np.concatenate([2.0 * ramp, 2.0 - 4.0 * ramp, -2.0 + 3.0 * ramp])
+    """Return-point memory: a swing to both extremes wipes out every smaller one before it, where the motor rests."""
+    ramp, quick = np.linspace(0.0, 1.0, 60), np.linspace(0.0, 1.0, 20)
+    swing = np.concatenate([2.0 * quick, 2.0 - 4.0 * quick, -2.0 + 3.0 * quick])
     small = np.concatenate([1.0 - 1.6 * ramp, -0.6 + 1.4 * ramp, 0.8 - 1.5 * ramp])
     first, last = (
         evidence(held(np.concatenate(order)), "one", "a")
         for order in ((swing, small, small), (small, small, swing))
     )
-    p = problem((first, last))
+    p = problem((first, last), joint=UNLIMITED)
     wiped, kept = (forgotten(p, p.start, e, {ANGLE: 1e-6}, 0.1) for e in (first, last))
     assert wiped.left_rad <= 1e-7
     assert 0 < wiped.first < len(first.rows) // 2
@@ -175,6 +180,35 @@ def test_a_past_that_nobody_recorded_is_estimated_with_the_zeros() -> None:
         np.concatenate(told.left(told.start)) / SIGMA, told.residual(told.start)[: len(blind.rows)] / blind.weight,
         atol=1e-6,
     )  # fmt: skip
+
+
+def test_a_drive_that_was_wound_under_load_is_not_taken_for_a_fresh_one() -> None:
+    """The motor wound loaded and came back unloaded before a recording in which it rests: what that left in the
+    cable is told by the joint's limits, or by another recording that goes as far; without either nobody could
+    know."""
+    ramp = np.linspace(0.0, 1.0, 60)
+    load = np.concatenate([2.0 * ramp, 2.0 + 0.0 * ramp, 2.0 - 2.0 * ramp])
+    motor = np.concatenate([0.0 * ramp, 1.5 * ramp, 1.5 - 1.5 * ramp])
+    small = np.concatenate([1.5 * ramp, 1.5 - 2.7 * ramp, -1.2 + 2.4 * ramp])
+    whole = moved(np.concatenate([motor, np.zeros_like(small)]), np.concatenate([load, small]))
+    blind = evidence({k: v[len(load) :] for k, v in whole.items()}, "one", "a")
+    limits = Limits(motor_position_min_rad=-1.5, motor_position_max_rad=1.5, joint_torque_max_Nm=2.0)
+    left = []
+    for joint in (UNLIMITED, JOINT.model_copy(update={"limits": limits})):
+        p = problem((blind,), spread=0.0, joint=joint)
+        past = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9).past
+        told = p.with_evidence([replace(blind, past=past)])
+        left.append(float(np.sum(told.residual(told.start) ** 2)))
+    far = evidence(
+        moved(np.concatenate([1.5 * ramp, -1.5 * ramp]), np.concatenate([2.0 * ramp, 2.0 * ramp])), "far", "b"
+    )
+    p = problem((blind, far), spread=0.0, joint=UNLIMITED)
+    beside = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9).past
+    told = problem((replace(blind, past=beside),), spread=0.0, joint=UNLIMITED)
+    left.append(float(np.sum(told.residual(told.start) ** 2)))
+    unknown, limited, seen = left
+    assert limited < 0.1 * unknown
+    assert seen < 0.1 * unknown
 
 
 def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(

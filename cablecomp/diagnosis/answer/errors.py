@@ -14,6 +14,7 @@ from cablecomp.diagnosis.result import Errors
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
+from cablecomp.estimation.limits import PAST
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
@@ -22,7 +23,8 @@ BLOCKS = 20
 
 
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
-    """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them."""
+    """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them; what a
+    recording's own past, which nobody recorded, still does to it is estimated and taken off."""
     inside = _rms(_left(fit, fit.problem.evidence, laws))
     folds = _folds(fit.problem.evidence, by)
 
@@ -65,10 +67,10 @@ def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], 
 
 
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
-    """Weighted misfit of the joint angle [rad] on counted rows, laws and the session's zero (the mean of what
-    is there, for a session that the fit has not seen) taken off."""
+    """Weighted misfit of the joint angle [rad] on counted rows; laws, the session's zero and the recording's past taken
+    off (both as these rows tell them where the fit has not seen the session, or the recording)."""
     problem = fit.problem
-    zeros = problem.zeros(fit.x)[JOINT]
+    zeros, pasts = problem.zeros(fit.x)[JOINT], problem.pasts(fit.x)
     try:
         misfits = problem.with_evidence(evidence).misfits(fit.x)[JOINT]
     except InputError:
@@ -79,9 +81,21 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
         if not kept.any():
             continue
         left = m[kept] - sum((value_of(law, e) for law in laws), np.zeros(int(kept.sum())))
-        zero = zeros[e.session][0] if e.session in zeros else float(np.mean(left))
-        parts.append(e.weight[kept] * (left - zero))
+        left -= zeros[e.session][0] if e.session in zeros else float(np.mean(left))
+        left -= pasts[e.name][kept] if e.name in pasts else _own_past(e, left, problem.weighing.sigma[JOINT])
+        parts.append(e.weight[kept] * left)
     return parts
+
+
+def _own_past(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:
+    """What the recording's past did, as what is left of these rows and its prior tell it."""
+    if JOINT not in e.past:
+        return np.zeros(len(left))
+    kept = e.counted[JOINT]
+    columns, w = e.past[JOINT][kept], e.weight[kept] / sigma
+    A = np.vstack([w[:, None] * columns, np.eye(columns.shape[1]) / PAST])
+    b = np.concatenate([w * left, np.zeros(columns.shape[1])])
+    return np.asarray(columns @ np.linalg.lstsq(A, b, rcond=None)[0], dtype=np.float64)
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:

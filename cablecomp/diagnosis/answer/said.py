@@ -36,9 +36,8 @@ def named_of(w: Weighed, final: Model) -> Named:
     parameters: dict[str, Value | str] = {
         v.name.removeprefix(mine): v for v in effect_values(final.fit) if v.name.startswith(mine)
     }
-    channel = w.term.name.partition(":")[2]
-    if channel:
-        parameters[effect.texts[0]] = channel
+    if w.term.channel:
+        parameters[effect.texts[0]] = w.term.channel
     return Named(
         effect.id,
         effect.statement,
@@ -71,6 +70,7 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
     """Effects of the final model that are not sure enough, then what else stood out in a round."""
     rows = [named_of(w, final) for w in found if w.confidence < LIMITS.name]
     known = {w.term.name for w in found}
+    held = {w.term.effect.id for w in found if not w.term.channel}
     for r in selection.rounds:
         for t in r.tried:
             if (
@@ -78,6 +78,7 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
                 or t.difference.gain < LIMITS.gain
                 or t.difference.z < 2.0
                 or isinstance(t.term, Dependence)
+                or t.term.effect.id in held
             ):
                 continue
             known.add(t.term.name)

@@ -21,6 +21,9 @@ from cablecomp.signal.smoothing import FloatArray, keep_corners
 ZEROS = ("joint_position_offset_rad", "motor_torque_offset_Nm")
 """Names in `[session] own` that are found inside of the fit, by session, always."""
 REPLICAS = 2
+PASSES = 2
+"""Times that histories are looked for: what is left over tells how faint a trace matters, and the first time it holds
+those traces."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +49,12 @@ def calibrate_drive(
     fit = solve(problem, evaluations=15)
     fit = refit(fit, weighed(fit, floor), 10)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
-    size = {c: rms_left(fit, c) for c in fit.problem.channels}
-    cut, constant = [], []
-    for e in fit.problem.evidence:
-        found = forgotten(fit.problem, fit.x, e, size, LIMITS.history)
-        first = max(found.first, full_swing(fit.problem, e, LIMITS.history_most))
-        cut.append(replace(e.counting_from(first), past=found.past))
-        constant.append(found.constant_rad)
-    floor = Weighing(
-        floor.sigma, {**floor.zero_sd, JOINT: max(floor.zero_sd[JOINT], float(np.mean(constant)))}
-    )
-    problem = fit.problem.with_evidence(cut)
-    fit = solve(problem, fit.x, 10)
+    sensors = floor
+    for _ in range(PASSES):
+        cut, constant = without_history(fit, evidence)
+        zero_sd = {**sensors.zero_sd, JOINT: max(sensors.zero_sd[JOINT], constant)}
+        floor = Weighing(sensors.sigma, zero_sd)
+        fit = refit(solve(fit.problem.with_evidence(cut), fit.x, 10), weighed(fit, floor), 6)
     floor_rad = noise_floor(fit, rng)
     seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
@@ -67,6 +64,19 @@ def calibrate_drive(
     nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))
     lost = before - sum(int(e.counted[JOINT].sum()) for e in cut)
     return Calibrated(fit, nominal, floor, floor_rad, lost)
+
+
+def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Evidence], float]:
+    """The recordings, rows counting from where their pasts are forgotten, with what these may still do; and by how much
+    that moves a recording's zero [rad]."""
+    size = {c: rms_left(fit, c) for c in fit.problem.channels}
+    cut, constant = [], []
+    for e in evidence:
+        found = forgotten(fit.problem, fit.x, e, size, LIMITS.history)
+        first = max(found.first, full_swing(fit.problem, e, LIMITS.history_most))
+        cut.append(replace(e.counting_from(first), past=found.past))
+        constant.append(found.constant_rad)
+    return cut, float(np.mean(constant))
 
 
 def _parameters(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[Parameter, ...]:

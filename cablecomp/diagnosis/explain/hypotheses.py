@@ -32,7 +32,8 @@ class Start:
 class Hypothesis:
     """One effect (and the channel that it reads), with the points to begin from.
 
-    `name`: its id, with `:channel` where it reads one. `amount`: the parameter that says how much.
+    `name`: its id, with `:channel` where it reads one, with `:amount` for a second of its amounts. `amount`: the
+    parameter that says how much.
     """
 
     effect: Effect
@@ -40,6 +41,7 @@ class Hypothesis:
     amount: Parameter
     starts: tuple[Start, ...]
     two_sided: bool
+    channel: str = ""
 
     @property
     def has_instant(self) -> bool:
@@ -112,33 +114,37 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
 def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
     if not all(_tells(evidence, channel) for channel in effect.needs):
         return []
-    channels: list[str | None] = [None]
+    channels = [""]
     if effect.texts:
         channels = [n for n in _others(evidence) if n not in config.condition.values()]
-    amount = next(p for p in effect.parameters if not p.shape)
+    amounts = [p for p in effect.parameters if not p.shape and not p.held]
+    return [_by_amount(effect, p, c, config, evidence) for p in amounts for c in channels]
+
+
+def _by_amount(
+    effect: Effect, amount: Parameter, channel: str, config: JointConfig, evidence: Sequence[Evidence]
+) -> Hypothesis:
     shapes = [p for p in effect.parameters if p.shape]
     further = [p for p in effect.parameters if not p.shape and p is not amount]
     low, high = amount.bounds(config)
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0
-    found = []
-    for channel in channels:
-        texts: dict[str, float | str] = {} if channel is None else {effect.texts[0]: channel}
-        grids = [_grid(p, config, evidence) for p in shapes]
-        starts = tuple(
-            Start(
-                {
-                    amount.name: size,
-                    **{p.name: v for p, v in zip(shapes, point, strict=True)},
-                    **{p.name: p.neutral for p in further},
-                    **texts,
-                }
-            )
-            for point in itertools.product(*grids)
+    texts: dict[str, float | str] = {effect.texts[0]: channel} if channel else {}
+    grids = [_grid(p, config, evidence) for p in shapes]
+    starts = tuple(
+        Start(
+            {
+                amount.name: size,
+                **{p.name: v for p, v in zip(shapes, point, strict=True)},
+                **{p.name: p.neutral for p in further},
+                **texts,
+            }
         )
-        name = effect.id if channel is None else f"{effect.id}:{channel}"
-        found.append(Hypothesis(effect, name, amount, starts, two_sided))
-    return found
+        for point in itertools.product(*grids)
+    )
+    second = [] if amount is next(p for p in effect.parameters if not p.shape) else [amount.name]
+    name = ":".join([effect.id, *filter(None, [channel]), *second])
+    return Hypothesis(effect, name, amount, starts, two_sided, channel)
 
 
 def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tuple[float, ...]:

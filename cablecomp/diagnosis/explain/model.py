@@ -200,8 +200,7 @@ def _derivative_of_rest(fit: Fit, problem: Problem) -> FloatArray | None:
 
 
 def _is(identifier: str, parameters: Mapping[str, object], term: Hypothesis) -> bool:
-    channel = term.name.partition(":")[2]
-    return identifier == term.effect.id and (not channel or channel in parameters.values())
+    return identifier == term.effect.id and (not term.channel or term.channel in parameters.values())
 
 
 def placed(fit: Fit, problem: Problem) -> FloatArray:

@@ -56,9 +56,11 @@ def rivals(
     """Every effect that promises something, and for an event what is none, fitted in a term's place: beside `base`,
     the model without it."""
     here = anchor(base.fit)
+    ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
     names = {t.name for t in model.terms}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
-    asked = side_by_side(lambda h: ask_all([here], h), [h for h in pool if h.name not in names])
+    others = [h for h in pool if h.name not in names and (h.channel or h.effect.id not in ids)]
+    asked = side_by_side(lambda h: ask_all([here], h), others)
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]
     fitted = [next(iter(f), None) for f in side_by_side(lambda a: rough(a, LIMITS.rough), answers)]
@@ -77,18 +79,19 @@ def rivals(
         differences[a.hypothesis.name] = score_difference(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
     kept = confidence_set(losses, rng)
-    plain = _plain(model, base, term, groups) if term.has_instant else {}
+    plain = _plain(model, base, term, groups)
     effects = tuple(n for n in kept if n != term.name)
     return Rivals(effects, tuple(plain), {**differences, **plain})
 
 
-def _plain(model: Model, base: Model, event: Hypothesis, groups: Groups) -> dict[str, ScoreDifference]:
-    """What is no effect and explains as much as an event does, with the event's score against it."""
+def _plain(model: Model, base: Model, term: Hypothesis, groups: Groups) -> dict[str, ScoreDifference]:
+    """What is no effect and explains as much as a term does, with the term's score against it."""
     found: dict[str, ScoreDifference] = {}
-    instant = float(model.fit.values[f"effect.{event.effect.id}.{event.instant}"])
-    step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
-    if step.gain < 0.0:
-        found[ZERO_STEP] = step
+    if term.has_instant:
+        instant = float(model.fit.values[f"effect.{term.effect.id}.{term.instant}"])
+        step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
+        if step.gain < 0.0:
+            found[ZERO_STEP] = step
     for other in _by_session(base, groups):
         step = score_difference(model.left_out, other.left_out, groups)
         if step.z < LIMITS.z:
@@ -117,8 +120,8 @@ def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
 
 
 def _by_session(base: Model, groups: Groups) -> list[Model]:
-    """What the drive's mounting anew explains in place of an event: sessions follow each other in time, and what lies
-    between two looks like an instant."""
+    """What the drive's mounting anew explains in place of a term: sessions follow each other in time, and what lies
+    between two looks like an instant; cables less tight look like a coupling that yields."""
     found = []
     for dependence, _, problem in ask_dependences(base.fit, base.terms, groups.by):
         if dependence.on != "session" or not dependence.of_drive:
