@@ -147,12 +147,12 @@ def held(load: FloatArray) -> dict[str, FloatArray]:
 
 def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_as_ever() -> None:
     """Return-point memory: a swing to both extremes wipes out every smaller one before it, where the motor rests."""
-    ramp, quick = np.linspace(0.0, 1.0, 60), np.linspace(0.0, 1.0, 20)
-    swing = np.concatenate([2.0 * quick, 2.0 - 4.0 * quick, -2.0 + 3.0 * quick])
+    ramp = np.linspace(0.0, 1.0, 60)
+    swing = np.concatenate([2.0 * ramp, 2.0 - 4.0 * ramp, -2.0 + 3.0 * ramp])
     small = np.concatenate([1.0 - 1.6 * ramp, -0.6 + 1.4 * ramp, 0.8 - 1.5 * ramp])
     first, last = (
         evidence(held(np.concatenate(order)), "one", "a")
-        for order in ((swing, small, small), (small, small, swing))
+        for order in ((swing, *[small] * 6), (*[small] * 6, swing))
     )
     p = problem((first, last), joint=UNLIMITED)
     wiped, kept = (forgotten(p, p.start, e, {ANGLE: 1e-6}, 0.1) for e in (first, last))
