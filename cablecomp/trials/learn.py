@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.diagnosis.explain import confidence
-from cablecomp.diagnosis.explain.confidence import FEATURES, Logistic
+from cablecomp.diagnosis.explain.confidence import FEATURES, OF_TRIED, Logistic, features_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_level
 from cablecomp.errors import InputError, printable
 from cablecomp.trials.calibrated import brier, calibration_error, risk_area
@@ -82,7 +82,7 @@ def fit_logistic(features: Floats, right: Floats, ridge: float, steps: int = 50)
     return float(w[0]), np.asarray(w[1:])
 
 
-def learn(judged: Sequence[Judged], ridge: float) -> Logistic:
+def learn(judged: Sequence[Judged], ridge: float, names: Sequence[str] = FEATURES) -> Logistic:
     """The logistic model of these effects; raises InputError for too few, or all right, or none."""
     right = np.array([float(j.right) for j in judged])
     if len(judged) < LEAST or right.min() == right.max():
@@ -91,18 +91,18 @@ def learn(judged: Sequence[Judged], ridge: float) -> Logistic:
             f"right: at least {LEAST}, right and "
             "wrong ones, are needed; run more trials with `cablecomp prove`"
         )
-    raw = np.array([[j.evidence[f] for f in FEATURES] for j in judged])
+    raw = np.array([[j.evidence[f] for f in names] for j in judged])
     centre, scale = raw.mean(axis=0), raw.std(axis=0)
     scale = np.where(scale > 1e-9, scale, 1.0)
     bias, weight = fit_logistic((raw - centre) / scale, right, ridge)
-    return Logistic(bias, _by_name(weight), _by_name(centre), _by_name(scale))
+    return Logistic(float(f"{bias:.4g}"), *(_by_name(names, v) for v in (weight, centre, scale)))
 
 
-def _by_name(values: Floats) -> dict[str, float]:
-    return {f: float(f"{v:.4g}") for f, v in zip(FEATURES, values, strict=True)}
+def _by_name(names: Sequence[str], values: Floats) -> dict[str, float]:
+    return {f: float(f"{v:.4g}") for f, v in zip(names, values, strict=True)}
 
 
-def check(judged: Sequence[Judged], ridge: float, seed: int = 0) -> Checked:
+def check(judged: Sequence[Judged], ridge: float, names: Sequence[str] = FEATURES, seed: int = 0) -> Checked:
     """Learn on some laws and judge the others, in turn."""
     laws = sorted({j.law for j in judged})
     if len(laws) < FOLDS:
@@ -111,7 +111,7 @@ def check(judged: Sequence[Judged], ridge: float, seed: int = 0) -> Checked:
     fold = {laws[k]: place % FOLDS for place, k in enumerate(order)}
     p = np.empty(len(judged))
     for f in range(FOLDS):
-        model = learn([j for j in judged if fold[j.law] != f], ridge)
+        model = learn([j for j in judged if fold[j.law] != f], ridge, names)
         for k, j in enumerate(judged):
             if fold[j.law] == f:
                 p[k] = model.probability(j.evidence)
@@ -125,25 +125,60 @@ def check(judged: Sequence[Judged], ridge: float, seed: int = 0) -> Checked:
     )
 
 
-def judged_in(board: Mapping[str, Any]) -> list[Judged]:
-    """All weighed effects of a scoreboard whose evidence is whole."""
-    found = []
+def judged_in(board: Mapping[str, Any]) -> tuple[list[Judged], list[Judged]]:
+    """All effects of a scoreboard's final models whose evidence is whole; those that were tried and left."""
+    weighed, left = [], []
     for row in board["rows"]:
         law = "+".join(row["forms"]) or row["kind"]
         for name in row["weighed"]:
             evidence = {k: v for k, v in name["evidence"].items() if v is not None}
             if {*FEATURES, "z"} <= evidence.keys():
-                found.append(Judged(evidence, bool(name["right"]), law))
-    return found
+                weighed.append(Judged(evidence, bool(name["right"]), law))
+            elif evidence.keys() == {"gain", "z", "selected_in"}:
+                told = {**features_of_tried(**evidence), "z": evidence["z"]}
+                left.append(Judged(told, bool(name["right"]), law))
+    return weighed, left
+
+
+def _best(judged: Sequence[Judged], names: Sequence[str]) -> tuple[float, Checked]:
+    """The ridge with the best Brier score on laws left out."""
+    tried = {ridge: check(judged, ridge, names) for ridge in RIDGES}
+    ridge = min(tried, key=lambda r: tried[r].brier)
+    return ridge, tried[ridge]
+
+
+def _of_tried(left: Sequence[Judged]) -> dict[str, Any] | None:
+    """The model for what was tried and left, and how it does on laws left out; None where that is too few."""
+    try:
+        ridge, best = _best(left, OF_TRIED)
+    except InputError:
+        return None
+    model = learn(left, ridge, OF_TRIED)
+    return {
+        "effects": len(left),
+        "right": sum(j.right for j in left),
+        "calibration_error": best.error,
+        "brier": best.brier,
+        "ridge": ridge,
+        **_as_read(model),
+    }
+
+
+def _as_read(model: Logistic) -> dict[str, Any]:
+    return {
+        "bias": model.bias,
+        "weight": dict(model.weight),
+        "centre": dict(model.centre),
+        "scale": dict(model.scale),
+    }
 
 
 def learnt_from(boards: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
     """The contents of `confidence.json`: the model, what it was learnt on, how it does on laws left out, the
     conformal level."""
-    judged = [j for board in boards for j in judged_in(board)]
-    tried = {ridge: check(judged, ridge) for ridge in RIDGES}
-    ridge = min(tried, key=lambda r: tried[r].brier)
-    model, best = learn(judged, ridge), tried[ridge]
+    judged, left = ([j for b in boards for j in judged_in(b)[k]] for k in range(2))
+    ridge, best = _best(judged, FEATURES)
+    model = learn(judged, ridge)
     short = [
         inf if r["short_by"] is None else float(r["short_by"])
         for board in boards
@@ -168,11 +203,9 @@ def learnt_from(boards: Sequence[Mapping[str, Any]], command: str) -> dict[str, 
             "risk_coverage_area_by_z": best.area_by_z,
         },
         "conformal": {"miss": MISS, "level": level if isfinite(level) else None, "trials": len(short)},
+        "tried": _of_tried(left),
         "ridge": ridge,
-        "bias": float(f"{model.bias:.4g}"),
-        "weight": dict(model.weight),
-        "centre": dict(model.centre),
-        "scale": dict(model.scale),
+        **_as_read(model),
     }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from cablecomp.diagnosis.explain.confidence import FEATURES, Logistic
+from cablecomp.diagnosis.explain.confidence import FEATURES, features_of_tried, logistic
 from cablecomp.diagnosis.explain.conformal import conformal_level, conformal_set, deficits
 from cablecomp.errors import InputError
 from cablecomp.trials.calibrated import calibration_error, risk_area, risk_coverage
@@ -49,9 +49,14 @@ def board(effects: int = 1500, seed: int = 1) -> dict[str, Any]:
         evidence = dict(zip(FEATURES, rng.standard_normal(len(FEATURES)).tolist(), strict=True))
         p = 1.0 / (1.0 + np.exp(-(0.3 + 1.5 * evidence["lead_z"] - 1.0 * evidence["share_left"])))
         name = {"evidence": {**evidence, "z": float(rng.uniform(2, 9))}, "right": bool(rng.uniform() < p)}
+        seen = float(rng.uniform(2, 9))
+        left = {
+            "evidence": {"gain": 0.2, "z": seen, "selected_in": 0.1},
+            "right": bool(rng.uniform() < 0.05 * seen),
+        }
         rows.append(
-            {"forms": [LAWS[k % len(LAWS)]], "kind": "single", "weighed": [name], "short_by": abs(float(rng.normal())),
-             "decidable": True, "failed": ""}
+            {"forms": [LAWS[k % len(LAWS)]], "kind": "single", "weighed": [name, left], "decidable": True,
+             "short_by": abs(float(rng.normal())), "failed": ""}
         )  # fmt: skip
     wish = {"trials": effects, "seed": seed, "kinds": "single", "laws": "mixed", "imperfections": "some"}
     return {"schema": 2, "sha256": "ab", **wish, "rows": rows}
@@ -67,9 +72,11 @@ def test_what_is_learnt_holds_on_laws_left_out(tmp_path: Path, capsys: pytest.Ca
     assert left_out["risk_coverage_area"] < 0.7 * left_out["risk_coverage_area_by_z"]
     assert found["learnt_on"]["laws"] == len(LAWS)
     assert found["learnt_on"]["runs"][0]["seed"] == 1
-    model = Logistic(found["bias"], found["weight"], found["centre"], found["scale"])
-    fresh = [(n["evidence"], n["right"]) for r in board(2000, 2)["rows"] for n in r["weighed"]]
-    assert calibration_error([model.probability(e) for e, _ in fresh], [r for _, r in fresh]) < 0.05
+    fresh = board(2000, 2)["rows"]
+    named = [(r["weighed"][0]["evidence"], r["weighed"][0]["right"]) for r in fresh]
+    left = [(features_of_tried(**r["weighed"][1]["evidence"]), r["weighed"][1]["right"]) for r in fresh]
+    for model, told in ((logistic(found), named), (logistic(found["tried"]), left)):
+        assert calibration_error([model.probability(e) for e, _ in told], [r for _, r in told]) < 0.05
     assert "calibration_error" in capsys.readouterr().out
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from cablecomp.diagnosis.answer.values import effect_values
 from cablecomp.diagnosis.body import Body
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.describe.unknown import describe
-from cablecomp.diagnosis.explain.confidence import learnt_level
+from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.experiment import best_experiment
@@ -67,7 +67,8 @@ def _depends(d: Dependence | None, final: Model) -> dict[str, object] | None:
 
 
 def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> tuple[Named, ...]:
-    """Effects of the final model that are not sure enough, then what else stood out in a round."""
+    """Effects of the final model that are not sure enough, then what else stood out in a round: no name, for the model
+    does without it."""
     rows = [named_of(w, final) for w in found if w.confidence < LIMITS.name]
     known = {w.term.name for w in found}
     held = {w.term.effect.id for w in found if not w.term.channel}
@@ -93,13 +94,19 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
                     {},
                     None,
                     t.difference.gain,
-                    0.0,
+                    _of_tried(evidence),
                     evidence,
                     (),
                     why,
                 )
             )
     return tuple(rows)
+
+
+def _of_tried(evidence: Mapping[str, float]) -> float:
+    """How probable it is that what the final model does without is there all the same: less than a name asks for."""
+    model = learnt_of_tried()
+    return 0.0 if model is None else min(model.probability(features_of_tried(**evidence)), LIMITS.name - 0.01)
 
 
 def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple[str, ...], str], ...]:

@@ -1,7 +1,8 @@
 """How probable it is that a name is right: a logistic model of the evidence of the case.
 
 p = 1/(1 + exp(-(b + sum_k w_k (f_k - centre_k)/scale_k))). The features are those below; weights, centres and
-scales are in `confidence.json` beside this file, with the trials that set them.
+scales are in `confidence.json` beside this file, with the trials that set them. Effects that stood out in a round and
+did not come into the final model have a model of their own (`tried`), of what a round knows of them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ FEATURES: Final = (
     "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "share_total", "rivals",
     "follows", "unsteady", "at_bound", "tries", "terms",
 )  # fmt: skip
+OF_TRIED: Final = ("log_gain", "log_z", "selected_in")
 _FILE: Final = Path(__file__).with_name("confidence.json")
 
 
@@ -41,7 +43,18 @@ class Logistic:
 @cache
 def learnt() -> Logistic:
     """The model that ships."""
-    data = _shipped()
+    return logistic(_shipped())
+
+
+@cache
+def learnt_of_tried() -> Logistic | None:
+    """The model for what did not come into the final one; None where trials were too few to say."""
+    data = _shipped()["tried"]
+    return None if data is None else logistic(data)
+
+
+def logistic(data: Mapping[str, Any]) -> Logistic:
+    """The model as a file holds it."""
     return Logistic(float(data["bias"]), data["weight"], data["centre"], data["scale"])
 
 
@@ -57,6 +70,19 @@ def learnt_level() -> float | None:
 def _shipped() -> Mapping[str, Any]:
     found: Mapping[str, Any] = json.loads(_FILE.read_text(encoding="utf-8"))
     return found
+
+
+def features_of_tried(gain: float, z: float, selected_in: float) -> dict[str, float]:
+    """The evidence of what did not come into the final model, as `features`."""
+    return {"log_gain": _log_gain(gain), "log_z": _log_z(z), "selected_in": selected_in}
+
+
+def _log_gain(gain: float) -> float:
+    return math.log10(max(gain, 1e-3))
+
+
+def _log_z(z: float) -> float:
+    return math.log10(max(z, 0.1))
 
 
 def features(
@@ -87,8 +113,8 @@ def features(
     that it was asked at (an event: many instants), the best of which counts. `terms`: effects in the final model.
     """
     return {
-        "log_gain": math.log10(max(gain, 1e-3)),
-        "log_z": math.log10(max(z, 0.1)),
+        "log_gain": _log_gain(gain),
+        "log_z": _log_z(z),
         "z_blocks": min(max(z_blocks, -3.0), 10.0),
         "selected_in": selected_in,
         "lead_gain": min(max(lead_gain, -1.0), 1.0),
