@@ -45,28 +45,16 @@ class Channel:
         """Judge one new value that came at `arrived_s`; False = turned down."""
         raw, dt = self._raw, arrived_s - self._raw_s
         self._raw, self._raw_s = value, arrived_s
-        if not self.suspect and abs(value) < self._most and abs(value - raw) <= self._rate * dt + self._floor:
-            # the usual case first: it is the one that must be quick
-            if value != self.value:
-                self.changed_s = arrived_s
-            self.value, self.arrived_s = value, arrived_s
-            return True
-        return self._judge(value, arrived_s, raw, dt)
-
-    def _judge(self, value: float, arrived_s: float, raw: float, dt: float) -> bool:
         if not -self._most < value < self._most:
             self.refused += 1
             self.suspect = self.suspect or not isfinite(value)
             return False
-        if raw == raw:
-            if self.suspect:
-                ok = abs(value - self.value) <= self._rate * self._hold_s + self._floor
-            else:
-                ok = abs(value - raw) <= self._rate * dt + self._floor
-            if not ok:
-                self.suspect = True
-                self.refused += 1
-                return False
+        if self.suspect:
+            raw, dt = self.value, self._hold_s
+        if abs(value - raw) > self._rate * dt + self._floor:  # false of a first value, before which there is none
+            self.suspect = True
+            self.refused += 1
+            return False
         self.suspect = False
         if value != self.value:
             self.changed_s = arrived_s

@@ -24,16 +24,16 @@ def test_a_value_may_move_by_rate_times_time_and_the_floor(moved: float, taken: 
     assert (channel.arrived_s, channel.changed_s) == ((8.0 * T, 8.0 * T) if taken else (0.0, 0.0))
 
 
+@pytest.mark.parametrize("bad", [50.0, inf, nan])
 @pytest.mark.parametrize(("back", "taken"), [(0.25 + 0.125, True), (0.25 + 0.126, False)])
-def test_after_a_jump_a_value_has_to_come_back_near_the_last_good_one(back: float, taken: bool) -> None:
-    """Within the rate times the time that a value is held, and the floor."""
-    channel = Channel(64.0, 0.125, 4.0 * T, 100.0)
-    channel.take(1.0, 0.0)
-    channel.take(50.0, T)
+def test_after_a_jump_a_value_has_to_come_back_near_the_last_good_one(
+    back: float, taken: bool, bad: float
+) -> None:
+    """Within the rate times the time that a value is held, and the floor; no less after what is no number."""
     for at in (1.0 + back, 1.0 - back):
         judged = Channel(64.0, 0.125, 4.0 * T, 100.0)
         judged.take(1.0, 0.0)
-        assert not judged.take(50.0, T)
+        assert not judged.take(bad, T)
         assert judged.take(at, 9.0 * T) is taken
         assert judged.suspect is not taken
         assert judged.refused == 1 + (not taken)
