@@ -149,8 +149,8 @@ def forgotten(
 
 def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:
     """Principal columns of what the pasts add from row `first` on, a constant apart; rotated, so that one prior
-    does for all."""
-    centred = runs - runs[first:].mean(axis=0)
+    does for all, and over the root of their number, so that more of them say no more: one of these has been."""
+    centred = (runs - runs[first:].mean(axis=0)) / np.sqrt(runs.shape[1])
     _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)
     kept = s > faint * np.sqrt(len(centred) - first)
     return np.asarray(centred @ Vt[kept].T, dtype=np.float64)

@@ -19,7 +19,7 @@ INSTANT_REACH_S: Final = 3.0
 ZERO: Final = 0.5
 """How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up
 what compliances do."""
-PAST: Final = 0.5
+PAST: Final = 1.0
 """Prior sd of what went before a recording, in pasts that go to the greatest load, or to the end of the stroke,
 and back."""
 EXACT: Final = 0.003
