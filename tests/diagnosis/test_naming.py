@@ -11,6 +11,7 @@ from joints import SMALL, SMALL_NOISE, closed
 
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.diagnose import diagnose
+from cablecomp.diagnosis.result import Value
 from cablecomp.effects import catalogue
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
@@ -97,3 +98,21 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
     )
     found = diagnose(joint, {"small/1": recording(effect, CASES[effect])})
     assert [named.effect for named in found.named] == [effect]
+
+
+def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> None:
+    """The torque sensor's filter lags by 60 ms; the encoders are on time."""
+    joint = parse_joint(
+        {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
+    )
+    columns = recording("clock_skew", Case({"delay_s": 0.0}, seconds=30.0))
+    columns["joint_torque_Nm"] = np.interp(
+        columns["time_s"] - 0.06, columns["time_s"], columns["joint_torque_Nm"]
+    )
+    found = diagnose(joint, {"small/1": columns})
+    assert [named.effect for named in found.named] == ["clock_skew"]
+    delay, of_load = (found.named[0].parameters[k] for k in ("delay_s", "load_delay_s"))
+    assert isinstance(delay, Value)
+    assert isinstance(of_load, Value)
+    assert abs(of_load.value - 0.06) < 0.012
+    assert abs(delay.value) < 0.004
