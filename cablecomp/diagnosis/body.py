@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
@@ -45,13 +46,16 @@ def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | No
     """The session of each recording: as `[[session]]` claims it, else its folder (`each`: its own, `one`: all
     together)."""
     found = {}
+    known = Counter(PurePath(name).name for name in names)
+    folders = Counter(p.name for p in {PurePath(name).parent for name in names})
     for name in names:
         claimed = [s.name for s in config.sessions if s.matches(Path(name))] if mode is None else []
-        folder = PurePath(name).parent.name
+        path = PurePath(name)
+        folder = path.parent.name if folders[path.parent.name] == 1 else str(path.parent)
         if claimed:
             found[name] = claimed[0]
         elif mode == "each":
-            found[name] = PurePath(name).name
+            found[name] = path.name if known[path.name] == 1 else str(path)
         else:
             found[name] = "all" if mode == "one" else (folder or "all")
     return found
@@ -67,6 +71,7 @@ def gather_body(
     names = list(recordings)
     if not names:
         raise InputError("no recording was given; a diagnosis needs one or more")
+    _need_alike(recordings)
     sessions = session_names(config, names, mode)
     samples = [len(recordings[n]["time_s"]) if "time_s" in recordings[n] else 0 for n in names]
     wanted = LIMITS.rows if rows is None else rows
@@ -101,6 +106,19 @@ def spread(evidence: Sequence[Evidence], most: int) -> tuple[Evidence, ...]:
     return tuple(e for k, e in enumerate(evidence) if k in chosen)
 
 
+def _need_alike(recordings: Mapping[str, Columns]) -> None:
+    """Raise InputError for a recording without times, or without a load that others have."""
+    loaded = {n for n, c in recordings.items() if "joint_torque_Nm" in c}
+    for name, columns in recordings.items():
+        if not len(columns.get("time_s", ())):
+            raise InputError(f"{name}: channel `time_s` is missing or empty; record it")
+        if loaded and name not in loaded:
+            raise InputError(
+                f"{name}: channel `joint_torque_Nm` is missing, which {min(loaded)} has; diagnose recordings with and "
+                "without a load on their own"
+            )
+
+
 def _conditions(config: JointConfig, e: Evidence) -> dict[str, float]:
     values = {}
     for condition, channel in config.condition.items():
@@ -113,13 +131,15 @@ def _conditions(config: JointConfig, e: Evidence) -> dict[str, float]:
 
 
 def _kept_for_the_end(found: Sequence[Evidence]) -> tuple[tuple[Evidence, ...], tuple[Evidence, ...], str]:
-    """Whole recordings where there are eight or more, else the end of each."""
+    """Whole recordings where there are eight or more and their sessions have others, else the end of each."""
     if len(found) >= FEW:
         final = [e for k, e in enumerate(found) if k % FINAL_EVERY == FINAL_EVERY // 2]
         used = [e for e in found if e not in final]
         lost = {e.session for e in final} - {e.session for e in used}
         used += [e for e in final if e.session in lost]
-        return tuple(used), tuple(e for e in final if e.session not in lost), "recording"
+        final = [e for e in final if e.session not in lost]
+        if final:
+            return tuple(used), tuple(final), "recording"
     used, final = [], []
     for e in found:
         last = int((1.0 - LIMITS.final_share) * len(e.rows))

@@ -86,7 +86,7 @@ def diagnose(
     progress("last fit", 0.9)
     final = _settled(selection.final.terms, selection.final.fit, drive, groups)
     selection = replace(selection, final=final)
-    if not whole and final.terms:
+    if not whole:
         everything = final.fit.problem.with_evidence(drive.fit.problem.evidence)
         groups = make_groups(drive.fit)
         fit = solve(everything, final.fit.x, 8)

@@ -45,7 +45,7 @@ class Parameter:
     a scale is given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`:
     a diagnosis leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in
     the parameter's unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a
-    configuration leaves it out (None: it has to be given).
+    configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded.
     """
 
     name: str
@@ -61,6 +61,7 @@ class Parameter:
     minimum: float = -math.inf
     maximum: float = math.inf
     omitted: float | None = None
+    of_load: bool = False
 
     @property
     def shape(self) -> bool:

@@ -94,6 +94,7 @@ EFFECT = Effect(
             minimum=-1.0,
             maximum=1.0,
             omitted=0.0,
+            of_load=True,
         ),
     ),
     acts_through=("velocity", "load_rate"),

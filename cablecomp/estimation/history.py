@@ -111,10 +111,15 @@ def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
 
 
 def forgotten(
-    problem: Problem, x: FloatArray, recording: Evidence, size: Mapping[str, float], share: float
+    problem: Problem,
+    x: FloatArray,
+    recording: Evidence,
+    size: Mapping[str, float],
+    share: float,
+    after: int = 0,
 ) -> Forgotten:
-    """Where the past is forgotten to within `share` of what is usually left over of each channel (`size`); the
-    best cut there is if it is nowhere."""
+    """Where the past is forgotten to within `share` of what is usually left over of each channel (`size`), from row
+    `after` on; the best cut there is if it is nowhere."""
     made = simulator(problem.joint(x, recording))
     try:
         base = made.predict(recording)
@@ -132,7 +137,7 @@ def forgotten(
     apart = np.stack([run[JOINT] for run in runs])
     best: tuple[float, int] | None = None
     for cut in CUTS:
-        first = int(cut * apart.shape[1])
+        first = max(int(cut * apart.shape[1]), after)
         later = apart[:, first:]
         left = float(np.sqrt(np.mean((later - later.mean(axis=1, keepdims=True)) ** 2)))
         if left <= share * size[JOINT]:

@@ -25,8 +25,6 @@ from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
-History = Mapping[str, FloatArray]
-
 
 @dataclass(frozen=True)
 class Zeros:
@@ -64,7 +62,6 @@ class Problem:
     parameters: tuple[Parameter, ...]
     evidence: tuple[Evidence, ...]
     weighing: Weighing
-    histories: History = field(default_factory=dict)
     fine: bool = False
     bases: Mapping[str, Zeros] = field(default_factory=dict)
 
@@ -132,7 +129,7 @@ class Problem:
             key = self._stand_key(r)
             if key not in cache:
                 cache[key] = simulator(standing(self.config, values, r), self.fine)
-            predicted = cache[key].predict(r, self.histories.get(r.name))
+            predicted = cache[key].predict(r)
             for c in self.channels:
                 if c in r.columns:
                     found[c].append(r.at_rows(c) - predicted[c])

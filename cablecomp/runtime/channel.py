@@ -51,7 +51,9 @@ class Channel:
             return False
         if self.suspect:
             raw, dt = self.value, self._hold_s
-        if abs(value - raw) > self._rate * dt + self._floor:  # false of a first value, before which there is none
+        if (
+            abs(value - raw) > self._rate * dt + self._floor
+        ):  # false of a first value, before which there is none
             self.suspect = True
             self.refused += 1
             return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from turning import JOINT, recorded
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.body import FEW, gather_body, session_names
 from cablecomp.errors import InputError
+from cablecomp.signal.smoothing import FloatArray
 
 PLAIN = JOINT.model_dump(by_alias=True, exclude_none=True)
 ANGLE = "joint_position_rad"
@@ -74,3 +76,32 @@ def test_no_recording_is_refused() -> None:
 
 def test_sessions_are_told_of_names_on_any_system() -> None:
     assert session_names(JOINT, [str(Path("a") / "b.csv")]) == {str(Path("a") / "b.csv"): "a"}
+
+
+def test_folders_of_one_name_are_not_one_session() -> None:
+    names = ["left/monday/1.csv", "right/monday/1.csv", "right/tuesday/2.csv"]
+    assert len(set(session_names(JOINT, names).values())) == 3
+    assert len(set(session_names(JOINT, names, "each").values())) == 3
+
+
+def test_where_every_recording_is_a_session_of_its_own_the_end_of_each_is_kept() -> None:
+    body = gather_body(JOINT, {f"{k}/1": recorded(seed=k, duration_s=6.0) for k in range(FEW)})
+    assert body.final_by == "block"
+    assert len(body.final) == FEW
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda c: {k: v for k, v in c.items() if k != "joint_torque_Nm"},
+            "`joint_torque_Nm` is missing, which a/1",
+        ),
+        (lambda c: {}, "`time_s` is missing"),
+    ],
+)
+def test_recordings_that_do_not_go_together_are_refused(
+    change: Callable[[dict[str, FloatArray]], dict[str, FloatArray]], words: str
+) -> None:
+    with pytest.raises(InputError, match=f"a/2: channel {words}"):
+        gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": change(recorded(seed=2))})

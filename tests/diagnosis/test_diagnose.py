@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from joints import SMALL, SMALL_NOISE, SMALL_TOLERANCE, closed
+from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.config_text import joint_text
@@ -139,3 +140,11 @@ def test_a_budget_that_is_over_ends_the_search_with_what_there_is_and_says_so(no
     assert found.tested == ()
     assert found.augmented.rmse_rad == found.baseline.rmse_rad
     assert not any("were over" in line for line in nothing.warnings)
+
+
+def test_of_many_recordings_in_which_nothing_is_missing_all_are_reported() -> None:
+    """More than are searched; a budget of none ends the search, not the report."""
+    parts = {f"s/{k}": recorded(seed=k, duration_s=6.0) for k in range(14)}
+    found = diagnose(JOINT, parts, budget_s=0.0)
+    assert found.named == ()
+    assert len(found.final) + len(found.traces) == len(parts)

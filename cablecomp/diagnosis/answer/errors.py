@@ -20,6 +20,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 FOLDS = 5
 BLOCKS = 20
+TELLING = 0.3
+"""Share of a recording that the fit has not seen that tells what its past still does."""
 
 
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
@@ -68,7 +70,7 @@ def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], 
 
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
     """Weighted misfit of the joint angle [rad] on counted rows; laws, the session's zero and the recording's past taken
-    off (both as these rows tell them where the fit has not seen the session, or the recording)."""
+    off (where the fit has not seen the session, or the recording: as these rows, and the first of them, tell it)."""
     problem = fit.problem
     zeros, pasts = problem.zeros(fit.x)[JOINT], problem.pasts(fit.x)
     try:
@@ -82,20 +84,25 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
             continue
         left = m[kept] - sum((value_of(law, e) for law in laws), np.zeros(int(kept.sum())))
         left -= zeros[e.session][0] if e.session in zeros else float(np.mean(left))
-        left -= pasts[e.name][kept] if e.name in pasts else _own_past(e, left, problem.weighing.sigma[JOINT])
-        parts.append(e.weight[kept] * left)
+        if e.name in pasts:
+            parts.append(e.weight[kept] * (left - pasts[e.name][kept]))
+        else:
+            parts.append(_without_own_past(e, left, problem.weighing.sigma[JOINT]))
     return parts
 
 
-def _own_past(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:
-    """What the recording's past did, as what is left of these rows and its prior tell it."""
-    if JOINT not in e.past:
-        return np.zeros(len(left))
+def _without_own_past(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:
+    """Weighted misfit without what the recording's past did, as its first rows and its prior tell it; these are not
+    judged, or a law that is missing would be taken for a past."""
     kept = e.counted[JOINT]
-    columns, w = e.past[JOINT][kept], e.weight[kept] / sigma
-    A = np.vstack([w[:, None] * columns, np.eye(columns.shape[1]) / PAST])
-    b = np.concatenate([w * left, np.zeros(columns.shape[1])])
-    return np.asarray(columns @ np.linalg.lstsq(A, b, rcond=None)[0], dtype=np.float64)
+    weighted = e.weight[kept] * left
+    if JOINT not in e.past:
+        return weighted
+    columns = e.weight[kept][:, None] * e.past[JOINT][kept]
+    first = int(TELLING * len(left))
+    A = np.vstack([columns[:first] / sigma, np.eye(columns.shape[1]) / PAST])
+    b = np.concatenate([weighted[:first] / sigma, np.zeros(columns.shape[1])])
+    return np.asarray((weighted - columns @ np.linalg.lstsq(A, b, rcond=None)[0])[first:], dtype=np.float64)
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:

@@ -47,7 +47,7 @@ def named_of(w: Weighed, final: Model) -> Named:
         w.removes,
         w.confidence,
         dict(w.evidence),
-        effect.acts_through,
+        w.term.acts_through,
         "" if w.confidence >= LIMITS.name else w.why_not,
     )
 
@@ -84,7 +84,10 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
                 continue
             known.add(t.term.name)
             effect = t.term.effect
-            why = f"beside {r.base.name}, {r.tried[0].term.name} takes off more; with it known, this one is not missed"
+            more = f"{r.tried[0].term.name} takes off more; with it known, this one is not missed"
+            if t is r.tried[0]:
+                more = "it takes off most, but another model without it predicts data left out better"
+            why = f"beside {r.base.name}, {more}"
             evidence = {"z": t.difference.z, "selected_in": t.selected_in, "gain": t.difference.gain}
             rows.append(
                 Named(

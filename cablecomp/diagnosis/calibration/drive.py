@@ -54,7 +54,8 @@ def calibrate_drive(
         cut, constant = without_history(fit, evidence)
         zero_sd = {**sensors.zero_sd, JOINT: max(sensors.zero_sd[JOINT], constant)}
         floor = Weighing(sensors.sigma, zero_sd)
-        fit = refit(solve(fit.problem.with_evidence(cut), fit.x, 10), weighed(fit, floor), 6)
+        fit = solve(fit.problem.with_evidence(cut), fit.x, 10)
+        fit = refit(fit, weighed(fit, floor), 6)
     floor_rad = noise_floor(fit, rng)
     seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
@@ -72,9 +73,9 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
     size = {c: rms_left(fit, c) for c in fit.problem.channels}
     cut, constant = [], []
     for e in evidence:
-        found = forgotten(fit.problem, fit.x, e, size, LIMITS.history)
-        first = max(found.first, full_swing(fit.problem, e, LIMITS.history_most))
-        cut.append(replace(e.counting_from(first), past=found.past))
+        swing = full_swing(fit.problem, e, LIMITS.history_most)
+        found = forgotten(fit.problem, fit.x, e, size, LIMITS.history, swing)
+        cut.append(replace(e.counting_from(found.first), past=found.past))
         constant.append(found.constant_rad)
     return cut, float(np.mean(constant))
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.effects import Effect, Parameter, catalogue
-from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence
+from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_effect
 
@@ -42,6 +42,12 @@ class Hypothesis:
     starts: tuple[Start, ...]
     two_sided: bool
     channel: str = ""
+
+    @property
+    def acts_through(self) -> tuple[str, ...]:
+        """Covariates in which its mismatch shows, best first, the channel that it reads by name."""
+        other = f"other:{self.channel.removeprefix('other_')}"
+        return tuple(other if name == "other" else name for name in self.effect.acts_through)
 
     @property
     def has_instant(self) -> bool:
@@ -117,6 +123,8 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
     channels = [""]
     if effect.texts:
         channels = [n for n in _others(evidence) if n not in config.condition.values()]
+    if not loaded(config, evidence):
+        effect = replace(effect, parameters=tuple(p for p in effect.parameters if not p.of_load))
     amounts = [p for p in effect.parameters if not p.shape and not p.held]
     return [_by_amount(effect, p, c, config, evidence) for p in amounts for c in channels]
 
@@ -203,6 +211,12 @@ def _tells(evidence: Sequence[Evidence], channel: str) -> bool:
     if channel in OUTPUTS:
         return all(channel in e.counted for e in evidence)
     return _varies(evidence, channel)
+
+
+def loaded(config: JointConfig, evidence: Sequence[Evidence]) -> bool:
+    """Whether the recordings tell a load."""
+    channel = load_channel(config, evidence[0].columns)
+    return channel is not None and _varies(evidence, channel)
 
 
 def _varies(evidence: Sequence[Evidence], channel: str) -> bool:

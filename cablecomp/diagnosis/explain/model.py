@@ -120,6 +120,18 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
+def most_told(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hypothesis:
+    """The same effect by that of its amounts of which the fit found most: all of them are free in it."""
+    same = [h for h in pool if (h.effect.id, h.channel) == (term.effect.id, term.channel)]
+    values = fit.values
+
+    def share(h: Hypothesis) -> float:
+        value = values.get(f"effect.{h.effect.id}.{h.amount.name}", h.amount.neutral)
+        return abs(value - h.amount.neutral) / max(abs(b) for b in h.amount.bounds(fit.problem.config))
+
+    return max(same, key=share) if len(same) > 1 else term
+
+
 def is_told(fit: Fit, term: Term) -> bool:
     """Whether an effect's own amount is more than none: a guide without friction is free cable, and yields as such.
     What depends on a condition may be none where that is none."""

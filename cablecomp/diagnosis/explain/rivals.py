@@ -56,10 +56,13 @@ def rivals(
     """Every effect that promises something, and for an event what is none, fitted in a term's place: beside `base`,
     the model without it."""
     here = anchor(base.fit)
-    ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
-    names = {t.name for t in model.terms}
+    ids = {t.effect.id for t in base.terms if isinstance(t, Hypothesis)}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
-    others = [h for h in pool if h.name not in names and (h.channel or h.effect.id not in ids)]
+    others = [
+        h
+        for h in pool
+        if h.effect.id not in ids and (h.effect.id, h.channel) != (term.effect.id, term.channel)
+    ]
     asked = side_by_side(lambda h: ask_all([here], h), others)
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]

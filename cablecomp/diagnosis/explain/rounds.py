@@ -13,7 +13,17 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Round, Term, Tried, finely, is_told, loss, placed
+from cablecomp.diagnosis.explain.model import (
+    Model,
+    Round,
+    Term,
+    Tried,
+    finely,
+    is_told,
+    loss,
+    most_told,
+    placed,
+)
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.scores import (
     Groups,
@@ -62,9 +72,8 @@ def one_round(
     begin from where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin
     from as well. Once the time is up nothing further is begun but the most promising fit."""
     anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
-    names = {t.name for t in model.terms}
     ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
-    left = [h for h in pool if h.name not in names and (h.effect.id not in ids or h.effect.texts)]
+    left = [h for h in pool if h.effect.id not in ids]  # a second of the same would share its parameters
     done = number / LIMITS.rounds
 
     def answer(h: Hypothesis) -> list[Answer]:
@@ -131,13 +140,14 @@ def one_round(
             fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
         except InputError:
             return None
-        if not is_told(fit, c.terms[0]):
+        terms = tuple(most_told(fit, t, pool) if isinstance(t, Hypothesis) else t for t in c.terms)
+        if not is_told(fit, terms[0]):
             return None
         ratio = 1.0
         if fine is not None and fit.problem.fine:
             size = scales(model.left_out, groups)
             ratio = loss(model, size, groups) / max(loss(fine, size, groups), 1e-300)
-        return Model((*model.terms, *c.terms), fit, left_out(fit, groups), ratio)
+        return Model((*model.terms, *terms), fit, left_out(fit, groups), ratio)
 
     models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], groups)
     differences = {

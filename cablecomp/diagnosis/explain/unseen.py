@@ -20,6 +20,8 @@ SHAPES = 6
 """Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
 ALIKE = 0.1
 """Share of what an effect does that calibration cannot imitate, below which it hides behind calibration."""
+KEPT = 0.5
+"""The same of the joint as it would then be, simulated: a step of the calibration follows a straight line."""
 WITHIN = 2.0
 """Standard deviations of its tolerance by which a parameter may be off to make up for an effect."""
 MOST = 3
@@ -53,8 +55,9 @@ def could_be_unseen(
     = any size. Beside them the effects that calibration within its tolerances conceals."""
     here = anchor(fit)
     found, hidden = [], []
+    held = {entry.id for entry in fit.problem.config.effect}
     for h in pool:
-        if h.name in named:
+        if h.name in named or (h.effect.id in held and not h.channel):
             continue
         shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // SHAPES)
         made = [contribution(here, h, h.starts[k]) for k in shapes]
@@ -107,9 +110,12 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
     j = int(np.argmax(np.abs(s) * scale))
     p = problem.parameters[j]
     made = with_entry(problem, h, h.entry({**h.starts[shape].values, h.amount.name: amount}))
-    x = here.fit.x - s * amount / size
+    x = here.fit.x + s * amount / size  # d is the residual without the effect less the one with it
     low, high = problem.bounds()
     moved = np.concatenate([np.clip(x, low, high), [q.x(q.start) for q in made.parameters[count:]]])
+    there = made.followed(moved)
+    if there is None or float(np.linalg.norm(there[: len(d)] - here.fit.residual[: len(d)])) > KEPT * visible:
+        return None
     return Hidden(h.name, p.name, amount, h.amount.unit, visible, made.joint(moved, problem.evidence[0]))
 
 

@@ -174,7 +174,7 @@ def _unsteady(final: Model, term: Hypothesis, groups: Groups) -> float:
 
 def _follows(term: Hypothesis, remainder: Location) -> float:
     """Share of the remainder that follows the first two covariates that the effect acts through."""
-    wanted = term.effect.acts_through[:2]
+    wanted = term.acts_through[:2]
     shares = [m.share for m in remainder.mismatch if m.covariate in wanted and m.p_value < 0.05]
     return max(shares, default=0.0)
 
