@@ -32,8 +32,7 @@ Floats = NDArray[np.float64]
 SHIPPED = Path(confidence.__file__).with_name("confidence.json")
 FOLDS, LEAST, MISS = 5, 30, 0.1
 RIDGES = (0.3, 1.0, 3.0, 10.0, 30.0)
-"""Standard deviations of a weight's prior to the minus two; the one with the best Brier score on laws left out
-is taken."""
+"""Standard deviations of a weight's prior to the minus two, of which one is taken (`_best`)."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +140,15 @@ def judged_in(board: Mapping[str, Any]) -> tuple[list[Judged], list[Judged]]:
 
 
 def _best(judged: Sequence[Judged], names: Sequence[str]) -> tuple[float, Checked]:
-    """The ridge with the best Brier score on laws left out."""
+    """The largest ridge whose Brier score on laws left out is no more than a standard error of the (paired) difference
+    behind the best: machines lie further out than trials (one-standard-error rule, T. Hastie, R. Tibshirani and J.
+    Friedman, The Elements of Statistical Learning, 2009, 7.10)."""
     tried = {ridge: check(judged, ridge, names) for ridge in RIDGES}
-    ridge = min(tried, key=lambda r: tried[r].brier)
+    right = np.array([float(j.right) for j in judged])
+    lost = {r: (np.array(c.probability) - right) ** 2 for r, c in tried.items()}
+    best = min(lost.values(), key=np.mean)
+    behind = {r: v - best for r, v in lost.items()}
+    ridge = max(r for r, d in behind.items() if np.mean(d) <= np.std(d) / np.sqrt(len(d)))
     return ridge, tried[ridge]
 
 

@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Any, Final
 
 FEATURES: Final = (
-    "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "share_total", "rivals",
-    "follows", "unsteady", "at_bound", "tries", "terms",
+    "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "rivals", "follows",
+    "unsteady", "at_bound", "tries",
 )  # fmt: skip
+"""What is learnt from. How many effects there are, and how large each is beside the others, stands in the evidence
+and is not learnt from: in trials that is as it was drawn, in a machine as it is."""
 OF_TRIED: Final = ("log_gain", "log_z", "selected_in")
 _FILE: Final = Path(__file__).with_name("confidence.json")
 
