@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Literal
@@ -46,19 +46,23 @@ def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | No
     """The session of each recording: as `[[session]]` claims it, else its folder (`each`: its own, `one`: all
     together)."""
     found = {}
-    known = Counter(PurePath(name).name for name in names)
-    folders = Counter(p.name for p in {PurePath(name).parent for name in names})
-    for name in names:
+    paths = {name: PurePath(name) for name in names}
+    files, folders = _told_apart(set(paths.values())), _told_apart({p.parent for p in paths.values()})
+    for name, path in paths.items():
         claimed = [s.name for s in config.sessions if s.matches(Path(name))] if mode is None else []
-        path = PurePath(name)
-        folder = path.parent.name if folders[path.parent.name] == 1 else str(path.parent)
         if claimed:
             found[name] = claimed[0]
         elif mode == "each":
-            found[name] = path.name if known[path.name] == 1 else str(path)
+            found[name] = files[path]
         else:
-            found[name] = "all" if mode == "one" else (folder or "all")
+            found[name] = "all" if mode == "one" else (folders[path.parent] or "all")
     return found
+
+
+def _told_apart(paths: Set[PurePath]) -> dict[PurePath, str]:
+    """Each by its last part, or whole where another has the same."""
+    count = Counter(p.name for p in paths)
+    return {p: p.name if count[p.name] == 1 else str(p) for p in paths}
 
 
 def gather_body(
@@ -73,7 +77,7 @@ def gather_body(
         raise InputError("no recording was given; a diagnosis needs one or more")
     _need_alike(recordings)
     sessions = session_names(config, names, mode)
-    samples = [len(recordings[n]["time_s"]) if "time_s" in recordings[n] else 0 for n in names]
+    samples = [len(recordings[n]["time_s"]) for n in names]
     wanted = LIMITS.rows if rows is None else rows
     fine, judged = rows_for(samples, max(wanted, LIMITS.rows_each * len(names)))
     found = []

@@ -87,10 +87,8 @@ def diagnose(
     final = _settled(selection.final.terms, selection.final.fit, drive, groups)
     selection = replace(selection, final=final)
     if not whole:
-        everything = final.fit.problem.with_evidence(drive.fit.problem.evidence)
         groups = make_groups(drive.fit)
-        fit = solve(everything, final.fit.x, 8)
-        final = _settled(final.terms, fit, drive, groups)
+        final = _about_all(final, drive, groups)
     after = series_of(final.fit, seen, drive.floor_rad)
     rest = locate(after, rng, sensitivities(final.fit))
     share_left = _share_left(drive, final)
@@ -169,6 +167,14 @@ def _from_where(body: Body, fit: Fit) -> tuple[Evidence, ...]:
 def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:
     """The fit about some of its recordings."""
     return solve(fit.problem.with_evidence(some), fit.x, 6, J=derivative_of_part(fit, some))
+
+
+def _about_all(model: Model, drive: Calibrated, groups: Groups) -> Model:
+    """The model about all recordings again: the calibrated drive where nothing was found."""
+    if not model.terms:
+        return _without_effects(model, drive, groups)
+    everything = model.fit.problem.with_evidence(drive.fit.problem.evidence)
+    return _settled(model.terms, solve(everything, model.fit.x, 8), drive, groups)
 
 
 def _at_start(fit: Fit) -> Fit:

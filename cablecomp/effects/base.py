@@ -167,6 +167,11 @@ class Effect:
         """The parameter of that name."""
         return next(p for p in self.parameters if p.name == name)
 
+    def covariates(self, channel: str) -> tuple[str, ...]:
+        """`acts_through` with the channel that it reads in place of `other`, as `other:<name>`."""
+        other = f"other:{channel.removeprefix('other_')}"
+        return tuple(other if name == "other" else name for name in self.acts_through)
+
     def of_role(self, role: Role) -> Parameter | None:
         """Its first parameter of that role, if any."""
         return next((p for p in self.parameters if p.role == role), None)

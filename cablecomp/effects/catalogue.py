@@ -89,9 +89,7 @@ def with_effects(config: JointConfig, effects: Sequence[tuple[str, Mapping[str, 
 
 def acts_through(entry: EffectEntry) -> tuple[str, ...]:
     """Covariates in which this effect's mismatch shows, best first, with its channel's `other:<name>`."""
-    channel = str(entry.parameters.get("channel", ""))
-    names = _look_up(entry.id).acts_through
-    return tuple(f"other:{channel.removeprefix('other_')}" if n == "other" else n for n in names)
+    return _look_up(entry.id).covariates(str(entry.parameters.get("channel", "")))
 
 
 def extend(config: JointConfig) -> Change | None:

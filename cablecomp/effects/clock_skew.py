@@ -62,9 +62,8 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    of_load, of_joint = -values["load_delay_s"], values["delay_s"]
-    terms = _look_back(delay=of_load, of_load=1.0) if of_load else ()
-    return Change(terms=(*terms, *(_look_back(delay=of_joint, of_load=0.0) if of_joint else ())))
+    delays = ((-values["load_delay_s"], 1.0), (values["delay_s"], 0.0))
+    return Change(terms=tuple(t for s, load in delays if s for t in _look_back(delay=s, of_load=load)))
 
 
 EFFECT = Effect(

@@ -209,48 +209,25 @@ class Problem:
         """By channel: the zero (and slope, for the motor torque) of each session, and of each recording, in the
         channel's unit."""
         misfits = self.misfits(x)
-        found: dict[str, dict[str, FloatArray]] = {}
-        for c in self.channels:
-            solved = self.bases[c].solve(self._rows(c, misfits[c]))
-            width = 2 if c == MOTOR else 1
-            sessions = self.sessions
-            by_name = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(sessions)}
-            first = width * len(sessions)
-            departures = solved[first : first + len(self.evidence)] if self.departs else None
-            for r, d in zip(
-                self.evidence, np.zeros(len(self.evidence)) if departures is None else departures, strict=True
-            ):
-                own = by_name[r.session].copy()
-                own[0] += d
-                by_name[r.name] = own
-            found[c] = by_name
-        return found
+        return {c: self._aside(c, misfits[c])[0] for c in self.channels}
+
+    def aside(
+        self, x: FloatArray, channel: str = JOINT
+    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """What is found inside of the fit: the channel's zeros, as `zeros` has them, and what each recording's past
+        adds to its judged rows, by name, in the channel's unit."""
+        return self._aside(channel, self.misfits(x)[channel])
 
     def left(self, x: FloatArray, channel: str = JOINT, own_zero: bool = True) -> list[FloatArray]:
         """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions') taken off."""
-        misfits, zeros, pasts = self.misfits(x)[channel], self.zeros(x)[channel], self.pasts(x, channel)
+        misfits = self.misfits(x)[channel]
+        zeros, pasts = self._aside(channel, misfits)
         parts = []
         for r, m in zip(self.evidence, misfits, strict=True):
             zero = zeros[r.name if own_zero else r.session]
             line = zero[0] + (zero[1] * r.at_rows("motor_position_rad") if len(zero) > 1 else 0.0)
             parts.append(m - line - pasts[r.name])
         return parts
-
-    def pasts(self, x: FloatArray, channel: str = JOINT) -> dict[str, FloatArray]:
-        """What each recording's past adds to its judged rows, by name, in the channel's unit."""
-        solved = self.bases[channel].solve(self._rows(channel, self.misfits(x)[channel]))
-        first = (2 if channel == MOTOR else 1) * len(self.sessions) + (
-            len(self.evidence) if self.departs else 0
-        )
-        found = {}
-        for r in self.evidence:
-            columns = r.past.get(channel) if channel in r.counted else None
-            count = 0 if columns is None else columns.shape[1]
-            found[r.name] = (
-                np.zeros(len(r.rows)) if columns is None else columns @ solved[first : first + count]
-            )
-            first += count
-        return found
 
     @property
     def departs(self) -> bool:
@@ -284,6 +261,28 @@ class Problem:
         return np.repeat(np.arange(len(counts)), counts)
 
     # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _aside(
+        self, channel: str, misfits: Sequence[FloatArray]
+    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        solved = self.bases[channel].solve(self._rows(channel, misfits))
+        width = 2 if channel == MOTOR else 1
+        zeros = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(self.sessions)}
+        pasts = {}
+        first = width * len(self.sessions)
+        for r in self.evidence:
+            zeros[r.name] = zeros[r.session].copy()
+            if self.departs:
+                zeros[r.name][0] += solved[first]
+                first += 1
+        for r in self.evidence:
+            columns = r.past.get(channel) if channel in r.counted else None
+            count = 0 if columns is None else columns.shape[1]
+            pasts[r.name] = (
+                np.zeros(len(r.rows)) if columns is None else columns @ solved[first : first + count]
+            )
+            first += count
+        return zeros, pasts
 
     def _rows(self, channel: str, misfits: Sequence[FloatArray]) -> FloatArray:
         parts = []

@@ -51,9 +51,8 @@ class Channel:
             return False
         if self.suspect:
             raw, dt = self.value, self._hold_s
-        if (
-            abs(value - raw) > self._rate * dt + self._floor
-        ):  # false of a first value, before which there is none
+        # before a first value there is none: its distance is no number and not too large
+        if abs(value - raw) > self._rate * dt + self._floor:
             self.suspect = True
             self.refused += 1
             return False

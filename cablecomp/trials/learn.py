@@ -181,7 +181,8 @@ def _as_read(model: Logistic) -> dict[str, Any]:
 def learnt_from(boards: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
     """The contents of `confidence.json`: the model, what it was learnt on, how it does on laws left out, the
     conformal level."""
-    judged, left = ([j for b in boards for j in judged_in(b)[k]] for k in range(2))
+    found = [judged_in(b) for b in boards]
+    judged, left = ([j for parts in found for j in parts[k]] for k in range(2))
     ridge, best = _best(judged, FEATURES)
     model = learn(judged, ridge)
     short = [

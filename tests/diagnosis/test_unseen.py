@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from turning import JOINT, recorded
 
+from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
 from cablecomp.estimation.evidence import JOINT as ANGLE
 from cablecomp.estimation.problem import Problem
+from cablecomp.signal.smoothing import FloatArray
 
 
 def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() -> None:
@@ -24,8 +26,8 @@ def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() ->
     assert mount.amount > 0.0
     bare = mount.joint.model_copy(update={"effect": ()})
 
-    def left(joint: object) -> np.ndarray:
-        problem = Problem(joint, (), fit.problem.evidence, fit.problem.weighing)  # type: ignore[arg-type]
+    def left(joint: JointConfig) -> FloatArray:
+        problem = Problem(joint, (), fit.problem.evidence, fit.problem.weighing)
         return np.concatenate(problem.left(problem.start, ANGLE))
 
     as_it_is = np.concatenate(fit.problem.left(fit.x))

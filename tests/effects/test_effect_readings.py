@@ -96,7 +96,11 @@ def test_a_late_torque_is_met_by_carrying_the_deflection_on(moving: float) -> No
     """What a torque read late makes of the joint, against the joint under the torque as it was."""
     config, delay = joint(), 0.05
     time = np.linspace(0.0, 16.0, 3200)
-    load = lambda t: 1.2 * np.arcsin(np.sin(1.6 * t))  # noqa: E731  corners, as a crane's test course has them
+
+    def load(at: np.ndarray) -> np.ndarray:
+        """To and fro evenly: it has corners."""
+        return np.asarray(1.2 * np.arcsin(np.sin(1.6 * at)))
+
     motor = moving * np.sin(1.2 * time)
     true = run(config, still(time, load(time), motor=motor))["joint_position_rad"]
     columns = still(time, load(time - delay), motor=motor)

@@ -72,7 +72,7 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
     """Weighted misfit of the joint angle [rad] on counted rows; laws, the session's zero and the recording's past taken
     off (where the fit has not seen the session, or the recording: as these rows, and the first of them, tell it)."""
     problem = fit.problem
-    zeros, pasts = problem.zeros(fit.x)[JOINT], problem.pasts(fit.x)
+    zeros, pasts = problem.aside(fit.x)
     try:
         misfits = problem.with_evidence(evidence).misfits(fit.x)[JOINT]
     except InputError:

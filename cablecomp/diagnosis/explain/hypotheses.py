@@ -46,8 +46,11 @@ class Hypothesis:
     @property
     def acts_through(self) -> tuple[str, ...]:
         """Covariates in which its mismatch shows, best first, the channel that it reads by name."""
-        other = f"other:{self.channel.removeprefix('other_')}"
-        return tuple(other if name == "other" else name for name in self.effect.acts_through)
+        return self.effect.covariates(self.channel)
+
+    def key(self, parameter: str) -> str:
+        """The full name of one of the effect's parameters, as a fit has it."""
+        return f"effect.{self.effect.id}.{parameter}"
 
     @property
     def has_instant(self) -> bool:
@@ -150,8 +153,8 @@ def _by_amount(
         )
         for point in itertools.product(*grids)
     )
-    second = [] if amount is next(p for p in effect.parameters if not p.shape) else [amount.name]
-    name = ":".join([effect.id, *filter(None, [channel]), *second])
+    second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
+    name = ":".join(filter(None, (effect.id, channel, second)))
     return Hypothesis(effect, name, amount, starts, two_sided, channel)
 
 

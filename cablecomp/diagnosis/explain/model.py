@@ -126,7 +126,7 @@ def most_told(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hypothe
     values = fit.values
 
     def share(h: Hypothesis) -> float:
-        value = values.get(f"effect.{h.effect.id}.{h.amount.name}", h.amount.neutral)
+        value = values.get(h.key(h.amount.name), h.amount.neutral)
         return abs(value - h.amount.neutral) / max(abs(b) for b in h.amount.bounds(fit.problem.config))
 
     return max(same, key=share) if len(same) > 1 else term
@@ -137,7 +137,7 @@ def is_told(fit: Fit, term: Term) -> bool:
     What depends on a condition may be none where that is none."""
     if not isinstance(term, Hypothesis):
         return True
-    name = f"effect.{term.effect.id}.{term.amount.name}"
+    name = term.key(term.amount.name)
     names = [p.name for p in fit.problem.parameters]
     if name not in names or any(n.startswith(f"{name}~") for n in names):
         return True

@@ -91,7 +91,7 @@ def _plain(model: Model, base: Model, term: Hypothesis, groups: Groups) -> dict[
     """What is no effect and explains as much as a term does, with the term's score against it."""
     found: dict[str, ScoreDifference] = {}
     if term.has_instant:
-        instant = float(model.fit.values[f"effect.{term.effect.id}.{term.instant}"])
+        instant = float(model.fit.values[term.key(term.instant)])
         step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
         if step.gain < 0.0:
             found[ZERO_STEP] = step

@@ -178,7 +178,7 @@ def _further(
         return [cold] if cold is not None and names else []
     best = max(having, key=lambda m: len(names & {t.name for t in m.terms}))
     values = dict(best.fit.values)
-    amounts = {f"effect.{t.effect.id}.{t.amount.name}" for t in model.terms if isinstance(t, Hypothesis)}
+    amounts = {t.key(t.amount.name) for t in model.terms if isinstance(t, Hypothesis)}
     for name, value in model.fit.values.items():
         values.setdefault(name, LIMITS.part * value if name in amounts else value)
     return [values]
@@ -200,7 +200,7 @@ def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] |
             h.amount.unit == "N m" and torque
         ):  # a share of the torques that go round: moments are not known beforehand
             values[h.amount.name] = 0.25 * float(np.median(torque))
-        found |= {f"effect.{h.effect.id}.{k}": v for k, v in values.items() if not isinstance(v, str)}
+        found |= {h.key(k): v for k, v in values.items() if not isinstance(v, str)}
     return found
 
 
@@ -221,7 +221,7 @@ def _by_conditions(begun: Begun) -> list[Begun]:
         values = [e.condition[condition] for e in problem.evidence]
         if len(set(values)) < 3:
             continue
-        name = f"effect.{term.effect.id}.{term.amount.name}"
+        name = term.key(term.amount.name)
         amount = next((p for p in problem.parameters if p.name == name), None)
         if amount is None or not may_depend(name, condition):
             continue

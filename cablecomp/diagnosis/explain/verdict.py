@@ -149,7 +149,7 @@ def _unsteady(final: Model, term: Hypothesis, groups: Groups) -> float:
     quick and slow, one channel and another), each fitted by a linear step of its own: a true constant is
     constant. In units of their mean; at most 1."""
     fit = final.fit
-    name = f"effect.{term.effect.id}.{term.amount.name}"
+    name = term.key(term.amount.name)
     column = next((k for k, p in enumerate(fit.problem.parameters) if p.name == name), None)
     if column is None:
         return 1.0
