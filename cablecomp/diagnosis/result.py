@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +126,6 @@ class Diagnosis:
     traces: tuple[Traces, ...] = ()
     runtime_s: float = 0.0
     warnings: tuple[str, ...] = ()
-    session_values: tuple[Value, ...] = field(default=())
 
     @property
     def acting(self) -> tuple[str, ...]:

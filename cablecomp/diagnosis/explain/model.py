@@ -4,7 +4,7 @@ consists of."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_losses, left_out, scales
-from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.errors import InputError
@@ -54,25 +53,21 @@ class Tried:
 
 @dataclass(frozen=True)
 class Round:
-    """One step: what was promised (cost before over cost after a linear step, by name), what was fitted, what
-    was taken."""
+    """One step: what was fitted, what was taken."""
 
     base: Model
-    promised: Mapping[str, float]
     tried: tuple[Tried, ...]
     accepted: Tried | None
 
 
 @dataclass(frozen=True)
 class Selection:
-    """The calibrated drive, the rounds, the final model; answers of the first round (how much each effect could
-    show)."""
+    """The calibrated drive, the rounds, the final model."""
 
     baseline: Model
     rounds: tuple[Round, ...]
     final: Model
     groups: Groups
-    answers: tuple[Answer, ...] = field(default=())
 
 
 def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:

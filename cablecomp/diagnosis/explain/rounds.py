@@ -67,7 +67,7 @@ def one_round(
     number: int,
     cold: Mapping[str, float] | None,
     known: Sequence[Model],
-) -> tuple[Round, tuple[Answer, ...]]:
+) -> Round:
     """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to
     begin from where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin
     from as well. Once the time is up nothing further is begun but the most promising fit."""
@@ -94,8 +94,6 @@ def one_round(
         if number == 0 and not model.fit.problem.parameters
         else ask_dependences(model.fit, model.terms, groups.by)
     )
-    promised = {a[0].hypothesis.name: before / max(a[0].cost, 1e-12) for a in answers}
-    promised |= {d.name: before / max(c, 1e-12) for d, c, _ in dependences}
     trades = cold is not None and number > 0
     worth = [a for a in answers if a[0].cost < LIMITS.promise * before or (trades and a[0].hypothesis.trades)]
     if number > 0:
@@ -161,9 +159,7 @@ def one_round(
     tried = [Tried(m.terms[first], m, differences[m.name], shares[m.name]) for m in models]
     tried.sort(key=lambda t: -t.difference.gain)
     good = [t for t in tried if demanded(t.difference, first=number == 0)]
-    return Round(model, promised, tuple(tried), good[0] if good else None), tuple(
-        x for a in answers for x in a
-    )
+    return Round(model, tuple(tried), good[0] if good else None)
 
 
 def _further(

@@ -47,25 +47,13 @@ def anchor(fit: Fit) -> Anchor:
 @dataclass(frozen=True)
 class Answer:
     """What a hypothesis promises at its best start: cost after it (half the sum of squares), its problem with
-    the effect in it, where to begin, the derivative there, and the information: RMS that a unit of its amount
-    adds beyond calibration."""
+    the effect in it, where to begin, the derivative there."""
 
     hypothesis: Hypothesis
     cost: float
     problem: Problem
     x: FloatArray
     J: FloatArray
-    length: float
-    amount: float
-    place: int = 0
-    """Which of the anchors it was asked at."""
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The effect's own parameters where the answer begins, by full name."""
-        mine = f"effect.{self.hypothesis.effect.id}."
-        found = self.problem.values(self.x)
-        return {k: v for k, v in found.items() if k.startswith(mine)}
 
 
 def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
@@ -184,9 +172,7 @@ def _answer(
     for k, p in enumerate(new):
         if p.base.endswith("." + h.amount.name):
             J[:data, count + k] = -d[:data] / size * p.slope(x[count + k])
-    own = here.beyond(d)
-    length = float(np.linalg.norm(own)) / max(abs(size), 1e-300)
-    return Answer(h, cost, problem, x, J, length, float(entry.parameters[h.amount.name]))
+    return Answer(h, cost, problem, x, J)
 
 
 def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
@@ -212,7 +198,7 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
 def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     """What a hypothesis promises at each anchor, best first."""
     asked = [ask(here, h) for here in anchors]
-    return sorted((replace(a, place=k) for k, a in enumerate(asked) if a is not None), key=lambda a: a.cost)
+    return sorted((a for a in asked if a is not None), key=lambda a: a.cost)
 
 
 def rough(

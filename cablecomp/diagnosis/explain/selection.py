@@ -24,7 +24,6 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.rounds import cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score_difference
-from cablecomp.diagnosis.explain.screening import Answer
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, rms_left
@@ -52,7 +51,6 @@ def select(
         nominal = Fit(problem, nominal.x, problem.residual(nominal.x), problem.jacobian(nominal.x))
     beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
     rounds: list[Round] = []
-    answers: tuple[Answer, ...] = ()
     cold = cold_starts(pool, baseline)
     best = first
     for number in range(0 if quiet(baseline) else LIMITS.rounds):
@@ -61,8 +59,7 @@ def select(
         candidates: list[tuple[Round, Tried]] = []
         for model, start in beam:
             known = [t.model for r in rounds for t in r.tried]
-            round_, answered = one_round(model, start, pool, groups, rng, pace, number, cold, known)
-            answers = answers or answered
+            round_ = one_round(model, start, pool, groups, rng, pace, number, cold, known)
             rounds.append(round_)
             candidates += [(round_, t) for t in round_.tried]
         good = [t for _, t in candidates if demanded(t.difference, first=number == 0)]
@@ -85,7 +82,7 @@ def select(
         # a law that is run on every sample is a hundred times as dear: the best model alone goes on from there
         beam = [(m, None) for m in carried[: 1 if carried[0].fit.problem.fine else LIMITS.beam]]
     final = _pruned(best, groups)
-    return Selection(first, tuple(rounds), final, groups, answers)
+    return Selection(first, tuple(rounds), final, groups)
 
 
 def _reigning(
