@@ -34,8 +34,8 @@ class Groups:
     row, in none). Where whole recordings are left out, how far a recording's zero departs from its session's is a
     row of its own: an offset that follows the load is a compliance, and not the encoder's matter.
 
-    `fold`: groups that are left out together (a recording, a session, a condition; a block where there is one
-    recording). `by`: what the folds are.
+    `fold`: groups that are left out together (a recording; a block where there are few recordings). `by`: what the
+    folds are.
     """
 
     block: IntArray
@@ -55,13 +55,13 @@ class Groups:
         return int(self.fold.max()) + 1
 
 
-def make_groups(fit: Fit, by: str | None = None) -> Groups:
-    """Blocks of a few memories of the remainder's, within recordings; folds of whole recordings, sessions or conditions
-    where there are enough of them, else of alternating blocks."""
+def make_groups(fit: Fit) -> Groups:
+    """Blocks of a few memories of the remainder's, within recordings; folds of whole recordings where there are enough
+    of them, else of alternating blocks."""
     problem = fit.problem
     owners = [problem.owners(c) for c in problem.channels]
     counts = np.bincount(owners[0], minlength=len(problem.evidence))
-    by = by or ("recording" if len(problem.evidence) >= LIMITS.recordings else "block")
+    by = "recording" if len(problem.evidence) >= LIMITS.recordings else "block"
     spans = problem.spans()
     first_rows = fit.residual[spans[problem.channels[0]]]
     parts = [first_rows[owners[0] == k] for k in range(len(problem.evidence)) if counts[k] > 8]
@@ -85,11 +85,9 @@ def make_groups(fit: Fit, by: str | None = None) -> Groups:
             if k < zeros:
                 departs[k] = first + each // 2
             first += each
-        in_fold[:zeros] = np.where(
-            alone[:zeros], -1, _fold_of(problem, np.arange(zeros), departs[:zeros], by)
-        )
+        in_fold[:zeros] = np.where(alone[:zeros], -1, _fold_of(np.arange(zeros), departs[:zeros], by))
         blocks += [block, departs]
-        folds += [np.where(alone[own], -1, _fold_of(problem, own, block, by)), in_fold]
+        folds += [np.where(alone[own], -1, _fold_of(own, block, by)), in_fold]
         channels.append(np.full(len(own) + len(departs), number, dtype=np.int64))
     return Groups(np.concatenate(blocks), np.concatenate(folds), by, np.concatenate(channels))
 
@@ -101,17 +99,8 @@ def _alone(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     return np.array([len(several) > 1 and e.session not in several for e in problem.evidence], dtype=np.bool_)
 
 
-def _fold_of(problem: Problem, own: IntArray, block: IntArray, by: str) -> IntArray:
-    if by == "recording":
-        return own
-    if by == "session":
-        names = problem.sessions
-        return np.array([names.index(e.session) for e in problem.evidence])[own]
-    if by == "condition":
-        keys = [tuple(e.condition.values()) for e in problem.evidence]
-        known = list(dict.fromkeys(keys))
-        return np.array([known.index(k) for k in keys])[own]
-    return np.asarray(block % 6, dtype=np.int64)
+def _fold_of(own: IntArray, block: IntArray, by: str) -> IntArray:
+    return own if by == "recording" else np.asarray(block % 6, dtype=np.int64)
 
 
 def left_out(fit: Fit, groups: Groups) -> FloatArray:
