@@ -160,7 +160,7 @@ def diagnose(
 
 
 def _from_where(body: Body, fit: Fit) -> tuple[Evidence, ...]:
-    """The recordings kept for the end, counted from where their pasts are forgotten, as the ones used are."""
+    """The recordings kept for the end, counted from where their histories are forgotten, as the ones used are."""
     return body.final if body.final_by == "block" else tuple(without_history(fit, body.final)[0])
 
 

@@ -48,8 +48,8 @@ class Evidence:
     `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are
     judged, thinned by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time
     that a judged row stands for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it;
-    `outliers`: readings set aside; `shift_s`: what was added to the recording's own clock; `past`: by output
-    channel, what pasts that nobody recorded would add to the judged rows, a column each.
+    `outliers`: readings set aside; `shift_s`: what was added to the recording's own clock; `carryover`: by output
+    channel, what histories that nobody recorded would add to the judged rows, a column each.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Evidence:
     samples: int = 0
     step_s: float = 0.0
     shift_s: float = 0.0
-    past: Mapping[str, FloatArray] = field(default_factory=dict)
+    carryover: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""

@@ -1,9 +1,9 @@
-"""What the history before the first sample, which nobody recorded, may still do to a prediction.
+"""What the history before the first sample, which nobody recorded, may still do to a prediction: its carry-over.
 
-The drive is run from several pasts (loaded to one side or the other, wound in from either end of the stroke, both);
-rows count from where these runs agree but for a constant, and how far the constants differ is how far a
-recording's zero may depart from its session's. What they still differ by from there on is estimated with the
-zeros, each with a prior.
+The drive is run from several assumed histories (loaded to one side or the other, wound in from either end of the
+stroke, both); rows count from where these runs agree but for a constant, and how far the constants differ is how far a
+recording's zero may depart from its session's. What they still differ by from there on, the carry-over, is estimated
+with the zeros, each column with a prior.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from cablecomp.signal.smoothing import FloatArray
 CUTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)
 """Shares of a recording that may be given up: what lasts longer is estimated."""
 LEG = 12
-"""Rows of one leg of an assumed past."""
+"""Rows of one leg of an assumed history."""
 FAINT = 0.02
-"""Share of what is usually left over below which a past's trace is not worth a column."""
+"""Share of what is usually left over below which a carry-over is not worth a column."""
 
 
 @dataclass(frozen=True)
 class Forgotten:
-    """From which judged row on a recording's past no longer matters, how far it may still move the joint from
-    there (RMS, rad, a constant apart), how far the constants differ (rad), and what the assumed pasts add by
+    """From which judged row on a recording's history no longer matters, how far it may still move the joint from
+    there (RMS, rad, a constant apart), how far the constants differ (rad), and what the assumed histories add by
     channel (columns)."""
 
     first: int
     left_rad: float
     constant_rad: float
-    past: Mapping[str, FloatArray] = field(default_factory=dict)
+    carryover: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ def reaches(problem: Problem) -> tuple[Reach, ...]:
     return (seen,) if allowed == seen else (seen, allowed)
 
 
-def pasts(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
-    """Assumed pasts (motor angle, load) of a recording: loaded as far as it goes and back, either way; in from
+def histories(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
+    """Assumed histories (motor angle, load) of a recording: loaded as far as it goes and back, either way; in from
     either end of the stroke; loaded at that end and wound in under load; loaded, wound there and back."""
     q = float(recording.columns["motor_position_rad"][0])
     m = float(np.ravel(load_of(problem.config, recording.columns))[0])
@@ -118,7 +118,7 @@ def forgotten(
     share: float,
     after: int = 0,
 ) -> Forgotten:
-    """Where the past is forgotten to within `share` of what is usually left over of each channel (`size`), from row
+    """Where the history is forgotten to within `share` of what is usually left over of each channel (`size`), from row
     `after` on; the best cut there is if it is nowhere."""
     made = simulator(problem.joint(x, recording))
     try:
@@ -126,11 +126,11 @@ def forgotten(
     except InputError:
         return Forgotten(0, 0.0, 0.0)
     runs = []
-    for past in pasts(problem, recording):
+    for history in histories(problem, recording):
         try:
-            run = made.predict(recording, past)
+            run = made.predict(recording, history)
         except InputError:
-            continue  # a past that the drive could not have had
+            continue  # a history that the drive could not have had
         runs.append({c: run[c] - base[c] for c in size})
     if not runs:
         return Forgotten(0, 0.0, 0.0)
@@ -148,12 +148,12 @@ def forgotten(
     assert best is not None
     left, first = best
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
-    traces = {c: _columns(np.column_stack([run[c] for run in runs]), first, FAINT * size[c]) for c in size}
-    return Forgotten(first, left, constant, {c: t for c, t in traces.items() if t.shape[1]})
+    carryover = {c: _columns(np.column_stack([run[c] for run in runs]), first, FAINT * size[c]) for c in size}
+    return Forgotten(first, left, constant, {c: t for c, t in carryover.items() if t.shape[1]})
 
 
 def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:
-    """Principal columns of what the pasts add from row `first` on, a constant apart; rotated, so that one prior
+    """Principal columns of what the histories add from row `first` on, a constant apart; rotated, so that one prior
     does for all, and over the root of their number, so that more of them say no more: one of these has been."""
     centred = (runs - runs[first:].mean(axis=0)) / np.sqrt(runs.shape[1])
     _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)

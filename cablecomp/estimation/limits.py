@@ -19,8 +19,8 @@ INSTANT_REACH_S: Final = 3.0
 ZERO: Final = 0.5
 """How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up
 what compliances do."""
-PAST: Final = 1.0
-"""Prior sd of what went before a recording, in what the assumed pasts add in the mean (RMS)."""
+CARRYOVER_SD: Final = 1.0
+"""Prior sd of a recording's carry-over, in what the assumed histories add in the mean (RMS)."""
 EXACT: Final = 0.003
 """Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without
 it, calibration would answer a slightly wrong ratio by physics."""

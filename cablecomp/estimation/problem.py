@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.limits import HOPELESS, PAST, STEP
+from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing
@@ -52,6 +52,17 @@ class Weighing:
 
     sigma: Mapping[str, float]
     zero_sd: Mapping[str, float]
+
+
+class Aside(NamedTuple):
+    """What is found inside of the fit, of one channel, in its unit.
+
+    `zeros`: of each session and of each recording, by name (and slope by motor angle, for the motor torque);
+    `carryover`: what each recording's history adds to its judged rows, by name.
+    """
+
+    zeros: dict[str, FloatArray]
+    carryover: dict[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -209,24 +220,21 @@ class Problem:
         """By channel: the zero (and slope, for the motor torque) of each session, and of each recording, in the
         channel's unit."""
         misfits = self.misfits(x)
-        return {c: self._aside(c, misfits[c])[0] for c in self.channels}
+        return {c: self._aside(c, misfits[c]).zeros for c in self.channels}
 
-    def aside(
-        self, x: FloatArray, channel: str = JOINT
-    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-        """What is found inside of the fit: the channel's zeros, as `zeros` has them, and what each recording's past
-        adds to its judged rows, by name, in the channel's unit."""
+    def aside(self, x: FloatArray, channel: str = JOINT) -> Aside:
+        """What is found inside of the fit, of one channel."""
         return self._aside(channel, self.misfits(x)[channel])
 
     def left(self, x: FloatArray, channel: str = JOINT, own_zero: bool = True) -> list[FloatArray]:
         """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions') taken off."""
         misfits = self.misfits(x)[channel]
-        zeros, pasts = self._aside(channel, misfits)
+        zeros, carryover = self._aside(channel, misfits)
         parts = []
         for r, m in zip(self.evidence, misfits, strict=True):
             zero = zeros[r.name if own_zero else r.session]
             line = zero[0] + (zero[1] * r.at_rows("motor_position_rad") if len(zero) > 1 else 0.0)
-            parts.append(m - line - pasts[r.name])
+            parts.append(m - line - carryover[r.name])
         return parts
 
     @property
@@ -262,13 +270,11 @@ class Problem:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _aside(
-        self, channel: str, misfits: Sequence[FloatArray]
-    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    def _aside(self, channel: str, misfits: Sequence[FloatArray]) -> Aside:
         solved = self.bases[channel].solve(self._rows(channel, misfits))
         width = 2 if channel == MOTOR else 1
         zeros = {s: solved[width * k : width * (k + 1)] for k, s in enumerate(self.sessions)}
-        pasts = {}
+        carryover = {}
         first = width * len(self.sessions)
         for r in self.evidence:
             zeros[r.name] = zeros[r.session].copy()
@@ -276,13 +282,13 @@ class Problem:
                 zeros[r.name][0] += solved[first]
                 first += 1
         for r in self.evidence:
-            columns = r.past.get(channel) if channel in r.counted else None
+            columns = r.carryover.get(channel) if channel in r.counted else None
             count = 0 if columns is None else columns.shape[1]
-            pasts[r.name] = (
+            carryover[r.name] = (
                 np.zeros(len(r.rows)) if columns is None else columns @ solved[first : first + count]
             )
             first += count
-        return zeros, pasts
+        return Aside(zeros, carryover)
 
     def _rows(self, channel: str, misfits: Sequence[FloatArray]) -> FloatArray:
         parts = []
@@ -303,8 +309,8 @@ class Problem:
         sessions = self.sessions
         n_dep = len(self.evidence) if self.departs else 0
         spread = max(spread, 1e-6 * sigma)
-        past = [
-            r.past[channel].shape[1] if channel in r.counted and channel in r.past else 0
+        carried = [
+            r.carryover[channel].shape[1] if channel in r.counted and channel in r.carryover else 0
             for r in self.evidence
         ]
         own = width * len(sessions)
@@ -315,19 +321,19 @@ class Problem:
                 continue
             kept = r.counted[channel]
             w = r.weight[kept] / sigma
-            block = np.zeros((len(w), free + sum(past)))
+            block = np.zeros((len(w), free + sum(carried)))
             first = width * sessions.index(r.session)
             block[:, first] = w
             if width == 2:
                 block[:, first + 1] = w * r.at_rows("motor_position_rad")[kept]
             if n_dep:
                 block[:, own + k] = w
-            if past[k]:
-                at = free + sum(past[:k])
-                block[:, at : at + past[k]] = w[:, None] * r.past[channel][kept]
+            if carried[k]:
+                at = free + sum(carried[:k])
+                block[:, at : at + carried[k]] = w[:, None] * r.carryover[channel][kept]
             blocks.append(block)
         matrix = np.vstack(blocks)
-        penalty = np.zeros((n_dep + sum(past), matrix.shape[1]))
-        penalty[:, own:] = np.diag([1.0 / spread] * n_dep + [1.0 / PAST] * sum(past))
+        penalty = np.zeros((n_dep + sum(carried), matrix.shape[1]))
+        penalty[:, own:] = np.diag([1.0 / spread] * n_dep + [1.0 / CARRYOVER_SD] * sum(carried))
         Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
         return Zeros(Q, R, len(penalty))

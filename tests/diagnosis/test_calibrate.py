@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from turning import LIMITED, NOISE_RAD, after_a_past
+from turning import LIMITED, NOISE_RAD, after_a_history
 
 from cablecomp.config import JointConfig, load_joint, with_values
 from cablecomp.diagnosis.calibrate import Calibration, calibrate
@@ -110,7 +110,7 @@ def test_a_missing_channel_is_named() -> None:
 
 
 def test_what_went_before_the_first_sample_is_no_misfit() -> None:
-    """Recordings after a past that nobody recorded: what is left is the noise, and no law is said to be missing."""
-    found = calibrate(LIMITED, {f"{k}/1": after_a_past(k) for k in range(2)})
+    """Recordings after a history that nobody recorded: what is left is the noise, and no law is said to be missing."""
+    found = calibrate(LIMITED, {f"{k}/1": after_a_history(k) for k in range(2)})
     assert found.rmse_rad < 1.3 * NOISE_RAD
     assert not any("more than noise" in line for line in found.warnings)

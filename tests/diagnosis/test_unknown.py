@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from planted import SIGMA, autoregressive, recording
 
-from cablecomp.diagnosis.describe.history import lagged, play
+from cablecomp.diagnosis.describe.memory import lagged, play
 from cablecomp.diagnosis.describe.periodic import Periodicity, which_angle
 from cablecomp.diagnosis.describe.unknown import Description, describe
 from cablecomp.diagnosis.locate.series import make_series

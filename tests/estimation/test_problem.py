@@ -161,7 +161,7 @@ def test_what_went_before_is_forgotten_once_the_load_has_been_both_ways_as_far_a
     assert kept.left_rad > 1e-6
 
 
-def test_a_past_that_nobody_recorded_is_estimated_with_the_zeros() -> None:
+def test_a_history_that_nobody_recorded_is_estimated_with_the_zeros() -> None:
     """Half of the way to the greatest load and back went before; small swings keep its bump, a constant does
     not hide it."""
     ramp = np.linspace(0.0, 1.0, 60)
@@ -172,7 +172,7 @@ def test_a_past_that_nobody_recorded_is_estimated_with_the_zeros() -> None:
     blind = evidence(seen, "one", "a")
     p = problem((blind,), spread=0.0)
     found = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9)
-    told = p.with_evidence([replace(blind, past=found.past)])
+    told = p.with_evidence([replace(blind, carryover=found.carryover)])
     without, with_ = (float(np.sum(q.residual(q.start) ** 2)) for q in (p, told))
     assert without > 100.0
     assert with_ < 0.1 * without
@@ -196,15 +196,15 @@ def test_a_drive_that_was_wound_under_load_is_not_taken_for_a_fresh_one() -> Non
     left = []
     for joint in (UNLIMITED, JOINT.model_copy(update={"limits": limits})):
         p = problem((blind,), spread=0.0, joint=joint)
-        past = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9).past
-        told = p.with_evidence([replace(blind, past=past)])
+        carryover = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9).carryover
+        told = p.with_evidence([replace(blind, carryover=carryover)])
         left.append(float(np.sum(told.residual(told.start) ** 2)))
     far = evidence(
         moved(np.concatenate([1.5 * ramp, -1.5 * ramp]), np.concatenate([2.0 * ramp, 2.0 * ramp])), "far", "b"
     )
     p = problem((blind, far), spread=0.0, joint=UNLIMITED)
-    beside = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9).past
-    told = problem((replace(blind, past=beside),), spread=0.0, joint=UNLIMITED)
+    beside = forgotten(p, p.start, blind, {ANGLE: SIGMA}, 1e-9).carryover
+    told = problem((replace(blind, carryover=beside),), spread=0.0, joint=UNLIMITED)
     left.append(float(np.sum(told.residual(told.start) ** 2)))
     unknown, limited, seen = left
     assert limited < 0.1 * unknown

@@ -43,7 +43,7 @@ def recorded(
     return {**columns, "joint_position_rad": angle + offset_rad + noise}
 
 
-def after_a_past(seed: int, softness: float = 0.0) -> dict[str, FloatArray]:
+def after_a_history(seed: int, softness: float = 0.0) -> dict[str, FloatArray]:
     """A recording of small loads with the motor at rest, after the joint was wound back and forth under great ones that
     nobody recorded."""
     before = course(14.0, seed=seed)

@@ -14,19 +14,19 @@ from cablecomp.diagnosis.result import Errors
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
-from cablecomp.estimation.limits import PAST
+from cablecomp.estimation.limits import CARRYOVER_SD
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
 FOLDS = 5
 BLOCKS = 20
 TELLING = 0.3
-"""Share of a recording that the fit has not seen that tells what its past still does."""
+"""Share of a recording that the fit has not seen that tells its carry-over."""
 
 
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
-    """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them; what a
-    recording's own past, which nobody recorded, still does to it is estimated and taken off."""
+    """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them; a
+    recording's carry-over is estimated and taken off."""
     inside = _rms(_left(fit, fit.problem.evidence, laws))
     folds = _folds(fit.problem.evidence, by)
 
@@ -69,10 +69,10 @@ def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], 
 
 
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
-    """Weighted misfit of the joint angle [rad] on counted rows; laws, the session's zero and the recording's past taken
-    off (where the fit has not seen the session, or the recording: as these rows, and the first of them, tell it)."""
+    """Weighted misfit of the joint angle [rad] on counted rows; laws, the session's zero and the recording's carry-over
+    taken off (where the fit has not seen the session, or the recording: as these rows, or the first of them, tell)."""
     problem = fit.problem
-    zeros, pasts = problem.aside(fit.x)
+    zeros, carryover = problem.aside(fit.x)
     try:
         misfits = problem.with_evidence(evidence).misfits(fit.x)[JOINT]
     except InputError:
@@ -84,23 +84,23 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
             continue
         left = m[kept] - sum((value_of(law, e) for law in laws), np.zeros(int(kept.sum())))
         left -= zeros[e.session][0] if e.session in zeros else float(np.mean(left))
-        if e.name in pasts:
-            parts.append(e.weight[kept] * (left - pasts[e.name][kept]))
+        if e.name in carryover:
+            parts.append(e.weight[kept] * (left - carryover[e.name][kept]))
         else:
-            parts.append(_without_own_past(e, left, problem.weighing.sigma[JOINT]))
+            parts.append(_without_carryover(e, left, problem.weighing.sigma[JOINT]))
     return parts
 
 
-def _without_own_past(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:
-    """Weighted misfit without what the recording's past did, as its first rows and its prior tell it; these are not
-    judged, or a law that is missing would be taken for a past."""
+def _without_carryover(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:
+    """Weighted misfit without the recording's carry-over, as its first rows and its prior tell it; these are not
+    judged, or a law that is missing would be taken for a carry-over."""
     kept = e.counted[JOINT]
     weighted = e.weight[kept] * left
-    if JOINT not in e.past:
+    if JOINT not in e.carryover:
         return weighted
-    columns = e.weight[kept][:, None] * e.past[JOINT][kept]
+    columns = e.weight[kept][:, None] * e.carryover[JOINT][kept]
     first = int(TELLING * len(left))
-    A = np.vstack([columns[:first] / sigma, np.eye(columns.shape[1]) / PAST])
+    A = np.vstack([columns[:first] / sigma, np.eye(columns.shape[1]) / CARRYOVER_SD])
     b = np.concatenate([weighted[:first] / sigma, np.zeros(columns.shape[1])])
     return np.asarray((weighted - columns @ np.linalg.lstsq(A, b, rcond=None)[0])[first:], dtype=np.float64)
 

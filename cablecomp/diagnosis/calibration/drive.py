@@ -22,8 +22,8 @@ ZEROS = ("joint_position_offset_rad", "motor_torque_offset_Nm")
 """Names in `[session] own` that are found inside of the fit, by session, always."""
 REPLICAS = 2
 PASSES = 2
-"""Times that histories are looked for: what is left over tells how faint a trace matters, and the first time it holds
-those traces."""
+"""Times that histories are looked for: what is left over tells how faint a carry-over matters, and the first time it
+holds those."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ def calibrate_drive(
 
 
 def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Evidence], float]:
-    """The recordings, rows counting from where their pasts are forgotten, with what these may still do; and by how much
+    """The recordings, rows counting from where their histories are forgotten, with their carry-over; and by how much
     that moves a recording's zero [rad]."""
     size = {c: rms_left(fit, c) for c in fit.problem.channels}
     cut, constant = [], []
     for e in evidence:
         swing = full_swing(fit.problem, e, LIMITS.history_most)
         found = forgotten(fit.problem, fit.x, e, size, LIMITS.history, swing)
-        cut.append(replace(e.counting_from(found.first), past=found.past))
+        cut.append(replace(e.counting_from(found.first), carryover=found.carryover))
         constant.append(found.constant_rad)
     return cut, float(np.mean(constant))
 

@@ -100,12 +100,14 @@ def _all_rows(problem: Problem, thin: Evidence, columns: Columns, group: int) ->
             begins = thin.at_rows("time_s")[int(np.argmax(thin.counted[c]))]
             counts[c] = kept & (time[e.rows] >= begins)
     then = thin.at_rows("time_s")
-    past = {c: np.column_stack([np.interp(time[e.rows], then, p) for p in t.T]) for c, t in thin.past.items()}
+    carryover = {
+        c: np.column_stack([np.interp(time[e.rows], then, p) for p in t.T]) for c, t in thin.carryover.items()
+    }
     return replace(
         e,
         columns={**e.columns, "time_s": time},
         counted=counts,
-        past=past,
+        carryover=carryover,
         condition=thin.condition,
         shift_s=thin.shift_s,
     )

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.describe.history import lagged, play
+from cablecomp.diagnosis.describe.memory import lagged, play
 from cablecomp.diagnosis.describe.periodic import Periodicity
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.locate.views import elapsed

@@ -8,8 +8,8 @@ from typing import Final, Literal
 import numpy as np
 
 from cablecomp.diagnosis.describe.blocks import alternate_blocks
-from cablecomp.diagnosis.describe.history import lagged, play
 from cablecomp.diagnosis.describe.law import SparseLaw, sparse_law
+from cablecomp.diagnosis.describe.memory import lagged, play
 from cablecomp.diagnosis.describe.periodic import Periodicity, periodicity, which_angle
 from cablecomp.diagnosis.describe.terms import terms
 from cablecomp.diagnosis.locate.crossfit import block_sums, gains
@@ -29,7 +29,7 @@ class Description:
     """What a residual looks like.
 
     `rms`: beyond noise, in rad; `memory`, `memoryless_share`, `memory_share`: share of the energy
-    beyond noise that present values account for, and what the past adds; `parity` in the direction of
+    beyond noise that present values account for, and what memory adds; `parity` in the direction of
     motion with `odd_share`, `even_share`; `path`: whether its size grows with the load ("load") or not
     ("displacement"); `period`: strongest period in an angle if it is beyond chance, `period_in`: which
     angle; `events_s`: instants at which it changes; `law`: a sparse equation if one holds on held-out
@@ -74,7 +74,7 @@ def describe(
     )
     thinned = thin(series, columns)
     ask = _Questions(thinned.series, thinned.extra)
-    memory, now, past = _memory(ask)
+    memory, present_share, memory_share = _memory(ask)
     parity, odd, even = _parity(ask)
     path = _path(ask)
     found = [
@@ -98,7 +98,9 @@ def describe(
     alike = [entry for entry in found if period is not None and entry.with_load == period.with_load]
     where = which_angle(alike, ratio)
     text = _text(rms, memory, parity, path, period, where, events, law)
-    return Description(rms, memory, now, past, parity, odd, even, path, period, where, events, law, text)
+    return Description(
+        rms, memory, present_share, memory_share, parity, odd, even, path, period, where, events, law, text
+    )
 
 
 class _Questions:
@@ -149,11 +151,11 @@ def _memory(ask: _Questions) -> tuple[Memory, float, float]:
     plain, with_time = ask.gain(now), ask.gain(now, timed)
     with_motion, both = ask.gain(now, moved), ask.gain(now, timed, moved)
     richest = max((with_time, with_motion, both), key=lambda gain: gain.share)
-    past = max(0.0, richest.share - max(0.0, plain.share))
+    by_memory = max(0.0, richest.share - max(0.0, plain.share))
     if ask.clear(richest, plain):
         kind: Memory = "remembers time" if with_time.share > with_motion.share else "remembers motion"
-        return kind, max(0.0, plain.share), past
-    return ("memoryless" if plain.share > 0.5 else "undecided"), max(0.0, plain.share), past
+        return kind, max(0.0, plain.share), by_memory
+    return ("memoryless" if plain.share > 0.5 else "undecided"), max(0.0, plain.share), by_memory
 
 
 def _present(series: Series) -> FloatArray:

@@ -46,7 +46,7 @@ def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]
 
 def _beside(apart: FloatArray, difference: FloatArray) -> FloatArray:
     """What is left of the differences once what the states still lie apart is taken off by a straight line; pairs
-    whose past differs further back do not draw it."""
+    whose history differs further back do not draw it."""
     found = np.linalg.lstsq(apart, difference, rcond=None)[0]
     left = np.abs(difference - apart @ found)
     kept = left <= 4.5 * np.median(left)
