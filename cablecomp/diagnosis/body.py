@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from cablecomp.config import JointConfig
+from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence, gather, rows_for
@@ -18,15 +19,11 @@ from cablecomp.signal.smoothing import FloatArray
 
 Sessions = Literal["folder", "each", "one"]
 Columns = Mapping[str, FloatArray]
-FINAL_EVERY = 6
-"""Of eight recordings and more, every sixth is kept for the end."""
-FEW = 8
-"""Recordings below which the end of each is kept instead."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """`used`: what is fitted and chosen on. `final`: what nothing is fitted or chosen on. `names`: all, in order."""
+    """`names`: all recordings, in order; `used`, `final`, `final_by`: as `KeptForTheEnd` has them."""
 
     names: tuple[str, ...]
     used: tuple[Evidence, ...]
@@ -92,8 +89,7 @@ def gather_body(
             end += shift
         after = end
         found.append(e)
-    used, final, by = _kept_for_the_end(found)
-    return Body(tuple(names), used, final, by)
+    return Body(tuple(names), *kept_for_the_end(found))
 
 
 def spread(evidence: Sequence[Evidence], most: int) -> tuple[Evidence, ...]:
@@ -132,22 +128,3 @@ def _conditions(config: JointConfig, e: Evidence) -> dict[str, float]:
             )
         values[condition] = float(np.median(e.columns[channel]))
     return values
-
-
-def _kept_for_the_end(found: Sequence[Evidence]) -> tuple[tuple[Evidence, ...], tuple[Evidence, ...], str]:
-    """Whole recordings where there are eight or more and their sessions have others, else the end of each."""
-    if len(found) >= FEW:
-        final = [e for k, e in enumerate(found) if k % FINAL_EVERY == FINAL_EVERY // 2]
-        used = [e for e in found if e not in final]
-        lost = {e.session for e in final} - {e.session for e in used}
-        used += [e for e in final if e.session in lost]
-        final = [e for e in final if e.session not in lost]
-        if final:
-            return tuple(used), tuple(final), "recording"
-    used, final = [], []
-    for e in found:
-        last = int((1.0 - LIMITS.final_share) * len(e.rows))
-        early = np.arange(len(e.rows)) < last
-        used.append(replace(e, counted={k: v & early for k, v in e.counted.items()}))
-        final.append(replace(e, counted={k: v & ~early for k, v in e.counted.items()}))
-    return tuple(used), tuple(final), "block"

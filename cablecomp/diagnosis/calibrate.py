@@ -23,16 +23,12 @@ from cablecomp.diagnosis.calibration.motion import Advice, what_would_tell
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Value
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import JOINT, Evidence, noise_mean
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.limits import EXACT
 from cablecomp.signal.noise import channel_noise
-
-UNTOLD = 0.9
-"""Share of its prior's sd from which a parameter's own sd says that the recordings told nothing of it."""
-TIED = 0.9
-"""Correlation from which on two values are said to be known only together."""
 
 OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure"
 
@@ -104,7 +100,7 @@ def calibrate(
         tied,
         rms_left(fit),
         rms_left(replace(fit, x=fit.problem.start)),
-        float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])),
+        noise_mean(fit.problem.evidence, JOINT),
         (*cut, *_warnings(drive, fit)),
         fit,
     )
@@ -142,7 +138,7 @@ def _not_told(fit: Fit) -> dict[str, str]:
     for p, s in zip(fit.problem.parameters, sd, strict=True):
         if p.name in bounded:
             found[p.name] = "the fit ended on its bound: what it would make up for is not its doing"
-        elif s > UNTOLD * p.sd:
+        elif s > LIMITS.untold * p.sd:
             found[p.name] = "these recordings tell nothing of it"
     return found
 
@@ -170,7 +166,7 @@ def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:
     for i in range(len(names)):
         for k in range(i):
             correlation = float(cov[i, k] / (sd[i] * sd[k]))
-            if abs(correlation) > TIED:
+            if abs(correlation) > LIMITS.tied:
                 found.append((names[k], names[i], correlation))
     return tuple(found)
 
@@ -192,14 +188,14 @@ def _warnings(drive: Calibrated, fit: Fit) -> tuple[str, ...]:
             f"{100 * drive.lost_rows / total:.0f} % of the rows were given up to the history before the first sample"
         )
     count = max(_count_rad(e) for e in fit.problem.evidence) * fit.problem.config.drive.ratio
-    if count > float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
+    if count > noise_mean(fit.problem.evidence, JOINT):
         found.append(
             f"one count of the motor encoder turns the joint by {1e6 * count:.2g} "
             f"urad, more than the joint encoder's noise: "
             "a motor that hunts within a count shakes friction loose unseen; "
             "mu_input is what acts then, not the material's"
         )
-    if rms_left(fit) > 2.0 * float(np.mean([e.noise[JOINT] for e in fit.problem.evidence])):
+    if rms_left(fit) > 2.0 * noise_mean(fit.problem.evidence, JOINT):
         found.append("more than noise is left: `cablecomp diagnose` says what the model lacks")
     return tuple(found)
 

@@ -1,6 +1,9 @@
 """Every number that steers a verdict, in one frozen place: its unit, the reason for it, and which trials set it.
 
-"Trials" are those of `firmware_sim.trials.make`; seeds named here were used to set numbers and judge nothing.
+"Trials" are those of `firmware_sim.trials.make`; seeds named here were used to set numbers and judge nothing. Where no
+trials are named, the reason alone set the number. What bounds a fit, whatever it is for (priors, steps of differences,
+assumed histories), stands in `estimation/limits.py`; the weights of a name's confidence in `explain/confidence.json`. A
+capital constant in another file belongs to the algorithm there, or to what is drawn and told: it steers no verdict.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from typing import Final
 class Thresholds:
     """The verdict's numbers; `LIMITS` are those in force."""
 
+    # --- what is looked at, what is left out
     rows: int = 1200
     """Judged rows of all recordings together while hypotheses are compared: a friction loop is told from another by
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
@@ -21,6 +25,41 @@ class Thresholds:
     searched: int = 9
     """Recordings among which hypotheses are compared, spread over sessions and order; the final model is fitted
     to all."""
+    recordings: int = 4
+    """Recordings from which whole ones are left out, and from which their zeros can tell a compliance; of fewer,
+    blocks are left out."""
+    blocks: tuple[int, int] = (12, 60)
+    """Fewest and most blocks of all recordings together: fewer have no scatter, more are dependent."""
+    memory: float = 2.0
+    """Blocks are this many times as long as the remainder remembers, so that blocks are nearly independent."""
+    folds: int = 6
+    """Folds that the blocks of few recordings are dealt to in turn: each leaves out a sixth, all over the recording."""
+    refits: int = 4
+    """Parts left out in turn where each is a fit done again: a drive known by order of magnitude, whose linear steps
+    tell nothing."""
+    parts: int = 5
+    """Parts left out in turn for the errors that are reported; each is a fit done again."""
+    part_blocks: int = 20
+    """Blocks that a recording is cut into for these, where whole ones are too few: four to a part."""
+    telling: float = 0.3
+    """Share of a recording that the fit has not seen that tells its carry-over; the rest is predicted."""
+    final_share: float = 0.15
+    """Share of a recording, its end, that nothing is chosen or fitted on where whole recordings are too few."""
+    final_from: int = 8
+    """Recordings from which whole ones are kept for the end instead."""
+    final_every: int = 6
+    """Of these, one in so many."""
+    history: float = 0.15
+    """Part of what is usually left over that an unknown history may still move the joint by where rows count."""
+    history_most: float = 0.4
+    """Share of a recording that may be given up to an unknown history."""
+    repeats: float = 0.02
+    """How alike two rows of a recording have to be to be called repeats, in each coordinate, as a share of its range; a
+    load that is two percent off still moves a soft cable by far more than the noise, so that is accounted for."""
+    repeats_fewest: int = 100
+    """Pairs of alike rows below which nothing is said of them: neighbours on one stroke make many that say the same."""
+
+    # --- the search
     search_weight: float = 0.5
     """Part of what the best model so far leaves that a row counts for while hypotheses are fitted: small, so
     that the priors of the calibration do not stand in the way of a better law."""
@@ -68,6 +107,20 @@ class Thresholds:
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0
     """The second model is carried on where its loss on data left out is less than this many times the best one's."""
+    part: float = 0.4
+    """Part of its amount with which an effect of the model begins beside one that was found without it."""
+    instants: int = 24
+    """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
+    edge: float = 0.06
+    """Share of a recording at either end within which an event has no before or no after that would show it."""
+    dependence: float = 0.97
+    """Cost after a linear step over the cost before, above which a dependence on session or condition is not tried."""
+    dependences: int = 3
+    """Dependences of a round that are fitted, best first."""
+    conditions: int = 3
+    """Values of a condition from which a gain by it may be asked for: two tell a line from nothing else."""
+
+    # --- what data left out demand
     quiet: float = 1.15
     """Mean square over the sensors' noise at which nothing further is asked: what is left is noise."""
     z_first: float = 1.7
@@ -88,30 +141,23 @@ class Thresholds:
     """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
     gain_sure: float = 0.03
     """That share."""
-    part: float = 0.4
-    """Part of its amount with which an effect of the model begins beside one that was found without it."""
+    z_zero_step: float = 0.0
+    """Standard errors by which an event has to predict better than a plain step of the encoder's zero at its instant:
+    an event steps the zero too, so the step stands in for it only where it predicts better. (Over a pretension of each
+    session's own an effect needs `z`, as over any smaller model.)"""
+    z_candidate: float = 2.0
+    """Standard errors from which what stood out in a round, and is not in the final model, is told as a candidate."""
     tail: float = 3.0
     """Standard deviations of the remainder beyond which a misfit counts linearly (Huber): outliers decide nothing."""
-    memory: float = 2.0
-    """Blocks are this many times as long as the remainder remembers, so that blocks are nearly independent."""
-    blocks: tuple[int, int] = (12, 60)
-    """Fewest and most blocks of all recordings together: fewer have no scatter, more are dependent."""
     resamples: int = 400
     """Draws of blocks for `selected_in` and for the model confidence set."""
     rival: float = 0.10
     """Level of the model confidence set: models that are as good in a tenth of resampled bodies of data stay in."""
-    recordings: int = 4
-    """Recordings from which whole ones are left out, and from which their zeros can tell a compliance; of fewer,
-    blocks are left out."""
+
+    # --- verdict and names
     followed: float = 0.9
     """What the final model leaves of a further channel over what the calibrated drive leaves (RMS), below which it
     follows that channel better: a name may rest on this where the joint's angle is predicted no better."""
-    final_share: float = 0.15
-    """Share of the data that nothing is chosen or fitted on."""
-    history: float = 0.15
-    """Part of what is usually left over that an unknown history may still move the joint by where rows count."""
-    history_most: float = 0.4
-    """Share of a recording that may be given up to an unknown history."""
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
     beyond_noise: float = 4.0
@@ -123,6 +169,36 @@ class Thresholds:
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     name: float = 0.5
     """Confidence from which an effect is named; weaker ones are candidates."""
+    p_follows: float = 0.05
+    """p-value below which what is left is said to follow a covariate that a named effect acts through."""
+    p_structured: float = 0.01
+    """p-value below which what is left is said to follow something, whatever it is."""
+    why_follows: float = 0.3
+    """Share of what is left that follows an effect's own covariate, from which that is a reason against its name."""
+    why_selected: float = 0.5
+    """Share of resampled data in which an effect is the best of its round, below which that is one."""
+    why_left: float = 0.3
+    """Share of the mismatch that the final model leaves, from which that is one."""
+
+    # --- what could be there unseen
+    unseen: float = 3.0
+    """Standard deviations of its amount up to which an effect could have stayed unseen."""
+    unseen_shapes: int = 6
+    """Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
+    hidden: float = 0.1
+    """Share of what an effect does that calibration cannot imitate, below which it hides behind calibration."""
+    hidden_kept: float = 0.5
+    """The same of the joint as it would then be, simulated: a step of the calibration follows a straight line."""
+    hidden_within: float = 2.0
+    """Standard deviations of its tolerance by which a parameter may be off to make up for an effect."""
+    hidden_most: int = 3
+    """Hidden effects that are told, the largest first."""
+
+    # --- what a calibration knows
+    untold: float = 0.9
+    """Share of its prior's sd from which a parameter's own sd says that the recordings told nothing of it."""
+    tied: float = 0.9
+    """Correlation from which on two values are said to be known only together."""
 
 
 LIMITS: Final = Thresholds()

@@ -71,6 +71,11 @@ class Evidence:
         return self.columns[name][self.rows]
 
     @property
+    def group(self) -> float:
+        """Readings of which a fine row is the mean."""
+        return max(1.0, self.samples / len(self.columns["time_s"]))
+
+    @property
     def rated(self) -> IntArray:
         """The fine rows at which a law with rates is run."""
         return np.union1d(self.rows, np.arange(0, len(self.columns["time_s"]), RATED))
@@ -79,6 +84,16 @@ class Evidence:
         """The same with judged rows before `first` not counted."""
         later = np.arange(len(self.rows)) >= first
         return replace(self, counted={k: v & later for k, v in self.counted.items()})
+
+
+def noise_mean(evidence: Sequence[Evidence], channel: str) -> float:
+    """1-sigma of a channel's reading, mean over the recordings; 0 where none shows any."""
+    return float(np.mean([e.noise.get(channel, 0.0) for e in evidence]))
+
+
+def noise_rms(evidence: Sequence[Evidence], channel: str) -> float:
+    """The same, root mean square: what noise alone leaves of readings of all recordings together."""
+    return float(np.sqrt(np.mean([e.noise.get(channel, 0.0) ** 2 for e in evidence])))
 
 
 def load_channel(config: JointConfig, columns: Mapping[str, FloatArray]) -> str | None:

@@ -16,16 +16,10 @@ import numpy as np
 
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.limits import HISTORY_CUTS, HISTORY_FAINT, HISTORY_LEG
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
-
-CUTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)
-"""Shares of a recording that may be given up: what lasts longer is estimated."""
-LEG = 12
-"""Rows of one leg of an assumed history."""
-FAINT = 0.02
-"""Share of what is usually left over below which a carry-over is not worth a column."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +80,7 @@ def histories(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
 
 
 def _path(corners: Sequence[tuple[float, float]]) -> FloatArray:
-    return np.concatenate([np.linspace(a, b, LEG) for a, b in pairwise(corners)])
+    return np.concatenate([np.linspace(a, b, HISTORY_LEG) for a, b in pairwise(corners)])
 
 
 def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
@@ -136,7 +130,7 @@ def forgotten(
         return Forgotten(0, 0.0, 0.0)
     apart = np.stack([run[JOINT] for run in runs])
     best: tuple[float, int] | None = None
-    for cut in CUTS:
+    for cut in HISTORY_CUTS:
         first = max(int(cut * apart.shape[1]), after)
         later = apart[:, first:]
         left = float(np.sqrt(np.mean((later - later.mean(axis=1, keepdims=True)) ** 2)))
@@ -148,7 +142,9 @@ def forgotten(
     assert best is not None
     left, first = best
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
-    carryover = {c: _columns(np.column_stack([run[c] for run in runs]), first, FAINT * size[c]) for c in size}
+    carryover = {
+        c: _columns(np.column_stack([run[c] for run in runs]), first, HISTORY_FAINT * size[c]) for c in size
+    }
     return Forgotten(first, left, constant, {c: t for c, t in carryover.items() if t.shape[1]})
 
 

@@ -21,6 +21,12 @@ ZERO: Final = 0.5
 what compliances do."""
 CARRYOVER_SD: Final = 1.0
 """Prior sd of a recording's carry-over, in what the assumed histories add in the mean (RMS)."""
+HISTORY_CUTS: Final = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)
+"""Shares of a recording that may be given up to an unknown history: what lasts longer is estimated."""
+HISTORY_LEG: Final = 12
+"""Rows of one leg of an assumed history."""
+HISTORY_FAINT: Final = 0.02
+"""Share of what is usually left over below which a carry-over is not worth a column."""
 EXACT: Final = 0.003
 """Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without
 it, calibration would answer a slightly wrong ratio by physics."""

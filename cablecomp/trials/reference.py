@@ -17,13 +17,8 @@ from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.explain.model import searching
-from cablecomp.diagnosis.explain.scores import (
-    Groups,
-    ScoreDifference,
-    left_out,
-    make_groups,
-    score_difference,
-)
+from cablecomp.diagnosis.explain.scores import ScoreDifference, left_out, score_difference
+from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence

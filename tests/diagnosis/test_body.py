@@ -10,7 +10,8 @@ import pytest
 from turning import JOINT, recorded
 
 from cablecomp.config import parse_joint
-from cablecomp.diagnosis.body import FEW, gather_body, session_names
+from cablecomp.diagnosis.body import gather_body, session_names
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
 
@@ -42,7 +43,7 @@ def test_the_end_of_few_recordings_is_kept_and_never_used() -> None:
 
 
 def test_whole_recordings_of_many_are_kept_and_every_session_stays_represented() -> None:
-    short = {f"{'abcd'[k % 4]}/{k}": recorded(seed=k, duration_s=6.0) for k in range(FEW + 4)}
+    short = {f"{'abcd'[k % 4]}/{k}": recorded(seed=k, duration_s=6.0) for k in range(LIMITS.final_from + 4)}
     body = gather_body(JOINT, short)
     assert body.final_by == "recording"
     used, final = {e.name for e in body.used}, {e.name for e in body.final}
@@ -85,9 +86,9 @@ def test_folders_of_one_name_are_not_one_session() -> None:
 
 
 def test_where_every_recording_is_a_session_of_its_own_the_end_of_each_is_kept() -> None:
-    body = gather_body(JOINT, {f"{k}/1": recorded(seed=k, duration_s=6.0) for k in range(FEW)})
+    body = gather_body(JOINT, {f"{k}/1": recorded(seed=k, duration_s=6.0) for k in range(LIMITS.final_from)})
     assert body.final_by == "block"
-    assert len(body.final) == FEW
+    assert len(body.final) == LIMITS.final_from
 
 
 @pytest.mark.parametrize(

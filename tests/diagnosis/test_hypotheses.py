@@ -6,7 +6,8 @@ import numpy as np
 from turning import JOINT, recorded
 
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.hypotheses import EDGE, hypotheses, instants
+from cablecomp.diagnosis.explain.hypotheses import hypotheses, instants
+from cablecomp.diagnosis.thresholds import LIMITS
 
 
 def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_session() -> None:
@@ -20,7 +21,7 @@ def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_sessi
     for first, last in spans:
         inside = asked[(asked >= first) & (asked <= last)]
         assert len(inside) >= 3
-        assert inside.min() >= first + 0.9 * EDGE * (last - first)
+        assert inside.min() >= first + 0.9 * LIMITS.edge * (last - first)
 
 
 def test_an_effect_that_reads_a_channel_is_asked_once_for_each_channel_that_varies() -> None:

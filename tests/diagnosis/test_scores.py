@@ -9,14 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cablecomp.diagnosis.explain.scores import (
-    Groups,
-    confidence_set,
-    huber,
-    left_out,
-    score_difference,
-    selected_in,
-)
+from cablecomp.diagnosis.explain.scores import confidence_set, huber, left_out, score_difference, selected_in
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.signal.smoothing import FloatArray
 
 BLOCKS, ROWS = 30, 20

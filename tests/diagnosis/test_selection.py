@@ -10,7 +10,7 @@ import pytest
 
 from cablecomp.diagnosis.explain import selection
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.scores import Groups
+from cablecomp.diagnosis.folds import Groups
 
 ROWS, BLOCKS = 600, 20
 GROUPS = Groups(

@@ -4,13 +4,14 @@ had seen."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from cablecomp.config import Empirical
 from cablecomp.diagnosis.describe.empirical import refitted, value_of
+from cablecomp.diagnosis.folds import Part, left_out_in_turn
 from cablecomp.diagnosis.result import Errors
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
@@ -18,24 +19,17 @@ from cablecomp.estimation.limits import CARRYOVER_SD
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
-FOLDS = 5
-BLOCKS = 20
-TELLING = 0.3
-"""Share of a recording that the fit has not seen that tells its carry-over."""
-
 
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
     """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them; a
     recording's carry-over is estimated and taken off."""
     inside = _rms(_left(fit, fit.problem.evidence, laws))
-    folds = _folds(fit.problem.evidence, by)
 
-    def left_out(k: int) -> list[FloatArray]:
-        train, test = folds[k]
-        again = fitted_to_part(fit, train, 5)
-        return _left(again, test, _again(again, laws))
+    def left_out(part: Part) -> list[FloatArray]:
+        again = fitted_to_part(fit, part.rest, 5)
+        return _left(again, part.out, _again(again, laws))
 
-    parts = [p for found in side_by_side(left_out, range(len(folds))) for p in found]
+    parts = [p for found in side_by_side(left_out, left_out_in_turn(fit.problem.evidence, by)) for p in found]
     return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)))
 
 
@@ -46,26 +40,6 @@ def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
     kept = [e for e in fit.problem.evidence if e.counted[JOINT].any()]
     weighted = _left(fit, kept)
     return refitted(laws, kept, [r / e.weight[e.counted[JOINT]] for r, e in zip(weighted, kept, strict=True)])
-
-
-def _folds(evidence: Sequence[Evidence], by: str) -> list[tuple[list[Evidence], list[Evidence]]]:
-    if by == "recording":
-        return [
-            (
-                [e for k, e in enumerate(evidence) if k % FOLDS != f],
-                [e for k, e in enumerate(evidence) if k % FOLDS == f],
-            )
-            for f in range(min(FOLDS, len(evidence)))
-        ]
-    found = []
-    for f in range(FOLDS):
-        train, test = [], []
-        for e in evidence:
-            held = (np.arange(len(e.rows)) * BLOCKS // len(e.rows)) % FOLDS == f
-            train.append(replace(e, counted={k: v & ~held for k, v in e.counted.items()}))
-            test.append(replace(e, counted={k: v & held for k, v in e.counted.items()}))
-        found.append((train, test))
-    return found
 
 
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
@@ -99,7 +73,7 @@ def _without_carryover(e: Evidence, left: FloatArray, sigma: float) -> FloatArra
     if JOINT not in e.carryover:
         return weighted
     columns = e.weight[kept][:, None] * e.carryover[JOINT][kept]
-    first = int(TELLING * len(left))
+    first = int(LIMITS.telling * len(left))
     A = np.vstack([columns[:first] / sigma, np.eye(columns.shape[1]) / CARRYOVER_SD])
     b = np.concatenate([weighted[:first] / sigma, np.zeros(columns.shape[1])])
     return np.asarray((weighted - columns @ np.linalg.lstsq(A, b, rcond=None)[0])[first:], dtype=np.float64)

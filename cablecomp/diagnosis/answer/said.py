@@ -6,10 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cablecomp.config import JointConfig
 from cablecomp.diagnosis.answer.values import effect_values
-from cablecomp.diagnosis.body import Body
-from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
@@ -17,11 +14,10 @@ from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.experiment import best_experiment
 from cablecomp.diagnosis.explain.model import Model, Selection
 from cablecomp.diagnosis.explain.unseen import Hidden
-from cablecomp.diagnosis.explain.verdict import Weighed
+from cablecomp.diagnosis.explain.weighing import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates, join
-from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.locate.remainders import sensitivities
-from cablecomp.diagnosis.locate.series import Series
+from cablecomp.diagnosis.outcome import Case, Outcome
 from cablecomp.diagnosis.result import Named, Tested, Traces, Value
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -77,7 +73,7 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
             if (
                 t.term.name in known
                 or t.difference.gain < LIMITS.gain
-                or t.difference.z < 2.0
+                or t.difference.z < LIMITS.z_candidate
                 or isinstance(t.term, Dependence)
                 or t.term.effect.id in held
             ):
@@ -148,16 +144,11 @@ def tested(selection: Selection, named: Sequence[str]) -> tuple[Tested, ...]:
 
 
 def next_experiment(
-    selection: Selection,
-    found: Sequence[Weighed],
-    kept: Model,
-    hidden: Sequence[Hidden],
-    drive: Calibrated,
-    seen: Sequence[Covariates],
+    case: Case, selection: Selection, outcome: Outcome, hidden: Sequence[Hidden]
 ) -> tuple[str, str] | None:
     """Where effects are tied, or one hides behind the calibration, what would set the predictions apart."""
-    first = drive.fit.problem.evidence[0]
-    names = {n for w in found for n in w.rivals}
+    first = case.drive.fit.problem.evidence[0]
+    names = {n for w in outcome.weighed for n in w.rivals}
     models = [selection.final.fit.problem.joint(selection.final.fit.x, first)]
     for r in selection.rounds:
         for t in r.tried:
@@ -165,47 +156,44 @@ def next_experiment(
                 names.discard(t.term.name)
                 models.append(t.model.fit.problem.joint(t.model.fit.x, first))
     if len(models) < 2:
-        models = [kept.fit.problem.joint(kept.fit.x, first), *(h.joint for h in hidden[:1])]
+        fit = outcome.kept.fit
+        models = [fit.problem.joint(fit.x, first), *(h.joint for h in hidden[:1])]
     if len(models) < 2:
         return None
     temperature = float(np.mean(first.columns.get("temperature_degC", np.array([20.0]))))
     try:
-        best = best_experiment(models, join(list(seen)), drive.floor_rad, temperature)
+        best = best_experiment(models, join(list(case.covariates)), case.drive.floor_rad, temperature)
     except InputError:
         return None
     return None if best is None else (best.why, best.protocol.to_toml())
 
 
-def remainder(
-    kept: Model,
-    found: Location,
-    series: Series,
-    structured: bool,
-    drive: Calibrated,
-    rng: np.random.Generator,
-) -> dict[str, object]:
-    left = rms_left(kept.fit)
+def remainder(case: Case, outcome: Outcome, rng: np.random.Generator) -> dict[str, object]:
+    """What the model kept leaves, in words and, where a sparse law holds, as an equation."""
+    fit = outcome.kept.fit
+    left = rms_left(fit)
     text, equation = "noise", None
-    if structured:
-        turns = 1.0 / kept.fit.problem.config.drive.ratio
-        description = describe(series, rng, sensitivities(kept.fit), turns)
-        first = found.significant(0.01)
+    if outcome.structured:
+        turns = 1.0 / fit.problem.config.drive.ratio
+        description = describe(outcome.left.series, rng, sensitivities(fit), turns)
+        first = outcome.left.location.significant(LIMITS.p_structured)
         text = (
             f"follows {first[0].covariate}: {first[0].how}; {description.text}" if first else description.text
         )
         equation = description.law.equation if description.law else None
     return {
         "rmse_rad": left,
-        "share": float(left**2 / max(rms_left(drive.fit) ** 2, 1e-300)),
-        "structured": structured,
+        "share": float(left**2 / max(rms_left(case.drive.fit) ** 2, 1e-300)),
+        "structured": outcome.structured,
         "description": text,
         "equation": equation,
     }
 
 
-def notes(config: JointConfig, body: Body, drive: Calibrated) -> tuple[str, ...]:
+def notes(case: Case) -> tuple[str, ...]:
     """What was assumed and what was left out."""
-    load = load_channel(config, body.used[0].columns)
+    body, drive = case.body, case.drive
+    load = load_channel(case.config, body.used[0].columns)
     found = [f"load from {load}" if load else "no load channel: the joint is taken as free"]
     if drive.lost_rows:
         total = sum(len(e.rows) for e in body.used)

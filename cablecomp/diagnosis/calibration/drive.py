@@ -11,7 +11,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
 from cablecomp.estimation.history import forgotten, full_swing
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
 from cablecomp.estimation.parameter import Parameter, of_drive, own_of
@@ -110,7 +110,7 @@ def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing
 
 
 def _floor(evidence: Sequence[Evidence], channels: Sequence[str]) -> Weighing:
-    sigma = {c: max(float(np.mean([e.noise.get(c, 0.0) for e in evidence])), 1e-9) for c in channels}
+    sigma = {c: max(noise_mean(evidence, c), 1e-9) for c in channels}
     return Weighing(sigma, {c: 0.1 * s for c, s in sigma.items()})
 
 
@@ -128,19 +128,14 @@ def noise_floor(fit: Fit, rng: np.random.Generator) -> float:
         except InputError:
             continue
         moved += [np.std(a - b) ** 2 for a, b in zip(base, other, strict=True)]
-    own = float(
-        np.mean(
-            [e.noise[JOINT] ** 2 / max(1.0, e.samples / len(e.columns["time_s"])) for e in problem.evidence]
-        )
-    )
+    own = float(np.mean([e.noise[JOINT] ** 2 / e.group for e in problem.evidence]))
     return float(np.sqrt(own + (float(np.mean(moved)) if moved else 0.0)))
 
 
 def _noise_replica(e: Evidence, rng: np.random.Generator) -> Evidence:
     columns = dict(e.columns)
-    group = max(1.0, e.samples / len(e.columns["time_s"]))
     for name in ("motor_position_rad", "joint_torque_Nm", MOTOR):
-        sigma = e.noise.get(name, 0.0) / np.sqrt(group)
+        sigma = e.noise.get(name, 0.0) / np.sqrt(e.group)
         if name in columns and sigma > 0.0 and name not in e.counted:
             noisy: FloatArray = columns[name] + sigma * rng.standard_normal(len(columns[name]))
             columns[name] = keep_corners(columns["time_s"], noisy, sigma)

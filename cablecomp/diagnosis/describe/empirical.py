@@ -10,7 +10,8 @@ import numpy as np
 
 from cablecomp.config import Empirical
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, score_difference
+from cablecomp.diagnosis.explain.scores import ScoreDifference, score_difference
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray, IntArray

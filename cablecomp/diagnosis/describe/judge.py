@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
-from cablecomp.diagnosis.describe.blocks import Layout
+from cablecomp.diagnosis.folds import Layout
 from cablecomp.signal.autocorrelation import integrated_time, long_run_variance
 from cablecomp.signal.smoothing import FloatArray, IntArray
 

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.describe.blocks import Layout
 from cablecomp.diagnosis.describe.judge import judge
 from cablecomp.diagnosis.describe.terms import Term
+from cablecomp.diagnosis.folds import Layout
 from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, gains
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.signal.smoothing import FloatArray

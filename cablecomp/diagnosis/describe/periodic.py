@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cablecomp.diagnosis.locate.series import Series, blocks_of
+from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.locate.views import contrasts, hats, load_path
 from cablecomp.signal.smoothing import FloatArray
 
@@ -67,7 +67,7 @@ def periodicity(
     base, _ = np.linalg.qr(plain * weight[:, None])
     residual = series.residual * weight
     residual = residual - base @ (base.T @ residual)
-    block = blocks_of(series)
+    block = series.blocks()
     firsts = np.flatnonzero(np.concatenate(([True], np.diff(block) != 0)))
     signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, len(firsts)))
     signs = np.vstack((np.ones((1, len(firsts))), signs))

@@ -7,14 +7,14 @@ from typing import Final, Literal
 
 import numpy as np
 
-from cablecomp.diagnosis.describe.blocks import alternate_blocks
 from cablecomp.diagnosis.describe.law import SparseLaw, sparse_law
 from cablecomp.diagnosis.describe.memory import lagged, play
 from cablecomp.diagnosis.describe.periodic import Periodicity, periodicity, which_angle
 from cablecomp.diagnosis.describe.terms import terms
+from cablecomp.diagnosis.folds import alternate_blocks
 from cablecomp.diagnosis.locate.crossfit import block_sums, gains
 from cablecomp.diagnosis.locate.segments import segment
-from cablecomp.diagnosis.locate.series import Series, blocks_of, thin
+from cablecomp.diagnosis.locate.series import Series, thin
 from cablecomp.diagnosis.locate.views import contrasts, elapsed, hats, load_path, products
 from cablecomp.signal.smoothing import FloatArray
 
@@ -108,7 +108,7 @@ class _Questions:
 
     def __init__(self, series: Series, nuisance: FloatArray) -> None:
         self.series = series
-        self.block = blocks_of(series)
+        self.block = series.blocks()
         self.weight = 1.0 / series.sigma**2
         self.nuisance = nuisance
         energy = float(np.sum(self.weight * series.residual**2))

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from cablecomp.diagnosis.explain.screening import anchor
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter, by_condition, own_of
@@ -21,8 +22,6 @@ from cablecomp.signal.smoothing import FloatArray
 
 POSTURES: Final = ("_rad", "_deg", "_m")
 """Ends of the names of conditions that say how the path lies."""
-PROMISING = 3
-"""Dependences of a round that are fitted, best first."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ def ask_dependences(fit: Fit, terms: Sequence[Any], by: str) -> list[tuple[Depen
             cost = 0.5 * float(np.sum((left - own / scale @ best) ** 2))
             found.append((dependence, cost, changed))
     found.sort(key=lambda f: f[1])
-    return [f for f in found if 2.0 * f[1] < 0.97 * energy][:PROMISING]
+    return [f for f in found if 2.0 * f[1] < LIMITS.dependence * energy][: LIMITS.dependences]
 
 
 def _ways(
@@ -123,7 +122,7 @@ def _ways(
         ways.append((Dependence(p.name, "session"), cut, replace(problem, parameters=free)))
     for condition in problem.evidence[0].condition:
         values = np.array([e.condition[condition] for e in problem.evidence])
-        if len(np.unique(values)) < 3 or not may_depend(p.base, condition):
+        if len(np.unique(values)) < LIMITS.conditions or not may_depend(p.base, condition):
             continue
         centred = values - values.mean()
         weight = np.where(owners >= 0, centred[np.maximum(owners, 0).astype(np.int64)], 0.0)

@@ -10,15 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_effect
-
-INSTANTS = 24
-"""Instants at which an event is asked for at first, over all recordings."""
-EDGE = 0.06
-"""Share of a recording at either end within which an event has no before or no after that would show it."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +185,7 @@ def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
         time = (
             e.columns["time_s"][e.rows[e.counted[JOINT]]] if e.counted[JOINT].any() else e.columns["time_s"]
         )
-        margin = EDGE * float(time[-1] - time[0])
+        margin = LIMITS.edge * float(time[-1] - time[0])
         spans.append((float(time[0]) + margin, float(time[-1]) - margin))
         if k and evidence[k - 1].session == e.session:
             last = float(evidence[k - 1].columns["time_s"][-1])
@@ -198,7 +194,7 @@ def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
     length = sum(b - a for a, b in inside)
     found = []
     for a, b in inside:
-        count = max(1, round(INSTANTS * (b - a) / length))
+        count = max(1, round(LIMITS.instants * (b - a) / length))
         found += [a + (b - a) * (k + 0.5) / count for k in range(count)]
     return tuple(found)
 

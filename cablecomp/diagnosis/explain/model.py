@@ -11,11 +11,12 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, block_losses, left_out, scales
+from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, left_out, scales
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence, load_channel
+from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -97,8 +98,7 @@ def searching(fit: Fit) -> Weighing:
     problem = fit.problem
     sigma = {}
     for c in problem.channels:
-        noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
-        sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise, 1e-12)
+        sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise_rms(problem.evidence, c), 1e-12)
     # zeros may not take up what an effect could explain: an offset that follows the load is a compliance. Where there
     # are recordings enough to tell, a zero keeps what it counts for among rows that remember each other
     told = len(problem.evidence) >= LIMITS.recordings

@@ -13,7 +13,6 @@ from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, placed
 from cablecomp.diagnosis.explain.scores import (
-    Groups,
     ScoreDifference,
     block_losses,
     confidence_set,
@@ -23,15 +22,13 @@ from cablecomp.diagnosis.explain.scores import (
     score_difference,
 )
 from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
-
-ZERO_STEP = "a step of the joint encoder's zero"
-OWN = "a pretension of each session's own"
 
 
 class Rivals(NamedTuple):
@@ -87,24 +84,31 @@ def rivals(
     return Rivals(effects, tuple(plain), {**differences, **plain})
 
 
+class Plain(NamedTuple):
+    """What is no effect, in a term's place: its name, what it leaves of data left out, and by how many standard errors
+    the term has to predict better, or it stands in for the term."""
+
+    name: str
+    left_out: FloatArray
+    z: float
+
+
 def _plain(model: Model, base: Model, term: Hypothesis, groups: Groups) -> dict[str, ScoreDifference]:
-    """What is no effect and explains as much as a term does, with the term's score against it."""
+    """What is no effect and stands in for a term, with the term's score against it."""
     found: dict[str, ScoreDifference] = {}
-    if term.has_instant:
-        instant = float(model.fit.values[term.key(term.instant)])
-        step = score_difference(model.left_out, _stepped(base, instant, groups), groups)
-        if step.gain < 0.0:
-            found[ZERO_STEP] = step
-    for other in _by_session(base, groups):
-        step = score_difference(model.left_out, other.left_out, groups)
-        if step.z < LIMITS.z:
-            found[OWN] = step
+    for plain in (_zero_step(model, base, term, groups), _mounted_anew(base, groups)):
+        if plain is not None:
+            step = score_difference(model.left_out, plain.left_out, groups)
+            if step.z < plain.z:
+                found[plain.name] = step
     return found
 
 
-def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
-    """What is left out with a plain step of the joint's zero in place of an event: what an encoder's hub does
-    when it slips. It speaks against the event only where it predicts better, for an event steps the zero too."""
+def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> Plain | None:
+    """A plain step of the joint's zero in place of an event: what an encoder's hub does when it slips."""
+    if not term.has_instant:
+        return None
+    instant_s = float(model.fit.values[term.key(term.instant)])
     fit, problem = base.fit, base.fit.problem
     after = [(e.at_rows("time_s") >= instant_s).astype(np.float64) for e in problem.evidence]
     struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)
@@ -119,22 +123,21 @@ def _stepped(base: Model, instant_s: float, groups: Groups) -> FloatArray:
     column[first : first + len(projected)] = projected
     A = np.column_stack((fit.J, column))
     step = np.linalg.lstsq(A, -fit.residual, rcond=None)[0]
-    return left_out_linearly(fit.residual + A @ step, A, groups)
+    left = left_out_linearly(fit.residual + A @ step, A, groups)
+    return Plain("a step of the joint encoder's zero", left, LIMITS.z_zero_step)
 
 
-def _by_session(base: Model, groups: Groups) -> list[Model]:
-    """What the drive's mounting anew explains in place of a term: sessions follow each other in time, and what lies
-    between two looks like an instant; cables less tight look like a coupling that yields."""
-    found = []
+def _mounted_anew(base: Model, groups: Groups) -> Plain | None:
+    """A pretension of each session's own: sessions follow each other in time, and what lies between two looks like an
+    instant; cables less tight look like a coupling that yields."""
     for dependence, _, problem in ask_dependences(base.fit, base.terms, groups.by):
-        if dependence.on != "session" or not dependence.of_drive:
-            continue
-        try:
-            fit = solve(problem, placed(base.fit, problem), 10, LIMITS.tolerance)
-        except InputError:
-            continue
-        found.append(Model((*base.terms, dependence), fit, left_out(fit, groups)))
-    return found
+        if dependence.on == "session" and dependence.of_drive:
+            try:
+                fit = solve(problem, placed(base.fit, problem), 10, LIMITS.tolerance)
+            except InputError:
+                return None
+            return Plain("a pretension of each session's own", left_out(fit, groups), LIMITS.z)
+    return None
 
 
 def _tried(fit: Fit) -> Fit | None:

@@ -25,15 +25,9 @@ from cablecomp.diagnosis.explain.model import (
     placed,
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
-from cablecomp.diagnosis.explain.scores import (
-    Groups,
-    demanded,
-    left_out,
-    scales,
-    score_difference,
-    selected_in,
-)
+from cablecomp.diagnosis.explain.scores import demanded, left_out, scales, score_difference, selected_in
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -215,7 +209,7 @@ def _by_conditions(begun: Begun) -> list[Begun]:
     found: list[Begun] = []
     for condition in problem.evidence[0].condition:
         values = [e.condition[condition] for e in problem.evidence]
-        if len(set(values)) < 3:
+        if len(set(values)) < LIMITS.conditions:
             continue
         name = term.key(term.amount.name)
         amount = next((p for p in problem.parameters if p.name == name), None)

@@ -16,6 +16,7 @@ from math import sqrt
 
 import numpy as np
 
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
 from cablecomp.errors import InputError
@@ -24,83 +25,7 @@ from cablecomp.estimation.least_squares import Fit, fitted_to_part
 from cablecomp.estimation.parameter import DECADE
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
-from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray
-
-
-@dataclass(frozen=True)
-class Groups:
-    """Which group each row of the residual belongs to, channel by channel as the residual goes (-1: a penalty
-    row, in none). Where whole recordings are left out, how far a recording's zero departs from its session's is a
-    row of its own: an offset that follows the load is a compliance, and not the encoder's matter.
-
-    `fold`: groups that are left out together (a recording; a block where there are few recordings). `by`: what the
-    folds are.
-    """
-
-    block: IntArray
-    fold: IntArray
-    by: str
-    channel: IntArray
-    """Number of the output channel that each row belongs to."""
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks."""
-        return int(self.block.max()) + 1
-
-    @property
-    def folds(self) -> int:
-        """Number of folds."""
-        return int(self.fold.max()) + 1
-
-
-def make_groups(fit: Fit) -> Groups:
-    """Blocks of a few memories of the remainder's, within recordings; folds of whole recordings where there are enough
-    of them, else of alternating blocks."""
-    problem = fit.problem
-    owners = [problem.owners(c) for c in problem.channels]
-    counts = np.bincount(owners[0], minlength=len(problem.evidence))
-    by = "recording" if len(problem.evidence) >= LIMITS.recordings else "block"
-    spans = problem.spans()
-    first_rows = fit.residual[spans[problem.channels[0]]]
-    parts = [first_rows[owners[0] == k] for k in range(len(problem.evidence)) if counts[k] > 8]
-    memory = integrated_time_of_parts(parts)
-    least, most = LIMITS.blocks
-    total = int(np.clip(counts.sum() / (LIMITS.memory * memory), least, most))
-    alone = _alone(problem) if by == "recording" else np.zeros(len(problem.evidence), dtype=np.bool_)
-    blocks, folds, channels = [], [], []
-    for number, (c, own) in enumerate(zip(problem.channels, owners, strict=True)):
-        block = np.full(len(own), -1, dtype=np.int64)
-        first = 0
-        departs, in_fold = (np.full(problem.bases[c].penalty_rows, -1, dtype=np.int64) for _ in range(2))
-        zeros = len(problem.evidence) if problem.departs and by != "block" else 0
-        for k in range(len(problem.evidence)):
-            here = own == k
-            n = int(here.sum())
-            each = max(1, round(total * counts[k] / max(counts.sum(), 1)))
-            # by time, so that a block holds all channels of its time
-            place = np.linspace(0, each, n, endpoint=False).astype(np.int64)
-            block[here] = first + place
-            if k < zeros:
-                departs[k] = first + each // 2
-            first += each
-        in_fold[:zeros] = np.where(alone[:zeros], -1, _fold_of(np.arange(zeros), departs[:zeros], by))
-        blocks += [block, departs]
-        folds += [np.where(alone[own], -1, _fold_of(own, block, by)), in_fold]
-        channels.append(np.full(len(own) + len(departs), number, dtype=np.int64))
-    return Groups(np.concatenate(blocks), np.concatenate(folds), by, np.concatenate(channels))
-
-
-def _alone(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Recordings that alone show how their session's drive stands, where other sessions have several: they are not
-    left out, or a session's own value could not be judged by the others."""
-    several = problem.repeated
-    return np.array([len(several) > 1 and e.session not in several for e in problem.evidence], dtype=np.bool_)
-
-
-def _fold_of(own: IntArray, block: IntArray, by: str) -> IntArray:
-    return own if by == "recording" else np.asarray(block % 6, dtype=np.int64)
 
 
 def left_out(fit: Fit, groups: Groups) -> FloatArray:
@@ -140,17 +65,13 @@ def left_out_linearly(residual: FloatArray, J: FloatArray, groups: Groups) -> Fl
     return r
 
 
-EXACT = 4
-"""Parts that are left out in turn where fits are done again."""
-
-
 def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArray:
     """As `left_out`, each of a few parts really left out and the rest fitted again: for drives known by order
     of magnitude only, whose parameters trade places along bent valleys that no linear step follows."""
     n = len(groups.fold)
     r = fit.residual[:n].copy()
-    for k in range(min(EXACT, groups.folds)):
-        out = (groups.fold >= 0) & (groups.fold % EXACT == k)
+    for k in range(min(LIMITS.refits, groups.folds)):
+        out = (groups.fold >= 0) & (groups.fold % LIMITS.refits == k)
         try:
             again = fitted_to_part(fit, _kept(fit.problem, out), evaluations)
         except InputError:

@@ -23,9 +23,11 @@ from cablecomp.diagnosis.explain.model import (
     without,
 )
 from cablecomp.diagnosis.explain.rounds import cold_starts, one_round
-from cablecomp.diagnosis.explain.scores import Groups, demanded, left_out, score_difference
+from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.evidence import noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.problem import Weighing
 
@@ -132,11 +134,8 @@ def _better(model: Model, than: Model, groups: Groups) -> bool:
 def quiet(fit: Fit) -> bool:
     """Whether all that is left of every channel is its sensor's noise."""
     problem = fit.problem
-    for c in problem.channels:
-        noise = float(np.sqrt(np.mean([e.noise.get(c, 0.0) ** 2 for e in problem.evidence])))
-        if rms_left(fit, c) > np.sqrt(LIMITS.quiet) * noise:
-            return False
-    return True
+    most = np.sqrt(LIMITS.quiet)
+    return not any(rms_left(fit, c) > most * noise_rms(problem.evidence, c) for c in problem.channels)
 
 
 def _pruned(model: Model, groups: Groups) -> Model:

@@ -11,21 +11,9 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.screening import Anchor, anchor, contribution, with_entry
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.signal.smoothing import FloatArray
-
-SIGMAS = 3.0
-"""Standard deviations of its amount up to which an effect could have stayed unseen."""
-SHAPES = 6
-"""Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
-ALIKE = 0.1
-"""Share of what an effect does that calibration cannot imitate, below which it hides behind calibration."""
-KEPT = 0.5
-"""The same of the joint as it would then be, simulated: a step of the calibration follows a straight line."""
-WITHIN = 2.0
-"""Standard deviations of its tolerance by which a parameter may be off to make up for an effect."""
-MOST = 3
-"""Hidden effects that are told, the largest first."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +47,7 @@ def could_be_unseen(
     for h in pool:
         if h.name in named or (h.effect.id in held and not h.channel):
             continue
-        shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // SHAPES)
+        shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
         made = [contribution(here, h, h.starts[k]) for k in shapes]
         sizes = [None if m is None else _bound(here, *m) for m in made]
         seen = [s for s in sizes if s is not None]
@@ -78,17 +66,17 @@ def could_be_unseen(
         if not (h.has_instant or h.has_phase):
             behind = [_hidden(here, h, k, *m) for k, m in zip(shapes, made, strict=True) if m is not None]
             hidden += sorted((b for b in behind if b is not None), key=lambda b: -b.visible)[:1]
-    return found, sorted(hidden, key=lambda b: -b.visible)[:MOST]
+    return found, sorted(hidden, key=lambda b: -b.visible)[: LIMITS.hidden_most]
 
 
 def _bound(here: Anchor, d: FloatArray, size: float) -> float | None:
     length = float(np.linalg.norm(here.beyond(d)))
-    return SIGMAS * abs(size) / length if length > 1e-9 else None
+    return LIMITS.unseen * abs(size) / length if length > 1e-9 else None
 
 
 def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float) -> Hidden | None:
     """Whether steps of the calibration inside the tolerances do what `size` of the effect does: J s = d, |s_j|
-    <= WITHIN."""
+    <= LIMITS.hidden_within."""
     problem = here.fit.problem
     count = len(problem.parameters)
     J, d = here.fit.J[: len(d) - count], d[: len(d) - count]
@@ -98,14 +86,14 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
         return None
     scale = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
     s = np.linalg.lstsq(J / scale, d, rcond=1e-6)[0] / scale
-    if float(np.linalg.norm(d - J @ s)) > ALIKE * length:
+    if float(np.linalg.norm(d - J @ s)) > LIMITS.hidden * length:
         return None
     sds = np.array([p.sd for p in problem.parameters])
     most = float(np.max(np.abs(s[finite]) / sds[finite]))
-    factor = WITHIN / max(most, 1e-300)
+    factor = LIMITS.hidden_within / max(most, 1e-300)
     amount = min(abs(size) * factor, max(abs(b) for b in h.amount.bounds(problem.config)))
     visible = length * amount / abs(size)
-    if visible < SIGMAS:
+    if visible < LIMITS.unseen:
         return None
     j = int(np.argmax(np.abs(s) * scale))
     p = problem.parameters[j]
@@ -114,7 +102,10 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
     low, high = problem.bounds()
     moved = np.concatenate([np.clip(x, low, high), [q.x(q.start) for q in made.parameters[count:]]])
     there = made.followed(moved)
-    if there is None or float(np.linalg.norm(there[: len(d)] - here.fit.residual[: len(d)])) > KEPT * visible:
+    if (
+        there is None
+        or float(np.linalg.norm(there[: len(d)] - here.fit.residual[: len(d)])) > LIMITS.hidden_kept * visible
+    ):
         return None
     return Hidden(h.name, p.name, amount, h.amount.unit, visible, made.joint(moved, problem.evidence[0]))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, coefficients, gains, surrogate_gains
 from cablecomp.diagnosis.locate.segments import segment
-from cablecomp.diagnosis.locate.series import Series, blocks_of, thin
+from cablecomp.diagnosis.locate.series import Series, thin
 from cablecomp.diagnosis.locate.views import View, load_path, views
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
@@ -166,7 +166,7 @@ def _ground(series: Series, nuisance: FloatArray | None) -> _Ground:
     energy = float(np.sum(weight * small.residual**2))
     # below a tenth of the energy the part beyond noise is not known well enough to divide by
     excess = max(energy - small.samples, 0.1 * energy, 1e-300)
-    return _Ground(small, blocks_of(small), weight, _orthonormal(thinned.extra, weight), excess)
+    return _Ground(small, small.blocks(), weight, _orthonormal(thinned.extra, weight), excess)
 
 
 def _orthonormal(columns: FloatArray, weight: FloatArray) -> FloatArray:

@@ -9,14 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cablecomp.diagnosis.locate.covariates import Covariates
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.signal.smoothing import FloatArray
-
-REACH = 0.02
-"""How alike two rows have to be in each coordinate, as a share of its range; a load that is two percent off still
-moves a soft cable by far more than the noise, so what is left apart is accounted for."""
-FEWEST = 100
-"""Pairs of alike rows below which nothing is said: neighbours on one stroke make many that say the same."""
 
 
 def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]) -> float | None:
@@ -31,9 +26,9 @@ def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]
         points = np.column_stack((state[:, used] / span[used], c.motion_direction, v["load_direction"]))
         time = v["time"]
         apart = 0.1 * float(time[-1] - time[0])
-        near = cKDTree(points).query_pairs(REACH * np.sqrt(points.shape[1]), output_type="ndarray")
+        near = cKDTree(points).query_pairs(LIMITS.repeats * np.sqrt(points.shape[1]), output_type="ndarray")
         near = near[np.abs(time[near[:, 0]] - time[near[:, 1]]) > apart]
-        if len(near) < FEWEST:
+        if len(near) < LIMITS.repeats_fewest:
             continue
         joint = e.at_rows(JOINT)
         a, b = near[:, 0], near[:, 1]

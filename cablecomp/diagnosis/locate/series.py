@@ -1,4 +1,4 @@
-"""A residual with its noise and covariates, cut into blocks: what all of the statistics here work on."""
+"""A residual with its noise and covariates: what all of the statistics here work on."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cablecomp.diagnosis.folds import blocks_by_memory
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.errors import InputError
-from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
@@ -40,6 +40,10 @@ class Series:
     def parts(self) -> list[FloatArray]:
         """Return the residual of each recording."""
         return [self.residual[span] for span in self.spans()]
+
+    def blocks(self) -> IntArray:
+        """Return the block of every sample, longer than the residual remembers."""
+        return blocks_by_memory(self.parts())
 
 
 @dataclass(frozen=True)
@@ -106,23 +110,3 @@ def thin(series: Series, extra: FloatArray | None = None, limit: int = 12_000) -
         group.astype(np.int64),
         np.asarray(means, dtype=np.float64),
     )
-
-
-def blocks_of(series: Series, taus: float = 8.0, fewest: int = 20, most: int = 60) -> IntArray:
-    """Return the block of every sample: contiguous, within one recording, about `taus` integrated times long.
-
-    The number of blocks stays between `fewest` and `most` as far as the recordings allow; with a memory
-    longer than that, blocks are dependent and their evidence is to be taken with care.
-    """
-    tau = integrated_time_of_parts(
-        [part / np.std(part) if np.std(part) > 0 else part for part in series.parts()]
-    )
-    total = int(np.clip(series.samples / (taus * tau), fewest, most))
-    block = np.zeros(series.samples, dtype=np.int64)
-    first = 0
-    for span in series.spans():
-        length = span.stop - span.start
-        count = max(1, round(total * length / series.samples))
-        block[span] = first + np.arange(length) * count // length
-        first += count
-    return block

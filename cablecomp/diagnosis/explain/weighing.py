@@ -1,4 +1,4 @@
-"""What the evidence amounts to: each effect of the final model with its evidence and confidence, and the verdict."""
+"""Each effect of the final model weighed: its evidence on data left out, against its rivals, and its confidence."""
 
 from __future__ import annotations
 
@@ -12,10 +12,17 @@ from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
-from cablecomp.diagnosis.explain.scores import Groups, ScoreDifference, halves, scales, score_difference
+from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
+from cablecomp.diagnosis.explain.search import Search
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray
+
+ALONE = ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
+"""Of an effect without which the drive cannot follow the recordings."""
+NO_RIVAL = ScoreDifference(1.0, 10.0, 10.0, np.zeros(1))
+"""Of an effect in whose place nothing could be tried."""
 
 
 @dataclass(frozen=True)
@@ -38,68 +45,58 @@ class Weighed:
     removes: float
 
 
-def weigh(
-    selection: Selection,
-    pool: Sequence[Hypothesis],
-    remainder: Location,
-    share_left: float,
-    rng: np.random.Generator,
-) -> list[Weighed]:
-    """Every effect of the final model, most certain first."""
-    final, groups = selection.final, selection.groups
-    bounds = final.fit.at_bound()
+def weigh(found: Search, left: Location, share_left: float, rng: np.random.Generator) -> list[Weighed]:
+    """Every effect of the search's model, most certain first; `left`: where lies what the final model leaves,
+    `share_left`: how much of the mismatch that is."""
+    selection, final = found.selection, found.selection.final
     # whoever took nothing off in any round stands in for nobody
     able = {t.term.name for r in selection.rounds for t in r.tried if t.difference.gain > 0.0}
-    found = []
-    for term in final.terms:
-        if not isinstance(term, Hypothesis):
-            continue
-        bare = without(final, term, groups)
-        own = (
-            score_difference(final.left_out, bare.left_out, groups)
-            if bare is not None
-            else ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
-        )
-        instead = (
-            Rivals()
-            if bare is None
-            else rivals(final, term, bare, [h for h in pool if h.name in able], groups, rng)
-        )
-        nearest = min(
-            instead.differences.values(),
-            key=lambda v: v.z,
-            default=ScoreDifference(1.0, 10.0, 10.0, np.zeros(1)),
-        )
-        follows = _follows(term, remainder)
-        evidence = features(
-            gain=own.gain,
-            z=own.z,
-            z_blocks=own.z_blocks,
-            selected_in=_selected(selection, term),
-            lead_gain=nearest.gain,
-            lead_z=nearest.z,
-            share_left=share_left,
-            share_total=_share_of_baseline(selection, bare, final),
-            rivals=len(instead.effects),
-            follows=follows,
-            unsteady=_unsteady(final, term, groups),
-            at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in bounds),
-            tries=len(term.starts),
-            terms=sum(isinstance(t, Hypothesis) for t in final.terms),
-        )
-        told = is_told(final.fit, term)
-        confidence = learnt().probability(evidence) if told else 0.0
-        depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
-        found.append(
-            Weighed(
-                term, depends, {**evidence, "z": own.z, "gain": own.gain}, confidence, instead.effects, nearest,
-                _against((*instead.effects, *instead.plain), follows, own, evidence)
-                if told
-                else "its amount is not told from none",
-                max(evidence["share_total"], _alone(selection, term)),
-            )
-        )  # fmt: skip
-    return sorted(found, key=lambda w: -w.confidence)
+    pool = [h for h in found.pool if h.name in able]
+    terms = [t for t in final.terms if isinstance(t, Hypothesis)]
+    weighed = [_weighed(selection, t, pool, left, share_left, rng) for t in terms]
+    return sorted(weighed, key=lambda w: -w.confidence)
+
+
+def _weighed(
+    selection: Selection,
+    term: Hypothesis,
+    pool: Sequence[Hypothesis],
+    left: Location,
+    share_left: float,
+    rng: np.random.Generator,
+) -> Weighed:
+    """One effect of the final model, `pool`: what may stand in for it."""
+    final, groups = selection.final, selection.groups
+    bare = without(final, term, groups)
+    own, instead = ALONE, Rivals()
+    if bare is not None:
+        own = score_difference(final.left_out, bare.left_out, groups)
+        instead = rivals(final, term, bare, pool, groups, rng)
+    nearest = min(instead.differences.values(), key=lambda v: v.z, default=NO_RIVAL)
+    evidence = features(
+        gain=own.gain,
+        z=own.z,
+        z_blocks=own.z_blocks,
+        selected_in=_selected(selection, term),
+        lead_gain=nearest.gain,
+        lead_z=nearest.z,
+        share_left=share_left,
+        share_total=_share_of_baseline(selection, bare, final),
+        rivals=len(instead.effects),
+        follows=_follows(term, left),
+        unsteady=_unsteady(final, term, groups),
+        at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in final.fit.at_bound()),
+        tries=len(term.starts),
+        terms=sum(isinstance(t, Hypothesis) for t in final.terms),
+    )
+    depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
+    confidence, why_not = 0.0, "its amount is not told from none"
+    if is_told(final.fit, term):
+        confidence = learnt().probability(evidence)
+        why_not = _against((*instead.effects, *instead.plain), own, evidence)
+    removes = max(evidence["share_total"], _alone(selection, term))
+    said = {**evidence, "z": own.z, "gain": own.gain}
+    return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes)
 
 
 def _selected(selection: Selection, term: Hypothesis) -> float:
@@ -172,25 +169,24 @@ def _unsteady(final: Model, term: Hypothesis, groups: Groups) -> float:
     return min(worst, 1.0)
 
 
-def _follows(term: Hypothesis, remainder: Location) -> float:
+def _follows(term: Hypothesis, left: Location) -> float:
     """Share of the remainder that follows the first two covariates that the effect acts through."""
     wanted = term.acts_through[:2]
-    shares = [m.share for m in remainder.mismatch if m.covariate in wanted and m.p_value < 0.05]
+    shares = [m.share for m in left.mismatch if m.covariate in wanted and m.p_value < LIMITS.p_follows]
     return max(shares, default=0.0)
 
 
-def _against(
-    instead: Sequence[str], follows: float, own: ScoreDifference, evidence: Mapping[str, float]
-) -> str:
-    reasons = []
+def _against(instead: Sequence[str], own: ScoreDifference, evidence: Mapping[str, float]) -> str:
+    """What speaks against a name, in words."""
+    reasons, follows = [], evidence["follows"]
     if instead:
         reasons.append(f"{', '.join(instead)} in its place explains data left out as well")
-    if follows > 0.3:
+    if follows > LIMITS.why_follows:
         reasons.append(f"{follows:.0%} of what is left still follows the covariate that it acts through")
     if own.z < LIMITS.z:
         reasons.append(f"z = {own.z:.1f}, {LIMITS.z:g} are asked for")
-    if evidence["selected_in"] < 0.5:
+    if evidence["selected_in"] < LIMITS.why_selected:
         reasons.append(f"it is the best of its round in {evidence['selected_in']:.0%} of resampled data only")
-    if evidence["share_left"] > 0.3:
+    if evidence["share_left"] > LIMITS.why_left:
         reasons.append(f"{evidence['share_left']:.0%} of the mismatch is left over")
     return "; ".join(reasons) or "its evidence is weak in every respect"

@@ -1,0 +1,80 @@
+"""A diagnosis as it is told, out of the case, the search and what was made of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cablecomp.diagnosis.answer.augmented import augmented_joint
+from cablecomp.diagnosis.answer.said import (
+    candidates,
+    channel_word,
+    named_of,
+    next_experiment,
+    notes,
+    remainder,
+    tested,
+    tied_of,
+    traces,
+)
+from cablecomp.diagnosis.answer.values import drive_values
+from cablecomp.diagnosis.answer.verdict import warnings_of
+from cablecomp.diagnosis.explain.search import Search
+from cablecomp.diagnosis.explain.unseen import could_be_unseen
+from cablecomp.diagnosis.outcome import Case, Left, Outcome
+from cablecomp.diagnosis.result import Diagnosis, Law
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.least_squares import Fit, rms_left
+
+OUT_OF_TIME = "the {:g} s were over before all hypotheses were tried: what is named is the best so far"
+
+
+def told(
+    case: Case, before: Left, found: Search, outcome: Outcome, rng: np.random.Generator, budget_s: float
+) -> Diagnosis:
+    """Everything found; `before`: what the calibrated drive leaves."""
+    drive, kept = case.drive, outcome.kept
+    unseen, hidden = could_be_unseen(kept.fit, found.pool, outcome.names)
+    return Diagnosis(
+        config=case.config,
+        recordings=case.body.names,
+        sessions=case.body.sessions,
+        verdict=outcome.verdict,
+        noise_floor_rad=drive.floor_rad,
+        repeatability_rad=outcome.repeated_rad,
+        nominal_rmse_rad=rms_left(drive.nominal),
+        baseline=outcome.baseline,
+        augmented=outcome.augmented,
+        heldout_by=found.groups.by,
+        folds=found.groups.folds,
+        final=tuple(e.name for e in case.body.final),
+        channels=_channels(drive.fit, kept.fit),
+        calibration=drive_values(kept.fit, case.config),
+        location=before.location,
+        named=tuple(named_of(w, found.final) for w in outcome.named),
+        candidates=candidates(outcome.weighed, found.selection, found.final),
+        not_excluded=(*tied_of(outcome.weighed, found.selection), *(((h.effect,), h.why) for h in hidden)),
+        empirical=_laws(outcome),
+        next_experiment=next_experiment(case, found.selection, outcome, hidden),
+        could_be_unseen=tuple(unseen),
+        remainder=remainder(case, outcome, rng),
+        remainder_location=outcome.left.location,
+        tested=tested(found.selection, outcome.names),
+        notes=notes(case),
+        augmented_joint=augmented_joint(case.config, kept, outcome.empirical, case.body.names),
+        evidence=drive.fit.problem.evidence,
+        traces=tuple(traces(drive.fit, kept.fit, case.covariates)),
+        warnings=(*((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()), *warnings_of(kept)),
+    )
+
+
+def _channels(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
+    """What is left of each further channel, before and after (RMS)."""
+    others = [c for c in before.problem.channels if c != JOINT]
+    return {c: (rms_left(before, c), rms_left(after, c)) for c in others}
+
+
+def _laws(outcome: Outcome) -> tuple[Law, ...]:
+    """The laws without a name, in the covariates' words."""
+    return tuple(
+        Law(f.law.id, channel_word(f.law.of), f.difference.gain, f.difference.z) for f in outcome.laws
+    )

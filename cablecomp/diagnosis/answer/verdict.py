@@ -1,0 +1,60 @@
+"""The verdict in one word, and what it rests on: does the model predict, is what it leaves more than noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.explain.model import Model, bears
+from cablecomp.diagnosis.locate.location import Location
+from cablecomp.diagnosis.locate.series import Series
+from cablecomp.diagnosis.result import Errors
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.least_squares import Fit, rms_left
+
+
+def verdict_of(named: bool, structured: bool, drive: Calibrated, kept: Model) -> str:
+    """explained | partly explained | unexplained | recalibrate | consistent."""
+    if named:
+        return "partly explained" if structured else "explained"
+    if structured:
+        return "unexplained"
+    before, after = rms_left(drive.nominal), rms_left(kept.fit)
+    return "recalibrate" if after < LIMITS.recalibrate * before else "consistent"
+
+
+def predicts(before: Fit, after: Fit, baseline: Errors, augmented: Errors) -> bool:
+    """Whether a fit done again without a part predicts that part better than the calibrated drive does; or whether
+    another channel than the joint's angle is followed better."""
+    others = [c for c in before.problem.channels if c != JOINT]
+    return augmented.heldout_rmse_rad < baseline.heldout_rmse_rad or any(
+        rms_left(after, c) < LIMITS.followed * rms_left(before, c) for c in others
+    )
+
+
+def is_structured(found: Location, series: Series, repeated_rad: float | None, named: bool) -> bool:
+    """Whether what is left is more than noise and follows something; beside a name, far more than noise is enough."""
+    noise = float(np.mean(series.sigma))
+    yardstick = noise if repeated_rad is None else max(repeated_rad, noise)
+    ratio = float(np.mean(series.residual**2)) / yardstick**2
+    follows = bool(found.significant(LIMITS.p_structured))
+    beyond = LIMITS.beyond_noise if named else LIMITS.far_beyond_noise
+    return ratio > (LIMITS.structured if follows else beyond)
+
+
+def share_left(drive: Calibrated, final: Model) -> float:
+    """Mean square beyond noise left by the final model over that of the calibrated drive."""
+    noise = drive.floor_rad**2
+    before, after = rms_left(drive.fit) ** 2 - noise, rms_left(final.fit) ** 2 - noise
+    return float(np.clip(after / max(before, 1e-3 * noise), 0.0, 1.0))
+
+
+def warnings_of(model: Model) -> tuple[str, ...]:
+    """What speaks against trusting the model as it is, one line each."""
+    lines = [f"{name} ended on its bound" for name in model.fit.at_bound()]
+    if model.terms and not bears(model.fit):
+        lines.append(
+            "the joint as fitted has no solution at up to twice these loads; record greater ones as well"
+        )
+    return tuple(lines)

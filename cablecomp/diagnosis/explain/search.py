@@ -1,0 +1,102 @@
+"""The search, start to end: hypotheses compared among a spread few of the recordings, what is found fitted to all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cablecomp.diagnosis.body import spread
+from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.model import Model, Selection, Term, placed, stripped
+from cablecomp.diagnosis.explain.scores import left_out
+from cablecomp.diagnosis.explain.selection import select
+from cablecomp.diagnosis.folds import Groups, make_groups
+from cablecomp.diagnosis.pace import Pace
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, solve, weighed
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search came to.
+
+    `pool`: every hypothesis asked. `selection`: its rounds and its model, about the recordings searched. `final`: that
+    model about all recordings; `groups`: what of these is left out in turn. `cut_short`: the time was up.
+    """
+
+    pool: Sequence[Hypothesis]
+    selection: Selection
+    final: Model
+    groups: Groups
+    cut_short: bool
+
+
+def search(drive: Calibrated, pool: Sequence[Hypothesis], rng: np.random.Generator, pace: Pace) -> Search:
+    """Find the model that data left out demand, beginning at the calibrated drive."""
+    evidence = drive.fit.problem.evidence
+    some = spread(evidence, LIMITS.searched)
+    whole = len(some) == len(evidence)
+    calibrated = drive.fit if whole else _about(drive.fit, some)
+    nominal = drive.nominal if whole else _nominal(calibrated)
+    groups = make_groups(calibrated)
+    selection = select(calibrated, nominal, pool, groups, rng, pace)
+    cut_short = pace.over
+    pace.tell("last fit", 0.9)
+    final = _settled(selection.final.terms, selection.final.fit, drive, groups)
+    selection = replace(selection, final=final)
+    if not whole:
+        groups = make_groups(drive.fit)
+        final = _about_all(final, drive, groups)
+    return Search(pool, selection, final, groups, cut_short)
+
+
+def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:
+    """The fit about some of its recordings."""
+    return solve(fit.problem.with_evidence(some), fit.x, 6, J=derivative_of_part(fit, some))
+
+
+def _about_all(model: Model, drive: Calibrated, groups: Groups) -> Model:
+    """The model about all recordings again: the calibrated drive where nothing was found."""
+    if not model.terms:
+        return without_effects(model, drive, groups)
+    everything = model.fit.problem.with_evidence(drive.fit.problem.evidence)
+    return _settled(model.terms, solve(everything, model.fit.x, 8), drive, groups)
+
+
+def _nominal(fit: Fit) -> Fit:
+    """The nominal drive about the same recordings, evaluated."""
+    problem = fit.problem
+    x = problem.start
+    return Fit(problem, x, problem.residual(x), problem.jacobian(x))
+
+
+def _settled(terms: tuple[Term, ...], fit: Fit, drive: Calibrated, groups: Groups) -> Model:
+    """The fit with weights that its own remainder asks for, so that its uncertainties mean something."""
+    for _ in range(2):
+        fit = refit(fit, weighed(fit, drive.floor), 6)
+    return Model(terms, fit, left_out(fit, groups))
+
+
+def without_effects(model: Model, drive: Calibrated, groups: Groups) -> Model:
+    """The model with no effect in it: what differs between sessions or with a condition stays where it is the drive's
+    own; the calibrated drive where nothing does."""
+    own = tuple(t for t in model.terms if isinstance(t, Dependence) and t.of_drive)
+    calibrated = Model((), drive.fit, left_out(drive.fit, groups))
+    if not own:
+        return calibrated
+    if own == model.terms:
+        return model
+    problem = model.fit.problem
+    for effect in (t for t in model.terms if isinstance(t, Hypothesis)):
+        problem = stripped(problem, effect)
+    try:
+        fit = solve(problem, placed(model.fit, problem), LIMITS.settled, LIMITS.tolerance)
+    except InputError:
+        return calibrated
+    return _settled(own, fit, drive, groups)

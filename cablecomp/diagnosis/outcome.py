@@ -1,0 +1,76 @@
+"""What the steps of a diagnosis hand on to each other: the case, what a model leaves, what is made of the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cablecomp.config import Empirical, JointConfig
+from cablecomp.diagnosis.body import Body
+from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.describe.empirical import Found
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.weighing import Weighed
+from cablecomp.diagnosis.locate.covariates import Covariates
+from cablecomp.diagnosis.locate.location import Location, locate
+from cablecomp.diagnosis.locate.remainders import sensitivities, series_of
+from cablecomp.diagnosis.locate.series import Series
+from cablecomp.diagnosis.result import Errors
+from cablecomp.estimation.least_squares import Fit
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves of the joint's angle, and where it lies."""
+
+    series: Series
+    location: Location
+
+
+@dataclass(frozen=True)
+class Case:
+    """The joint as configured, its recordings, the drive calibrated on them, and the covariates of each recording
+    used."""
+
+    config: JointConfig
+    body: Body
+    drive: Calibrated
+    covariates: tuple[Covariates, ...]
+
+    def left_by(self, fit: Fit, rng: np.random.Generator) -> Left:
+        """What a fit to these recordings leaves."""
+        series = series_of(fit, self.covariates, self.drive.floor_rad)
+        return Left(series, locate(series, rng, sensitivities(fit)))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What is made of a search.
+
+    `weighed`: every effect of its model; `named`: those that are sure enough, what is missed most first. `kept`: the
+    model to go by, without effects where none is named; `laws`: laws without a name beside it. `baseline`, `augmented`:
+    errors of the calibrated drive, and of what is kept. `left`: what is left over; `repeated_rad`: what the machine
+    itself repeats; `structured`: what is left is more than noise.
+    """
+
+    weighed: tuple[Weighed, ...]
+    named: tuple[Weighed, ...]
+    kept: Model
+    laws: tuple[Found, ...]
+    baseline: Errors
+    augmented: Errors
+    left: Left
+    repeated_rad: float | None
+    structured: bool
+    verdict: str
+
+    @property
+    def names(self) -> list[str]:
+        """Names of what is named."""
+        return [w.term.name for w in self.named]
+
+    @property
+    def empirical(self) -> list[Empirical]:
+        """The laws without a name, as a configuration has them."""
+        return [f.law for f in self.laws]
