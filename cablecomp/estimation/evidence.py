@@ -120,60 +120,76 @@ def gather(
     for key in NEEDED:
         if key not in columns:
             raise InputError(f"{name}: channel `{key}` is missing; a diagnosis needs {', '.join(NEEDED)}")
-    raw = {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()}
-    raw = _in_order(name, raw)
+    raw = _in_order(name, {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()})
     load = load_channel(config, raw)
-    inputs = [k for k in raw if k not in OUTPUTS or k == load]
-    good = {k: np.isfinite(v) for k, v in raw.items() if k != "time_s"}
-    outliers = 0
-    for key, values in raw.items():
-        if key == "time_s":
-            continue
-        if good[key].sum() < 40:
-            count = int(good[key].sum())
-            raise InputError(f"{name}: channel `{key}` has {count} finite readings; 40 are needed")
-        spikes = _spikes(values, good[key])
-        outliers += int(spikes.sum())
-        good[key] &= ~spikes
+    good, outliers = _good(name, raw)
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
-    # the drive goes from reading to reading: where an input has none, a bridged value would be an error of the
-    # prediction
-    kept = np.ones(len(raw["time_s"]), dtype=np.bool_)
-    for key in ("motor_position_rad", *([load] if load else [])):
-        if good[key].mean() > SPARSE:
-            kept &= good[key]
-    time = raw["time_s"]
-    raw = {
-        k: v[kept] if k == "time_s" else np.interp(time[kept], time[good[k]], v[good[k]])
-        for k, v in raw.items()
-    }
-    finite = {k: good[k][kept] for k in OUTPUTS if k in raw}
-    group = max(1, -(-len(raw["time_s"]) // fine_rows))
-    whole = len(raw["time_s"]) // group * group
-    means = {k: group_means(v[:whole], group) for k, v in raw.items()}
-    good_rows = {k: group_means(v[:whole].astype(np.float64), group) > 0.99 for k, v in finite.items()}
-    for key in inputs:
-        if key != "time_s" and np.ptp(means[key]) > 0.0:
-            means[key] = keep_corners(means["time_s"], means[key], noise[key] / np.sqrt(group))
-    if load == MOTOR:
-        good_rows.pop(MOTOR)
+    raw, finite = _bridged(raw, good, _drivable(raw, good, load))
+    means, counted = _fine(raw, finite, noise, fine_rows, load)
     rows = thinned(means, load, judged_rows)
     time = means["time_s"][rows]
     share = np.gradient(time) if len(time) > 1 else np.ones(1)
     weight = np.sqrt(share / share.mean())
     return Evidence(
-        name,
-        session,
-        {},
-        means,
-        rows,
-        {k: v[rows] for k, v in good_rows.items()},
-        weight,
-        noise,
-        outliers,
-        len(raw["time_s"]),
-        float(np.median(np.diff(raw["time_s"]))),
-    )
+        name, session, {}, means, rows, {k: v[rows] for k, v in counted.items()}, weight, noise, outliers,
+        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))),
+    )  # fmt: skip
+
+
+def _good(name: str, raw: Mapping[str, FloatArray]) -> tuple[dict[str, BoolArray], int]:
+    """Which readings of each channel are to be trusted, and how many were set aside as outliers."""
+    good = {k: np.isfinite(v) for k, v in raw.items() if k != "time_s"}
+    outliers = 0
+    for key, kept in good.items():
+        if kept.sum() < 40:
+            raise InputError(f"{name}: channel `{key}` has {int(kept.sum())} finite readings; 40 are needed")
+        spikes = _spikes(raw[key], kept)
+        outliers += int(spikes.sum())
+        kept &= ~spikes
+    return good, outliers
+
+
+def _drivable(raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], load: str | None) -> BoolArray:
+    """Rows at which the inputs were read: the drive goes from reading to reading, and where an input has none, a
+    bridged value would be an error of the prediction."""
+    kept = np.ones(len(raw["time_s"]), dtype=np.bool_)
+    for key in ("motor_position_rad", *([load] if load else [])):
+        if good[key].mean() > SPARSE:
+            kept &= good[key]
+    return kept
+
+
+def _bridged(
+    raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], kept: BoolArray
+) -> tuple[dict[str, FloatArray], dict[str, BoolArray]]:
+    """The rows kept, other channels bridged where they have no reading; and where an output has one."""
+    time = raw["time_s"]
+    bridged = {
+        k: v[kept] if k == "time_s" else np.interp(time[kept], time[good[k]], v[good[k]])
+        for k, v in raw.items()
+    }
+    return bridged, {k: good[k][kept] for k in OUTPUTS if k in raw}
+
+
+def _fine(
+    raw: Mapping[str, FloatArray],
+    finite: Mapping[str, BoolArray],
+    noise: Mapping[str, float],
+    fine_rows: int,
+    load: str | None,
+) -> tuple[dict[str, FloatArray], dict[str, BoolArray]]:
+    """Means of as many readings as leave `fine_rows`, inputs cleaned; and which of them count, by output channel."""
+    group = max(1, -(-len(raw["time_s"]) // fine_rows))
+    whole = len(raw["time_s"]) // group * group
+    means = {k: group_means(v[:whole], group) for k, v in raw.items()}
+    counted = {k: group_means(v[:whole].astype(np.float64), group) > 0.99 for k, v in finite.items()}
+    for key in raw:
+        is_input = key != "time_s" and (key not in OUTPUTS or key == load)
+        if is_input and np.ptp(means[key]) > 0.0:
+            means[key] = keep_corners(means["time_s"], means[key], noise[key] / np.sqrt(group))
+    if load == MOTOR:
+        counted.pop(MOTOR)
+    return means, counted
 
 
 def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]:

@@ -114,38 +114,51 @@ def forgotten(
 ) -> Forgotten:
     """Where the history is forgotten to within `share` of what is usually left over of each channel (`size`), from row
     `after` on; the best cut there is if it is nowhere."""
-    made = simulator(problem.joint(x, recording))
-    try:
-        base = made.predict(recording)
-    except InputError:
-        return Forgotten(0, 0.0, 0.0)
-    runs = []
-    for history in histories(problem, recording):
-        try:
-            run = made.predict(recording, history)
-        except InputError:
-            continue  # a history that the drive could not have had
-        runs.append({c: run[c] - base[c] for c in size})
+    runs = _apart(problem, x, recording, tuple(size))
     if not runs:
         return Forgotten(0, 0.0, 0.0)
     apart = np.stack([run[JOINT] for run in runs])
-    best: tuple[float, int] | None = None
-    for cut in HISTORY_CUTS:
-        first = max(int(cut * apart.shape[1]), after)
-        later = apart[:, first:]
-        left = float(np.sqrt(np.mean((later - later.mean(axis=1, keepdims=True)) ** 2)))
-        if left <= share * size[JOINT]:
-            best = (left, first)
-            break
-        if best is None or left < 0.7 * best[0]:
-            best = (left, first)
-    assert best is not None
-    left, first = best
+    first, left = _first_row(apart, share * size[JOINT], after)
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
     carryover = {
         c: _columns(np.column_stack([run[c] for run in runs]), first, HISTORY_FAINT * size[c]) for c in size
     }
     return Forgotten(first, left, constant, {c: t for c, t in carryover.items() if t.shape[1]})
+
+
+def _apart(
+    problem: Problem, x: FloatArray, recording: Evidence, channels: Sequence[str]
+) -> list[dict[str, FloatArray]]:
+    """What each assumed history that the drive could have had adds to the judged rows, by channel."""
+    made = simulator(problem.joint(x, recording))
+    try:
+        base = made.predict(recording)
+    except InputError:
+        return []
+    runs = []
+    for history in histories(problem, recording):
+        try:
+            run = made.predict(recording, history)
+        except InputError:
+            continue
+        runs.append({c: run[c] - base[c] for c in channels})
+    return runs
+
+
+def _first_row(apart: FloatArray, enough: float, after: int) -> tuple[int, float]:
+    """The earliest cut, from row `after` on, from which histories (k x rows) differ by no more than `enough` but for a
+    constant, else the best there is; and by how much they differ from there on (RMS)."""
+    best: tuple[int, float] | None = None
+    for cut in HISTORY_CUTS:
+        first = max(int(cut * apart.shape[1]), after)
+        later = apart[:, first:]
+        left = float(np.sqrt(np.mean((later - later.mean(axis=1, keepdims=True)) ** 2)))
+        if left <= enough:
+            return first, left
+        if best is None or left < 0.7 * best[1]:
+            best = (first, left)
+    assert best is not None
+    return best
 
 
 def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:

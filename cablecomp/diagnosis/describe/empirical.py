@@ -4,7 +4,8 @@ data left out."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,49 +34,63 @@ class Found:
 
 def empirical_laws(model: Model, groups: Groups) -> list[Found]:
     """The series that hold, best first, each fitted to what the ones before left."""
-    problem = model.fit.problem
-    span = problem.spans()[JOINT]
-    count = len(problem.owners(JOINT))
-    rows = slice(span.start, span.start + count)
-    sigma = problem.weighing.sigma[JOINT]
-    weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
-    left = model.left_out[rows].copy()
-    fold, block = groups.fold[rows], groups.block[rows]
-    here = Groups(block, fold, groups.by, np.zeros_like(block))
+    rows = _joint_rows(model, groups)
     found: list[Found] = []
     while True:
-        best: Found | None = None
-        gone: FloatArray | None = None
-        for channel in CHANNELS:
-            if any(f.law.of == channel for f in found) or not all(
-                channel in e.columns for e in problem.evidence
-            ):
-                continue
-            x = np.concatenate([e.at_rows(channel)[e.counted[JOINT]] for e in problem.evidence])
-            centre, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
-            if half <= 0.0:
-                continue
-            T = _basis(x, centre, half) * (weight / sigma)[:, None]
-            predicted = _crossed(T, left, fold)
-            step = score_difference(left - predicted, left, here)
-            if (
-                step.z > LIMITS.z
-                and step.gain > LIMITS.gain
-                and (best is None or step.gain > best.difference.gain)
-            ):
-                coefficients = _ridge(T, left)
-                name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace(
-                    "position", "angle"
-                )
-                law = Empirical(
-                    id=name, law="chebyshev", of=channel, centre=centre, half_width=half,
-                    coefficients_rad=(0.0, *(float(c) for c in coefficients)),
-                )  # fmt: skip
-                best, gone = Found(law, step), predicted
-        if best is None or gone is None:
+        others = [c for c in CHANNELS if all(f.law.of != c for f in found)]
+        held = [h for c in others if (h := _held(c, rows)) is not None]
+        if not held:
             return found
-        found.append(best)
-        left = left - gone
+        best = max(held, key=lambda h: h.found.difference.gain)
+        found.append(best.found)
+        rows = replace(rows, left=rows.left - best.predicted)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The joint angle's rows: what is left of them (weighted), their weights over sigma, and what is left out in
+    turn."""
+
+    evidence: Sequence[Evidence]
+    left: FloatArray
+    weight: FloatArray
+    groups: Groups
+
+
+class _Held(NamedTuple):
+    found: Found
+    predicted: FloatArray
+
+
+def _joint_rows(model: Model, groups: Groups) -> _Rows:
+    problem = model.fit.problem
+    first = problem.spans()[JOINT].start
+    rows = slice(first, first + len(problem.owners(JOINT)))
+    weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
+    block = groups.block[rows]
+    here = Groups(block, groups.fold[rows], groups.by, np.zeros_like(block))
+    return _Rows(problem.evidence, model.left_out[rows].copy(), weight / problem.weighing.sigma[JOINT], here)
+
+
+def _held(channel: str, rows: _Rows) -> _Held | None:
+    """The series in one channel, fitted to what is left; None where it does not hold on data left out."""
+    if not all(channel in e.columns for e in rows.evidence):
+        return None
+    x = np.concatenate([e.at_rows(channel)[e.counted[JOINT]] for e in rows.evidence])
+    centre, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
+    if half <= 0.0:
+        return None
+    T = _basis(x, centre, half) * rows.weight[:, None]
+    predicted = _crossed(T, rows.left, rows.groups.fold)
+    step = score_difference(rows.left - predicted, rows.left, rows.groups)
+    if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
+        return None
+    name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace("position", "angle")
+    law = Empirical(
+        id=name, law="chebyshev", of=channel, centre=centre, half_width=half,
+        coefficients_rad=(0.0, *(float(c) for c in _ridge(T, rows.left))),
+    )  # fmt: skip
+    return _Held(Found(law, step), predicted)
 
 
 def value_of(law: Empirical, recording: Evidence) -> FloatArray:

@@ -40,6 +40,38 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 @dataclass(frozen=True)
+class Beginning:
+    """What a round begins from.
+
+    `nominal`: a further point to ask from. `number`: 0 for the first round. `cold`: values to begin from where the
+    drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well. Once the time
+    is up nothing further is begun but the most promising fit.
+    """
+
+    model: Model
+    nominal: Fit | None
+    pool: Sequence[Hypothesis]
+    groups: Groups
+    pace: Pace
+    number: int
+    cold: Mapping[str, float] | None
+    known: Sequence[Model]
+
+    @property
+    def cost(self) -> float:
+        """Cost of the model that hypotheses are put beside."""
+        return self.model.fit.cost
+
+    def tell(self, what: str) -> None:
+        """Say what is being done, and how far the search is."""
+        self.pace.tell(what, self.number / LIMITS.rounds)
+
+    def trades(self, h: Hypothesis) -> bool:
+        """Whether a hypothesis is tried whatever it promises: beside another effect it may trade places."""
+        return self.cold is not None and self.number > 0 and h.trades
+
+
+@dataclass(frozen=True)
 class Begun:
     """A fit that has been begun: its cost so far, what it adds, where it stands, and what is roughly known of
     its derivative."""
@@ -51,119 +83,117 @@ class Begun:
     J: FloatArray | None = None
 
 
-def one_round(
-    model: Model,
-    nominal: Fit | None,
-    pool: Sequence[Hypothesis],
-    groups: Groups,
-    rng: np.random.Generator,
-    pace: Pace,
-    number: int,
-    cold: Mapping[str, float] | None,
-    known: Sequence[Model],
-) -> Round:
-    """Every hypothesis and dependence beside `model`. `nominal`: a further point to ask from; `cold`: values to
-    begin from where the drive is known by order of magnitude only; `known`: models of earlier rounds, to begin
-    from as well. Once the time is up nothing further is begun but the most promising fit."""
-    anchors = [anchor(f) for f in (model.fit, nominal) if f is not None]
-    ids = {t.effect.id for t in model.terms if isinstance(t, Hypothesis)}
-    left = [h for h in pool if h.effect.id not in ids]  # a second of the same would share its parameters
-    done = number / LIMITS.rounds
-
-    def answer(h: Hypothesis) -> list[Answer]:
-        pace.tell(f"asking {h.name}", done)
-        return [] if pace.over else ask_all(anchors, h)
-
-    answers = [a for a in side_by_side(answer, left) if a]
-    before = 0.5 * float(model.fit.residual @ model.fit.residual)
-    fine = finely(model, groups) if any(_wants_rates(a[0], model, before) for a in answers) else None
+def one_round(at: Beginning, rng: np.random.Generator) -> Round:
+    """Every hypothesis and dependence beside a model: asked, begun, the promising ones fitted to the end and compared
+    with the model on data left out."""
+    answers = _asked(at)
+    fine = finely(at.model, at.groups) if any(_wants_rates(a[0], at) for a in answers) else None
     if fine is not None:
         there = [anchor(fine.fit)]
-        answers = [
-            (ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], model, before) else a
-            for a in answers
-        ]
-    dependences = (
-        []
-        if number == 0 and not model.fit.problem.parameters
-        else ask_dependences(model.fit, model.terms, groups.by)
-    )
-    trades = cold is not None and number > 0
-    worth = [a for a in answers if a[0].cost < LIMITS.promise * before or (trades and a[0].hypothesis.trades)]
-    if number > 0:
-        dear = 2 if model.fit.problem.fine else 1
-        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later // dear]
-    promising = max(LIMITS.promising - 2 * number, LIMITS.promising // 2)
-
-    def begin(a: list[Answer]) -> list[Fit]:
-        pace.tell(f"trying {a[0].hypothesis.name}", done)
-        if pace.over:
-            return []
-        further = _further(a[0].hypothesis, model, known, cold) if a[0].hypothesis.trades else []
-        return rough(a, LIMITS.rough, further)
-
-    roughs = side_by_side(begin, worth)
-    ranked: list[Begun] = []
-    second: list[Begun] = []
-    for fits, a in zip(roughs, worth, strict=True):
-        for k, f in enumerate(fits[: 2 if trades and a[0].hypothesis.trades else 1]):
-            (second if k else ranked).append(Begun(f.cost, (a[0].hypothesis,), f.problem, f.x, f.J))
-    for found in side_by_side(lambda c: _by_conditions(c), list(ranked)):
-        ranked += found
-    for d, cost, problem in dependences:
-        ranked.append(Begun(cost, (d,), problem, placed(model.fit, problem)))
-    ranked.sort(key=lambda c: c.cost)
-    top = ranked[0].cost if ranked else 0.0
-    chosen = [
-        c
-        for k, c in enumerate(ranked[:promising])
-        if c.cost < before and (k < 2 or c.cost < LIMITS.hopeless * top)
-    ]
-
-    # what lies lower need not predict better: of two valleys both are fitted to the end
-    taken = [c.terms[0].name for c in chosen]
-    chosen += [c for c in second if c.terms[0].name in taken and c.cost < LIMITS.hopeless * top]
+        answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], at) else a for a in answers]
+    chosen = _chosen(*_begun(at, answers), at)
 
     def finish(c: Begun) -> Model | None:
-        pace.tell(f"fitting {c.terms[0].name}", done)
-        if pace.over and c is not chosen[0]:
-            return None
-        try:
-            fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
-        except InputError:
-            return None
-        terms = tuple(most_told(fit, t, pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-        if not is_told(fit, terms[0]):
-            return None
-        ratio = 1.0
-        if fine is not None and fit.problem.fine:
-            size = scales(model.left_out, groups)
-            ratio = loss(model, size, groups) / max(loss(fine, size, groups), 1e-300)
-        return Model((*model.terms, *terms), fit, left_out(fit, groups), ratio)
+        at.tell(f"fitting {c.terms[0].name}")
+        return None if at.pace.over and c is not chosen[0] else _finished(c, at, fine)
 
-    models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], groups)
+    models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], at.groups)
+    tried = _compared(models, at, fine, rng)
+    good = [t for t in tried if demanded(t.difference, first=at.number == 0)]
+    return Round(at.model, tuple(tried), good[0] if good else None)
+
+
+def _asked(at: Beginning) -> list[list[Answer]]:
+    """What each hypothesis that the model has not promises, by a linear step from each anchor."""
+    anchors = [anchor(f) for f in (at.model.fit, at.nominal) if f is not None]
+    ids = {t.effect.id for t in at.model.terms if isinstance(t, Hypothesis)}
+    left = [h for h in at.pool if h.effect.id not in ids]  # a second of the same would share its parameters
+
+    def answer(h: Hypothesis) -> list[Answer]:
+        at.tell(f"asking {h.name}")
+        return [] if at.pace.over else ask_all(anchors, h)
+
+    return [a for a in side_by_side(answer, left) if a]
+
+
+def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun], list[Begun]]:
+    """Rough fits of what promises anything, dependences among them, best first; and the second valleys of effects that
+    trade places."""
+    model = at.model
+    worth = [a for a in answers if a[0].cost < LIMITS.promise * at.cost or at.trades(a[0].hypothesis)]
+    if at.number > 0:
+        dear = 2 if model.fit.problem.fine else 1
+        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later // dear]
+
+    def begin(a: list[Answer]) -> list[Fit]:
+        h = a[0].hypothesis
+        at.tell(f"trying {h.name}")
+        return [] if at.pace.over else rough(a, LIMITS.rough, _further(h, at) if h.trades else [])
+
+    first: list[Begun] = []
+    second: list[Begun] = []
+    for fits, a in zip(side_by_side(begin, worth), worth, strict=True):
+        h = a[0].hypothesis
+        for k, f in enumerate(fits[: 2 if at.trades(h) else 1]):
+            (second if k else first).append(Begun(f.cost, (h,), f.problem, f.x, f.J))
+    for found in side_by_side(_by_conditions, list(first)):
+        first += found
+    if at.number > 0 or model.fit.problem.parameters:
+        for d, cost, problem in ask_dependences(model.fit, model.terms, at.groups.by):
+            first.append(Begun(cost, (d,), problem, placed(model.fit, problem)))
+    return sorted(first, key=lambda c: c.cost), second
+
+
+def _chosen(first: Sequence[Begun], second: Sequence[Begun], at: Beginning) -> list[Begun]:
+    """What is fitted to the end. What lies lower need not predict better: of two valleys both are."""
+    promising = max(LIMITS.promising - 2 * at.number, LIMITS.promising // 2)
+    most = LIMITS.hopeless * (first[0].cost if first else 0.0)
+    chosen = [c for k, c in enumerate(first[:promising]) if c.cost < at.cost and (k < 2 or c.cost < most)]
+    taken = [c.terms[0].name for c in chosen]
+    return chosen + [c for c in second if c.terms[0].name in taken and c.cost < most]
+
+
+def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
+    """The model with what was begun, fitted to the end; None where it cannot be followed, or is none of it."""
+    try:
+        fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
+    except InputError:
+        return None
+    terms = tuple(most_told(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
+    if not is_told(fit, terms[0]):
+        return None
+    ratio = 1.0
+    if fine is not None and fit.problem.fine:
+        size = scales(at.model.left_out, at.groups)
+        ratio = loss(at.model, size, at.groups) / max(loss(fine, size, at.groups), 1e-300)
+    return Model((*at.model.terms, *terms), fit, left_out(fit, at.groups), ratio)
+
+
+def _compared(
+    models: Sequence[Model], at: Beginning, fine: Model | None, rng: np.random.Generator
+) -> list[Tried]:
+    """Each model's score against the one before, run as finely as it is itself; best first."""
     differences = {
         m.name: score_difference(
-            m.left_out, fine.left_out if fine is not None and m.fit.problem.fine else model.left_out, groups
+            m.left_out,
+            fine.left_out if fine is not None and m.fit.problem.fine else at.model.left_out,
+            at.groups,
         )
         for m in models
     }
     shares = selected_in({n: v.by_block for n, v in differences.items()}, rng)
-    first = len(model.terms)
-    tried = [Tried(m.terms[first], m, differences[m.name], shares[m.name]) for m in models]
-    tried.sort(key=lambda t: -t.difference.gain)
-    good = [t for t in tried if demanded(t.difference, first=number == 0)]
-    return Round(model, tuple(tried), good[0] if good else None)
+    added = len(at.model.terms)
+    tried = [Tried(m.terms[added], m, differences[m.name], shares[m.name]) for m in models]
+    return sorted(tried, key=lambda t: -t.difference.gain)
 
 
-def _further(
-    h: Hypothesis, model: Model, known: Sequence[Model], cold: Mapping[str, float] | None
-) -> list[Mapping[str, float]]:
+def _further(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
     """Values to begin from beside where calibration stands: effects that trade places sit in a valley of their
     own, and an earlier model that has this one may have found it; what that model lacks begins at a part of its
     amount."""
+    model, cold = at.model, at.cold
     names = {t.name for t in model.terms}
-    having = [m for m in known if any(t.name == h.name for t in m.terms) and len(m.terms) <= len(names)]
+    having = [m for m in at.known if any(t.name == h.name for t in m.terms) and len(m.terms) <= len(names)]
     if not having:
         return [cold] if cold is not None and names else []
     best = max(having, key=lambda m: len(names & {t.name for t in m.terms}))
@@ -194,12 +224,10 @@ def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] |
     return found
 
 
-def _wants_rates(a: Answer, model: Model, before: float) -> bool:
-    return (
-        a.hypothesis.effect.rates
-        and not model.fit.problem.fine
-        and before / max(a.cost, 1e-12) > LIMITS.worth_rates
-    )
+def _wants_rates(a: Answer, at: Beginning) -> bool:
+    """Whether a law with rates promises so much that it is worth a run on every sample."""
+    worth = at.cost / max(a.cost, 1e-12) > LIMITS.worth_rates
+    return a.hypothesis.effect.rates and not at.model.fit.problem.fine and worth
 
 
 def _by_conditions(begun: Begun) -> list[Begun]:

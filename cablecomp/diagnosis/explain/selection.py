@@ -22,7 +22,7 @@ from cablecomp.diagnosis.explain.model import (
     searching,
     without,
 )
-from cablecomp.diagnosis.explain.rounds import cold_starts, one_round
+from cablecomp.diagnosis.explain.rounds import Beginning, cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
@@ -58,33 +58,38 @@ def select(
     for number in range(0 if quiet(baseline) else LIMITS.rounds):
         if pace.over and number:
             break
-        candidates: list[tuple[Round, Tried]] = []
+        tried: list[Tried] = []
         for model, start in beam:
             known = [t.model for r in rounds for t in r.tried]
-            round_ = one_round(model, start, pool, groups, rng, pace, number, cold, known)
-            rounds.append(round_)
-            candidates += [(round_, t) for t in round_.tried]
-        good = [t for _, t in candidates if demanded(t.difference, first=number == 0)]
-        fresh = ranked([t.model for t in good], groups)
-        fresh = [m for m in fresh if bears(m.fit)] or fresh
-        if not fresh:
+            rounds.append(one_round(Beginning(model, start, pool, groups, pace, number, cold, known), rng))
+            tried += rounds[-1].tried
+        found = _carried(tried, groups, first=number == 0)
+        if found is None:
             break
-        size = common([fresh[0]], groups)
-        most = LIMITS.close * loss(fresh[0], size, groups)
-        kept = [m for m in fresh[: LIMITS.beam + 1] if loss(m, size, groups) < most]
-        sharper = searching(fresh[0].fit)
-        again = [reweighed(m, sharper, groups) for m in kept]
-        carried = ranked([m for m in again if all(is_told(m.fit, t) for t in m.terms)], groups)
-        if not carried:
-            break
-        carried = simplest_first(carried, groups)
+        carried, sharper = found
         best = _reigning(best, carried, first, sharper, groups) if number else carried[0]
         if quiet(best.fit):
             break
         # a law that is run on every sample is a hundred times as dear: the best model alone goes on from there
         beam = [(m, None) for m in carried[: 1 if carried[0].fit.problem.fine else LIMITS.beam]]
-    final = _pruned(best, groups)
-    return Selection(first, tuple(rounds), final, groups)
+    return Selection(first, tuple(rounds), _pruned(best, groups), groups)
+
+
+def _carried(tried: Sequence[Tried], groups: Groups, first: bool) -> tuple[list[Model], Weighing] | None:
+    """The models that data left out demand and that come near the best one, fitted to the weights that this one asks
+    for, best first; with those weights. None where there is none."""
+    good = [t.model for t in tried if demanded(t.difference, first=first)]
+    fresh = ranked(good, groups)
+    fresh = [m for m in fresh if bears(m.fit)] or fresh
+    if not fresh:
+        return None
+    size = common([fresh[0]], groups)
+    most = LIMITS.close * loss(fresh[0], size, groups)
+    kept = [m for m in fresh[: LIMITS.beam + 1] if loss(m, size, groups) < most]
+    sharper = searching(fresh[0].fit)
+    again = [reweighed(m, sharper, groups) for m in kept]
+    carried = ranked([m for m in again if all(is_told(m.fit, t) for t in m.terms)], groups)
+    return (simplest_first(carried, groups), sharper) if carried else None
 
 
 def _reigning(

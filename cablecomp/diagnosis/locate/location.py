@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, coefficients, gains, surrogate_gains
-from cablecomp.diagnosis.locate.segments import segment
+from cablecomp.diagnosis.locate.segments import Segments, segment
 from cablecomp.diagnosis.locate.series import Series, thin
 from cablecomp.diagnosis.locate.views import View, load_path, views
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -110,6 +110,21 @@ def locate(
     Near ties go to the covariate that leaves less to the other.
     """
     ground = _ground(series, nuisance)
+    answers, highest = _asked(ground, rng, surrogates)
+    regressors = np.column_stack((np.ones(ground.series.samples), load_path(ground.series)))
+    pieces = segment(ground.series.residual / ground.series.sigma, regressors)
+    mismatch = tuple(
+        _mismatch(answer, ground, pieces, _p_value(highest, _top_score(answer, answers)))
+        for answer in _ranked(_best_views(answers, ground.excess), ground)
+    )
+    ratio = float(np.mean((series.residual / series.sigma) ** 2))
+    excess = float(np.sqrt(max(0.0, float(np.mean(series.residual**2 - series.sigma**2)))))
+    times = ground.series.covariates.values["time"][pieces.changes]
+    return Location(mismatch, excess, ratio, tuple(float(t) for t in times))
+
+
+def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[list[_Answer], FloatArray]:
+    """What every view accounts for; and of each surrogate the largest score over all of them."""
     plain = _sums(ground, ground.nuisance)
     signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, plain.blocks))
     looped = _sums(ground, _with_path(ground))
@@ -133,27 +148,22 @@ def locate(
         highest = np.maximum(highest, (null - centre) / scale)
         score = (strength - centre) / scale
         answers.append(_Answer(view, sums, total / ground.excess, per_block, score))
-    best = _best_views(answers, ground.excess)
-    ranked = _ranked(best, ground)
-    fitted = {id(answer): answer.view.basis @ _own(answer, ground) for answer in ranked}
-    regressors = np.column_stack((np.ones(ground.series.samples), load_path(ground.series)))
-    pieces = segment(ground.series.residual / ground.series.sigma, regressors)
-    mismatch = tuple(
-        Mismatch(
-            answer.view.covariate,
-            float(np.clip(answer.share, 0.0, 1.0)),
-            *_range(answer.view.covariate, fitted[id(answer)], ground),
-            _intervals(answer.view.covariate, fitted[id(answer)], ground, pieces.bounds, pieces.coefficients),
-            _p_value(highest, _top_score(answer, answers)),
-            answer.view.how,
-            _share_sd(answer.per_block, ground.excess),
-        )
-        for answer in ranked
+    return answers, highest
+
+
+def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float) -> Mismatch:
+    """One covariate's part, from its best view."""
+    name = answer.view.covariate
+    fitted = answer.view.basis @ _own(answer)
+    return Mismatch(
+        name,
+        float(np.clip(answer.share, 0.0, 1.0)),
+        *_range(name, fitted, ground),
+        _intervals(name, fitted, ground, pieces.bounds),
+        p_value,
+        answer.view.how,
+        _share_sd(answer.per_block, ground.excess),
     )
-    ratio = float(np.mean((series.residual / series.sigma) ** 2))
-    excess = float(np.sqrt(max(0.0, float(np.mean(series.residual**2 - series.sigma**2)))))
-    times = ground.series.covariates.values["time"][pieces.changes]
-    return Location(mismatch, excess, ratio, tuple(float(t) for t in times))
 
 
 def _ground(series: Series, nuisance: FloatArray | None) -> _Ground:
@@ -187,7 +197,7 @@ def _sums(ground: _Ground, basis: FloatArray) -> BlockSums:
     return block_sums(basis, ground.series.residual, ground.weight, ground.block)
 
 
-def _own(answer: _Answer, ground: _Ground) -> FloatArray:
+def _own(answer: _Answer) -> FloatArray:
     """Coefficients of the view's own regressors."""
     return coefficients(answer.sums)[-answer.view.width :]
 
@@ -275,7 +285,7 @@ def _range(name: str, fitted: FloatArray, ground: _Ground) -> tuple[float, float
 
 
 def _intervals(
-    name: str, fitted: FloatArray, ground: _Ground, bounds: IntArray, pieces: FloatArray
+    name: str, fitted: FloatArray, ground: _Ground, bounds: IntArray
 ) -> tuple[tuple[float, float], ...]:
     """The times that hold four fifths of the fitted energy, short gaps closed; for time, whole pieces
     between changes.
