@@ -2,5 +2,6 @@
 
 Imports estimation and everything below, not the runtime. Start reading at `diagnose.py`, the story from top to bottom
 (`calibrate.py` is that of a calibration alone); its rooms, in the order in which they work: `calibration`, `locate`,
-`explain`, `describe`, `answer`. `result.py` is what comes out, `thresholds.py` every number that decides.
+`explain`, `describe`, `answer`. `outcome.py` is what one step hands on to the next, `result.py` what comes out;
+`folds.py` makes all that is left out, `thresholds.py` holds every number that decides.
 """

@@ -37,6 +37,8 @@ class Thresholds:
     refits: int = 4
     """Parts left out in turn where each is a fit done again: a drive known by order of magnitude, whose linear steps
     tell nothing."""
+    crossfit: int = 5
+    """Folds that blocks are dealt to in turn where a residual is regressed on a covariate."""
     parts: int = 5
     """Parts left out in turn for the errors that are reported; each is a fit done again."""
     part_blocks: int = 20

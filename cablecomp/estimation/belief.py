@@ -33,6 +33,7 @@ SCALE_OFF: Final = 4.0
 LATE_GAIN: Final = 0.75
 """A delay is believed where it takes what a straight line leaves down to this share."""
 MOST_LATE_S: Final = 0.25
+"""Greatest delay that is looked for."""
 DELAY_ROWS: Final = 1500
 """Rows on which delays are looked for."""
 LOST: Final = np.array((0.004, 0.012, 0.035, 0.1))
@@ -50,6 +51,7 @@ _ANGLES: Final = {
     1000.0: "joint_position_rad seems to be in milliradians",
     0.001: "motor_position_rad seems to be in milliradians",
 }
+"""What a slope so many times the drive's ratio comes of."""
 _TORQUES: Final = {
     1e-3: "mNm",
     1e-2: "Ncm",
@@ -58,6 +60,7 @@ _TORQUES: Final = {
     1.35582: "ftlbf",
     1e3: "kNm",
 }
+"""Units of torque by how many N m one is."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Numbers that bound a fit: each with its unit and the reason for it."""
+"""Numbers that bound a fit, whatever it is for: each with its unit and the reason for it.
+
+What decides a verdict stands in `diagnosis/thresholds.py`.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,8 @@ from typing import TypeVar
 A = TypeVar("A")
 B = TypeVar("B")
 
-MOST = 4  # threads; beyond, the interpreter between kernel calls is what they wait for
+MOST = 4
+"""Threads; beyond, the interpreter between kernel calls is what they wait for."""
 
 
 def side_by_side(work: Callable[[A], B], items: Sequence[A]) -> Iterator[B]:

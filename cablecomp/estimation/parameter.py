@@ -17,6 +17,7 @@ from cablecomp.effects import Parameter as EffectParameter
 from cablecomp.estimation.limits import DECADES, EXACT, INSTANT_REACH_S, INSTANT_STEP_S, OWN_SD, STEP
 
 DECADE = log(10.0)
+"""Prior sd, in the logarithm, of what is known by order of magnitude."""
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,12 @@ import pytest
 from planted import SIGMA, autoregressive, causes, columns, recording
 
 from cablecomp.diagnosis.locate.covariates import Covariates, covariates
-from cablecomp.diagnosis.locate.crossfit import FOLDS, block_sums, gains, surrogate_gains
+from cablecomp.diagnosis.locate.crossfit import block_sums, gains, surrogate_gains
 from cablecomp.diagnosis.locate.location import locate
 from cablecomp.diagnosis.locate.segments import segment
 from cablecomp.diagnosis.locate.series import make_series, thin
 from cablecomp.diagnosis.locate.views import load_path
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
 
@@ -144,8 +145,8 @@ def gain_of_rows(basis: FloatArray, residual: FloatArray, weight: FloatArray, bl
     energy = np.sum(rows**2, axis=0)
     ridge = np.diag(np.sqrt(1e-3 * energy + 1e-12 * energy.max()))
     gain = 0.0
-    for fold in range(FOLDS):
-        here = block % FOLDS == fold
+    for fold in range(LIMITS.crossfit):
+        here = block % LIMITS.crossfit == fold
         stacked = np.concatenate((rows[~here], ridge))
         c = np.linalg.lstsq(stacked, np.concatenate((target[~here], np.zeros(len(ridge)))), rcond=None)[0]
         gain += float(np.sum(target[here] ** 2) - np.sum((target[here] - rows[here] @ c) ** 2))

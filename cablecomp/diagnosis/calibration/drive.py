@@ -21,6 +21,7 @@ from cablecomp.signal.smoothing import FloatArray, keep_corners
 ZEROS = ("joint_position_offset_rad", "motor_torque_offset_Nm")
 """Names in `[session] own` that are found inside of the fit, by session, always."""
 REPLICAS = 2
+"""Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
 PASSES = 2
 """Times that histories are looked for: what is left over tells how faint a carry-over matters, and the first time it
 holds those."""

@@ -17,6 +17,7 @@ from cablecomp.estimation.parameter import Parameter, of_drive
 from cablecomp.estimation.problem import Problem, Weighing
 
 RATE_HZ = 50.0
+"""Samples of a motion that is only thought of."""
 WORTH = 0.7
 """A motion is worth proposing where it brings the sd down to this share of the prior's."""
 

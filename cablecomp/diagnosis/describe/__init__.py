@@ -1,4 +1,4 @@
 """What has no name: unknown structure in words and as a sparse law, and series in one channel that a joint can carry.
 
-Imports `locate` and `explain` beside it and what they import. Start reading at `unknown.py`.
+Imports `locate`, `explain` and `folds.py` beside it and what they import. Start reading at `unknown.py`.
 """

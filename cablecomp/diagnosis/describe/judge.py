@@ -19,6 +19,7 @@ from cablecomp.signal.autocorrelation import integrated_time, long_run_variance
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _FREEDOM: Final = (3.0, 5.0, 10.0, 30.0, 300.0)
+"""Degrees of freedom among which Student's t is fitted."""
 
 
 @dataclass(frozen=True)

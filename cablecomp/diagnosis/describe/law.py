@@ -16,7 +16,9 @@ from cablecomp.diagnosis.locate.series import Series
 from cablecomp.signal.smoothing import FloatArray
 
 MOST_TERMS: Final = 5
+"""Terms of a sparse law: of more nobody reads anything."""
 _LEAST_SHARE: Final = 0.02
+"""Share of the energy on held-out blocks that a further term has to remove."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,9 @@ from cablecomp.diagnosis.locate.views import contrasts, hats, load_path
 from cablecomp.signal.smoothing import FloatArray
 
 _MOST: Final = 160
+"""Frequencies of the periodogram: its cost."""
 _HIGHEST: Final = 60.0
+"""Highest frequency looked at [1/rad]: finer than any tooth or strand."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,9 @@ from cablecomp.diagnosis.locate.views import elapsed
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _LAGS: Final = (0.02, 0.05, 0.15)
+"""Time constants of lags that are tried, as shares of a recording's length."""
 _RADII: Final = (0.05, 0.15)
+"""Radii of play operators that are tried, as shares of a channel's range."""
 
 
 @dataclass(frozen=True)

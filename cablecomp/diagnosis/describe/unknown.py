@@ -22,6 +22,7 @@ Memory = Literal["memoryless", "remembers time", "remembers motion", "undecided"
 Parity = Literal["odd", "even", "mixed", "undecided"]
 Path = Literal["load", "displacement", "both", "undecided"]
 _LEAST: Final = 0.04
+"""Share of the energy beyond noise below which one description says no more than another."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What physics explains a mismatch: hypotheses, asked cheaply, fitted, scored on data left out, held against
 rivals; what would tell more.
 
-Imports estimation, effects and what lies below, `locate` and `thresholds.py` beside it. Start reading at
-`selection.py`.
+Imports estimation, effects and what lies below, `calibration`, `locate`, `folds.py` and `thresholds.py` beside it.
+Start reading at `search.py`, which calls `selection.py`, which calls `rounds.py`; `weighing.py` comes after.
 """

@@ -24,6 +24,7 @@ from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
 STEPS = 2500
+"""Instants at which a proposed motion is simulated."""
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
-FOLDS: Final = 5
 _RIDGE: Final = 1e-3
+"""Share of a regressor's own energy that holds its coefficient back."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def block_sums(basis: FloatArray, residual: FloatArray, weight: FloatArray, bloc
     gram = np.stack([weighted[a:b].T @ basis[a:b] for a, b in itertools.pairwise(bounds)])
     moment = np.add.reduceat(weighted * residual[:, None], firsts, axis=0)
     energy = np.add.reduceat(weight * residual**2, firsts)
-    fold = (np.arange(len(firsts)) % FOLDS).astype(np.int64)
+    fold = (np.arange(len(firsts)) % LIMITS.crossfit).astype(np.int64)
     return BlockSums(gram, moment, fold, np.asarray(energy, dtype=np.float64))
 
 
@@ -88,7 +89,7 @@ def _normal(sums: BlockSums) -> tuple[FloatArray, FloatArray]:
 
 def _folds(sums: BlockSums) -> list[IntArray]:
     """The blocks of each fold that has any."""
-    found = [np.flatnonzero(sums.fold == fold) for fold in range(FOLDS)]
+    found = [np.flatnonzero(sums.fold == fold) for fold in range(LIMITS.crossfit)]
     return [here for here in found if len(here)]
 
 

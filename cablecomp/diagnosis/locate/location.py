@@ -14,8 +14,11 @@ from cablecomp.diagnosis.locate.views import View, load_path, views
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _ENERGY_SHARE: Final = 0.8
+"""Share of the fitted energy that a range, or intervals, are told to hold."""
 _TIE: Final = 0.05
+"""Least difference of shares by which one covariate is told before another, whatever each leaves of the other."""
 _MOST_INTERVALS: Final = 40
+"""Intervals that are told of one covariate."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from cablecomp.diagnosis.locate.series import Series
 from cablecomp.signal.smoothing import FloatArray
 
 _INSTANTS: Final = 15
+"""Instants of a single jump that are looked at, even over the recordings."""
 
 
 @dataclass(frozen=True)
