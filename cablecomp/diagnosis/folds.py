@@ -204,14 +204,13 @@ class Layout:
     """Which samples are fitted and which are held out.
 
     `block`: number of the block of each sample, contiguous, within one recording; `heldout`, `training`: whether the
-    sample's block is held out or fitted; `heldout_blocks`, `training_blocks`: their numbers.
+    sample's block is held out or fitted; `heldout_blocks`: numbers of those held out.
     """
 
     block: IntArray
     heldout: BoolArray
     training: BoolArray
     heldout_blocks: IntArray
-    training_blocks: IntArray
 
 
 def alternate_blocks(starts: IntArray, samples: int, direction: FloatArray) -> Layout:
@@ -234,5 +233,4 @@ def alternate_blocks(starts: IntArray, samples: int, direction: FloatArray) -> L
         blocks.append(first + cut(int(b - a), count))
         first += count
     block = np.concatenate(blocks)
-    numbers = np.arange(first, dtype=np.int64)
-    return Layout(block, block % 2 == 1, block % 2 == 0, numbers[1::2], numbers[0::2])
+    return Layout(block, block % 2 == 1, block % 2 == 0, np.arange(1, first, 2, dtype=np.int64))

@@ -47,7 +47,8 @@
     if (beside) for (const axis of axes) if (axis.title?.text) axis.title.text = wrapped(axis.title.text);
     const columns = Object.keys(layout).filter((key) => /^xaxis/.test(key) && layout[key].domain);
     const below = (axis) => layout[(axis.anchor ?? "x").replace("x", "xaxis")]?.domain?.[0] ?? 0;
-    const named = Object.keys(layout).some((key) => /^yaxis/.test(key) && layout[key].title?.text && below(layout[key]) > 0.2);
+    const titled = (axis) => axis.title?.text && below(axis) > 0.2;
+    const named = Object.keys(layout).some((key) => /^yaxis/.test(key) && titled(layout[key]));
     for (const key of named ? columns : []) {  // room for the name of an axis between two columns
       const [from, to] = layout[key].domain;
       layout[key].domain = [from > 0.2 ? from + 0.06 : from, to < 0.8 ? to - 0.05 : to];

@@ -41,7 +41,6 @@ def test_a_planted_dependence_ranks_first(kind: str, cause: str) -> None:
     assert first.covariate == cause.split(",")[0]
     assert first.p_value < 0.05
     assert first.share > 0.6
-    assert location.excess_rms == pytest.approx(np.sqrt(10.0) * SIGMA, rel=0.15)
 
 
 @pytest.mark.parametrize("memory", [0.1, 4.0])
@@ -97,7 +96,6 @@ def test_changes_are_found_to_the_sample_and_not_in_noise() -> None:
     assert len(segment(noise, regressors).changes) == 0
     found = segment(noise + 3.0 * (np.arange(6_000) > 4_321) * load, regressors)
     assert found.changes == pytest.approx([4_321], abs=30)
-    assert found.coefficients[1, 1] - found.coefficients[0, 1] == pytest.approx(3.0, abs=0.3)
 
 
 def test_thinning_keeps_means_and_recordings_apart() -> None:

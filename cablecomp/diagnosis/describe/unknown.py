@@ -29,9 +29,8 @@ _LEAST: Final = 0.04
 class Description:
     """What a residual looks like.
 
-    `rms`: beyond noise, in rad; `memory`, `memoryless_share`, `memory_share`: share of the energy
-    beyond noise that present values account for, and what memory adds; `parity` in the direction of
-    motion with `odd_share`, `even_share`; `path`: whether its size grows with the load ("load") or not
+    `rms`: beyond noise, in rad; `memory`: whether present values account for it, or what went before;
+    `parity` in the direction of motion; `path`: whether its size grows with the load ("load") or not
     ("displacement"); `period`: strongest period in an angle if it is beyond chance, `period_in`: which
     angle; `events_s`: instants at which it changes; `law`: a sparse equation if one holds on held-out
     blocks; `text`: all of it in plain words.
@@ -39,11 +38,7 @@ class Description:
 
     rms: float
     memory: Memory
-    memoryless_share: float
-    memory_share: float
     parity: Parity
-    odd_share: float
-    even_share: float
     path: Path
     period: Periodicity | None
     period_in: str
@@ -75,8 +70,8 @@ def describe(
     )
     thinned = thin(series, columns)
     ask = _Questions(thinned.series, thinned.extra)
-    memory, present_share, memory_share = _memory(ask)
-    parity, odd, even = _parity(ask)
+    memory = _memory(ask)
+    parity = _parity(ask)
     path = _path(ask)
     found = [
         entry
@@ -99,9 +94,7 @@ def describe(
     alike = [entry for entry in found if period is not None and entry.with_load == period.with_load]
     where = which_angle(alike, ratio)
     text = _text(rms, memory, parity, path, period, where, events, law)
-    return Description(
-        rms, memory, present_share, memory_share, parity, odd, even, path, period, where, events, law, text
-    )
+    return Description(rms, memory, parity, path, period, where, events, law, text)
 
 
 class _Questions:
@@ -130,7 +123,7 @@ class _Questions:
         return better.share - worse.share > max(_LEAST, 2.0 * error)
 
 
-def _memory(ask: _Questions) -> tuple[Memory, float, float]:
+def _memory(ask: _Questions) -> Memory:
     series = ask.series
     values, starts = series.covariates.values, series.covariates.starts
     now = _present(series)
@@ -152,11 +145,9 @@ def _memory(ask: _Questions) -> tuple[Memory, float, float]:
     plain, with_time = ask.gain(now), ask.gain(now, timed)
     with_motion, both = ask.gain(now, moved), ask.gain(now, timed, moved)
     richest = max((with_time, with_motion, both), key=lambda gain: gain.share)
-    by_memory = max(0.0, richest.share - max(0.0, plain.share))
     if ask.clear(richest, plain):
-        kind: Memory = "remembers time" if with_time.share > with_motion.share else "remembers motion"
-        return kind, max(0.0, plain.share), by_memory
-    return ("memoryless" if plain.share > 0.5 else "undecided"), max(0.0, plain.share), by_memory
+        return "remembers time" if with_time.share > with_motion.share else "remembers motion"
+    return "memoryless" if plain.share > 0.5 else "undecided"
 
 
 def _present(series: Series) -> FloatArray:
@@ -177,7 +168,7 @@ def _present(series: Series) -> FloatArray:
     return np.column_stack(parts)
 
 
-def _parity(ask: _Questions) -> tuple[Parity, float, float]:
+def _parity(ask: _Questions) -> Parity:
     values = ask.series.covariates.values
     load, speed = values["load"], values["velocity"]
     q = values.get("joint_angle", values["motor_angle"])
@@ -188,14 +179,14 @@ def _parity(ask: _Questions) -> tuple[Parity, float, float]:
     ways = np.column_stack((turns, np.abs(load)[:, None] * turns, load[:, None] * turns, speed))
     odd, even, both = ask.gain(ways), ask.gain(place), ask.gain(ways, place)
     if both.share < 0.2:
-        return "undecided", max(0.0, odd.share), max(0.0, even.share)
+        return "undecided"
     # what each part still adds when the other one is there: load and direction overlap in most recordings
     odd_only, even_only = max(0.0, both.share - even.share), max(0.0, both.share - odd.share)
     if odd_only > 3.0 * even_only and odd_only > 0.1:
-        return "odd", odd_only, even_only
+        return "odd"
     if even_only > 3.0 * odd_only and even_only > 0.1:
-        return "even", odd_only, even_only
-    return ("mixed" if min(odd_only, even_only) > 0.1 else "undecided"), odd_only, even_only
+        return "even"
+    return "mixed" if min(odd_only, even_only) > 0.1 else "undecided"
 
 
 def _path(ask: _Questions) -> Path:

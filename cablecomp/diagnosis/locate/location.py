@@ -28,7 +28,7 @@ class Mismatch:
     `share` of the energy beyond noise that the covariate accounts for in blocks not used for fitting;
     `low`, `high`: the range of the covariate that holds four fifths of that; `intervals_s`: when; `p_value`
     against autocorrelated noise, corrected for all covariates asked; `how`: in plain words, how the
-    residual follows it; `share_sd`: sd of the share between blocks.
+    residual follows it.
     """
 
     covariate: str
@@ -38,7 +38,6 @@ class Mismatch:
     intervals_s: tuple[tuple[float, float], ...]
     p_value: float
     how: str
-    share_sd: float
 
     def entry(self) -> dict[str, Any]:
         """Return the entry of `diagnosis.json`."""
@@ -56,14 +55,11 @@ class Mismatch:
 class Location:
     """Where the mismatch is.
 
-    `mismatch`: all covariates, ranked; `excess_rms`: RMS of the residual beyond its noise in rad (0 if
-    none); `energy_ratio`: mean of (residual/sigma)^2, 1 for pure noise; `changes_s`: instants at which the
-    residual's dependence on the load path changes.
+    `mismatch`: all covariates, ranked; `changes_s`: instants at which the residual's dependence on the load path
+    changes.
     """
 
     mismatch: tuple[Mismatch, ...]
-    excess_rms: float
-    energy_ratio: float
     changes_s: tuple[float, ...]
 
     def significant(self, level: float = 0.05) -> tuple[Mismatch, ...]:
@@ -120,10 +116,8 @@ def locate(
         _mismatch(answer, ground, pieces, _p_value(highest, _top_score(answer, answers)))
         for answer in _ranked(_best_views(answers, ground.excess), ground)
     )
-    ratio = float(np.mean((series.residual / series.sigma) ** 2))
-    excess = float(np.sqrt(max(0.0, float(np.mean(series.residual**2 - series.sigma**2)))))
     times = ground.series.covariates.values["time"][pieces.changes]
-    return Location(mismatch, excess, ratio, tuple(float(t) for t in times))
+    return Location(mismatch, tuple(float(t) for t in times))
 
 
 def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[list[_Answer], FloatArray]:
@@ -165,7 +159,6 @@ def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float
         _intervals(name, fitted, ground, pieces.bounds),
         p_value,
         answer.view.how,
-        _share_sd(answer.per_block, ground.excess),
     )
 
 

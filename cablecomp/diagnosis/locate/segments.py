@@ -19,14 +19,12 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 class Segments:
     """Pieces of a recording with constant coefficients.
 
-    `bounds`: 0, first samples of the later pieces, n; `coefficients`: pieces x k; `gain`: energy that the
-    changes remove over the energy that one piece leaves; `penalty`: energy that one change had to remove.
+    `bounds`: 0, first samples of the later pieces, n; `gain`: energy that the changes remove over the energy that one
+    piece leaves.
     """
 
     bounds: IntArray
-    coefficients: FloatArray
     gain: float
-    penalty: float
 
     @property
     def changes(self) -> IntArray:
@@ -58,10 +56,9 @@ def segment(
     penalty = strictness * (k + 1) * np.log(count + 1.0) * _noise_energy(residual, regressors)
     cuts = _optimal(cost, penalty, most)
     bounds = _refined(residual, regressors, edges[cuts])
-    fits = np.stack([_fit(regressors[a:b], residual[a:b]) for a, b in itertools.pairwise(bounds)])
     rest = sum(cost[a, b] for a, b in itertools.pairwise(cuts))
     whole = float(cost[0, count])
-    return Segments(bounds, fits, 1.0 - float(rest) / whole if whole > 0.0 else 0.0, float(penalty))
+    return Segments(bounds, 1.0 - float(rest) / whole if whole > 0.0 else 0.0)
 
 
 def _costs(gram: FloatArray, moment: FloatArray, energy: FloatArray) -> FloatArray:
