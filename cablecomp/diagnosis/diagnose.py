@@ -10,8 +10,8 @@ from math import inf
 import numpy as np
 
 from cablecomp.config import JointConfig
+from cablecomp.diagnosis.answer.diagnosis import diagnosis_of
 from cablecomp.diagnosis.answer.errors import errors_of
-from cablecomp.diagnosis.answer.told import told
 from cablecomp.diagnosis.answer.verdict import is_structured, predicts, share_left, verdict_of
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
@@ -56,7 +56,7 @@ def diagnose(
     pace.tell("holding each name against its rivals", 0.92)
     weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
     outcome = _judged(case, before, found, after, weighed, rng, pace)
-    answer = told(case, before, found, outcome, rng, budget_s)
+    answer = diagnosis_of(case, before, found, outcome, rng, budget_s)
     return replace(answer, runtime_s=time.monotonic() - begin_s)
 
 

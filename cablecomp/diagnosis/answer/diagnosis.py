@@ -1,11 +1,11 @@
-"""A diagnosis as it is told, out of the case, the search and what was made of it."""
+"""A diagnosis put together, out of the case, the search and what was made of it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cablecomp.diagnosis.answer.augmented import augmented_joint
-from cablecomp.diagnosis.answer.said import (
+from cablecomp.diagnosis.answer.entries import (
     candidates,
     channel_word,
     named_of,
@@ -28,7 +28,7 @@ from cablecomp.estimation.least_squares import Fit, rms_left
 OUT_OF_TIME = "the {:g} s were over before all hypotheses were tried: what is named is the best so far"
 
 
-def told(
+def diagnosis_of(
     case: Case, before: Left, found: Search, outcome: Outcome, rng: np.random.Generator, budget_s: float
 ) -> Diagnosis:
     """Everything found; `before`: what the calibrated drive leaves."""
