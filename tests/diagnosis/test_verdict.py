@@ -1,0 +1,103 @@
+"""The verdict: one word for each case, and what it rests on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.diagnosis.answer import verdict
+from cablecomp.diagnosis.answer.verdict import is_structured, predicts, share_left, verdict_of
+from cablecomp.diagnosis.result import Errors
+from cablecomp.diagnosis.thresholds import LIMITS
+
+NOISE = 2e-5
+
+
+@dataclass(frozen=True)
+class Left:
+    """A fit by what it leaves of each channel (RMS)."""
+
+    rms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def problem(self) -> Any:
+        return SimpleNamespace(channels=tuple(self.rms))
+
+
+@pytest.fixture(autouse=True)
+def _as_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdict, "rms_left", lambda fit, channel="joint_position_rad": fit.rms[channel])
+
+
+def leaving(rms: float, torque: float | None = None) -> Any:
+    """A fit that leaves so much of the joint's angle, and of the motor's torque where there is one."""
+    return Left({"joint_position_rad": rms} | ({} if torque is None else {"motor_torque_Nm": torque}))
+
+
+def drive(nominal: float, calibrated: float) -> Any:
+    return SimpleNamespace(nominal=leaving(nominal), fit=leaving(calibrated), floor_rad=NOISE)
+
+
+def model(rms: float) -> Any:
+    return SimpleNamespace(fit=leaving(rms))
+
+
+@pytest.mark.parametrize(
+    ("named", "structured", "calibrated", "word"),
+    [
+        (True, False, 1.0, "explained"),
+        (True, True, 1.0, "partly explained"),
+        (False, True, 0.1, "unexplained"),
+        (False, False, 0.5, "recalibrate"),
+        (False, False, 0.99, "consistent"),
+    ],
+)
+def test_each_case_has_its_word(named: bool, structured: bool, calibrated: float, word: str) -> None:
+    assert verdict_of(named, structured, drive(1.0, 1.0), model(calibrated)) == word
+
+
+def test_a_model_predicts_by_the_angle_left_out_or_by_another_channel_that_it_follows() -> None:
+    before, worse, better = Errors(1.0, 1.0, 1.0), Errors(0.5, 1.1, 1.0), Errors(0.5, 0.9, 1.0)
+    assert predicts(leaving(1.0), leaving(0.5), before, better)
+    assert not predicts(leaving(1.0), leaving(0.5), before, worse)
+    assert predicts(leaving(1.0, torque=1.0), leaving(0.5, torque=0.5), before, worse)
+    assert not predicts(leaving(1.0, torque=1.0), leaving(0.5, torque=0.95), before, worse)
+
+
+def test_the_share_left_is_all_of_it_where_nothing_was_won_and_none_where_noise_is_left() -> None:
+    assert share_left(drive(1.0, 1e-3), model(1e-3)) == 1.0
+    assert share_left(drive(1.0, 1e-3), model(NOISE)) == 0.0
+    half = (0.5 * (1e-3**2 - NOISE**2) + NOISE**2) ** 0.5
+    assert share_left(drive(1.0, 1e-3), model(half)) == pytest.approx(0.5)
+
+
+def structured(
+    times_noise: float, follows: bool, repeated_rad: float | None = None, named: bool = False
+) -> bool:
+    rng = np.random.default_rng(1)
+    residual = rng.standard_normal(4_000)
+    series: Any = SimpleNamespace(
+        residual=times_noise * NOISE * residual / np.sqrt(np.mean(residual**2)), sigma=np.full(4_000, NOISE)
+    )
+    location: Any = SimpleNamespace(significant=lambda level: ("time",) if follows else ())
+    return is_structured(location, series, repeated_rad, named)
+
+
+def test_what_follows_something_is_structured_sooner_than_what_follows_nothing() -> None:
+    beyond = [
+        LIMITS.structured, LIMITS.beyond_noise, LIMITS.far_beyond_noise
+    ]  # fmt: skip
+    assert beyond == sorted(beyond)
+    for limit, follows, named in zip(beyond, (True, False, False), (True, True, False), strict=True):
+        assert structured(1.01 * limit**0.5, follows, named=named)
+        assert not structured(0.99 * limit**0.5, follows, named=named)
+
+
+def test_what_the_machine_itself_does_not_repeat_is_no_structure() -> None:
+    assert structured(6.0, follows=True)
+    assert not structured(6.0, follows=True, repeated_rad=6.0 * NOISE)
+    assert structured(6.0, follows=True, repeated_rad=0.1 * NOISE)
