@@ -1,0 +1,54 @@
+"""The search among some of the recordings ends in a model of all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from turning import JOINT, recorded
+
+from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.search import search, without_effects
+from cablecomp.diagnosis.folds import make_groups
+from cablecomp.diagnosis.pace import Pace
+from cablecomp.diagnosis.thresholds import LIMITS
+
+FREE = JOINT.model_copy(update={"tolerance": {"EA_N": 0.1}})
+
+
+@pytest.fixture(scope="module")
+def drive() -> Calibrated:
+    many = {f"all/{k}": recorded(seed=k, duration_s=5.0) for k in range(LIMITS.searched + 3)}
+    body = gather_body(FREE, many)
+    assert len(body.used) > LIMITS.searched
+    return calibrate_drive(FREE, body.used, np.random.default_rng(0))
+
+
+def test_where_nothing_is_asked_the_calibrated_drive_is_the_model_of_all_recordings(
+    drive: Calibrated,
+) -> None:
+    told: list[str] = []
+    found = search(drive, [], np.random.default_rng(0), Pace(lambda what, share: told.append(what)))
+    assert found.final.terms == ()
+    assert found.final.fit is drive.fit
+    assert not found.cut_short
+    assert told[-1] == "last fit"
+    searched = found.selection.final.fit.problem.evidence
+    assert len(searched) < len(drive.fit.problem.evidence)
+    assert found.groups.folds == len(drive.fit.problem.evidence)
+
+
+def test_a_time_that_is_up_is_said(drive: Calibrated) -> None:
+    found = search(drive, [], np.random.default_rng(0), Pace(lambda what, share: None, end_s=0.0))
+    assert found.cut_short
+
+
+def test_without_effects_only_what_is_the_drives_own_stays(drive: Calibrated) -> None:
+    groups = make_groups(drive.fit)
+    own = Model((Dependence("pretension_N", "session"),), drive.fit, drive.fit.residual)
+    assert without_effects(own, drive, groups) is own
+    found = without_effects(Model((), drive.fit, drive.fit.residual), drive, groups)
+    assert found.terms == ()
+    assert found.fit is drive.fit
