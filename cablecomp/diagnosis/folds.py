@@ -204,13 +204,12 @@ class Layout:
     """Which samples are fitted and which are held out.
 
     `block`: number of the block of each sample, contiguous, within one recording; `heldout`, `training`: whether the
-    sample's block is held out or fitted; `heldout_blocks`: numbers of those held out.
+    sample's block is held out or fitted.
     """
 
     block: IntArray
     heldout: BoolArray
     training: BoolArray
-    heldout_blocks: IntArray
 
 
 def alternate_blocks(starts: IntArray, samples: int, direction: FloatArray) -> Layout:
@@ -233,4 +232,4 @@ def alternate_blocks(starts: IntArray, samples: int, direction: FloatArray) -> L
         blocks.append(first + cut(int(b - a), count))
         first += count
     block = np.concatenate(blocks)
-    return Layout(block, block % 2 == 1, block % 2 == 0, np.arange(1, first, 2, dtype=np.int64))
+    return Layout(block, block % 2 == 1, block % 2 == 0)

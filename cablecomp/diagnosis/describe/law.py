@@ -137,7 +137,7 @@ def _judged(
     covariance = inverse @ (scores.T @ scores) @ inverse
     sds = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     prediction = basis @ fit
-    held = judge(series.residual, {"law": series.residual - prediction}, layout, rng, level).scores[0]
+    held = judge(series.residual, series.residual - prediction, layout, rng, level)
     symbols = ["1", *(symbol for term in chosen for symbol in term.symbols)]
     units = ["rad", *(_unit(term.unit) for term in chosen for _ in term.symbols)]
     terms = tuple(
