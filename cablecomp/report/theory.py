@@ -7,31 +7,24 @@ from pathlib import Path
 from cablecomp.config import JointConfig
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report import page, theory_closed, theory_models, theory_open, theory_wrap
-from cablecomp.report.theory_common import Figure, Subject, subject_of
+from cablecomp.report.theory_common import Subject, subject_of
 
-_CHAPTERS = (
+CHAPTERS = (
     ("Wrapped cable", "Chapter 2: one wrap on a pulley that does not turn.", theory_wrap.figures),
     ("Open circuit", "Chapter 3: one cable between two pulleys, the input pulley held.", theory_open.figures),
     ("Closed circuit", "Chapter 4: two antagonistic cables, the input pulley held.", theory_closed.figures),
     ("Approximate models", "Chapter 4.2.6: what the simpler formulas are worth.", theory_models.figures),
 )
-
-
-def theory_figures(config: JointConfig, load_max_Nm: float | None = None) -> tuple[Figure, ...]:
-    """Return figures 2.7, 2.8, 3.2 to 3.4, 4.4, 4.5, 4.7 to 4.15 of the thesis for this joint.
-
-    `load_max_Nm`: greatest load, N m (default: `[limits] joint_torque_max_Nm`); raises InputError where
-    neither is known.
-    """
-    subject = subject_of(config, load_max_Nm)
-    return tuple(figure for _, _, draw in _CHAPTERS for figure in draw(subject))
+"""Title, words and figures of each part of the page."""
 
 
 def write_theory_figures(config: JointConfig, out_dir: Path, load_max_Nm: float | None = None) -> Path:
-    """Write the theory figures of this joint to `out_dir`/theory.html and return its path.
+    """Write figures 2.7, 2.8, 3.2 to 3.4, 4.4, 4.5, 4.7 to 4.15 of the thesis, drawn for this joint, to
+    `out_dir`/theory.html; returns its path.
 
-    plotly.js is embedded once; the page needs no network. Nothing is left behind on failure. Raises
-    InputError as `theory_figures`, and where `out_dir` cannot be written.
+    `load_max_Nm`: greatest load, N m (default: `[limits] joint_torque_max_Nm`). plotly.js is embedded once; the page
+    needs no network. Nothing is left behind on failure. Raises InputError where neither load is known, and where
+    `out_dir` cannot be written.
     """
     subject = subject_of(config, load_max_Nm)
     html = page.page(f"Theory of {config.name}", _lead(subject), _sections(subject))
@@ -42,7 +35,7 @@ def write_theory_figures(config: JointConfig, out_dir: Path, load_max_Nm: float 
 
 def _sections(subject: Subject) -> list[page.Section]:
     sections = []
-    for title, lead, draw in _CHAPTERS:
+    for title, lead, draw in CHAPTERS:
         shown = [
             f'<h3 style="margin: 14px 0 0">{figure.number} · {figure.title}</h3>'
             + page.figure(figure.figure, figure.caption)

@@ -22,8 +22,7 @@ class ChannelNoise:
     """Noise of one channel, in the channel's unit.
 
     `sigma`: 1-sigma of a reading, quantisation included; `white`: the part that is there before rounding;
-    `resolution`: step of the grid that the readings lie on (0 = no grid seen); `relative_sd`: sd of `white`
-    over itself, or over the resolution's part where that is larger; infinite if the channel never changes;
+    `resolution`: step of the grid that the readings lie on (0 = no grid seen);
     `resting_share`: share of the recording in which the channel moves by less than a grid step within a
     block, where quantisation acts as a constant offset and not as noise; `coloured`: differences of higher
     order keep falling, so noise is filtered or the motion is not resolved by the sampling, and `sigma` is a
@@ -33,7 +32,6 @@ class ChannelNoise:
     sigma: float
     white: float
     resolution: float
-    relative_sd: float
     resting_share: float
     coloured: bool
     samples: int
@@ -98,10 +96,7 @@ def channel_noise(time_s: FloatArray, values: FloatArray, resolution: float | No
     inside = power <= 4.0 * np.median(power) + step**2
     white = _solve_white(power[inside], speed[inside], step, order)
     resting = float(np.mean(speed * block < 1.0)) if step > 0.0 else 0.0
-    scatter = float(np.std(power[inside]) / np.sqrt(inside.sum()))
-    spread = max(2.0 * white**2, step**2 / 12.0)
-    doubt = scatter / spread if spread > 0.0 else float("inf")
-    return ChannelNoise(reading_sigma(white, step), white, step, doubt, resting, coloured, len(values))
+    return ChannelNoise(reading_sigma(white, step), white, step, resting, coloured, len(values))
 
 
 def _differences(time_s: FloatArray, values: FloatArray, order: int) -> FloatArray:

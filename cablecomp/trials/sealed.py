@@ -86,7 +86,7 @@ class Truth:
 
     `kind`: single, pair, none, stranger, sessions or confounded; `partner`: the other explanation of a
     confounded trial; `depends_on`: (parameter, on) pairs; `imperfections`: by name, with what each was drawn to
-    be; `true` drive values by name; `zeros_rad`: the joint encoder's zero in each recording.
+    be; `true` drive values by name.
     """
 
     number: int
@@ -100,7 +100,6 @@ class Truth:
     loop_rad: float
     floor_rad: float
     true: Mapping[str, float]
-    zeros_rad: tuple[float, ...] = ()
 
     @property
     def main(self) -> tuple[TrueEffect, ...]:
@@ -166,7 +165,6 @@ def truth_from(t: Mapping[str, Any]) -> Truth:
             float(t["loop_rad"]),
             float(t["noise_floor_rad"]),
             t["true"],
-            tuple(float(r["zeros"]["joint_position"]) for r in t["recordings"]),
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputError(f"a sealed truth lacks or misstates {error}; run `cablecomp prove` again") from None

@@ -54,11 +54,10 @@ def status_packet(frame: Frame) -> bytes:
 
 
 class InstructionReader:
-    """Cuts a byte stream into instructions, as frames of the number addressed; counts what was damaged."""
+    """Cuts a byte stream into instructions, as frames of the number addressed; what is damaged is passed over."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
-        self.bad_packets = 0
 
     def reset(self) -> None:
         """Forget half a packet."""
@@ -87,7 +86,6 @@ class InstructionReader:
             return None
         packet = bytes(b[: 7 + length])
         if not SHORTEST <= length <= LONGEST or crc(packet[:-2]) != int.from_bytes(packet[-2:], "little"):
-            self.bad_packets += 1
             del b[:4]
             return ()
         del b[: 7 + length]

@@ -39,8 +39,3 @@ def to_raw(value: float, scale: float, bits: int) -> int:
     return min(
         max(round(value / scale) if math.isfinite(value) else int(math.copysign(top, value)), -top), top
     )
-
-
-def from_raw(raw: int, scale: float, bits: int) -> float:
-    """Inverse of `to_raw`."""
-    return math.nan if raw == -(1 << (bits - 1)) else raw * scale

@@ -104,16 +104,6 @@ def to_float(raw: int, low: float, high: float, bits: int) -> float:
     return raw * (high - low) / ((1 << bits) - 1) + low
 
 
-def encode_command(model: MitModel, target: Setpoint) -> bytes:
-    """The eight bytes of a command."""
-    bits = to_uint(target.position_rad, -model.position, model.position, 16)
-    bits = bits << 12 | to_uint(target.velocity_rad_s, -model.velocity, model.velocity, 12)
-    bits = bits << 12 | to_uint(target.kp_Nm_per_rad, 0.0, model.kp, 12)
-    bits = bits << 12 | to_uint(target.kd_Nms_per_rad, 0.0, model.kd, 12)
-    bits = bits << 12 | to_uint(target.torque_Nm, -model.torque, model.torque, 12)
-    return bits.to_bytes(8, "big")
-
-
 def decode_command(model: MitModel, data: bytes) -> Setpoint:
     """Targets of a command."""
     bits = int.from_bytes(data, "big")

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import struct
 
-from firmware_sim.firmware import Sample, SensorFlag, Status
-from firmware_sim.wire.frame import Frame, from_raw, to_raw
+from firmware_sim.firmware import Sample, Status
+from firmware_sim.wire.frame import Frame, to_raw
 from firmware_sim.wire.tables import SENSOR_BASE, SENSOR_STRIDE
 
 
@@ -27,16 +27,3 @@ def status_frame(joint: int, status: Status) -> Frame:
     temperature = to_raw(status.temperature_degC, 0.01, 16)
     data = struct.pack("<IhBB", status.device_time_us, temperature, status.error_flags, status.sequence)
     return Frame(SENSOR_BASE + 1 + SENSOR_STRIDE * (joint - 1), data)
-
-
-def read_state(frame: Frame) -> Sample:
-    """Inverse of `state_frame`."""
-    (angle,) = struct.unpack_from("<i", frame.data)
-    torque = int.from_bytes(frame.data[4:7], "little", signed=True)
-    return Sample(from_raw(angle, 1e-6, 32), from_raw(torque, 1e-5, 24), frame.data[7])
-
-
-def read_status(frame: Frame) -> Status:
-    """Inverse of `status_frame`."""
-    time_us, temperature, flags, sequence = struct.unpack("<IhBB", frame.data)
-    return Status(time_us, from_raw(temperature, 0.01, 16), SensorFlag(flags), sequence)

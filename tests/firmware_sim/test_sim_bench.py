@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+from far_end import encode_command, read_state, read_status
 from sim_two_mass import ListPort, TwoMass
 
 from firmware_sim.bench import Bench
@@ -14,8 +15,7 @@ from firmware_sim.errors import SimError
 from firmware_sim.firmware import DriveState, Mode, SensorFlag, SensorNode, SensorNodeConfig, Setpoint
 from firmware_sim.plantlike import Readings
 from firmware_sim.wire.frame import Frame
-from firmware_sim.wire.mit import MODELS, encode_command
-from firmware_sim.wire.sensor import read_state, read_status
+from firmware_sim.wire.mit import MODELS
 
 ENTER = b"\xff" * 7 + b"\xfc"
 STILL = Readings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 25.0)

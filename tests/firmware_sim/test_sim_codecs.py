@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cantools
 import pytest
+from far_end import encode_command, read_state, read_status
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -26,10 +27,10 @@ from firmware_sim.plantlike import Readings
 from firmware_sim.wire.base import Answer
 from firmware_sim.wire.damiao import DamiaoWire
 from firmware_sim.wire.frame import Frame
-from firmware_sim.wire.mit import MODELS, MitWire, decode_command, encode_command
+from firmware_sim.wire.mit import MODELS, MitWire, decode_command
 from firmware_sim.wire.odrive import OdriveWire
 from firmware_sim.wire.packed import PackedMessage
-from firmware_sim.wire.sensor import read_state, read_status, state_frame, status_frame
+from firmware_sim.wire.sensor import state_frame, status_frame
 from firmware_sim.wire.shipped import tables
 
 LINKS = Path(__file__).resolve().parents[2] / "configs" / "links"

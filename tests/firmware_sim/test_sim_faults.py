@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
+from far_end import encode_command, read_state, read_status
 from hypothesis import given
 from hypothesis import strategies as st
 from sim_two_mass import ListPort, TwoMass
@@ -15,8 +16,7 @@ from firmware_sim.errors import SimError
 from firmware_sim.faults import FAULTS, FaultyPort, SerialNoise, describe_faults, parse_fault
 from firmware_sim.firmware import DriveFlag, DriveState, SensorFlag, Setpoint
 from firmware_sim.wire.frame import Frame
-from firmware_sim.wire.mit import MODELS, encode_command
-from firmware_sim.wire.sensor import read_state, read_status
+from firmware_sim.wire.mit import MODELS
 from firmware_sim.wire.serial_records import RecordReader, encode_record
 
 ENTER = Frame(1, b"\xff" * 7 + b"\xfc")

@@ -15,6 +15,7 @@ import msgpack
 import numpy as np
 import pytest
 import serial
+from far_end import encode_command
 from sim_two_mass import TwoMass
 
 from firmware_sim.build import BenchConfig, make_bench
@@ -25,7 +26,7 @@ from firmware_sim.ports import PtyPort, SerialPort, SlcanPort, open_port
 from firmware_sim.ports.can_port import sound
 from firmware_sim.runner import BenchThread, run_real_time
 from firmware_sim.wire.frame import Frame
-from firmware_sim.wire.mit import MODELS, encode_command
+from firmware_sim.wire.mit import MODELS
 from firmware_sim.wire.serial_records import RecordReader, encode_record
 
 ENTER = b"\xff" * 7 + b"\xfc"

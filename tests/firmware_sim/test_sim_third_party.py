@@ -17,13 +17,14 @@ from pathlib import Path
 
 import can
 import pytest
+from far_end import encode_command
 from sim_two_mass import TwoMass
 
 from firmware_sim.bench import Bench
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.firmware import DriveState, Setpoint
 from firmware_sim.ports import CanPort, open_port
-from firmware_sim.wire.mit import MODELS, encode_command
+from firmware_sim.wire.mit import MODELS
 
 LINKS = Path(__file__).resolve().parents[2] / "configs" / "links"
 ENTER = b"\xff" * 7 + b"\xfc"

@@ -12,7 +12,8 @@ from rendering import as_text
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
 from cablecomp.report.info import bench_table, design_table, quantity
-from cablecomp.report.theory import theory_figures, write_theory_figures
+from cablecomp.report.theory import CHAPTERS, write_theory_figures
+from cablecomp.report.theory_common import Figure, subject_of
 from cablecomp.thesis.bench.evaluate import BenchRecording, evaluate_bench
 from cablecomp.thesis.bench.vectors import DriveOnBench
 from cablecomp.thesis.design import design_sheet
@@ -28,6 +29,12 @@ def joint(name: str) -> JointConfig:
 def curve(figure: object, name: str) -> tuple[np.ndarray, np.ndarray]:
     trace = next(trace for trace in figure.data if trace.name == name)
     return np.asarray(trace.x), np.asarray(trace.y)
+
+
+def theory_figures(config: JointConfig) -> list[Figure]:
+    """All figures of the page."""
+    subject = subject_of(config, None)
+    return [figure for _, _, draw in CHAPTERS for figure in draw(subject)]
 
 
 @pytest.mark.parametrize("path", JOINTS, ids=lambda path: path.stem)

@@ -68,10 +68,6 @@ def test_a_grid_printed_with_few_decimals_is_still_a_grid() -> None:
     assert grid_step(np.random.default_rng(9).standard_normal(5_000)) == 0.0
 
 
-def test_a_channel_at_rest_says_that_it_cannot_tell() -> None:
-    assert channel_noise(TIME, np.full(len(TIME), 0.2)).relative_sd == float("inf")
-
-
 def test_too_few_readings_are_refused() -> None:
     with pytest.raises(InputError, match="32 readings"):
         channel_noise(TIME[:10], TIME[:10])

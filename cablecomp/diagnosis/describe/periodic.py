@@ -18,7 +18,7 @@ from cablecomp.signal.smoothing import FloatArray
 _MOST: Final = 160
 """Frequencies of the periodogram: its cost."""
 _HIGHEST: Final = 60.0
-"""Highest frequency looked at [1/rad]: finer than any tooth or strand."""
+"""Highest frequency looked at [periods per revolution]: finer than any tooth or strand."""
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,6 @@ def branch_of(
         weighted_mean([point.mu_eff for point in points if point.mu_eff is not None]),
         acting,
         None if line is None else line.correlation,
-        None if line is None else line.intercept,
         0 if line is None else line.samples,
         points,
     )
@@ -80,7 +79,6 @@ class _Line:
     scale: float
     scale_sd: float
     correlation: float
-    intercept: float
     samples: int
 
 
@@ -118,7 +116,7 @@ def _fit(
     white = np.hypot(data.deflection_noise, rise * data.load_noise)
     sd = _slope_sd(parts.vector, residual, white, data.load.window)
     correlation = float(np.corrcoef(parts.vector, wrap)[0, 1])
-    return _Line(scale, scale * scale * sd, correlation, float(intercept), len(index))
+    return _Line(scale, scale * scale * sd, correlation, len(index))
 
 
 def _slope_sd(x: Array, residual: Array, white: Array, block: int) -> float:

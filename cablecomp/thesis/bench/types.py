@@ -85,7 +85,6 @@ class Branch:
     """From the slope of wrap deflection against the processed load vector while the load moves."""
     correlation: float | None
     """Of that line."""
-    intercept_rad: float | None
     samples: int
     points: tuple[EquilibriumPoint, ...]
 
