@@ -9,6 +9,7 @@ while models are compared (`make_groups`), recordings or blocks of them for the 
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -19,7 +20,6 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import BoolArray, Evidence
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.problem import Problem
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
@@ -102,7 +102,7 @@ def make_groups(fit: Fit) -> Groups:
     counts = np.bincount(owners[0], minlength=len(problem.evidence))
     by = "recording" if len(problem.evidence) >= LIMITS.recordings else "block"
     each = _blocks_of_each(fit, owners[0], counts)
-    alone = _alone(problem) if by == "recording" else np.zeros(len(problem.evidence), dtype=np.bool_)
+    alone = _alone(problem.evidence, by)
     blocks, folds, channels = [], [], []
     for number, (c, own) in enumerate(zip(problem.channels, owners, strict=True)):
         block = np.full(len(own), -1, dtype=np.int64)
@@ -133,11 +133,13 @@ def _blocks_of_each(fit: Fit, owners: IntArray, counts: IntArray) -> list[int]:
     return [max(1, round(total * n / max(counts.sum(), 1))) for n in counts]
 
 
-def _alone(problem: Problem) -> BoolArray:
+def _alone(evidence: Sequence[Evidence], by: str) -> BoolArray:
     """Recordings that alone show how their session's drive stands, where other sessions have several: they are not
-    left out, or a session's own value could not be judged by the others."""
-    several = problem.repeated
-    return np.array([len(several) > 1 and e.session not in several for e in problem.evidence], dtype=np.bool_)
+    left out, or nothing would tell that session's own values."""
+    count = Counter(e.session for e in evidence)
+    several = {s for s, n in count.items() if n > 1}
+    whole = by == "recording" and len(several) > 1
+    return np.array([whole and e.session not in several for e in evidence], dtype=np.bool_)
 
 
 def _fold_of(own: IntArray, block: IntArray, by: str) -> IntArray:
@@ -158,13 +160,14 @@ def left_out_in_turn(evidence: Sequence[Evidence], by: str) -> list[Part]:
     """A few parts of whole recordings (`by` "recording"), or of blocks of each recording ("block")."""
     count = LIMITS.parts
     if by == "recording":
-        place = np.arange(len(evidence)) % count
+        turn = ~_alone(evidence, by)
+        place = np.where(turn, (np.cumsum(turn) - 1) % count, -1)
         return [
             Part(
                 [e for e, p in zip(evidence, place, strict=True) if p != k],
                 [e for e, p in zip(evidence, place, strict=True) if p == k],
             )
-            for k in range(min(count, len(evidence)))
+            for k in range(min(count, int(turn.sum())))
         ]
     fold = [cut(len(e.rows), LIMITS.part_blocks) % count for e in evidence]
     return [

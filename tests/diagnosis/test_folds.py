@@ -1,0 +1,45 @@
+"""What is left out in turn: each row once, and no session without a recording that tells how its drive stood."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from cablecomp.diagnosis.folds import left_out_in_turn
+from cablecomp.estimation.evidence import JOINT, Evidence
+
+
+def recording(name: str, session: str) -> Evidence:
+    time = np.arange(60.0)
+    rows = np.arange(60)
+    return Evidence(
+        name, session, {}, {"time_s": time}, rows, {JOINT: np.ones(60, dtype=np.bool_)}, np.ones(60)
+    )
+
+
+@pytest.mark.parametrize("sessions", ["aabb", "abcd", "aaaa", "aabbc", "aaaaabbbbbc"])
+def test_recordings_are_left_out_once_and_never_all_that_tell_a_sessions_drive(sessions: str) -> None:
+    evidence = [recording(str(k), s) for k, s in enumerate(sessions)]
+    several = {s for s, n in Counter(sessions).items() if n > 1}
+    parts = left_out_in_turn(evidence, "recording")
+    out = [e.name for part in parts for e in part.out]
+    kept = {e.name for e in evidence if len(several) > 1 and e.session not in several}
+    assert sorted(out) == sorted({e.name for e in evidence} - kept)
+    for part in parts:
+        assert {e.name for e in part.out} | {e.name for e in part.rest} == {e.name for e in evidence}
+        assert not {e.name for e in part.out} & {e.name for e in part.rest}
+        assert part.rest
+        if len(several) > 1:
+            assert {e.session for e in part.out} <= {e.session for e in part.rest}
+
+
+def test_blocks_are_left_out_once() -> None:
+    evidence = [recording(str(k), "one") for k in range(2)]
+    parts = left_out_in_turn(evidence, "block")
+    for k in range(2):
+        counted = np.sum([part.out[k].counted[JOINT] for part in parts], axis=0)
+        assert np.array_equal(counted, np.ones(60))
+        for part in parts:
+            assert not np.any(part.out[k].counted[JOINT] & part.rest[k].counted[JOINT])
