@@ -30,7 +30,7 @@ from cablecomp.cli.shared import (
 from cablecomp.config import JointConfig
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlMode
-from cablecomp.control.protocol import load_protocol
+from cablecomp.control.protocol import Protocol, load_protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
 from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.load import load_link
@@ -124,14 +124,7 @@ def run(
         wanted = wanted.model_copy(
             update={"compensator": wanted.compensator.model_copy(update={"mode": mode})}
         )
-    force = wanted.compensator.mode is ControlMode.FORCE
-    if protocol == CALIBRATE and not CALIBRATE.is_file():
-        asked = calibration_protocol(joint)
-    elif protocol is not None:
-        asked = load_protocol(protocol)
-    else:
-        span = 30.0 if duration is None else max(duration, 30.0)
-        asked = force_protocol(joint, seed, span) if force else reaching_protocol(joint, seed, span)
+    asked = _asked(protocol, joint, wanted.compensator.mode, seed, duration)
     wish = SimulationWish(bus, wanted, 1, not nominal, seed, tuple(fault or ()))
     options = RunOptions(
         duration, fast, out, bounds, resume=resume, without_drive_timeout=without_drive_timeout
@@ -154,6 +147,19 @@ def run(
             if simulation is not None:
                 simulation.close()
         _finish(report, joint, config, beside, as_json)
+
+
+def _asked(
+    protocol: Path | None, joint: JointConfig, mode: ControlMode, seed: int, duration: float | None
+) -> Protocol:
+    """What is asked for over time: the file's, the one for calibrations, else motions at random for the mode."""
+    if protocol == CALIBRATE and not CALIBRATE.is_file():
+        return calibration_protocol(joint)
+    if protocol is not None:
+        return load_protocol(protocol)
+    span = 30.0 if duration is None else max(duration, 30.0)
+    random = force_protocol if mode is ControlMode.FORCE else reaching_protocol
+    return random(joint, seed, span)
 
 
 @contextmanager

@@ -150,7 +150,7 @@ class Loop:
             begin = perf_counter()
             self.link.poll(tick.now_s)
             polled = perf_counter()
-            done = self._one(tick)
+            done = self._tick(tick)
             self._account(tick, begin, polled, perf_counter())
             if self._after is not None:
                 self._after(tick, self.stage)
@@ -159,7 +159,8 @@ class Loop:
             if done:
                 return
 
-    def _one(self, tick: Tick) -> bool:
+    def _tick(self, tick: Tick) -> bool:
+        """Do what the stage asks for at this tick; returns whether the run is over."""
         now = tick.now_s
         if self.stage is Stage.LISTENING:
             self._listen(now)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cablecomp.config import JointConfig
 from cablecomp.config_text import write_joint
-from cablecomp.control.compensator import given_gains
+from cablecomp.control.compensator import Gains, given_gains
 from cablecomp.control.design import design_gains
 from cablecomp.control.options import ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol
@@ -100,19 +100,12 @@ def run_joints(
     already by the caller). Raises InputError for what does not fit together, DeviceError if the other side
     does not answer.
     """
-    if options.stepped and simulation is None:
-        raise InputError("stepped time needs a simulated joint; leave out --fast, or add --sim")
-    if simulation is None and not options.without_drive_timeout:
-        check_drive_timeouts(link, [c.place for c in contestants])
-    for c in contestants:
-        protocol.check_within(c.config.limits, protocol.name)
+    _check(contestants, link, protocol, options, simulation)
     if simulation is not None and simulation.terminal is not None:
         link = link.at_terminal(simulation.terminal)
     first = contestants[0]
     mode = ControlMode.FORCE if protocol.mode == "force" else first.options.mode
-    chosen = control.model_copy(update={"compensator": first.options.model_copy(update={"mode": mode})})
-    given = given_gains(chosen.compensator)
-    gains = design_gains(first.config, link.rate_Hz, chosen) if given is None else given
+    gains = _gains(first, mode, link, control)
     period = 1.0 / link.rate_Hz
     bus: Link = BusLink(link)
     references = references_of(protocol, mode is ControlMode.FORCE)
@@ -124,11 +117,8 @@ def run_joints(
     )
     if not options.stepped:
         check_pace([_pace(setup, options) for setup in setups], period)
-    duration = protocol.duration_s if options.duration_s is None else options.duration_s
-    policy = options.policy if options.policy is not None else (QUIET if options.stepped else Policy())
     clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
-    begin = 0.0 if options.resume is None else max(resumed_at_s(s) for s in setups) + period
-    timing = LoopOptions(duration, mode=_drive_mode(link, first.place), policy=policy, begin_s=begin)
+    timing = _timing(options, protocol, link, first.place, setups)
     truths = TruthTally([c.name for c in contestants])
 
     def after(tick: Tick, stage: Stage) -> None:
@@ -157,6 +147,43 @@ def run_joints(
             tuple(loop.failures),
         )
         return found if options.out is None else _reported(found, options.out)
+
+
+def _check(
+    contestants: Sequence[Contestant],
+    link: LinkConfig,
+    protocol: Protocol,
+    options: RunOptions,
+    simulation: Simulation | None,
+) -> None:
+    """Raise InputError for what does not fit together."""
+    if options.stepped and simulation is None:
+        raise InputError("stepped time needs a simulated joint; leave out --fast, or add --sim")
+    if simulation is None and not options.without_drive_timeout:
+        check_drive_timeouts(link, [c.place for c in contestants])
+    for c in contestants:
+        protocol.check_within(c.config.limits, protocol.name)
+
+
+def _gains(first: Contestant, mode: ControlMode, link: LinkConfig, control: ControlConfig) -> Gains:
+    """The gains that the first joint's options state, else those designed for it; all joints run with them."""
+    options = first.options.model_copy(update={"mode": mode})
+    given = given_gains(options)
+    if given is not None:
+        return given
+    return design_gains(first.config, link.rate_Hz, control.model_copy(update={"compensator": options}))
+
+
+def _timing(
+    options: RunOptions, protocol: Protocol, link: LinkConfig, place: int, setups: Sequence[JointSetup]
+) -> LoopOptions:
+    """How long the run takes, from when on its clock counts, and how the process gets its time."""
+    duration = protocol.duration_s if options.duration_s is None else options.duration_s
+    policy = options.policy if options.policy is not None else (QUIET if options.stepped else Policy())
+    begin = 0.0
+    if options.resume is not None:
+        begin = max(resumed_at_s(s) for s in setups) + 1.0 / link.rate_Hz
+    return LoopOptions(duration, mode=_drive_mode(link, place), policy=policy, begin_s=begin)
 
 
 def _pace(setup: JointSetup, options: RunOptions) -> Pace:

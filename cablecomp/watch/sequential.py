@@ -1,5 +1,6 @@
-"""Watch a running residual: a sequential test with a stated rate of false alarms, constant memory, O(1)
-per sample.
+"""Watch a running residual: a sequential test with a stated rate of false alarms; own code, as `ruptures` looks back.
+
+Constant memory, O(1) per sample.
 """
 
 from __future__ import annotations

@@ -32,10 +32,9 @@ def test_the_readme_names_every_folder_in_one_line() -> None:
 def test_a_package_says_what_it_is_what_it_imports_and_where_to_start(package: Path) -> None:
     text = " ".join((ast.get_docstring(ast.parse((package / "__init__.py").read_text())) or "").split())
     assert re.search(r"\b[Ii]mports? |each imported when", text), text
-    start = re.search(r"[Ss]tart reading at (any|`[\w./]+`)", text)
-    assert start, text
-    if start[1] != "any":
-        assert (package / start[1].strip("`")).exists(), start[1]
+    assert re.search(r"[Ss]tart reading at (any|`[\w./]+`)|One sample's way", text), text
+    for name in re.findall(r"`([\w/]+(?:\.py|/))`", text):
+        assert (package / name).exists() or (package.parent / name).exists(), name
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=NAMES)
