@@ -138,7 +138,7 @@ class JointLoop:
         if not self.stop_reason:
             motor = checked.sample.motor_position_rad
             wish = self.taking_up.step(self._sent, motor, self.enabled, mode, now_s)
-            self._pass(wish, checked, now_s)
+            self._send_gated(wish, checked, now_s)
         self._finish(command, None)
 
     def begin(self) -> None:
@@ -152,7 +152,7 @@ class JointLoop:
         command = self._observe(now_s, since_s)
         checked = self.checked
         if checked is not None and not self.stop_reason:
-            self._pass(command, checked, now_s)
+            self._send_gated(command, checked, now_s)
         self._finish(command, since_s)
 
     def stand(self, now_s: float) -> None:
@@ -272,7 +272,7 @@ class JointLoop:
         elif drive and self.readings.state in _NOT_RUNNING:
             self.stop_reason = self.stop_reason or f"drive reports {self.drive_words}"
 
-    def _pass(self, command: Command, checked: Checked, now_s: float) -> None:
+    def _send_gated(self, command: Command, checked: Checked, now_s: float) -> None:
         """Through the gate, and out."""
         s = self.setup
         position = checked.sample.motor_position_rad

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from joints import WRIST_GAINS
 
 from cablecomp.config import load_joint
 from cablecomp.control.command import Reference
@@ -29,15 +30,6 @@ from firmware_sim.ports import open_port
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 JOINT = CONFIGS / "joints/wrist-capstan.toml"
-GAINS = {
-    "load_filter_Hz": 15.5,
-    "load_lead_s": 0.0,
-    "follow_filter_Hz": 30.0,
-    "follow_lead_s": 0.01,
-    "joint_feedback_per_s": 0.0,
-    "force_feedback_per_s": 20.0,
-    "motor_integral_per_s": 65.0,
-}
 
 
 @pytest.mark.parametrize("mode", ["position", "force"])
@@ -50,7 +42,7 @@ def test_step_of_observer_and_compensator(benchmark: Any, mode: str) -> None:
         )
     observer = Observer(config)
     observer.compile()
-    options = CompensatorOptions.model_validate({**GAINS, "mode": mode})
+    options = CompensatorOptions.model_validate({**WRIST_GAINS, "mode": mode})
     compensator = Compensator(config, options, 1e-3, observer)
     samples = []
     for k in range(200_000):
@@ -130,7 +122,7 @@ def test_a_cycle_of_eight_joints(benchmark: Any) -> None:
     """
     joint, control = load_joint(JOINT), load_control(CONFIGS / "control/wrist-capstan.toml")
     health = control.health.model_copy(update={"joint_residual_rad": None})
-    options = control.compensator.model_copy(update=GAINS)
+    options = control.compensator.model_copy(update=WRIST_GAINS)
     control = control.model_copy(update={"compensator": options, "health": health})
     link, control = matched(load_link(CONFIGS / "links/wrist-virtual.toml"), control, own_link=False)
     names = [f"joint-{k + 1}" for k in range(8)]

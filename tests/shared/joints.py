@@ -27,6 +27,12 @@ EQUAL: dict[str, Any] = {
 }  # fmt: skip
 """What replays run: equal pulleys close to each other."""
 
+WRIST_GAINS = {
+    "load_filter_Hz": 18.6, "load_lead_s": 0.0, "follow_filter_Hz": 18.6, "follow_lead_s": 0.0171,
+    "joint_feedback_per_s": 0.0, "force_feedback_per_s": 16.0, "motor_integral_per_s": 65.0,
+}  # fmt: skip
+"""What `cablecomp design` gives for `configs/joints/wrist-capstan.toml`; stated, so that no test need design anew."""
+
 
 def closed(stage: dict[str, Any], name: str = "test joint") -> dict[str, Any]:
     """A configuration, ours and the plant's, of one closed stage."""

@@ -22,19 +22,14 @@ CONTROL = CONFIGS / "control/wrist-capstan.toml"
 LINK = CONFIGS / "links/wrist-virtual.toml"
 
 
+def simulated(joint: Path = JOINT, control: Path | None = CONTROL, **options: object) -> list[str]:
+    """Arguments of a run on a simulated joint in simulated time."""
+    given = {"config": joint, **({} if control is None else {"control": control}), **options}
+    return ["run", "--sim", "--fast", *(word for k, v in given.items() for word in (f"--{k}", str(v)))]
+
+
 def test_the_command_line_runs_and_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = [
-        "run",
-        "--config",
-        str(JOINT),
-        "--control",
-        str(CONTROL),
-        "--sim",
-        "--fast",
-        "--duration",
-        "0.5",
-    ]
-    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
+    assert cli.main(simulated(out=tmp_path, duration=0.5)) == 0
     assert "report.html" in capsys.readouterr().out.replace("\n", "")
     page = (tmp_path / "report.html").read_text()
     assert "https://" not in page.split("<script")[0]
@@ -44,18 +39,7 @@ def test_the_command_line_runs_and_writes_a_page(tmp_path: Path, capsys: pytest.
 def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
     protocol = tmp_path / "p.toml"
     protocol.write_text(REACH.to_toml(), encoding="utf-8")
-    arguments = [
-        "run",
-        "--config",
-        str(JOINT),
-        "--control",
-        str(CONTROL),
-        "--sim",
-        "--fast",
-        "--duration",
-        "0.3",
-    ]
-    assert cli.main([*arguments, "--protocol", str(protocol), "--out", str(tmp_path / "out")]) == 0
+    assert cli.main(simulated(out=tmp_path / "out", duration=0.3, protocol=protocol)) == 0
     cycles = pl.read_csv(tmp_path / "out" / "cycles.csv", infer_schema_length=None).filter(
         pl.col("controlled") > 0
     )
@@ -114,9 +98,8 @@ def test_a_bus_that_is_not_there_is_exit_code_3(tmp_path: Path, capsys: pytest.C
 
 @pytest.mark.parametrize("name", ["mit-virtual", "odrive-virtual", "dbc-virtual", "mit-slcan", "mit-serial"])
 def test_the_simulated_joint_sits_behind_every_kind_of_link(name: str, tmp_path: Path) -> None:
-    arguments = ["run", "--config", str(JOINT), "--control", str(CONTROL), "--sim", "--fast", "--nominal"]
-    arguments += ["--link", str(CONFIGS / "links" / f"{name}.toml"), "--duration", "0.8", "--no-bounds"]
-    assert cli.main([*arguments, "--out", str(tmp_path)]) == 0
+    link = CONFIGS / "links" / f"{name}.toml"
+    assert cli.main([*simulated(out=tmp_path, link=link, duration=0.8), "--nominal", "--no-bounds"]) == 0
     said = json.loads((tmp_path / "run.json").read_text())
     assert said["joints"][0]["cycles"] > 790
     assert said["joints"][0]["residual_rad"] < 2e-3
@@ -130,34 +113,13 @@ def test_a_joint_with_nothing_but_its_motor_runs_on_the_motor_s_torque(tmp_path:
     text = (CONFIGS / "links/mit-virtual.toml").read_text()
     text = text.replace("cablecomp_joint.dbc", str(CONFIGS / "links/cablecomp_joint.dbc"))
     link.write_text(text.partition("[joint.sensor]")[0], encoding="utf-8")
-    arguments = [
-        "run",
-        "--config",
-        str(joint),
-        "--control",
-        str(CONTROL),
-        "--link",
-        str(link),
-        "--sim",
-        "--fast",
-    ]
-    assert cli.main([*arguments, "--duration", "1.5", "--no-bounds", "--out", str(tmp_path / "out")]) == 0
+    asked = simulated(joint, out=tmp_path / "out", link=link, duration=1.5)
+    assert cli.main([*asked, "--no-bounds"]) == 0
     assert "joint_position_rad" not in (tmp_path / "out/recording.csv").read_text()
 
 
 def test_a_run_that_had_to_stop_the_joint_says_so_by_its_exit_code(tmp_path: Path) -> None:
-    arguments = [
-        "run",
-        "--config",
-        str(JOINT),
-        "--control",
-        str(CONTROL),
-        "--sim",
-        "--fast",
-        "--duration",
-        "2",
-    ]
-    assert cli.main([*arguments, "--fault", "silent:node=drive,start=0.3", "--out", str(tmp_path)]) == 3
+    assert cli.main(simulated(out=tmp_path, duration=2, fault="silent:node=drive,start=0.3")) == 3
     assert "stale" in json.loads((tmp_path / "run.json").read_text())["stop_reason"]
     assert (tmp_path / "report.html").exists()
 
@@ -167,15 +129,8 @@ def test_an_open_circuit_is_held_by_its_brake_and_run_in_every_mode(mode: str, t
     """Its pretension pulls at the motor: without brake and counter-torque the joint runs away before control
     begins.
     """
-    arguments = [
-        "run",
-        "--config",
-        str(CONFIGS / "joints/snow-open-rig.toml"),
-        "--sim",
-        "--fast",
-        "--no-bounds",
-    ]
-    assert cli.main([*arguments, "--mode", mode, "--duration", "1.5", "--out", str(tmp_path)]) == 0
+    asked = simulated(CONFIGS / "joints/snow-open-rig.toml", None, out=tmp_path, mode=mode, duration=1.5)
+    assert cli.main([*asked, "--no-bounds"]) == 0
     recording = pl.read_csv(tmp_path / "recording.csv", comment_prefix="#")
     assert abs(recording["joint_position_rad"][:20]).max() < 0.02
     assert "jumped" not in (tmp_path / "events.jsonl").read_text()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joints import WRIST_GAINS
 
 from cablecomp.cli.live import LiveRun
 from cablecomp.cli.simulation import start_simulation
@@ -26,16 +27,6 @@ from cablecomp.watch.live import LiveOptions
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 JOINT = CONFIGS / "joints/wrist-capstan.toml"
-GAINS = {
-    "load_filter_Hz": 18.6,
-    "load_lead_s": 0.0,
-    "follow_filter_Hz": 18.6,
-    "follow_lead_s": 0.0171,
-    "joint_feedback_per_s": 0.0,
-    "force_feedback_per_s": 16.0,
-    "motor_integral_per_s": 65.0,
-}
-"""What `cablecomp design` gives for this joint."""
 OPTIONS = LiveOptions(between_false_alarms_s=3_600.0, learning_s=4.0, keep_s=8.0, after_s=2.0)
 SLIPS_AT_S = 8.3
 
@@ -43,7 +34,7 @@ SLIPS_AT_S = 8.3
 def watched_run(out: Path, duration_s: float, slip_m: float = 0.0) -> tuple[RunReport, LiveRun]:
     """A run in stepped time; the simulated joint is exactly as configured, but that a clamp slips in it."""
     joint, control = load_joint(JOINT), load_control(CONFIGS / "control/wrist-capstan.toml")
-    options = control.compensator.model_copy(update=GAINS)
+    options = control.compensator.model_copy(update=WRIST_GAINS)
     link = load_link(CONFIGS / "links/wrist-virtual.toml")
     link, control = matched(link, control.model_copy(update={"compensator": options}), own_link=False)
     true = joint

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from joints import WRIST_GAINS
 
 from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
@@ -33,18 +34,6 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 JOINT = CONFIGS / "joints/wrist-capstan.toml"
 CONTROL = CONFIGS / "control/wrist-capstan.toml"
 LINK = CONFIGS / "links/wrist-virtual.toml"
-
-
-GAINS = {
-    "load_filter_Hz": 18.6,
-    "load_lead_s": 0.0,
-    "follow_filter_Hz": 18.6,
-    "follow_lead_s": 0.0171,
-    "joint_feedback_per_s": 0.0,
-    "force_feedback_per_s": 16.0,
-    "motor_integral_per_s": 65.0,
-}
-"""What `cablecomp design` gives for this joint; stated, so that each test need not design anew."""
 
 REACH = parse_protocol(
     {
@@ -69,7 +58,7 @@ def simulated_run(
 ) -> RunReport:
     """A run in stepped time on a joint exactly as configured."""
     joint, control = load_joint(JOINT), load_control(CONTROL)
-    options = control.compensator.model_copy(update={**GAINS, "mode": mode, **changes})
+    options = control.compensator.model_copy(update={**WRIST_GAINS, "mode": mode, **changes})
     link, control = matched(
         load_link(LINK), control.model_copy(update={"compensator": options}), own_link=False
     )
@@ -201,7 +190,7 @@ def test_impedance_yields_by_its_stiffness() -> None:
     joint, control = load_joint(JOINT), load_control(CONTROL)
     options = control.compensator.model_copy(
         update={
-            **GAINS,
+            **WRIST_GAINS,
             "mode": ControlMode.IMPEDANCE,
             "impedance_stiffness_Nm_per_rad": 8.0,
             "impedance_damping_Nms_per_rad": 0.3,
@@ -247,7 +236,7 @@ def test_a_force_run_replays_bit_for_bit_as_well(tmp_path: Path) -> None:
 
 def test_asked_to_stop_before_anything_has_come_leaves_a_page_and_no_riddle(tmp_path: Path) -> None:
     joint, control = load_joint(JOINT), load_control(CONTROL)
-    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=GAINS)})
+    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=WRIST_GAINS)})
     link, control = matched(load_link(LINK), control, own_link=False)
     simulation = start_simulation(JOINT, SimulationWish(link, control, faults=("silent:node=both",)))
 
@@ -269,7 +258,7 @@ def test_a_run_goes_on_from_a_snapshot_and_can_be_replayed_from_there(
     assert finished.folder is not None
     snapshot = finished.folder / "observer.snapshot"
     joint, control = load_joint(JOINT), load_control(CONTROL)
-    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=GAINS)})
+    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=WRIST_GAINS)})
     link, control = matched(load_link(LINK), control, own_link=False)
     simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
     options = RunOptions(0.5, True, tmp_path, resume=snapshot)
