@@ -125,6 +125,23 @@ def unit_named(text: str, table: Mapping[str, Unit]) -> Unit | None:
     return table.get(name) or table.get(_SPELT.get(name, _SPELT.get(name.lower(), "")))
 
 
+class Stated(NamedTuple):
+    """What the end of a name says: the rest of it, its unit, and the units of that quantity."""
+
+    stem: str
+    unit: Unit
+    table: Mapping[str, Unit]
+
+
+def stated_unit(name: str) -> Stated | None:
+    """The unit at the end of a name, SI or not (`cable_diameter_mm`); None if there is none."""
+    fitting = [(unit, table) for table in UNITS.values() for unit in table if name.endswith(f"_{unit}")]
+    unit, table = max(fitting, key=lambda f: len(f[0]), default=("", TIME))
+    if not unit or name.endswith(f"_per_{unit}"):
+        return None
+    return Stated(name.removesuffix(f"_{unit}"), table[unit], table)
+
+
 def suffix_of(name: str) -> str | None:
     """The suffix of a name that says its SI unit (`motor_velocity_rad_s` -> `rad_s`); None if it has none."""
     fitting = [suffix for suffix in UNITS if name.endswith(f"_{suffix}")]

@@ -60,7 +60,7 @@ def init(
         return
     told = dict(read_toml(answers)) if answers is not None else {}
     told |= dict(_answer(word) for word in given or ())
-    if not told:
+    if answers is None and not given:
         if not sys.stdin.isatty():
             raise InputError(
                 "init: nobody to ask; give --set KEY=VALUE or --from FILE (cablecomp init --keys lists the keys)"

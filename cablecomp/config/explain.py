@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from cablecomp.config.toml_file import Place
-from cablecomp.units import UNITS, suffix_of, unit_named
+from cablecomp.units import stated_unit, unit_named
 
 _MOST_LINES: Final = 20
 _ACCEPTED: Final = {
@@ -159,16 +159,18 @@ def _meant(found: _Found, data: Any) -> tuple[str | None, float | None]:
     number = float(value) if isinstance(value, int | float) and abs(value) < 1e300 else None
     free = _free_keys(found, data)
     for name in free:
-        suffix = suffix_of(name)
-        if suffix is None:
+        own = stated_unit(name)
+        if own is None:
             continue
-        stem = name.removesuffix(f"_{suffix}").lower()
+        stem = own.stem.lower()
         if given.lower() in (stem, name.lower()):
             return name, None
         written = given[len(stem) + 1 :] if given.lower().startswith(f"{stem}_") else ""
-        unit = unit_named(written, UNITS[suffix])
+        unit = unit_named(written, own.table)
+        if unit is not None and number is not None:
+            return name, (unit.factor * number + unit.offset - own.unit.offset) / own.unit.factor
         if unit is not None:
-            return name, None if number is None else unit.factor * number + unit.offset
+            return name, None
     folded = {name.lower(): name for name in free}
     close = difflib.get_close_matches(given.lower()[:80], folded, 1, 0.7)
     return (folded[close[0]], None) if close else (None, None)

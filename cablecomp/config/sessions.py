@@ -84,8 +84,9 @@ def check_names(where: str, names: Iterable[str], known: Iterable[str], stages: 
     known = tuple(known)
     bad = [name for name in names if not _is_parameter(name, known, stages)]
     if bad:
-        close = difflib.get_close_matches(bad[0].partition(".")[0], known, 1)
-        hint = f"did you mean `{close[0]}`?" if close and close[0] not in bad[0] else ""
+        heads = [name.partition(".")[0] for name in bad[:9]]
+        close = [near for head in heads for near in difflib.get_close_matches(head, known, 1) if near != head]
+        hint = f"did you mean {', '.join(f'`{near}`' for near in dict.fromkeys(close))}?" if close else ""
         hint = hint or f"known are {', '.join(known)}, KEY.N of stage N, effect.ID.KEY"
         raise ValueError(
             f"[{where}]: {', '.join(f'`{name}`' for name in bad[:9])}: no such parameter; {hint}"

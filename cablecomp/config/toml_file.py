@@ -41,7 +41,7 @@ def read_toml(path: Path) -> TomlTable:
     if len(content) > _MOST_BYTES:
         raise InputError(f"{path}: is larger than {_MOST_BYTES / 1e6:g} MB; that is no configuration")
     try:
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")  # some editors begin a file with a mark
         found = TomlTable(tomllib.loads(text))
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not text; a TOML file in UTF-8 is accepted") from None

@@ -68,6 +68,18 @@ def test_everything_wrong_is_said_at_once_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_file_of_answers_is_read_as_any_configuration_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answers = tmp_path / "idea.toml"
+    answers.write_text("")
+    assert main(["init", "--from", str(answers), "--out", str(tmp_path)]) == 2
+    assert "idea.toml: missing key `cable`" in capsys.readouterr().err
+    answers.write_text("output_radius_m = 0.03\n")
+    assert main(["init", "--from", str(answers), "--out", str(tmp_path)]) == 2
+    assert "did you mean `output_radius_mm = 30`?" in capsys.readouterr().err
+
+
 def test_a_file_that_differs_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert init(tmp_path) == 0
     before = (tmp_path / "joint.toml").read_text()

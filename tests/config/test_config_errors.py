@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def test_every_error_is_said_each_with_its_line(tmp_path: Path) -> None:
         ("pretension_N = 35.0", 'pretension_N = "35"'),
         ("mu_input = 0.16", "mu_input = -0.16"),
         ("[sensors]", "[sensors]\nspeed = 3"),
-        ("EA_N = 0.08", "EA = 0.08"),
+        ("EA_N = 0.08", "EA = 0.08\nmu_inptu = 0.1"),
     )
     expected = {
         'circuit = "clsed"': "'clsed'",
@@ -62,7 +63,7 @@ def test_every_error_is_said_each_with_its_line(tmp_path: Path) -> None:
         'pretension_N = "35"': "a number is accepted",
         "mu_input = -0.16": "a number above 0 is accepted",
         "speed": "unknown key `sensors.speed`",
-        "[tolerance]": "did you mean `EA_N`?",
+        "[tolerance]": "did you mean `EA_N`, `mu_input`?",
     }
     lines = said(text, tmp_path)
     assert len(lines) == len(expected)
@@ -89,6 +90,12 @@ def test_a_near_miss_is_guessed_and_not_called_missing_as_well(
     lines = said(changed(("output_radius_m = 0.008", f"{key} = {value}")), tmp_path)
     assert len(lines) == 1
     assert f"did you mean {meant}?" in lines[0]
+
+
+def test_a_mark_at_the_head_of_the_file_is_no_error(tmp_path: Path) -> None:
+    path = tmp_path / "joint.toml"
+    path.write_text(GOOD, encoding="utf-8-sig")
+    assert load_joint(path) == parse_joint(tomllib.loads(GOOD), "joint.toml")
 
 
 def test_a_quotient_is_not_taken_for_its_last_unit(tmp_path: Path) -> None:
