@@ -17,7 +17,7 @@ _WORDS: Final = {
     "time": _set("time t stamp timestamp timestamps clock millis micros elapsed tick ticks"),
     "position": _set("pos position positions angle ang theta q enc encoder phi rotation qin qout qm qj"),
     "velocity": _set("vel velocity velocities speed omega qd dq qdot rate w"),
-    "torque": _set("torque torques tau trq moment mom effort eff load taum tauj"),
+    "torque": _set("torque torques tau trq moment mom effort eff load taum tauj ft wrench"),
     "current": _set("current cur curr iq amps amp i"),
     "tension": _set("tension tens force pull"),
     "temperature": _set("temp temperature therm"),
@@ -29,6 +29,7 @@ _SIDES: Final = {
         "finger end external ext qout qj tauj ft sensor"
     ),
 }
+_BEGINS: Final = ("motor", "joint", "actuator", "output", "input", "link")
 _ASKED: Final = _set("cmd command commanded des desired target ref reference setpoint goal sp want")
 _MADE: Final = _set("err error residual raw filtered filt model predicted est estimate")
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]+?)\s*[\])>}]\s*$")
@@ -132,4 +133,10 @@ def _by_unit(unit: str) -> list[str]:
 
 
 def _words(name: str) -> set[str]:
-    return {part.lower() for part in _PARTS.findall(name)}
+    return {word for part in _PARTS.findall(name) for word in _apart(part.lower())}
+
+
+def _apart(word: str) -> set[str]:
+    """A word, or the side of the drive that it begins with and the rest (`motorpos`)."""
+    sides = [s for s in _BEGINS if word.startswith(s) and len(word) > len(s)]
+    return {sides[0], word.removeprefix(sides[0])} if sides else {word}

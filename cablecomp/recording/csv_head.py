@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -12,8 +13,10 @@ from cablecomp.errors import InputError
 from cablecomp.recording.source import Truncated, chunks
 from cablecomp.units import UNITS, unit_named
 
-_HEAD_LIMIT: Final = 1 << 20
+_HEAD_LEAST, _HEAD_LIMIT = 1 << 16, 1 << 20
 _MOST_COLUMNS: Final = 4096
+_PREAMBLE: Final = 100
+"""Lines among which the names are looked for."""
 _SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
 _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
 
@@ -42,15 +45,18 @@ def read_head(path: Path, gzipped: bool) -> Head:
     """Read comments and header line; InputError if there is no header or it holds numbers."""
     text = b""
     try:
-        for piece in chunks(path, gzipped, 1 << 16):
+        for piece in chunks(path, gzipped, _HEAD_LEAST):
             text += piece.data
+            if len(text) < _HEAD_LEAST:
+                continue
             head = _parse_head(text)
             if head is not None and text.count(b"\n") > head.first_line:
                 break
             if len(text) > _HEAD_LIMIT:
                 break
     except Truncated as error:
-        raise InputError(f"{path}: {error}, before the first row; copy or record the file anew") from None
+        if _parse_head(text) is None:  # else whoever reads the rows says where it ends
+            raise InputError(f"{path}: {error}, before the first row; copy or record the file anew") from None
     head = _parse_head(text)
     if head is None:
         raise InputError(
@@ -69,33 +75,76 @@ def read_head(path: Path, gzipped: bool) -> Head:
 
 
 def _parse_head(text: bytes) -> Head | None:
-    size, comments = 0, []
     shift = 3 if text.startswith(b"\xef\xbb\xbf") else 0
-    lines = plain_breaks(text[shift:].removesuffix(b"\r")).split(b"\n")
-    for number, raw in enumerate(lines, start=1):
-        size += len(raw) + 1
-        line = raw.decode("utf-8", "replace").strip()
-        if not line:
-            continue
-        if line.startswith("#"):
-            comments.append(line[1:].strip())
-            continue
-        separator = max(_SEPARATORS, key=line.count)
-        names = (name.strip().strip('"').strip() for name in line.split(separator))
-        columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
-        first = lines[number].decode("utf-8", "replace") if number < len(lines) else ""
-        comma = separator != "," and "," in first
-        found = Head(columns, tuple(comments), separator, comma, number, number + 1, size + shift)
-        return _below(found, lines[number : number + 2])
-    return None
+    lines = [_text(raw) for raw in plain_breaks(text[shift:].removesuffix(b"\r")).split(b"\n")]
+    kept = [k for k, line in enumerate(lines) if line.strip() and not line.strip().startswith("#")]
+    if not kept:
+        return None
+    header, first = _header_at(lines, kept)
+    separator = _separator(lines[header], lines[first] if first < len(lines) else "")
+    names = (name.strip().strip('"').strip() for name in _cells(lines[header].strip("#\r "), separator))
+    columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
+    before = [line.strip().lstrip("#").strip() for line in lines[: max(header, first - 1)]]
+    comma = separator != "," and first < len(lines) and "," in lines[first]
+    raw = plain_breaks(text[shift:]).split(b"\n")
+    size = shift + sum(len(line) + 1 for line in raw[:first])
+    found = Head(columns, tuple(c for c in before if c), separator, comma, header + 1, first + 1, size)
+    return _below(found, raw[first : first + 2])
+
+
+def _text(raw: bytes) -> str:
+    """A line as text: UTF-8, else the Windows code page of western Europe, as spreadsheets there write."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", "replace")
+
+
+def _separator(header: str, row: str) -> str:
+    """What stands between names; blanks where nothing else does and the row below has as many cells."""
+    best = max(_SEPARATORS, key=header.count)
+    if best in header:
+        return best
+    numbers = [_is_number(cell) for cell in row.split()]
+    return " " if all(numbers) and len(header.strip("# ").split()) == len(numbers) > 1 else best
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return line.split() if separator == " " else line.split(separator)
+
+
+def _header_at(lines: list[str], kept: list[int]) -> tuple[int, int]:
+    """Places of the line of names and of the line after it: the first that is no comment, the comment right above rows
+    of numbers (numpy writes it so), or what follows a preamble (of other numbers of cells than the rows)."""
+    top = kept[0]
+    if _numeric(lines[top]):
+        above = [k for k in range(top) if lines[k].strip()]
+        if above and _alike(lines[above[-1]].strip().lstrip("#"), lines[top]):
+            return above[-1], top
+        return top, top + 1
+    below = kept[1:_PREAMBLE]
+    if below and not _alike(lines[top], lines[below[0]]):
+        for k, after in pairwise(below):
+            if not _numeric(lines[k]) and _alike(lines[k], lines[after]) and _numeric(lines[after]):
+                return k, k + 1
+    return top, top + 1
+
+
+def _alike(names: str, row: str) -> bool:
+    """Whether a line may name the cells of a row: as many, and more than one."""
+    separator = _separator(names, row)
+    return len(_cells(names, separator)) == len(_cells(row, separator)) > 1
+
+
+def _numeric(line: str) -> bool:
+    """Whether a line begins with a number or a date."""
+    cell = _cells(line, _separator(line, line))[0].strip().strip('"')
+    return _is_number(cell) or _is_number(cell.replace(",", ".")) or _DATE.fullmatch(cell) is not None
 
 
 def _below(head: Head, lines: list[bytes]) -> Head:
     """Take in a row of units, if there is one, and look for dates in the first row."""
-    rows = [
-        [cell.strip().strip('"') for cell in line.decode("utf-8", "replace").split(head.separator)]
-        for line in lines
-    ]
+    rows = [[cell.strip().strip('"') for cell in _cells(_text(line), head.separator)] for line in lines]
     if rows and len(rows[0]) == len(head.columns) and any(rows[0]) and all(map(_is_unit, rows[0])):
         units = tuple(cell.strip("[]()") for cell in rows.pop(0))
         first_line, size = head.first_line + 1, head.size + len(lines[0]) + 1

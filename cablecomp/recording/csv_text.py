@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from cablecomp.recording.table import FloatArray
 
 _BREAK: Final = b"\n"
 _LINE_LIMIT: Final = 1 << 20
+_BLANKS: Final = re.compile(rb"[ \t]+")
+_AT_ENDS: Final = re.compile(rb"^[ \t]+|[ \t]+$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Rows:
 
 
 def open_csv(path: Path, gzipped: bool) -> RawTable:
-    """Open CSV text (comma, semicolon, tab; plain or gzip); InputError if it has no header of names."""
+    """Open CSV text (comma, semicolon, tab, blanks; plain or gzip); InputError if it has no header of names."""
     head = read_head(path, gzipped)
     twice = next((n for n, count in Counter(head.columns).items() if count > 1), None)
     if twice is not None:
@@ -101,6 +104,8 @@ class _Parser:
 
     def parse(self, text: bytes, line: int, fraction: float, last: bool = False) -> Rows:
         text = text.replace(b'"', b"") if b'"' in text else text
+        if self.head.separator == " ":
+            text = _BLANKS.sub(b" ", _AT_ENDS.sub(b"", text))
         if self.head.decimal_comma:
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)

@@ -49,14 +49,14 @@ def raw_columns(path: Path, decode: Callable[[], DecodeFrame] | None = None) -> 
         ordered = dict(sorted(wanted.items(), key=lambda item: item[1][0] != leader))
         joined = join(source.log, source.topics, ordered, (), JoinRule(leader, hold_s=1e9))
         table = RawTable(joined.names, lambda names: joined.read(), notes=joined.notes)
-        columns = _stacked(table, ("time_s", *wanted))
+        columns = _stacked(path, table, ("time_s", *wanted))
         return RawColumns(kind, columns, (), source.topics, {}, table.notes)
     names, text = _numeric(path, source)
     table = replace(source, names=names)
-    return RawColumns(kind, _stacked(table, names), text, {}, dict(source.units), source.notes)
+    return RawColumns(kind, _stacked(path, table, names), text, {}, dict(source.units), source.notes)
 
 
-def _stacked(table: RawTable, names: tuple[str, ...]) -> dict[str, FloatArray]:
+def _stacked(path: Path, table: RawTable, names: tuple[str, ...]) -> dict[str, FloatArray]:
     parts: dict[str, list[FloatArray]] = {name: [] for name in names}
     rows = 0
     for piece in table.read(names):
@@ -66,7 +66,7 @@ def _stacked(table: RawTable, names: tuple[str, ...]) -> dict[str, FloatArray]:
         if rows >= _MOST_ROWS:
             break
     if not rows:
-        raise InputError("has column names but no rows; expected at least one row of numbers")
+        raise InputError(f"{path}: has column names but no rows; expected at least one row of numbers")
     return {name: np.concatenate(part)[:_MOST_ROWS] for name, part in parts.items()}
 
 

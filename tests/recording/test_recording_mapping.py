@@ -27,6 +27,7 @@ from cablecomp.recording.mapping import (
     mapping_text,
     save_mapping,
 )
+from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import open_recording, read_all
 from cablecomp.recording.suggest import as_mapping, suggest
 
@@ -139,6 +140,14 @@ def test_a_row_of_units_is_understood(tmp_path: Path) -> None:
     assert read_all(path).columns["motor_position_rad"].tolist() == pytest.approx([0.0, math.pi])
 
 
+def test_names_in_a_windows_code_page_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes("t [ms];motor [°]\n0;1,5\n1;3\n".encode("cp1252"))
+    raw = raw_columns(path)
+    assert list(raw.columns) == ["t [ms]", "motor [°]"]
+    assert list(raw.columns["motor [°]"]) == [1.5, 3.0]
+
+
 @pytest.mark.parametrize("how", ["{}", "{}Z", "{}+02:00"])
 def test_dates_and_times_become_seconds(how: str, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
@@ -170,6 +179,9 @@ def test_dates_and_times_become_seconds(how: str, tmp_path: Path) -> None:
         ("cable tension 1 (N)", "tension_h_N", "N"),
         ("cable tension 2 (N)", "tension_l_N", "N"),
         ("winding_temp", "temperature_degC", None),
+        ("motorpos", "motor_position_rad", None),
+        ("jointtorque_mNm", "joint_torque_Nm", "mNm"),
+        ("ft_sensor", "joint_torque_Nm", None),
     ],
 )
 def test_names_that_people_use_are_understood(column: str, channel: str, unit: str | None) -> None:

@@ -45,9 +45,14 @@ def _same(path: Path) -> None:
         TEXT.rstrip("\n").encode(),
         (TEXT + "\n\r\n\n").encode(),
         ("\n# more\n\n" + TEXT).encode(),
+        TEXT.replace(",", " ").encode(),
+        TEXT.replace(",", "   ").replace("\n0", "\n  0").encode(),
+        TEXT.replace("time_s", "# time_s").encode(),
+        ("Logger v1.2\nserial: 123\n\n" + TEXT).encode(),
+        ("Logger,1.2\nchannels;a;b;c;d\n" + TEXT).encode(),
     ],
     ids=["plain", "crlf", "cr", "bom", "semicolon", "tab", "comma decimals", "blanks", "quotes", "no end",
-         "blank end", "blank head"],
+         "blank end", "blank head", "only blanks", "aligned", "names as a comment", "preamble", "table before"],
 )  # fmt: skip
 @pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".txt", ".parquet"])
 def test_csv_dialects_and_wrong_endings_read_the_same(content: bytes, ending: str, tmp_path: Path) -> None:
