@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -28,6 +29,8 @@ _UNSEEN: Final = style.translucent(style.LOAD, 0.10)
 _TIME: Final = style.label("time", "s")
 _MOST_INTERVALS: Final = 40
 _MOST_TRIED: Final = 24
+_BESIDE: Final = 24
+"""Letters of an axis' name beside a low figure, after which it goes on in a new line."""
 
 
 def unit_of(covariate: str) -> str:
@@ -142,7 +145,8 @@ def energy_map(traces: Sequence[Traces], covariate: str, floor_rad: float) -> An
             col=1,
         )
         x = _TIME if row == 2 else ""
-        style.axes(fig, x, style.label(words(covariate), unit_of(covariate)), row=row, col=1)
+        y = textwrap.wrap(style.label(words(covariate), unit_of(covariate)), _BESIDE)
+        style.axes(fig, x, "<br>".join(y), row=row, col=1)
     return fig
 
 

@@ -146,9 +146,11 @@ def _points(d: Diagnosis, result: Mapping[str, Any], law: Mapping[str, Any]) -> 
 
 
 def _remains(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
-    body = page.paragraph(f"{sentence(str(d.remainder['description']))}.")
-    if d.remainder.get("equation"):
-        body += f'<div class="equation">{escape(str(d.remainder["equation"]))}</div>'
+    law = d.remainder.get("equation")
+    said = str(d.remainder["description"])
+    body = page.paragraph(f"{sentence(said.removesuffix(str(law)).removesuffix(': ') if law else said)}.")
+    if law:
+        body += f'<div class="equation">{escape(str(law))}</div>'
         body += page.paragraph("A fit that holds on data left out; not the name of a mechanism.")
     after = [m.entry() for m in d.remainder_location.mismatch]
     if d.named and after:

@@ -13,6 +13,7 @@ from cablecomp.report import page
 from cablecomp.report.diagnosis_figures import residual
 from cablecomp.report.diagnosis_words import plain, short
 from cablecomp.report.replay_figures import Scale
+from cablecomp.units import suffix_of
 
 
 def angle(value_rad: float | None, unit: Scale) -> str:
@@ -74,7 +75,8 @@ def errors(result: Mapping[str, Any], unit: Scale) -> str:
     for name, entry in result["channels"].items():
         before, after = known(entry["baseline_rmse"]), known(entry["augmented_rmse"])
         ratio = f"{before / after:.2f}" if after > 0.0 else "–"
-        rows.append((f"{name}, fitted", page.number(before), page.number(after), ratio))
+        stated = (suffix_of(name) or "").replace("Nm", "N·m")
+        rows.append((f"{name}, fitted", page.number(before, stated), page.number(after, stated), ratio))
     return page.table(("joint angle, RMS on data", "before", "after", "before / after"), rows)
 
 

@@ -166,7 +166,7 @@ def _trial(r: Row) -> tuple[object, ...]:
         r.case or r.kind,
         ", ".join(r.forms),
         ", ".join(r.imperfections),
-        f"{100.0 * r.size:.2g}",
+        f"{100.0 * r.size:.2g}" if isfinite(r.size) else "–",
         r.excitation,
         r.verdict,
         named + (f" tied: {tied}" if tied else ""),
