@@ -59,14 +59,14 @@ class RunData:
         return np.asarray(self.column("joint_position_rad") - offset_rad - self.asked_rad, dtype=np.float64)
 
 
-def load_run(folder: Path, points: int = 6000) -> RunData:
+def load_run(folder: Path, points: int = 4000) -> RunData:
     """Read what a run left in a joint's folder: the rows that all three tables hold (a disk that filled up may have
     taken more of one than of another).
     """
     recording = read_all(folder / "recording.csv").columns
     prediction, cycles = _columns(folder / "prediction.csv"), _columns(folder / "cycles.csv")
     rows = min(_rows(table) for table in (recording, prediction, cycles))
-    step = max(1, rows // points)
+    step = max(1, -(-rows // points))
     return RunData(
         *({k: v[:rows:step] for k, v in table.items()} for table in (recording, prediction, cycles))
     )

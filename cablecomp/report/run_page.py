@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from plotly.subplots import make_subplots
@@ -18,6 +18,8 @@ from cablecomp.report.run_data import Floats, RunData, load_run
 from cablecomp.runtime.results import JointResult, RunReport
 
 TIME = style.label("time", "s")
+_POINTS: Final = 4000
+"""Rows that are drawn, of all joints together."""
 BAND = "The band holds the truth whatever went before the run; where it is wider than the curves it is cut."
 
 
@@ -160,7 +162,7 @@ def _sections(report: RunReport, config_text: str) -> Iterator[Section]:
         folder = report.folder if len(report.joints) == 1 else report.folder / joint.name
         if not (folder / "recording.csv").exists():  # stopped before its first sample
             continue
-        data = load_run(folder)
+        data = load_run(folder, max(_POINTS // len(report.joints), 400))
         if data.rows == 0:  # a disk that was full from the beginning
             continue
         yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
