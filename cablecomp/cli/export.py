@@ -20,7 +20,7 @@ from cablecomp.cli.shared import (
     read_joint,
 )
 from cablecomp.config import JointConfig
-from cablecomp.control.nonlinear_system import fit_plays
+from cablecomp.control.plays import fit_plays
 from cablecomp.errors import InputError
 from cablecomp.export.code import LOST, c_source, identifier, write_fmu
 from cablecomp.export.equivalent import equivalent

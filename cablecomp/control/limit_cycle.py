@@ -15,8 +15,10 @@ from cablecomp.control.options import MotorModel
 from cablecomp.control.plant_model import (
     Complex,
 )
-from cablecomp.control.stiffness import Hysteresis
+from cablecomp.control.stiffness import full, plain
 from cablecomp.control.synthesis import DesignWork
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
 
 
 @dataclass(frozen=True)
@@ -76,3 +78,65 @@ def _balance(m: MotorModel, value: complex, hertz: NDArray[np.float64], G: Compl
     loss = [float((K[p].imag + b * w[p]) / K[p].real) for p in places]
     worst = int(np.argmin(loss))
     return float(hertz[places[worst]]), loss[worst]
+
+
+class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc]  # python-control has no types
+    """Deflection to load of a joint, motor held, as python-control's describing functions want a
+    nonlinearity.
+
+    `describing_function(A)` = first harmonic of the load over the amplitude of a sinusoidal deflection of A
+    rad, in the third cycle, mean removed (Nm/rad, complex: the imaginary part is the loop's loss). `bias_Nm`
+    = load about which it swings.
+    """
+
+    def __init__(self, config: JointConfig, bias_Nm: float = 0.0, samples: int = 120) -> None:
+        super().__init__()
+        self._config = plain(config)
+        self._samples = samples
+        self._bias_Nm = bias_Nm
+        self._cache: dict[float, complex] = {}
+        self._live: Observer | None = None
+        self._time = 0.0
+
+    def __call__(self, deflection_rad: float) -> float:
+        """Load (Nm) at a deflection (rad), history kept between calls; see `reset`."""
+        if self._live is None:
+            self._live = self._started()
+        self._time += 1e3
+        sample = Sample(self._time, 0.0, 0.0, float(deflection_rad), 0.0, 20.0)
+        return self._live.step_inverse(full(sample, self._live)).joint_torque_Nm
+
+    def reset(self) -> None:
+        """Forget the history of calls."""
+        self._live = None
+
+    def _isstatic(self) -> bool:
+        return False
+
+    def describing_function(self, A: float) -> complex:
+        """First harmonic of the load over A, Nm/rad."""
+        key = float(A)
+        if key not in self._cache:
+            self._cache[key] = self._harmonic(key)
+        return self._cache[key]
+
+    def _started(self) -> Observer:
+        observer = Observer(self._config)
+        self._time = 1.0
+        found = observer.step(full(Sample(0.0, 0.0, self._bias_Nm, 0.0, 0.0, 20.0), observer))
+        self._middle = found.deflection_rad
+        return observer
+
+    def _harmonic(self, amplitude: float) -> complex:
+        observer = self._started()
+        n = self._samples
+        phase = 2.0 * np.pi * np.arange(1, 3 * n + 1) / n
+        loads = []
+        for k, angle in enumerate(self._middle + amplitude * np.sin(phase)):
+            sample = Sample(1e3 * (k + 1), 0.0, 0.0, float(angle), 0.0, 20.0)
+            loads.append(observer.step_inverse(full(sample, observer)).joint_torque_Nm)
+        last, at = np.array(loads[-n:]), phase[-n:]
+        last = last - last.mean()
+        in_phase = 2.0 * float(np.mean(last * np.sin(at)))
+        quadrature = 2.0 * float(np.mean(last * np.cos(at)))
+        return complex(in_phase, quadrature) / amplitude

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from cablecomp.config import JointConfig
-from cablecomp.control.nonlinear_system import Plays
+from cablecomp.control.plays import Plays
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_directory
 

@@ -12,6 +12,7 @@ import pytest
 
 from cablecomp.config import load_joint
 from cablecomp.control.design import LoopDesign, design_loop
+from cablecomp.control.limit_cycle import Hysteresis
 from cablecomp.control.margins import grid_for, highest_gain, modulus_for
 from cablecomp.control.motors import DriveGains, control_for
 from cablecomp.control.options import ControlConfig, MotorModel, load_control
@@ -25,7 +26,7 @@ from cablecomp.control.plant_model import (
     stable_when_closed,
 )
 from cablecomp.control.shaping import Ahead, Slope
-from cablecomp.control.stiffness import Hysteresis, stiffness_range
+from cablecomp.control.stiffness import stiffness_range
 from cablecomp.control.synthesis import DesignWork
 from cablecomp.errors import InputError
 from cablecomp.links.load import load_link

@@ -18,8 +18,8 @@ import pytest
 
 from cablecomp.cli import main
 from cablecomp.config import load_joint
-from cablecomp.control.nonlinear_system import Plays
 from cablecomp.control.options import MotorModel
+from cablecomp.control.plays import Plays
 from cablecomp.examples import example
 from cablecomp.export.code import c_source, identifier, write_fmu
 from cablecomp.export.equivalent import Equivalent, equivalent
