@@ -17,6 +17,7 @@ from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.catalogue import role_of
 from cablecomp.signal.smoothing import FloatArray
 
 ALONE = ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
@@ -85,7 +86,7 @@ def _weighed(
         rivals=len(instead.effects),
         follows=_follows(term, left),
         unsteady=_unsteady(final, term, groups),
-        at_bound=any(b.startswith(f"effect.{term.effect.id}.") for b in final.fit.at_bound()),
+        at_bound=_at_bound(final, term),
         tries=len(term.starts),
         terms=sum(isinstance(t, Hypothesis) for t in final.terms),
     )
@@ -97,6 +98,13 @@ def _weighed(
     removes = max(evidence["share_total"], _alone(selection, term))
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes)
+
+
+def _at_bound(model: Model, term: Hypothesis) -> bool:
+    """Whether a parameter of the effect ended on a bound; that all of a cable lies on its guides is an answer, as that
+    none does."""
+    names = (name.partition("@")[0].partition("~")[0] for name in model.fit.at_bound())
+    return any(n.startswith(f"effect.{term.effect.id}.") and role_of(n) != "length" for n in names)
 
 
 def _selected(selection: Selection, term: Hypothesis) -> float:
