@@ -30,8 +30,6 @@ class Sensors(Frozen):
     motor_torque_noise_Nm: NonNegative | None = Field(None, description=_NOISE)
     motor_torque_resolution_Nm: NonNegative | None = Field(None, description=_STEP)
     motor_torque_offset_Nm: Finite = Field(0.0, description="what the motor torque reads without load")
-    tension_noise_N: NonNegative | None = Field(None, description=_NOISE)
-    tension_resolution_N: NonNegative | None = Field(None, description=_STEP)
 
 
 class EffectEntry(Frozen):

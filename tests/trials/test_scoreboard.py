@@ -30,7 +30,7 @@ def truth(
     kind: str = "single", *effects: TrueEffect, partner: str = "", number: int = 0, **imperfections: Any
 ) -> Truth:
     drive = {k: v for k, v in JOINT.drive.stage[0].model_dump().items() if v is not None}
-    return Truth(number, kind, "", partner, "bench", effects, (), imperfections, 1e-3, 1e-5, drive, (0.0,))
+    return Truth(number, kind, "", partner, "bench", effects, (), imperfections, 1e-3, 1e-5, drive)
 
 
 def effect(name: str, size: float = 0.1, **parameters: float | str) -> TrueEffect:
