@@ -11,7 +11,10 @@ from cablecomp.errors import InputError
 
 _MOST_BYTES: Final = 4_000_000
 _MOST_DEPTH: Final = 24
+_MOST_DOTS: Final = 1000
+"""In one key; the parser's time grows with their square."""
 _HEAD = re.compile(r"\s*\[(\[?)\s*([A-Za-z0-9_.\- ]+?)\s*\]")
+_BETWEEN_KEYS = re.compile(r"[=,{\n]")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-]+)\s*=")
 
 Place = tuple[str | int, ...]
@@ -42,6 +45,8 @@ def read_toml(path: Path) -> TomlTable:
         raise InputError(f"{path}: is larger than {_MOST_BYTES / 1e6:g} MB; that is no configuration")
     try:
         text = content.decode("utf-8-sig")  # some editors begin a file with a mark
+        if any(part.count(".") > _MOST_DOTS for part in _BETWEEN_KEYS.split(text)):
+            raise RecursionError
         found = TomlTable(tomllib.loads(text))
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not text; a TOML file in UTF-8 is accepted") from None

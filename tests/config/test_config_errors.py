@@ -119,7 +119,10 @@ def test_errors_are_counted_beyond_twenty(tmp_path: Path) -> None:
     [
         ("nested arrays", "x = " + "[" * 9000 + "]" * 9000, "nested too deeply"),
         ("nested tables", "x = " + "{a = " * 9000, "nested too deeply"),
-        ("dotted key", ".".join("a" * 5000) + " = 1", "nested too deeply"),
+        ("dotted key", ".".join("a" * 900) + " = 1", "nested too deeply"),
+        ("endless key", ".".join("a" * 500_000) + " = 1", "nested too deeply"),
+        ("endless head", "[" + ".".join("a" * 500_000) + "]", "nested too deeply"),
+        ("endless key inside", "x = {y = 1, " + ".".join("a" * 500_000) + " = 1}", "nested too deeply"),
         ("decimal digits", "schema = " + "9" * 5000, "too many digits"),
         ("hexadecimal digits", "schema = 0x" + "f" * 5000, "a number with too many digits"),
         ("many stages", GOOD + "[[drive.stage]]\n" * 50_000, "50001 entries; at most 16"),
