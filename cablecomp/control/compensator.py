@@ -116,6 +116,8 @@ class Compensator:
         self._motor_limit = options.motor_integral_limit_rad
         self._linear = options.linear_stiffness_Nm_per_rad
         self._from_sensor = options.load != "reference"
+        linear = options.feed_forward is FeedForward.LINEAR
+        self._step_ahead = None if linear else getattr(observer, "step_ahead", None)
 
     def enable(self) -> None:
         """Let feed-forward act from the next step on, without a step in the target."""
@@ -144,9 +146,7 @@ class Compensator:
         """
         self.observed = False
         if self.options.mode is ControlMode.POSITION:
-            estimate = self.observer.step(sample)
-            self.estimate, self.observed = estimate, True
-            return self._position(sample, reference, feed, estimate, joint_ok)
+            return self._position(sample, reference, feed, joint_ok)
         before = self.estimate
         if feed.held and before is not None and self.options.torque_from == "encoders":
             # Old readings of one encoder against new ones of the other would be taken for a load:
@@ -158,13 +158,12 @@ class Compensator:
 
     # ---- position mode ---------------------------------------------------------------------------
 
-    def _position(
-        self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate, joint_ok: bool
-    ) -> Command:
-        measured = sample.joint_torque_Nm
-        load = self._expected_load(measured if measured == measured else estimate.joint_torque_Nm, reference)
+    def _position(self, sample: Sample, reference: Reference, feed: Feed, joint_ok: bool) -> Command:
+        load, ahead = self._observe(sample, reference, feed)
+        estimate = self.estimate
+        assert estimate is not None
         if not feed.held:
-            self.deflection_used_rad = self._deflection(sample, reference, load)
+            self.deflection_used_rad = ahead if ahead == ahead else self._deflection(sample, reference, load)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
         n, now = self.ratio, self._reference
         if joint_ok and now is not None and self.gains.joint_feedback_per_s > 0.0 and not feed.held:
@@ -173,6 +172,25 @@ class Compensator:
         velocity = (reference.joint_velocity_rad_s - self.deflection_slope.step(used)) / n
         torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, load)
         return self._command(sample, reference, wanted, velocity, torque, used, estimate)
+
+    def _observe(self, sample: Sample, reference: Reference, feed: Feed) -> tuple[float, float]:
+        """Take the sample in; returns the load expected next and, where the observer told it along, the deflection
+        under it (else NaN)."""
+        measured, step_ahead = sample.joint_torque_Nm, self._step_ahead
+        if step_ahead is None or measured != measured or feed.held:
+            self.estimate, self.observed = self.observer.step(sample), True
+            known = self.estimate.joint_torque_Nm
+            return self._expected_load(measured if measured == measured else known, reference), NAN
+        before = self.load.state
+        load = self._expected_load(measured, reference)
+        motor = sample.motor_position_rad + self._velocity * self.period_s
+        try:
+            self.estimate, ahead = step_ahead(sample, sample.time_s + self.period_s, motor, load)
+        except InputError:
+            self.load.state = before  # what is refused leaves no trace
+            raise
+        self.observed = True
+        return load, ahead
 
     def _expected_load(self, measured_Nm: float, reference: Reference) -> float:
         """Load of the next instant; `measured_Nm`: the sensor's, or where there is none the observer's."""

@@ -30,6 +30,15 @@ class Ahead:
         self.first = self.second = self.rate = 0.0
         self.started = False
 
+    @property
+    def state(self) -> tuple[float, float, float, bool]:
+        """All that it remembers."""
+        return self.first, self.second, self.rate, self.started
+
+    @state.setter
+    def state(self, state: tuple[float, float, float, bool]) -> None:
+        self.first, self.second, self.rate, self.started = state
+
     def step(self, reading: float) -> float:
         """Take a reading, give the expected value."""
         if not self.started:

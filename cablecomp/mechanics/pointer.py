@@ -32,6 +32,23 @@ def call_term(address: int, context: Any, parameters: Any, state: Any) -> None:
     _call(address, context.ctypes.data, parameters.ctypes.data, state.ctypes.data)
 
 
+def _pointer_to(kind: Any) -> Any:
+    """A function (address) for compiled code that makes a pointer of it, for `numba.carray`."""
+    pointer = types.CPointer(kind)
+
+    def at(_typing: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+            return builder.inttoptr(args[0], context.get_value_type(pointer))
+
+        return pointer(types.int64), generate
+
+    return intrinsic(at)
+
+
+floats_at = _pointer_to(types.float64)
+ints_at = _pointer_to(types.int64)
+
+
 def _caller(result: Any) -> Any:
     """A function (address, arguments) for compiled code that runs a kernel of this result by its address.
 

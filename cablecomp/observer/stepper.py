@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numba
+
 from cablecomp.mechanics.drive import Arrays, Drive, Terms, drive, terms_of
-from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel, njit
 from cablecomp.mechanics.joint import (
     advance,
     joint_commit,
@@ -15,7 +17,7 @@ from cablecomp.mechanics.joint import (
     strength_used,
     terms_sane,
 )
-from cablecomp.mechanics.pointer import call_walk
+from cablecomp.mechanics.pointer import call_walk, floats_at, ints_at
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 from cablecomp.mechanics.records import IN, OTHERS
 from cablecomp.mechanics.status import (
@@ -30,7 +32,7 @@ from cablecomp.mechanics.status import (
     STATUS_UNREACHABLE,
     STATUS_UNWOUND,
 )
-from cablecomp.observer.rows import answer_in, readings_in
+from cablecomp.observer.rows import PLACES, answer_in, readings_in
 
 
 @inner_kernel
@@ -161,6 +163,34 @@ def walk(
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK
+
+
+@njit
+def walk_ahead(places: Ints, laws: Floats) -> tuple[int, int]:
+    """Commit the first of a joint's two rows, then predict the second, whose time, motor and load are given and all
+    else is the first's; returns both statuses.
+
+    One call for what a loop asks for in every cycle; `laws` as in `walk`.
+    """
+    at = places.view(PLACES)[0]
+    joint = Arrays(
+        numba.carray(floats_at(at.fixed[0]), (at.fixed[1],)),
+        numba.carray(ints_at(at.layout[0]), (at.layout[1],)),
+        numba.carray(floats_at(at.memory[0]), (at.memory[1],)),
+        numba.carray(ints_at(at.heights[0]), (at.heights[1],)),
+        laws,
+    )
+    rows = numba.carray(floats_at(at.rows[0]), (2, at.rows[1]))
+    outs = numba.carray(floats_at(at.outs[0]), (2, at.outs[1]))
+    _, status = call_walk(at.walk, (joint, rows[:1], outs[:1], True))
+    if status != STATUS_OK:
+        return status, status
+    last, asked = readings_in(rows[0]), readings_in(rows[1])
+    asked.joint, asked.temperature = last.joint, last.temperature
+    for j in range(OTHERS):
+        asked.other[j] = last.other[j]
+    _, ahead = call_walk(at.walk, (joint, rows[1:], outs[1:], False))
+    return status, ahead
 
 
 @inner_kernel

@@ -216,3 +216,31 @@ def test_an_open_circuit_is_held_against_its_pretension_and_a_closed_one_against
     stage = one_sided.drive.stage[0]
     assert preload_of(one_sided) == stage.input_radius_m * stage.pretension_N
     assert preload_of(balanced) == 0.0
+
+
+class StepByStep:
+    """An observer that can be asked for one thing at a time."""
+
+    def __init__(self, observer: Observer) -> None:
+        self.step, self.peek_deflection = observer.step, observer.peek_deflection
+        self.step_inverse = observer.step_inverse
+
+
+@pytest.mark.parametrize("load", ["sensor", "reference", "both"])
+def test_what_is_asked_of_the_observer_at_once_is_what_is_asked_one_by_one(load: str) -> None:
+    """Bit for bit; a sample that is refused leaves no trace in either."""
+    one, other = Observer(JOINT), Observer(JOINT)
+    chosen = CompensatorOptions.model_validate({"load": load})
+    pair = [Compensator(JOINT, chosen, T, o, gains=GAINS) for o in (one, StepByStep(other))]
+    rng = np.random.default_rng(5)
+    for k in range(300):
+        now = sample(k, 0.02 * np.sin(0.02 * k), float(np.sin(0.07 * k)), 0.01)
+        if k % 50 == 30:
+            for c in pair:
+                with pytest.raises(InputError):
+                    c.step(now._replace(joint_torque_Nm=1e4), Reference())
+        feed = Feed(0.5, True) if k % 70 > 60 else FULL
+        wanted = Reference(0.1 * rng.standard_normal(), 0.0, 0.5)
+        found, expected = (c.step(now, wanted, feed) for c in pair)
+        assert np.array_equal(found, expected, equal_nan=True)
+    assert one.snapshot() == other.snapshot()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from math import inf, nan
@@ -135,6 +136,35 @@ def test_a_block_that_stops_has_taken_all_before_and_nothing_after() -> None:
         single.step(sample)
     assert block.snapshot() == single.snapshot()
     assert same(block.step(good[25]), single.step(good[25]))
+
+
+@pytest.mark.parametrize("path", JOINTS, ids=lambda path: path.stem)
+def test_a_step_that_looks_ahead_is_the_step_and_the_look(path: Path) -> None:
+    """Bit for bit, what is refused included; a look that would be refused is NaN."""
+    config = load_joint(path)
+    for name, observer in variants(config):
+        twin, refusals, blind = Observer(observer.config, bounds="bounds" in name), 0, 0
+        for k, good in enumerate(walk(config, np.random.default_rng(11), 30)):
+            bad = spoilt(good, config)
+            for sample in (good, bad[k % len(bad)]):
+                ask = bad[(k + 7) % len(bad)] if k % 3 == 0 else good._replace(joint_torque_Nm=0.0)
+                asked = sample.time_s + 1e-3, ask.motor_position_rad, ask.joint_torque_Nm
+                try:
+                    found, ahead = observer.step_ahead(sample, *asked)
+                except SampleRefused as refusal:
+                    refusals += 1
+                    with pytest.raises(SampleRefused, match=re.escape(str(refusal))):
+                        twin.step(sample)
+                else:
+                    assert same(found, twin.step(sample)), name
+                    try:
+                        assert ahead == twin.peek_deflection(*asked), name
+                    except SampleRefused:
+                        blind += 1
+                        assert ahead != ahead
+                assert observer.snapshot() == twin.snapshot(), name
+        assert refusals >= 5, name
+        assert blind >= 2, name
 
 
 def test_reasons_are_typed() -> None:
