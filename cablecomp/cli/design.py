@@ -16,10 +16,11 @@ from cablecomp.cli.shared import (
     console,
     control_of,
     echo_json,
-    needs,
     read_joint,
 )
+from cablecomp.control.design import design_loop
 from cablecomp.recording.atomic import atomic_directory
+from cablecomp.report.design_page import design_page, design_tables
 
 
 def design(
@@ -31,10 +32,6 @@ def design(
     as_json: JsonOption = False,
 ) -> None:
     """Design gains from the drive's stiffness range: margins, hysteresis as a describing function, plots."""
-    needs("control", "design", "the design of gains")
-    from cablecomp.control.design import design_loop  # python-control brings matplotlib along
-    from cablecomp.report.design_page import design_page, design_tables
-
     joint = read_joint(config, effects)
     wanted = control_of(control, joint)
     free = {"load_filter_Hz": None, "load_lead_s": None, "joint_feedback_per_s": None}

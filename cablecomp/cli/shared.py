@@ -9,7 +9,6 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
-from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,7 +19,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from cablecomp.config import JointConfig, doubts, load_joint
-from cablecomp.errors import InputError
 from cablecomp.examples import resolve
 
 if TYPE_CHECKING:
@@ -115,14 +113,6 @@ def control_of(path: Path | None, joint: JointConfig, stated: DriveGains | None 
     from cablecomp.control.options import load_control
 
     return load_control(path)
-
-
-def needs(package: str, extra: str, what: str) -> None:
-    """Raise InputError that says what to install where an optional package is not."""
-    if find_spec(package) is None:
-        raise InputError(
-            f"{what} needs the package {package}; install it with `pip install 'cablecomp[{extra}]'`"
-        )
 
 
 def announce_compilation() -> None:
