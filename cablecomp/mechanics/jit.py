@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -16,6 +17,7 @@ import numba
 import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -34,6 +36,7 @@ def _base() -> Path:
 
 
 CACHE = _base() / "cablecomp" / _source_key()
+_DECORATING = threading.RLock()
 
 
 def drop_cut_short(folder: Path) -> int:
@@ -71,14 +74,19 @@ def constant(value: int) -> int:
     return cast(int, np.int64(value))
 
 
-def cached(decorate: Callable[[], F]) -> F:
-    """Run a numba decorator with the project's cache folder, leaving numba's own setting as it was."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE)
-    try:
-        return decorate()
-    finally:
-        numba.config.CACHE_DIR = before
+def cached(decorate: Callable[[], T]) -> T:
+    """Run a numba decorator with the project's cache folder, leaving numba's own setting as it was.
+
+    The setting is the process's: of threads that make an effect's term at a time, one waits for the other, or its code
+    would be kept in whatever folder the process runs in.
+    """
+    with _DECORATING:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(CACHE)
+        try:
+            return decorate()
+        finally:
+            numba.config.CACHE_DIR = before
 
 
 def njit(function: F) -> F:

@@ -1,15 +1,18 @@
-"""Compiled kernels on disk: files that were cut short are made anew, whole ones stay."""
+"""Compiled kernels on disk: files that were cut short are made anew, whole ones stay; all lie in one folder."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numba
 import pytest
 
-from cablecomp.mechanics.jit import drop_cut_short
+from cablecomp.mechanics.jit import CACHE, cached, drop_cut_short
 
 MODULE = """
 from cablecomp.mechanics.jit import njit
@@ -46,3 +49,17 @@ def test_a_cache_that_was_cut_short_breaks_nothing(kind: str, size: int, tmp_pat
     (again,) = (tmp_path / "cache").rglob(f"*.{kind}")
     assert again.stat().st_size == whole
     assert drop_cut_short(tmp_path / "cache") == 0
+
+
+def test_threads_that_compile_at_a_time_keep_their_code_in_one_folder() -> None:
+    """The folder is a setting of the whole process, and the terms of effects are made by threads."""
+
+    def decorate() -> str:
+        time.sleep(0.02)  # as long as numba takes to look for the folder
+        return str(numba.config.CACHE_DIR)
+
+    usual = numba.config.CACHE_DIR
+    with ThreadPoolExecutor(4) as threads:
+        folders = [w.result() for w in [threads.submit(cached, decorate) for _ in range(8)]]
+    assert set(folders) == {str(CACHE)}
+    assert usual == numba.config.CACHE_DIR
