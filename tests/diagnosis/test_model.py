@@ -8,7 +8,7 @@ from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.model import bears, is_told
+from cablecomp.diagnosis.explain.model import bears, is_told, runs_away
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
@@ -78,3 +78,30 @@ def test_an_amount_is_told_from_none_by_what_is_plausible(
     problem = with_entry(fit.problem, h, entry)
     x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
     assert is_told(Fit(problem, x, fit.residual, np.empty((0, len(x)))), h) == told
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount", "away"),
+    [
+        (
+            "pulley_runout",
+            {"eccentricity_m": 1.0},
+            True,
+        ),  # on its bound, many times the most that is plausible
+        ("pulley_runout", {"eccentricity_m": 1e-4}, False),
+        (
+            "routing_friction",
+            {"mu_angle": 1e3, "arc_length_m": 0.01},
+            False,
+        ),  # a share: its bound is the most
+    ],
+)
+def test_an_amount_at_many_times_what_is_plausible_has_run_away(
+    effect: str, amount: dict[str, float], away: bool
+) -> None:
+    fit = fitted(JOINT, 1.0)
+    (h,) = [h for h in hypotheses(JOINT, fit.problem.evidence) if h.name == effect]
+    entry = h.entry({**h.starts[0].values, **amount})
+    problem = with_entry(fit.problem, h, entry)
+    x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
+    assert runs_away(Fit(problem, x, fit.residual, np.empty((0, len(x)))), h) is away

@@ -23,6 +23,7 @@ from cablecomp.diagnosis.explain.model import (
     loss,
     most_told,
     placed,
+    runs_away,
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.scores import demanded, left_out, scales, score_difference, selected_in
@@ -160,7 +161,7 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
     except InputError:
         return None
     terms = tuple(most_told(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    if not is_told(fit, terms[0]):
+    if not is_told(fit, terms[0]) or runs_away(fit, terms[0]):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:
