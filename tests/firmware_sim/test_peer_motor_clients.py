@@ -91,9 +91,9 @@ def test_damiao_motor_runs_every_mode(damiao: Any) -> None:
 def test_damiao_motor_reads_and_writes_registers(damiao: Any) -> None:
     with running(protocol="mit", model="DM4340P", reply_id=0x11) as (channel, bench):
         motor = damiao(channel, "4340P")
-        assert [motor.get_register(n) for n in (21, 22, 23)] == pytest.approx([12.5, 10.0, 28.0])
+        assert [motor.get_register(n, 30.0) for n in (21, 22, 23)] == pytest.approx([12.5, 10.0, 28.0])
         motor.set_can_timeout(200)
-        assert motor.get_register(9) == 4000
+        assert motor.get_register(9, 30.0) == 4000
         assert bench.joints[0].drive.config.command_timeout_s == pytest.approx(0.2)
 
 
