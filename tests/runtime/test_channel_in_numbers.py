@@ -39,7 +39,10 @@ def test_after_a_jump_a_value_has_to_come_back_near_the_last_good_one(
         assert judged.refused == 1 + (not taken)
 
 
-@pytest.mark.parametrize(("value", "suspect"), [(2.0, False), (-2.0, False), (inf, True), (nan, True)])
+@pytest.mark.parametrize(
+    ("value", "suspect"),
+    [(2.0, False), (-2.0, False), (3.0, False), (-3.0, False), (inf, True), (nan, True)],
+)
 def test_what_is_out_of_range_is_turned_down_and_what_is_no_number_is_suspect(
     value: float, suspect: bool
 ) -> None:
@@ -61,11 +64,13 @@ def test_a_value_that_stays_has_arrived_and_not_changed() -> None:
 def test_the_first_value_is_taken_wherever_it_is() -> None:
     channel = Channel(1.0, 0.0, T)
     assert (channel.arrived_s, channel.changed_s, channel.suspect) == (-inf, -inf, False)
+    assert channel.seen == 0
     assert channel.take(12345.0, 7.0)
 
 
 def test_a_condition_lasts_from_its_first_step() -> None:
     held = Sustained(4.0 * T)
+    assert held.age_s == 0.0
     ages = [(held.step(k >= 2, k * T), held.age_s / T) for k in range(9)]
     assert ages == 6 * [(False, 0)] + [(True, 0), (True, 1), (True, 2)]
     assert held.begun
@@ -76,16 +81,18 @@ def test_a_condition_lasts_from_its_first_step() -> None:
 
 def test_the_least_lateness_rises_by_200_ppm() -> None:
     latency = Latency()
+    assert latency.take(9.0, nan) == 0.0
     assert latency.take(10.5, 10.0) == 0.0
     assert latency.take(20.75, 20.0) == pytest.approx(0.25 - 2e-4 * 10.0)
-    assert latency.take(99.0, 20.0) == latency.take(99.0, nan) == pytest.approx(0.248)  # nothing new
+    assert latency.take(99.0, float("20")) == latency.take(99.0, nan) == pytest.approx(0.248)  # nothing new
     assert latency.take(30.4, 30.0) == 0.0
     assert latency.take(31.4, 31.0) == 0.0
 
 
-def test_shaking_is_what_two_filters_in_a_row_leave() -> None:
-    shaking = Shaking(T)
-    follow, forget = 1.0 - exp(-2.0 * 3.141592653589793 * 10.0 * T), 1.0 - exp(-T / 0.03)
+@pytest.mark.parametrize("period", [T, 64.0 * T])
+def test_shaking_is_what_two_filters_in_a_row_leave(period: float) -> None:
+    shaking = Shaking(period)
+    follow, forget = 1.0 - exp(-2.0 * 3.141592653589793 * 10.0 * period), 1.0 - exp(-period / 0.03)
     slow, square = 2.0, 0.0
     for value in (2.0, 3.0, nan, 1.0, 5.0):
         found = shaking.step(value)
