@@ -1,5 +1,5 @@
 """Print errors on recordings of real hardware, by the command's own diagnosis and by models that do not know the drive:
-`python tests/golden/real_recordings.py [jaw|sheath|jaw-baselines|sheath-baselines]`."""
+`python tests/golden/real_recordings.py [jaw|jaw-given|sheath|jaw-baselines|sheath-baselines]`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
+import jaw_given
 import jaw_recordings as jaw
 import numpy as np
 import recordings as files
@@ -32,7 +33,22 @@ def jaw_by_diagnosis() -> None:
         train, judged = jaw.pitch_split(pitch)
         joint = files.diagnosed(config, train).augmented_joint
         left = {str(p): files.replayed(joint, p, jaw.GROUP) for p in judged}
-        print(f"{pitch} left out {degrees(left):.3f} deg")
+        mean = float(np.mean(np.concatenate(list(left.values()))))
+        session = {name: m - mean for name, m in left.items()}
+        print(f"{pitch} left out {degrees(left):.3f} deg, the session's own zero {degrees(session):.3f} deg")
+
+
+def jaw_laws_given() -> None:
+    """Every wrist pitch left out once, the laws given and not searched for."""
+    for pitch in jaw.PITCHES:
+        left = jaw_given.pitch_left_out(pitch)
+        mean = float(np.mean(np.concatenate(list(left.values()))))
+        session = {name: m - mean for name, m in left.items()}
+        print(
+            f"{pitch} left out, laws given: {degrees(left):.3f} deg, the session's own zero "
+            f"{degrees(session):.3f}, one zero per recording {degrees(own_zero(left)):.3f}",
+            flush=True,
+        )
 
 
 def jaw_baselines() -> None:
@@ -79,7 +95,7 @@ def _show(what: str, d: Diagnosis) -> None:
 
 
 PARTS: Final[dict[str, Callable[[], None]]] = {
-    "jaw": jaw_by_diagnosis, "sheath": sheath_by_diagnosis,
+    "jaw": jaw_by_diagnosis, "jaw-given": jaw_laws_given, "sheath": sheath_by_diagnosis,
     "jaw-baselines": jaw_baselines, "sheath-baselines": sheath_baselines,
 }  # fmt: skip
 
