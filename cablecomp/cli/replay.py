@@ -74,7 +74,7 @@ def replay(
     source = reading(joint).open(recording)
     joint, stood, said = as_it_stood(joint, recording, source.head, session)
     warn(said)
-    announce_compilation()
+    announce_compilation(joint, bounds)
     source.require(required_channels(joint), f"with [observer] load = {joint.observer.load!r}")
     source = dataclasses.replace(source, notes=(*source.notes, *said, *believe_streamed(joint, source)))
     with progress_bar(f"replay {recording.name}") as told:

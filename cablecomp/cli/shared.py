@@ -115,14 +115,17 @@ def control_of(path: Path | None, joint: JointConfig, stated: DriveGains | None 
     return load_control(path)
 
 
-def announce_compilation() -> None:
-    """Say so before the first use of this very version compiles its kernels."""
+def announce_compilation(joint: JointConfig | None = None, bounds: bool = False) -> None:
+    """Say so before the first use of this very version compiles its kernels, and do it where the joint is known."""
     from cablecomp.mechanics.jit import is_compiled
 
-    if not is_compiled():
-        Console(stderr=True).print(
-            "compiling the kernels, once for this version (under a minute) ...", style="dim"
-        )
+    if is_compiled("walk") and (not bounds or is_compiled("bounds_step")):
+        return
+    errors().print("compiling the kernels, once for this version (under a minute) ...", style="dim")
+    if joint is not None:
+        from cablecomp.observer.first_use import compile_first
+
+        compile_first(joint, bounds)
 
 
 def plain_counts(console: Console) -> Callable[[str, int, int], None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from cablecomp.mechanics.flat import records
 from cablecomp.mechanics.jit import inlined_kernel
 from cablecomp.mechanics.profile import Floats, Ints, Points
 from cablecomp.mechanics.records import (
@@ -21,8 +22,7 @@ from cablecomp.mechanics.records import (
     floats,
 )
 
-N_SIZES, N_SENSOR, N_CABLE = floats(SIZES), floats(SENSOR), floats(CABLE)
-N_CONTEXT, N_FILTER, N_GRID = floats(CONTEXT), floats(FILTER), floats(GRID)
+N_SIZES = floats(SIZES)
 
 
 class Arrays(NamedTuple):
@@ -66,24 +66,25 @@ def named(fixed: Floats, layout: Ints, memory: Floats, heights: Ints) -> Drive:
     1.5 us a call to recognise. The law tables go beside them, as the compiler leaves out what a plain drive does not
     need by an argument that is None.
     """
-    size = layout[:N_SIZES].view(SIZES)[0]
+    size = records(layout, 0, (1,), SIZES)[0]
     return Drive(
         size,
-        fixed[size.sensor_at : size.sensor_at + N_SENSOR].view(SENSOR)[0],
-        memory[size.context_at : size.context_at + N_CONTEXT].view(CONTEXT)[0],
-        memory[size.filter_at : size.filter_at + N_FILTER].view(FILTER)[0],
-        fixed[: size.cables_at].view(CIRCUIT),
-        fixed[size.cables_at : size.cables_at + size.cables * N_CABLE].view(CABLE),
-        memory[: size.context_at].view(STATE),
-        memory[size.steps_at : size.profiles_at].view(STEP),
-        memory[size.grids_at : size.grids_at + size.grids * N_GRID].view(GRID),
-        memory[size.profiles_at : size.spare_at].view(POINT).reshape((size.stacks, size.capacity)),
+        records(fixed, size.sensor_at, (1,), SENSOR)[0],
+        records(memory, size.context_at, (1,), CONTEXT)[0],
+        records(memory, size.filter_at, (1,), FILTER)[0],
+        records(fixed, 0, (size.circuits,), CIRCUIT),
+        records(fixed, size.cables_at, (size.cables,), CABLE),
+        records(memory, 0, (size.cables,), STATE),
+        records(memory, size.steps_at, (2 * size.cables,), STEP),
+        records(memory, size.grids_at, (size.grids,), GRID),
+        records(memory, size.profiles_at, (size.stacks, size.capacity), POINT),
         heights,
     )
 
 
 def _terms(fixed: Floats, layout: Ints, memory: Floats) -> Terms:
-    return Terms(layout[N_SIZES:].view(TERM), fixed, memory)
+    size = records(layout, 0, (1,), SIZES)[0]
+    return Terms(records(layout, N_SIZES, (size.terms,), TERM), fixed, memory)
 
 
 drive = inlined_kernel(named)

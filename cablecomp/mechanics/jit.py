@@ -61,9 +61,9 @@ def drop_cut_short(folder: Path) -> int:
 drop_cut_short(CACHE)
 
 
-def is_compiled() -> bool:
-    """True if an earlier run left compiled kernels of these very sources on disk."""
-    return any(CACHE.rglob("*.nbi"))
+def is_compiled(function: str = "walk") -> bool:
+    """True if an earlier run left a function of these very sources on disk as machine code."""
+    return any(CACHE.rglob(f"*.{function}-*.nbi"))
 
 
 def constant(value: int) -> int:

@@ -59,8 +59,13 @@ class BoundPair:
         """Step the observer's own state (by `walk`, whose machine code lies at `walk_at`) and the bounds
         through rows of readings; `interval` gets lowest and highest joint angle. Returns rows done and the
         status that stopped it."""
-        step_at = kernel_address(bounds_step, *joint, self.numbers, *self._low, *self._up)
-        return run_bounded(walk_at, step_at, joint, rows, outs, self.numbers, self._low, self._up, interval)
+        return run_bounded(
+            walk_at, self.compile(joint), joint, rows, outs, self.numbers, self._low, self._up, interval
+        )
+
+    def compile(self, joint: Arrays) -> int:
+        """Where the machine code of `bounds_step` lies."""
+        return kernel_address(bounds_step, *joint, self.numbers, *self._low, *self._up)
 
     def states(self) -> list[tuple[Floats, Ints]]:
         """The two histories, for a snapshot (with `numbers`)."""

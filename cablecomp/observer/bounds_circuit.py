@@ -301,7 +301,7 @@ def bounds_step(
         Side(drive(fixed, layout, memory_low, heights_low), -1.0),
         Side(drive(fixed, layout, memory_up, heights_up), 1.0),
     )
-    b = bounds_of(nominal.size.circuits, numbers)
+    b = bounds_of(nominal.size.circuits, nominal.size.cables, numbers)
     first = b.circuits[0].first > 0.0
     side_follow(low.drive, nominal, first)
     side_follow(up.drive, nominal, first)

@@ -13,6 +13,7 @@ import numpy as np
 
 from cablecomp.mechanics.assemble import Model
 from cablecomp.mechanics.drive import Drive, drive
+from cablecomp.mechanics.flat import records
 from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import (
@@ -115,13 +116,12 @@ class Turning(NamedTuple):
     compliance: float
 
 
-def named_bounds(circuits: int, numbers: Floats) -> Bounds:
-    """The records in the flat array of the bounds of a joint with this many circuits."""
-    cables_at = N_BOUNDS + circuits * N_CIRCUIT
+def named_bounds(circuits: int, cables: int, numbers: Floats) -> Bounds:
+    """The records in the flat array of the bounds of a joint with this many circuits and cables."""
     return Bounds(
-        numbers[:N_BOUNDS].view(BOUNDS)[0],
-        numbers[N_BOUNDS:cables_at].view(BOUNDS_CIRCUIT),
-        numbers[cables_at:].view(BOUNDS_CABLE),
+        records(numbers, 0, (1,), BOUNDS)[0],
+        records(numbers, N_BOUNDS, (circuits,), BOUNDS_CIRCUIT),
+        records(numbers, N_BOUNDS + circuits * N_CIRCUIT, (cables,), BOUNDS_CABLE),
     )
 
 
@@ -132,7 +132,7 @@ def bounds_numbers(model: Model, past_low: float, past_high: float) -> Floats:
     """The bounds' flat array before their start; past = least and greatest ln(T/T0) that any cable has borne."""
     size = model.named(model.memory, model.heights).size
     numbers = np.zeros(N_BOUNDS + size.circuits * N_CIRCUIT + size.cables * N_CABLE)
-    whole = named_bounds(size.circuits, numbers).whole
+    whole = named_bounds(size.circuits, size.cables, numbers).whole
     whole.steepest, whole.past_low, whole.past_high = steepest(model.laws), past_low, past_high
     return numbers
 
@@ -162,7 +162,7 @@ def sides_start(
     """Fill all wraps of two started joints with the least and the greatest tension of the past; the first step
     cuts them to what friction admits."""
     low, up = drive(fixed, layout, memory_low, heights_low), drive(fixed, layout, memory_up, heights_up)
-    b = bounds_of(low.size.circuits, numbers)
+    b = bounds_of(low.size.circuits, low.size.cables, numbers)
     numbers[N_BOUNDS:] = 0.0
     _fill(low, laws, b.whole.past_low)
     _fill(up, laws, b.whole.past_high)

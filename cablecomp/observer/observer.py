@@ -229,6 +229,13 @@ class Observer:
         twin.inverse(still)
         twin.step_ahead(still, 0.0, 0.0, 0.0)
 
+    def compile_bounds(self) -> None:
+        """As `compile`, for what the bounds alone call."""
+        if self._bounds is not None:
+            self._bounds.start(0.0, 0.0)
+            self._bounds.compile(self._arrays)
+            self._bounds.forget()
+
     def stiffness(self) -> float:
         """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
         return 1.0 / float(self._named.context.compliance)

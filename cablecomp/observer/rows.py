@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cablecomp.mechanics.flat import records
 from cablecomp.mechanics.jit import inlined_kernel
 from cablecomp.mechanics.profile import Floats
 from cablecomp.mechanics.records import OTHERS, floats, record
@@ -88,11 +89,11 @@ def answers(count: int) -> tuple[Floats, Answer]:
 
 
 def _readings_in(row: Floats) -> Any:
-    return row.view(READINGS)[0]
+    return records(row, 0, (1,), READINGS)[0]
 
 
 def _answer_in(out: Floats) -> Any:
-    return out.view(ANSWER)[0]
+    return records(out, 0, (1,), ANSWER)[0]
 
 
 readings_in = inlined_kernel(_readings_in)
