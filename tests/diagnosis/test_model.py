@@ -7,7 +7,7 @@ import pytest
 from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
-from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.model import bears, is_told, runs_away
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
@@ -32,6 +32,15 @@ def fitted(config: JointConfig, load_Nm: float) -> Fit:
     problem = Problem(config, (), (e,), Weighing({ANGLE: 1e-4}, {}))
     nothing = np.empty(0)
     return Fit(problem, nothing, problem.residual(nothing), np.empty((len(e.rows), 0)))
+
+
+def beside(effect: str, amount: dict[str, float]) -> tuple[Fit, Hypothesis]:
+    """The joint's fit with an effect of these values beside it, and that effect as a hypothesis."""
+    fit = fitted(JOINT, 1.0)
+    (h,) = [h for h in hypotheses(JOINT, fit.problem.evidence) if h.name == effect]
+    problem = with_entry(fit.problem, h, h.entry({**h.starts[0].values, **amount}))
+    x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
+    return Fit(problem, x, fit.residual, np.empty((0, len(x)))), h
 
 
 def holding(force_N: float | None) -> JointConfig:
@@ -72,36 +81,22 @@ def test_a_stated_breaking_force_is_no_reason() -> None:
 def test_an_amount_is_told_from_none_by_what_is_plausible(
     effect: str, amount: dict[str, float], told: bool
 ) -> None:
-    fit = fitted(JOINT, 1.0)
-    (h,) = [h for h in hypotheses(JOINT, fit.problem.evidence) if h.name == effect]
-    entry = h.entry({**h.starts[0].values, **amount})
-    problem = with_entry(fit.problem, h, entry)
-    x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
-    assert is_told(Fit(problem, x, fit.residual, np.empty((0, len(x)))), h) == told
+    fit, h = beside(effect, amount)
+    assert is_told(fit, h) is told
 
 
 @pytest.mark.parametrize(
     ("effect", "amount", "away"),
     [
-        (
-            "pulley_runout",
-            {"eccentricity_m": 1.0},
-            True,
-        ),  # on its bound, many times the most that is plausible
+        # ends on its bound, many times the most that is plausible
+        ("pulley_runout", {"eccentricity_m": 1.0}, True),
         ("pulley_runout", {"eccentricity_m": 1e-4}, False),
-        (
-            "routing_friction",
-            {"mu_angle": 1e3, "arc_length_m": 0.01},
-            False,
-        ),  # a share: its bound is the most
+        # a share: its bound is the most that is plausible
+        ("routing_friction", {"mu_angle": 1e3, "arc_length_m": 0.01}, False),
     ],
 )
 def test_an_amount_at_many_times_what_is_plausible_has_run_away(
     effect: str, amount: dict[str, float], away: bool
 ) -> None:
-    fit = fitted(JOINT, 1.0)
-    (h,) = [h for h in hypotheses(JOINT, fit.problem.evidence) if h.name == effect]
-    entry = h.entry({**h.starts[0].values, **amount})
-    problem = with_entry(fit.problem, h, entry)
-    x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
-    assert runs_away(Fit(problem, x, fit.residual, np.empty((0, len(x)))), h) is away
+    fit, h = beside(effect, amount)
+    assert runs_away(fit, h) is away

@@ -46,7 +46,7 @@ def told(after: list[ast.stmt]) -> bool:
 
 def test_the_table_is_frozen() -> None:
     with pytest.raises(FrozenInstanceError):
-        LIMITS.name = 0.9  # type: ignore[misc]
+        LIMITS.name = 0.9  # type: ignore[misc]  # wrong on purpose
 
 
 def test_every_threshold_has_its_reason() -> None:
