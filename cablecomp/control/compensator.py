@@ -28,6 +28,11 @@ class ObserverLike(Protocol):
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         """Say what the deflection would be, commit nothing."""
 
+    def step_ahead(
+        self, sample: Sample, time_s: float, motor_position_rad: float, joint_torque_Nm: float
+    ) -> tuple[Estimate, float]:
+        """Take a sample in, and say what the deflection would be (NaN where it has to be asked for by itself)."""
+
     def step_inverse(self, sample: Sample) -> Estimate:
         """Take a sample in, the load being found from both encoders."""
 
@@ -116,8 +121,7 @@ class Compensator:
         self._motor_limit = options.motor_integral_limit_rad
         self._linear = options.linear_stiffness_Nm_per_rad
         self._from_sensor = options.load != "reference"
-        linear = options.feed_forward is FeedForward.LINEAR
-        self._step_ahead = None if linear else getattr(observer, "step_ahead", None)
+        self._looks_ahead = options.feed_forward is not FeedForward.LINEAR
 
     def enable(self) -> None:
         """Let feed-forward act from the next step on, without a step in the target."""
@@ -176,8 +180,8 @@ class Compensator:
     def _observe(self, sample: Sample, reference: Reference, feed: Feed) -> tuple[float, float]:
         """Take the sample in; returns the load expected next and, where the observer told it along, the deflection
         under it (else NaN)."""
-        measured, step_ahead = sample.joint_torque_Nm, self._step_ahead
-        if step_ahead is None or measured != measured or feed.held:
+        measured = sample.joint_torque_Nm
+        if not self._looks_ahead or measured != measured or feed.held:
             self.estimate, self.observed = self.observer.step(sample), True
             known = self.estimate.joint_torque_Nm
             return self._expected_load(measured if measured == measured else known, reference), NAN
@@ -185,7 +189,9 @@ class Compensator:
         load = self._expected_load(measured, reference)
         motor = sample.motor_position_rad + self._velocity * self.period_s
         try:
-            self.estimate, ahead = step_ahead(sample, sample.time_s + self.period_s, motor, load)
+            self.estimate, ahead = self.observer.step_ahead(
+                sample, sample.time_s + self.period_s, motor, load
+            )
         except InputError:
             self.load.state = before  # what is refused leaves no trace
             raise

@@ -35,6 +35,11 @@ class Spring:
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         return joint_torque_Nm / K
 
+    def step_ahead(
+        self, sample: Sample, time_s: float, motor_position_rad: float, joint_torque_Nm: float
+    ) -> tuple[Estimate, float]:
+        return self.step(sample), joint_torque_Nm / K
+
     def step_inverse(self, sample: Sample) -> Estimate:
         return self._at(sample, K * (sample.joint_position_rad - N * sample.motor_position_rad))
 
@@ -224,6 +229,11 @@ class StepByStep:
     def __init__(self, observer: Observer) -> None:
         self.step, self.peek_deflection = observer.step, observer.peek_deflection
         self.step_inverse = observer.step_inverse
+
+    def step_ahead(
+        self, sample: Sample, time_s: float, motor_position_rad: float, joint_torque_Nm: float
+    ) -> tuple[Estimate, float]:
+        return self.step(sample), NAN
 
 
 @pytest.mark.parametrize("load", ["sensor", "reference", "both"])
