@@ -60,6 +60,8 @@ class Thresholds:
     load that is two percent off still moves a soft cable by far more than the noise, so that is accounted for."""
     repeats_fewest: int = 100
     """Pairs of alike rows below which nothing is said of them: neighbours on one stroke make many that say the same."""
+    repeats_knots: int = 9
+    """Knots of a course in time, over a recording, that repeats are freed of: what slips or creeps is no scatter."""
 
     # --- the search
     search_weight: float = 0.5
@@ -117,6 +119,9 @@ class Thresholds:
     """The second model is carried on where its loss on data left out is less than this many times the best one's."""
     part: float = 0.4
     """Part of its amount with which an effect of the model begins beside one that was found without it."""
+    shaped: float = 0.9
+    """Cost after a linear step with a shape that an effect may do without (an event that takes its time, a mount that
+    yields more one way) over that of the best without it, above which it does without it."""
     instants: int = 24
     """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
     edge: float = 0.06

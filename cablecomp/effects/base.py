@@ -31,10 +31,12 @@ Floats = NDArray[np.float64]
 TermFunction = Callable[[Any, Any, Any], None]
 Names = Sequence[str | tuple[str, int]]
 """Names of numbers; a name with a length is an array."""
-Role = Literal["amount", "shape", "phase", "instant", "reference", "length", "presliding"]
-"""An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s]; the
-reference of what the law reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; any
-other shape."""
+Role = Literal[
+    "amount", "shape", "phase", "instant", "duration", "begin", "reference", "length", "presliding"
+]
+"""An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s] and how
+long it takes [s]; when a slow course began [s]; the reference of what the law reads; the length of cable in a path [m];
+the turn in which friction builds up [rad]; any other shape."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,10 @@ class Parameter:
     a scale is given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`:
     a diagnosis leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in
     the parameter's unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a
-    configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded.
+    configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
+    the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
+    that it leaves out at first (a duration's are in units of the recordings', a begin's count
+    from the first of all samples).
     """
 
     name: str
@@ -62,6 +67,8 @@ class Parameter:
     maximum: float = math.inf
     omitted: float | None = None
     of_load: bool = False
+    of: str = ""
+    tries: tuple[float, ...] = ()
 
     @property
     def shape(self) -> bool:
@@ -76,6 +83,22 @@ class Parameter:
         """Prior range (low, high) for this joint, in the parameter's unit."""
         unit = 1.0 if self.scale is None else self.scale(config)
         return self.low * unit, self.high * unit
+
+
+DURATION = Parameter(
+    "duration_s",
+    "s",
+    0.0,
+    0.0,
+    3600.0,
+    "d, how long the event takes, evenly; 0: all at once",
+    role="duration",
+    omitted=0.0,
+    minimum=0.0,
+    maximum=3600.0,
+    tries=(0.1, 0.3, 0.6, 1.0),
+)
+"""How long an event takes."""
 
 
 def pretension_moment(config: JointConfig) -> float:
@@ -177,8 +200,11 @@ class Effect:
         return next((p for p in self.parameters if p.role == role), None)
 
     def neutral(self) -> dict[str, float]:
-        """The values that switch the effect off (shape parameters at the middle of their range)."""
-        return {p.name: (p.middle() if p.shape else p.neutral) for p in self.parameters}
+        """The values that switch the effect off (shapes at the middle of their range); what may be left out is."""
+        given = [p for p in self.parameters if p.omitted is None]
+        return {p.name: (p.middle() if p.shape else p.neutral) for p in given} or {
+            p.name: p.neutral for p in self.parameters if not p.shape
+        }
 
 
 class CompiledTerm:

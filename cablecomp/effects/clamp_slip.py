@@ -1,4 +1,4 @@
-"""Clamp slip: a termination or clamp of one cable gives way once."""
+"""Clamp slip: a termination or clamp of one cable gives way, at once or for a while."""
 
 from __future__ import annotations
 
@@ -6,21 +6,24 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, term, wrap_deflection
+from cablecomp.effects.base import DURATION, Change, Effect, Parameter, drum_radius, term, wrap_deflection
 
 
-@term(parameters=("slip", "instant"))
+@term(parameters=("slip", "instant", "duration"))
 def _slip(c: Any, p: Any, s: Any) -> None:
-    """p: length let go [m] (below 0: by cable l), instant [s]."""
-    if c.time >= p.instant:
+    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s]."""
+    since = c.time - p.instant
+    if since >= 0.0:
+        done = since / p.duration if since < p.duration else 1.0
         if p.slip > 0.0:
-            c.length_h -= p.slip
+            c.length_h -= p.slip * done
         else:
-            c.length_l += p.slip
+            c.length_l += p.slip * done
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_slip(slip=values["slip_m"], instant=values["time_s"]))
+    slip = _slip(slip=values["slip_m"], instant=values["time_s"], duration=values["duration_s"])
+    return Change(terms=slip)
 
 
 def _loop_arc(config: JointConfig) -> float:
@@ -30,10 +33,10 @@ def _loop_arc(config: JointConfig) -> float:
 
 EFFECT = Effect(
     id="clamp_slip",
-    statement="A clamp or termination slipped once (of cable h where the length is "
+    statement="A clamp or termination slipped, at once or little by little (of cable h where the length is "
     "positive, of l where it is negative): the "
     "joint stands off from then on, and the pretension is lower.",
-    equation="length of cable h + s, s > 0; of cable l + |s|, s < 0; for t >= t*",
+    equation="length of cable h + g s, s > 0; of cable l + g |s|, s < 0; g = (t - t*)/d within 0..1, d = 0: a step",
     source="kinematics; in a closed circuit the joint moves by about s/(2R), and both tensions fall",
     parameters=(
         Parameter(
@@ -48,6 +51,7 @@ EFFECT = Effect(
             maximum=0.1,
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
+        DURATION,
     ),
     acts_through=("time",),
     bounded=True,

@@ -12,11 +12,14 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
-@term(parameters=("fraction", "time_constant", "hanging"), state=("start",))
+@term(parameters=("fraction", "time_constant", "began", "hanging"), state=("start",))
 def _relax(c: Any, p: Any, s: Any) -> None:
-    """p: fraction, time constant [s], hanging moment R T0 [N m] (closed: 0); s: the first sample's time."""
-    start = c.time if c.first else s.start
-    factor = max(1.0 - p.fraction * math.log1p((c.time - start) / p.time_constant), LEAST)
+    """p: fraction, time constant [s], when it began [s] (none: with the first sample), hanging moment R T0 [N m]
+    (closed: 0); s: when it began."""
+    start = s.start
+    if c.first:
+        start = c.time if math.isnan(p.began) else p.began
+    factor = max(1.0 - p.fraction * math.log1p(max(c.time - start, 0.0) / p.time_constant), LEAST)
     if p.hanging > 0.0:
         c.moment += p.hanging * (1.0 - factor)
     else:
@@ -29,7 +32,12 @@ def _relax(c: Any, p: Any, s: Any) -> None:
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     closed = config.drive.circuit == "closed"
     hanging = 0.0 if closed else pretension_moment(config)
-    terms = _relax(fraction=values["fraction"], time_constant=values["time_constant_s"], hanging=hanging)
+    terms = _relax(
+        fraction=values["fraction"],
+        time_constant=values["time_constant_s"],
+        began=values["began_s"],
+        hanging=hanging,
+    )
     return Change(terms=terms, moves_pretension=closed)
 
 
@@ -37,8 +45,8 @@ EFFECT = Effect(
     id="pretension_relaxation",
     statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
     "more slowly.",
-    equation="T0(t) = T0 (1 - a ln(1 + t/t_c)), t since the recording's first sample; in an open circuit "
-    "T = T0(t) + M/R",
+    equation="T0(t) = T0 (1 - a ln(1 + (t - t0)/t_c)), t0 the recording's first sample unless it is given (creep that "
+    "goes on from recording to recording); in an open circuit T = T0(t) + M/R",
     source="logarithmic stress relaxation of steel wire and polymers at constant length: W. N. Findley, J. "
     "S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     parameters=(
@@ -63,6 +71,18 @@ EFFECT = Effect(
             log=True,
             role="shape",
             minimum=1e-6,
+        ),
+        Parameter(
+            "began_s",
+            "s",
+            0.0,
+            0.0,
+            3600.0,
+            "t0, on the recordings' common clock; left out: the recording's first sample",
+            role="begin",
+            held=True,
+            omitted=math.nan,
+            tries=(0.0,),
         ),
     ),
     acts_through=("time",),

@@ -14,7 +14,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     angle, arc = values["mu_angle"], values["arc_length_m"]
     if angle < FRICTIONLESS:
         return Change(extra_length_m=arc)
-    return Change(guide_angle=angle, guide_length_m=arc)
+    return Change(guide_angle=angle, guide_length_m=arc, guide_skew=values["skew"])
 
 
 EFFECT = Effect(
@@ -22,7 +22,7 @@ EFFECT = Effect(
     statement="The cable rubs on fixed guides, idlers or a sheath between the "
     "pulleys; tension is lost over the bends in "
     "the direction of sliding, and motion is lost at each reversal until all of the path slides the other way.",
-    equation="ln(T_out/T_in) = -+ mu Theta while sliding; in between the guide's "
+    equation="ln(T_out/T_in) = -+ mu Theta (1 + s) while sliding in cable h, (1 - s) in l; in between the guide's "
     "tension profile sticks, clamped from both ends",
     source="capstan law (Euler-Eytelwein); Kaneko et al. 1991; profile law of a doubly free arc",
     parameters=(
@@ -45,6 +45,19 @@ EFFECT = Effect(
             role="length",
             scale=lambda config: config.drive.stage[-1].free_length_m,
             minimum=0.0,
+        ),
+        Parameter(
+            "skew",
+            "-",
+            0.0,
+            -0.95,
+            0.95,
+            "s, how unlike the paths of the two cables are",
+            role="shape",
+            omitted=0.0,
+            minimum=-0.99,
+            maximum=0.99,
+            tries=(-0.6, 0.6),
         ),
     ),
     acts_through=("reversal", "load_direction", "velocity", "load"),

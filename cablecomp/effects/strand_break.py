@@ -1,4 +1,4 @@
-"""Strand break: wires of one cable break at an instant, and it is softer from then on."""
+"""Strand break: wires of one cable break, at once or one after another, and it is softer from then on."""
 
 from __future__ import annotations
 
@@ -6,29 +6,33 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.base import DURATION, Change, Effect, Parameter, term
 
 
-@term(parameters=("fraction", "instant"))
+@term(parameters=("fraction", "instant", "duration"))
 def _break(c: Any, p: Any, s: Any) -> None:
-    """p: share of EA lost (below 0: by cable l), instant [s]."""
-    if c.time >= p.instant:
+    """p: share of EA lost (below 0: by cable l), instant [s], how long it takes [s]."""
+    since = c.time - p.instant
+    if since >= 0.0:
+        done = since / p.duration if since < p.duration else 1.0
         if p.fraction > 0.0:
-            c.stiffness_h *= 1.0 - p.fraction
+            c.stiffness_h *= 1.0 - p.fraction * done
         else:
-            c.stiffness_l *= 1.0 + p.fraction
+            c.stiffness_l *= 1.0 + p.fraction * done
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_break(fraction=values["fraction"], instant=values["time_s"]))
+    broken = _break(fraction=values["fraction"], instant=values["time_s"], duration=values["duration_s"])
+    return Change(terms=broken)
 
 
 EFFECT = Effect(
     id="strand_break",
     statement="Wires of one cable broke (of h where the share is positive, of "
-    "l where it is negative): from one instant "
+    "l where it is negative), at once or one after another: from then "
     "on it is softer, and at the same stretch it pulls less.",
-    equation="EA_h -> EA_h (1 - f), f > 0; EA_l -> EA_l (1 - |f|), f < 0; for t >= t*, stretch unchanged",
+    equation="EA_h -> EA_h (1 - g f), f > 0; EA_l -> EA_l (1 - g |f|), f < 0; g = (t - t*)/d within 0..1, d = 0: a "
+    "step; stretch unchanged",
     source="EA is modulus times metallic area; a broken wire carries nothing (G. A. Costello, Theory of "
     "Wire Rope, 1990)",
     parameters=(
@@ -43,6 +47,7 @@ EFFECT = Effect(
             maximum=0.95,
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
+        DURATION,
     ),
     acts_through=("time", "load"),
     bounded=True,

@@ -20,14 +20,19 @@ from cablecomp.effects.base import (
 LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
-@term(parameters=("coefficient", "reference", "hanging"))
+@term(parameters=("coefficient", "reference", "lag", "hanging"), state=("time", "warm"))
 def _expand(c: Any, p: Any, s: Any) -> None:
-    """p: coefficient [1/K], reference [degC], moment R T0 that hangs [N m] (closed circuit: 0).
+    """p: coefficient [1/K], reference [degC], lag [s], moment R T0 that hangs [N m] (closed circuit: 0); s: time [s]
+    and temperature [degC] of what expands.
 
     Without a temperature nothing is changed.
     """
     warm = c.temperature
     if not math.isnan(warm):
+        if p.lag > 0.0 and not c.first:
+            warm += (s.warm - warm) * math.exp(-(c.time - s.time) / p.lag)
+        if c.commit:
+            s.time, s.warm = c.time, warm
         factor = max(1.0 + p.coefficient * (warm - p.reference), LEAST)
         if p.hanging > 0.0:
             c.moment += p.hanging * (1.0 - factor)
@@ -40,7 +45,10 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     closed = config.drive.circuit == "closed"
     hanging = 0.0 if closed else pretension_moment(config)
     terms = _expand(
-        coefficient=values["coefficient_per_K"], reference=values["reference_degC"], hanging=hanging
+        coefficient=values["coefficient_per_K"],
+        reference=values["reference_degC"],
+        lag=values["lag_s"],
+        hanging=hanging,
     )
     return Change(terms=terms, moves_pretension=closed)
 
@@ -60,8 +68,8 @@ EFFECT = Effect(
     id="thermal_pretension",
     statement="Cable and frame expand differently with temperature, and the pretension rises or falls with "
     "it.",
-    equation="T0(ϑ) = T0 (1 + k (ϑ - ϑ_ref)), with k = (α_frame - α_cable) EA/T0 for a stiff frame; in an "
-    "open circuit T = T0(ϑ) + M/R",
+    equation="T0(ϑ) = T0 (1 + k (ϑ - ϑ_ref)), with k = (α_frame - α_cable) EA/T0 for a stiff frame, ϑ "
+    "the temperature of what expands: t_l dϑ/dt = ϑ_measured - ϑ; in an open circuit T = T0(ϑ) + M/R",
     source="thermal strain of a member held at constant length: S. Timoshenko, Strength of Materials, part "
     "I, 1930",
     parameters=(
@@ -85,6 +93,19 @@ EFFECT = Effect(
             "temperature at which T0 is the nominal one",
             role="reference",
             held=True,
+        ),
+        Parameter(
+            "lag_s",
+            "s",
+            0.0,
+            1.0,
+            300.0,
+            "t_l, by which what expands follows the temperature measured; 0: at once",
+            log=True,
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            tries=(5.0, 20.0, 60.0),
         ),
     ),
     acts_through=("temperature", "time"),

@@ -16,7 +16,7 @@ from cablecomp.mechanics.change import Change, law_tables
 from cablecomp.mechanics.drive import Drive, named
 from cablecomp.mechanics.profile import Floats, Ints
 from cablecomp.mechanics.records import floats
-from cablecomp.mechanics.tables import ELSEWHERE, ON_H, ON_L
+from cablecomp.mechanics.tables import ELSEWHERE, IN_H, IN_L, ON_H, ON_L
 
 Row: TypeAlias = tuple[Any, ...]
 """A record by the order of its fields."""
@@ -169,7 +169,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             radius=(stage.output_radius_m, stage.input_radius_m),
             mu=(stage.mu_output, stage.mu_input),
             wrap=(stage.wrap_output_rad, stage.wrap_input_rad),
-            law=((ON_H if sign > 0.0 else ON_L) if stage is config.drive.stage[-1] else ELSEWHERE, ELSEWHERE),
+            law=_laws(stage, sign, config),
             length=stage.free_length_m + extra.extra_length_m,
             EA=stage.EA_N,
             T0=stage.pretension_N,
@@ -177,7 +177,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             weight=n_i / stage.output_radius_m,
             sign=sign,
             ratio=stage.ratio,
-            guide=extra.guide_angle,
+            guide=extra.guide_angle * (1.0 + sign * extra.guide_skew),
             guide_length=extra.guide_length_m,
             play_share=extra.play_share,
             play_yield=extra.play_yield_N,
@@ -187,6 +187,13 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
         )
         for stage, n_i in zip(group, ratios_to_last(group), strict=True)
     ]
+
+
+def _laws(stage: Stage, sign: float, config: JointConfig) -> tuple[int, int]:
+    """Law tables of a cable's output drum and of its input drum: the joint's and the motor's have their own."""
+    first, last = config.drive.stage[0], config.drive.stage[-1]
+    on_joint, on_motor = (ON_H, IN_H) if sign > 0.0 else (ON_L, IN_L)
+    return on_joint if stage is last else ELSEWHERE, on_motor if stage is first else ELSEWHERE
 
 
 def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:

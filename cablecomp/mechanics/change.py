@@ -8,7 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.mechanics.tables import Floats, law_table, plain_law, stiffening_law
+from cablecomp.mechanics.tables import (
+    IN_H,
+    IN_L,
+    LAWS,
+    ON_H,
+    ON_L,
+    Floats,
+    law_table,
+    plain_law,
+    stiffening_law,
+)
 
 Factor = Callable[[Floats], Floats]
 
@@ -31,9 +41,13 @@ class Change:
     """mu/mu0 as a function of tau = T/T0, vectorised."""
     joint_angle_factor: Factor | None = None
     """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs there."""
+    motor_angle_factor: Factor | None = None
+    """mu/mu0 of the input drum's groove, by the motor angle [rad] at which the cable departs there."""
     stiffening: float = 0.0
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
+    guide_skew: float = 0.0
+    """The guide's angle counts (1 + skew) times in cable h, (1 - skew) times in l."""
     extra_length_m: float = 0.0
     """Free cable beyond the stage's own free length."""
     play_share: float = 0.0
@@ -49,9 +63,11 @@ def together(changes: Sequence[Change]) -> Change:
         terms=tuple(t for c in changes for t in c.terms),
         tension_factor=_product([c.tension_factor for c in changes]),
         joint_angle_factor=_product([c.joint_angle_factor for c in changes]),
+        motor_angle_factor=_product([c.motor_angle_factor for c in changes]),
         stiffening=sum(c.stiffening for c in changes),
         guide_angle=sum(c.guide_angle for c in changes),
         guide_length_m=sum(c.guide_length_m for c in changes),
+        guide_skew=sum(c.guide_skew for c in changes),
         extra_length_m=sum(c.extra_length_m for c in changes),
         play_share=sum(c.play_share for c in changes),
         play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
@@ -73,25 +89,31 @@ def _product(factors: Sequence[Factor | None]) -> Factor | None:
 
 
 def law_tables(change: Change, config: JointConfig) -> Floats | None:
-    """Law tables (`tables.py`) for the output drums of chain h and l and for all other places.
+    """Law tables (`tables.py`) for the output drums of chain h and l, for all other places, for the input drums.
 
     None where terms are all that is added: the kernel then runs the plain drive's own, quicker code.
     """
-    by_tension, by_angle = change.tension_factor, change.joint_angle_factor
-    if by_tension is None and by_angle is None:
+    by_tension, by_joint, by_motor = (
+        change.tension_factor,
+        change.joint_angle_factor,
+        change.motor_angle_factor,
+    )
+    if by_tension is None and by_joint is None and by_motor is None:
         if change.stiffening != 0.0:
-            return np.stack([stiffening_law(change.stiffening)] * 3)
+            return np.stack([stiffening_law(change.stiffening)] * LAWS)
         inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
-        return np.stack([plain_law()] * 3) if inside or change.moves_pretension else None
-    stage = config.drive.stage[-1]
+        return np.stack([plain_law()] * LAWS) if inside or change.moves_pretension else None
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
 
     def table(groove: Factor) -> Floats:
         return law_table(by_tension or np.ones_like, groove, widest, change.stiffening)
 
     elsewhere = table(np.ones_like)
-    if by_angle is None:
-        return np.stack([elsewhere] * 3)
-    on_h = table(lambda y: by_angle(y - stage.wrap_output_rad))
-    on_l = table(lambda y: by_angle(stage.wrap_output_rad - y))
-    return np.stack([on_h, on_l, elsewhere])  # ON_H, ON_L, ELSEWHERE
+    laws = np.stack([elsewhere] * LAWS)
+    if by_joint is not None:
+        out = config.drive.stage[-1].wrap_output_rad
+        laws[ON_H], laws[ON_L] = table(lambda y: by_joint(y - out)), table(lambda y: by_joint(out - y))
+    if by_motor is not None:  # the motor winds on what the joint winds off
+        wound = config.drive.stage[0].wrap_input_rad
+        laws[IN_H], laws[IN_L] = table(lambda y: by_motor(wound - y)), table(lambda y: by_motor(y - wound))
+    return laws

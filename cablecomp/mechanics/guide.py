@@ -52,7 +52,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     for iteration in range(60):
         tau_in = tau_of_v(laws, ELSEWHERE, v_in)
         on_drum = wrap_eval(
-            d.profiles[wrap], laws, ELSEWHERE, d.heights[wrap], w_in, v_in, tau_in, cable.mu[IN]
+            d.profiles[wrap], laws, cable.law[IN], d.heights[wrap], w_in, v_in, tau_in, cable.mu[IN]
         )
         set_pending(step, on_drum)
         step.end_v, step.end_tau = v_in, tau_in

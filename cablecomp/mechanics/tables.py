@@ -26,8 +26,9 @@ Floats: TypeAlias = NDArray[np.float64]
 SIZE = 4096
 LEAST_U, MOST_U = -7.0, 2.5
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
-# laws: of the joint's own drum in chain h and l, of all other places
-ON_H, ON_L, ELSEWHERE = constant(0), constant(1), constant(2)
+# laws: of the joint's own drum in chain h and l, of all other places, of the motor's own drum in chain h and l
+ON_H, ON_L, ELSEWHERE, IN_H, IN_L = constant(0), constant(1), constant(2), constant(3), constant(4)
+LAWS = 5
 # rows
 HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3)
 (

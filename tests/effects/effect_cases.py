@@ -17,6 +17,9 @@ Floats = NDArray[np.float64]
 Columns = dict[str, Floats]
 CONFIGS = Path(__file__).parents[2] / "configs" / "joints"
 
+IN_TWO_SECONDS = {"time_s": 0.7, "duration_s": 0.4, "began_s": -1.0, "lag_s": 0.3}
+"""Times at which something happens while the excitation lasts."""
+
 
 def joint(name: str = "snow-closed-rig", **stage: float) -> JointConfig:
     """A shipped joint whose cables never break, with stage values changed."""
@@ -34,8 +37,7 @@ def typical(name: str, config: JointConfig) -> dict[str, Any]:
     for parameter in effect.parameters:
         low, high = parameter.bounds(config)
         values[parameter.name] = np.sqrt(low * high) if parameter.log else 0.25 * low + 0.75 * high
-        if parameter.name == "time_s":
-            values[parameter.name] = 0.7
+        values[parameter.name] = IN_TWO_SECONDS.get(parameter.name, values[parameter.name])
     return values | dict.fromkeys(effect.texts, "other_neighbour_Nm")
 
 

@@ -37,6 +37,29 @@ def test_relaxation_lowers_the_tensions_by_its_law(name: str) -> None:
     assert found["deflection_rad"] == pytest.approx(np.zeros_like(time), abs=1e-12)
 
 
+def test_creep_that_began_before_the_recording_goes_on() -> None:
+    """A recording that begins 20 s into the creep: the joint's tensions are those of one long recording there."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(100.0, 140.0, 401)
+    law = {"fraction": 0.04, "time_constant_s": 3.0}
+    whole = run(config, resting(time), ("pretension_relaxation", law))
+    later = run(config, resting(time[200:]), ("pretension_relaxation", {**law, "began_s": 100.0}))
+    # what lies on the drums follows with the next sample
+    assert later["tension_h_N"][1:] == pytest.approx(whole["tension_h_N"][201:], rel=1e-9)
+    assert later["tension_h_N"][0] < 0.95 * whole["tension_h_N"][0]
+
+
+def test_what_expands_late_follows_a_step_of_temperature_exponentially() -> None:
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 10.0, 401)
+    columns = resting(time) | {"temperature_degC": np.where(time >= 2.0, 30.0, 20.0)}
+    values = {"coefficient_per_K": 0.01, "reference_degC": 20.0, "lag_s": 1.5}
+    found = run(config, columns, ("thermal_pretension", values))["tension_h_N"]
+    warm = 10.0 * (1.0 - np.exp(-np.maximum(time - 1.975, 0.0) / 1.5))
+    stage = config.drive.stage[0]
+    assert found == pytest.approx(stage.pretension_N * (1.0 + 0.01 * warm), rel=3e-3)
+
+
 def test_relaxation_stops_before_the_cable_is_slack() -> None:
     time = np.linspace(0.0, 1e6, 50)
     found = run(joint(), resting(time), ("pretension_relaxation", {"fraction": 0.3, "time_constant_s": 1e-3}))
@@ -151,6 +174,28 @@ def test_a_clamp_that_slips_shifts_the_joint_and_loosens_both_sides() -> None:
     lost = stage.EA_N * 0.05 / (2.0 * LONG)
     assert (plain["tension_h_N"] - found["tension_h_N"])[late] == pytest.approx(lost, rel=5e-3)
     assert (plain["tension_l_N"] - found["tension_l_N"])[late] == pytest.approx(lost, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount"), [("clamp_slip", {"slip_m": 2e-3}), ("strand_break", {"fraction": 0.3})]
+)
+def test_an_event_that_takes_its_time_goes_evenly(effect: str, amount: dict[str, float]) -> None:
+    """Slowly means the same as ever so many sudden ones: after a share of the time the joint stands where that share of
+    the amount at once leaves it, while load and motor rest."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 4.0, 81)
+    columns = still(time, np.full(81, 0.4))
+    plain = run(config, columns)["deflection_rad"]
+    slowly = (
+        run(config, columns, (effect, {**amount, "time_s": 1.0, "duration_s": 2.0}))["deflection_rad"] - plain
+    )
+    for at, share in ((1.5, 0.25), (2.5, 0.75), (3.5, 1.0)):
+        part = {name: share * value for name, value in amount.items()}
+        once = run(config, columns, (effect, {**part, "time_s": at}))["deflection_rad"] - plain
+        k = int(np.argmin(np.abs(time - at)))
+        assert slowly[k] == pytest.approx(once[k], rel=1e-3)
+        assert abs(once[k]) > 1e-3
+    assert slowly[time < 1.0] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_clamp_slip_in_an_open_circuit_is_a_lasting_step() -> None:

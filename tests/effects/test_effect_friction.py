@@ -106,13 +106,42 @@ def test_friction_that_depends_on_the_place_in_the_groove() -> None:
         assert found[k] == pytest.approx(expected, rel=1e-6)
 
 
-def test_the_other_cable_sees_the_groove_the_other_way_round() -> None:
+@pytest.mark.parametrize("guide", [0.0, 0.2])
+def test_friction_that_depends_on_the_place_in_the_input_drums_groove(guide: float) -> None:
+    """The place at s from where the cable leaves the input drum is the one that it leaves at motor angle q + s, for the
+    motor winds on what the joint winds off; behind a guide as well, where the cable's tension is nearer to T0."""
+    config = joint("snow-open-rig", wrap_output_rad=25.0, wrap_input_rad=25.0)
+    stage = config.drive.stage[0]
+    amplitude, phase, motor = 0.7, 0.9, 2.3
+    columns = unloading(config)
+    columns["motor_position_rad"] += motor
+    rough = ("position_dependent_friction", {"input_amplitude": amplitude, "input_phase_rad": phase})
+    bent = [("routing_friction", {"mu_angle": guide, "arc_length_m": 0.0})] if guide else []
+    found = run(config, columns, rough, *bent)["deflection_rad"]
+    plain = run(config, columns, *bent)["deflection_rad"]
+
+    def groove(_: float, s: float) -> float:
+        return stage.mu_input * (1.0 + amplitude * math.cos(motor + s - phase))
+
+    unit = stage.pretension_N / stage.EA_N * stage.input_radius_m / stage.output_radius_m
+    for k in (40, 60, 79):
+        load = columns["joint_torque_Nm"][k]
+        tau = (1.0 + load / (stage.output_radius_m * stage.pretension_N)) * math.exp(guide)
+        even = stretch(lambda *_: stage.mu_input, tau, stage.wrap_input_rad)
+        expected = unit * (stretch(groove, tau, stage.wrap_input_rad) - even)
+        assert found[k] - plain[k] == pytest.approx(expected, rel=1e-5)
+        assert abs(expected) > 1e-6
+
+
+@pytest.mark.parametrize("drum", ["", "input_"])
+def test_the_other_cable_sees_the_groove_the_other_way_round(drum: str) -> None:
     """Closed circuit, mirrored: reversing load, motion and phase reverses the joint exactly."""
     config = joint()
     columns = excitation(config)
     mirrored = columns | {k: -columns[k] for k in ("motor_position_rad", "joint_torque_Nm")}
-    ahead = run(config, columns, ("position_dependent_friction", {"amplitude": 0.8, "phase_rad": 0.5}))
-    back = run(config, mirrored, ("position_dependent_friction", {"amplitude": 0.8, "phase_rad": -0.5}))
+    amplitude, phase = f"{drum}amplitude", f"{drum}phase_rad"
+    ahead = run(config, columns, ("position_dependent_friction", {amplitude: 0.8, phase: 0.5}))
+    back = run(config, mirrored, ("position_dependent_friction", {amplitude: 0.8, phase: -0.5}))
     assert back["deflection_rad"] == pytest.approx(-ahead["deflection_rad"], abs=1e-10)
     assert back["tension_l_N"] == pytest.approx(ahead["tension_h_N"], rel=1e-8)
 

@@ -24,6 +24,16 @@ def test_series_compliance_adds_in_proportion(name: str) -> None:
     assert found["tension_h_N"] == pytest.approx(plain["tension_h_N"], rel=1e-12)
 
 
+def test_a_mount_that_rests_on_a_stop_yields_one_way() -> None:
+    config = joint()
+    columns = excitation(config)
+    load, plain = columns["joint_torque_Nm"], run(config, columns)["deflection_rad"]
+    for skew, soft, hard in ((1.0, 2.0, 0.0), (-0.4, 0.6, 1.4)):
+        mount = ("series_compliance", {"compliance_rad_per_Nm": 3e-3, "skew": skew})
+        gave = run(config, columns, mount)["deflection_rad"] - plain
+        assert gave == pytest.approx(3e-3 * np.where(load > 0.0, soft, hard) * load, abs=1e-12)
+
+
 def test_compliance_and_clearance_see_what_passes_the_load_path() -> None:
     """A moment that enters beside the torque channel bends the mount as well."""
     config = joint()

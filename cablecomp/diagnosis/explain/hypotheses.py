@@ -29,7 +29,8 @@ class Hypothesis:
     """One effect (and the channel that it reads), with the points to begin from.
 
     `name`: its id, with `:channel` where it reads one, with `:amount` for a second of its amounts. `amount`: the
-    parameter that says how much.
+    parameter that says how much. `further`: values of shapes that the starts leave out, asked for once the best start
+    is known.
     """
 
     effect: Effect
@@ -38,6 +39,7 @@ class Hypothesis:
     starts: tuple[Start, ...]
     two_sided: bool
     channel: str = ""
+    further: tuple[Mapping[str, float], ...] = ()
 
     @property
     def acts_through(self) -> tuple[str, ...]:
@@ -56,7 +58,7 @@ class Hypothesis:
     @property
     def has_phase(self) -> bool:
         """Whether it has a phase, which goes with the amount as a pair."""
-        return self.effect.of_role("phase") is not None
+        return self.phase != ""
 
     @property
     def instant(self) -> str:
@@ -67,7 +69,15 @@ class Hypothesis:
     @property
     def phase(self) -> str:
         """The name of its phase."""
-        found = self.effect.of_role("phase")
+        return next(
+            (p.name for p in self.effect.parameters if p.role == "phase" and p.of in ("", self.amount.name)),
+            "",
+        )
+
+    @property
+    def duration(self) -> str:
+        """The name of how long the event takes."""
+        found = self.effect.of_role("duration")
         return found.name if found else ""
 
     @property
@@ -131,8 +141,10 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
 def _by_amount(
     effect: Effect, amount: Parameter, channel: str, config: JointConfig, evidence: Sequence[Evidence]
 ) -> Hypothesis:
-    shapes = [p for p in effect.parameters if p.shape]
-    further = [p for p in effect.parameters if not p.shape and p is not amount]
+    own = [p for p in effect.parameters if p.of in ("", amount.name)]
+    shapes = [p for p in own if p.shape and not p.tries]
+    shaped = {p.of for p in effect.parameters}  # an amount with a shape of its own is a hypothesis of its own
+    further = [p for p in own if not p.shape and p is not amount and not {p.name, amount.name} & shaped]
     low, high = amount.bounds(config)
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0
@@ -151,7 +163,17 @@ def _by_amount(
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
-    return Hypothesis(effect, name, amount, starts, two_sided, channel)
+    tried = tuple({p.name: _absolute(p, v, evidence)} for p in own for v in p.tries)
+    return Hypothesis(effect, name, amount, starts, two_sided, channel, tried)
+
+
+def _absolute(p: Parameter, tried: float, evidence: Sequence[Evidence]) -> float:
+    """A value to try in the parameter's unit."""
+    if p.role == "duration":
+        return tried * float(np.median([np.ptp(e.columns["time_s"]) for e in evidence]))
+    if p.role == "begin":
+        return tried + min(float(e.columns["time_s"][0]) for e in evidence)
+    return tried
 
 
 def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tuple[float, ...]:

@@ -105,12 +105,17 @@ def _plain(model: Model, base: Model, term: Hypothesis, groups: Groups) -> dict[
 
 
 def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> Plain | None:
-    """A plain step of the joint's zero in place of an event: what an encoder's hub does when it slips."""
+    """A plain step, or creep, of the joint's zero in place of an event: what an encoder's hub does when it slips."""
     if not term.has_instant:
         return None
-    instant_s = float(model.fit.values[term.key(term.instant)])
+    values = model.fit.values
+    instant_s, lasts_s = (
+        float(values[term.key(term.instant)]),
+        float(values.get(term.key(term.duration), 0.0)),
+    )
     fit, problem = base.fit, base.fit.problem
-    after = [(e.at_rows("time_s") >= instant_s).astype(np.float64) for e in problem.evidence]
+    since = [e.at_rows("time_s") - instant_s for e in problem.evidence]
+    after = [np.clip(s / lasts_s, 0.0, 1.0) if lasts_s else (s >= 0.0).astype(np.float64) for s in since]
     struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)
     rows = [
         (e.weight * a * (e.session == struck))[e.counted[JOINT]] / problem.weighing.sigma[JOINT]

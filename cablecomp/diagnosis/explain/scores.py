@@ -100,11 +100,12 @@ def _kept(problem: Problem, out: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> 
 
 
 def _free(fit: Fit) -> IntArray:
-    """Parameters that are not on a bound; an event's instant is read from all rows, a block left out cannot
+    """Parameters that are not on a bound; when an event happens is read from all rows, a block left out cannot
     place it."""
     low, high = fit.problem.bounds()
     margin = 1e-4 * (high - low)
-    instant = np.array([role_of(p.base) == "instant" for p in fit.problem.parameters], dtype=np.bool_)
+    when = ("instant", "duration")
+    instant = np.array([role_of(p.base) in when for p in fit.problem.parameters], dtype=np.bool_)
     return np.flatnonzero((fit.x > low + margin) & (fit.x < high - margin) & ~instant)
 
 

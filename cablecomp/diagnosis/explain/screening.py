@@ -63,6 +63,10 @@ def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
     return replace(problem, config=joint, parameters=(*problem.parameters, *h.free(values, problem.config)))
 
 
+_Best = tuple[float, dict[str, float | str], FloatArray, float]
+"""Of the best start: cost, values with the linear amount, contribution of the size asked, that size."""
+
+
 def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     """The best linear answer over the hypothesis's starts; None if it cannot be simulated or shows nothing."""
     if h.has_phase:
@@ -85,12 +89,26 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
                 best = other
     if best is None:
         return None
+    if h.further and not here.fit.problem.fine:
+        best = _shaped(here, h, best)
     cost, values, d, size = best
     return _answer(here, h, values, cost, d, size)
 
 
-def _best(here: Anchor, h: Hypothesis) -> tuple[float, dict[str, float | str], FloatArray, float] | None:
-    """(cost, values with the linear amount, contribution of the size asked, that size) of the best start."""
+def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best:
+    """The best with one of the shapes that its starts leave out, where that promises enough more; an event that takes
+    its time is asked for with its middle where the sudden one lies."""
+    values = best[1]
+    starts = []
+    for shape in h.further:
+        begun = {h.instant: float(values[h.instant]) - 0.5 * shape[h.duration]} if h.duration in shape else {}
+        starts.append(Start({**values, **begun, **shape}))
+    other = _best(here, replace(h, starts=tuple(starts)))
+    return other if other is not None and other[0] < LIMITS.shaped * best[0] else best
+
+
+def _best(here: Anchor, h: Hypothesis) -> _Best | None:
+    """The best linear answer over the hypothesis's starts."""
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)
     best = None

@@ -144,7 +144,8 @@ def quiet(fit: Fit) -> bool:
 
 
 def _pruned(model: Model, groups: Groups) -> Model:
-    """Leave out, weakest first, every term whose absence costs less than an effect has to bring."""
+    """Leave out, weakest first, every term whose absence costs less than it had to bring: the first of all as the
+    first, the others as further ones."""
     while len(model.terms) > 1:
         weakest: tuple[float, Model] | None = None
         for term in model.terms[:-1]:
@@ -154,7 +155,8 @@ def _pruned(model: Model, groups: Groups) -> Model:
             if smaller is None:
                 continue
             step = score_difference(model.left_out, smaller.left_out, groups)
-            if not demanded(step) and (weakest is None or step.gain < weakest[0]):
+            first = term is model.terms[0]
+            if not demanded(step, first=first) and (weakest is None or step.gain < weakest[0]):
                 weakest = (step.gain, smaller)
         if weakest is None:
             return model

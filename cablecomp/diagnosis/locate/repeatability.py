@@ -1,5 +1,5 @@
 """What the machine itself repeats: the joint angle at the same motor angle, load and distance from the last
-reversals."""
+reversals, what creeps with time taken off (a slip or a drift is something to explain, not what cannot be repeated)."""
 
 from __future__ import annotations
 
@@ -33,10 +33,19 @@ def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]
         joint = e.at_rows(JOINT)
         a, b = near[:, 0], near[:, 1]
         alike = used.sum()
-        squares.append(_beside(points[a, :alike] - points[b, :alike], joint[a] - joint[b]) ** 2)
+        slow = _hats(time)
+        apart_by = np.column_stack((points[a, :alike] - points[b, :alike], slow[a] - slow[b]))
+        squares.append(_beside(apart_by, joint[a] - joint[b]) ** 2)
     if not squares:
         return None
     return float(np.sqrt(0.5 * np.median(np.concatenate(squares)) / 0.455))
+
+
+def _hats(time: FloatArray) -> FloatArray:
+    """A straight line between knots in time for each knot, the first left out: together any slow course."""
+    knots = np.linspace(time[0], time[-1], LIMITS.repeats_knots)
+    width = knots[1] - knots[0]
+    return np.asarray(np.maximum(1.0 - np.abs(time[:, None] - knots[1:]) / width, 0.0), dtype=np.float64)
 
 
 def _beside(apart: FloatArray, difference: FloatArray) -> FloatArray:
