@@ -40,6 +40,7 @@ def main() -> None:
 def in_child(command, wanted: dict) -> int:
     """The command, in its own session; standard input, output and error where they are wanted."""
     os.setsid()
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # it may be ignored where the tests run in the background
     os.chdir(wanted["cwd"])
     place = wanted["terminal"] or wanted["said"]
     handle = os.open(place, os.O_RDWR | os.O_CREAT | os.O_APPEND)
