@@ -50,7 +50,7 @@ class Parameter:
     configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
     the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
     that it leaves out at first (a duration's are in units of the recordings', a begin's count
-    from the first of all samples).
+    from the first of all samples, others' are in units of `scale(config)`).
     """
 
     name: str

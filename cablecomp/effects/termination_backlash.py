@@ -19,8 +19,29 @@ def _cross(c: Any, p: Any, s: Any) -> None:
     c.reading += 0.5 * p.gap * math.tanh((c.load - c.moment) / p.width)
 
 
+@term(parameters=("gap", "impulse", "drag"), state=("place", "time", "path", "pulley"))
+def _cross_slowly(c: Any, p: Any, s: Any) -> None:
+    """p: gap [rad], impulse that crosses it [N m s], friction of the link [N m]; s: place in the gap, over half of it,
+    and the time, moment and pulley's angle of the sample before."""
+    path = c.load - c.moment
+    flank = 1.0 if path > 0.0 else -1.0
+    place = flank
+    if not c.first:
+        if abs(path) < p.drag:
+            place = s.place - 2.0 * (c.joint - s.pulley) / p.gap if p.gap > 0.0 else s.place
+        elif p.impulse > 0.0:
+            place = s.place + (path + s.path) * (c.time - s.time) / p.impulse
+        place = min(max(place, -1.0), 1.0)
+    c.reading += 0.5 * p.gap * place
+    if c.commit:
+        s.place, s.time, s.path, s.pulley = place, c.time, path, c.joint
+
+
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_cross(gap=values["gap_rad"], width=TRANSITION * pretension_moment(config)))
+    gap, impulse, drag = values["gap_rad"], values["impulse_Nms"], values["drag_Nm"]
+    if impulse > 0.0 or drag > 0.0:
+        return Change(terms=_cross_slowly(gap=gap, impulse=impulse, drag=drag))
+    return Change(terms=_cross(gap=gap, width=TRANSITION * pretension_moment(config)))
 
 
 EFFECT = Effect(
@@ -28,7 +49,8 @@ EFFECT = Effect(
     statement="A hub key, pin or crimp has clearance: the joint falls from one flank to the other where "
     "the load changes sign.",
     equation="q_out = q_drive + (b/2) tanh(M/(0.0005 R T0)), M the moment in the load path: sgn M with a "
-    "narrow transition",
+    "narrow transition; greased, the gap is crossed at the speed b M/J; a link that drags stands still in space while "
+    "|M| is less than its friction M_f, and the pulley turns under it",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",
     parameters=(
@@ -43,6 +65,34 @@ EFFECT = Effect(
             scale=wrap_deflection,
             minimum=0.0,
             maximum=0.5,
+        ),
+        Parameter(
+            "impulse_Nms",
+            "N m s",
+            0.0,
+            1e-4,
+            1.0,
+            "J, the load's impulse that crosses the gap; 0: crossed at once",
+            log=True,
+            role="shape",
+            scale=pretension_moment,
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.003, 0.03),
+        ),
+        Parameter(
+            "drag_Nm",
+            "N m",
+            0.0,
+            1e-3,
+            1.0,
+            "M_f, friction of the link beyond the gap; 0: it falls freely",
+            log=True,
+            role="shape",
+            scale=pretension_moment,
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.03, 0.1),
         ),
     ),
     acts_through=("load", "load_direction"),

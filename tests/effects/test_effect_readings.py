@@ -63,6 +63,35 @@ def test_backlash_jumps_by_its_gap_at_zero_load() -> None:
     assert np.all(np.diff(step[np.argsort(load)]) >= -1e-15)
 
 
+def test_a_greased_gap_is_crossed_at_the_loads_speed() -> None:
+    """b M/J: under a load that turns over and stays, the key comes over after J/M seconds."""
+    config = joint()
+    time = np.linspace(0.0, 2.0, 2001)
+    columns = still(time, np.where(time < 0.5, 0.4, -0.4))
+    gap, impulse = 5e-4, 0.2
+    greased = ("termination_backlash", {"gap_rad": gap, "impulse_Nms": impulse})
+    step = run(config, columns, greased)["deflection_rad"] - run(config, columns)["deflection_rad"]
+    over = np.clip(0.4 * (time - 0.5) / impulse, 0.0, 1.0)
+    assert step == pytest.approx(gap * (0.5 - over), abs=gap * 3e-3)
+
+
+def test_a_link_that_drags_stands_still_while_the_pulley_turns_under_it() -> None:
+    """Unloaded, the motor back and forth: the joint is the play of the gap's width over the pulley."""
+    config = joint()
+    time = np.linspace(0.0, 6.0, 1201)
+    columns = still(time, np.zeros(1201), motor=0.4 * np.sin(2.0 * time))
+    gap = 2e-2
+    drags = ("termination_backlash", {"gap_rad": gap, "drag_Nm": 0.05})
+    pulley = run(config, columns)["joint_position_rad"]
+    link = run(config, columns, drags)["joint_position_rad"]
+    place, expected = -0.5 * gap, []
+    for before, now in zip([pulley[0], *pulley[:-1]], pulley, strict=True):
+        place = min(max(place - (now - before), -0.5 * gap), 0.5 * gap)
+        expected.append(now + place)
+    assert link == pytest.approx(np.array(expected), abs=1e-9)
+    assert np.mean(np.abs(np.diff(link)) < 1e-12) > 0.05
+
+
 def late(columns: dict[str, np.ndarray], q: np.ndarray, delay: float) -> np.ndarray:
     return np.interp(columns["time_s"] - delay, columns["time_s"], q)
 

@@ -163,17 +163,17 @@ def _by_amount(
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
-    tried = tuple({p.name: _absolute(p, v, evidence)} for p in own for v in p.tries)
+    tried = tuple({p.name: _absolute(p, v, config, evidence)} for p in own for v in p.tries)
     return Hypothesis(effect, name, amount, starts, two_sided, channel, tried)
 
 
-def _absolute(p: Parameter, tried: float, evidence: Sequence[Evidence]) -> float:
+def _absolute(p: Parameter, tried: float, config: JointConfig, evidence: Sequence[Evidence]) -> float:
     """A value to try in the parameter's unit."""
     if p.role == "duration":
         return tried * float(np.median([np.ptp(e.columns["time_s"]) for e in evidence]))
     if p.role == "begin":
         return tried + min(float(e.columns["time_s"][0]) for e in evidence)
-    return tried
+    return tried if p.scale is None else tried * p.scale(config)
 
 
 def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tuple[float, ...]:
