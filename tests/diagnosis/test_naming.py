@@ -20,33 +20,41 @@ EVENT_S = 11.0
 
 
 class Case(NamedTuple):
-    """An effect's values in the plant, and what its recording needs beyond the common one."""
+    """An effect's values in the plant, and what its recording needs beyond the common one; `form`: the law that the plant
+    has it with, where that is not the usual one."""
 
     values: dict[str, float]
     channels: tuple[str, ...] = ()
     seconds: float = 20.0
     loads: float = 1.0
+    form: str = ""
 
 
 CASES = {
     "bearing_friction": Case({"torque_Nm": 0.03, "load_coefficient": 0.0, "presliding_rad": 2e-4}),
-    "clamp_slip": Case({"slip_m": 2e-4, "time_s": EVENT_S}),
+    "clamp_slip": Case(
+        {"slip_m": 2e-4, "time_s": EVENT_S - 4.0, "duration_s": 6.0, "steps": 4.0}, form=":in_steps"
+    ),
     "clock_skew": Case({"delay_s": 0.02}),
     "crosstalk": Case({"load_coefficient": 0.1}, ("other_1",)),
     "gravity_load": Case({"moment_Nm": 0.15, "phase_rad": 0.4}),
     "inertial_load": Case({"inertia_kgm2": 0.05}),
     "motor_friction": Case({"torque_Nm": 0.03, "presliding_rad": 0.01}, ("motor_torque_Nm",)),
     "nonlinear_cable": Case({"stiffening": 0.6}),
-    "position_dependent_friction": Case({"amplitude": 0.6, "phase_rad": 0.5}),
+    "position_dependent_friction": Case({"amplitude": 0.6, "phase_rad": 0.5}, form=":input_drum"),
     "pressure_dependent_friction": Case({"exponent": 0.6}, loads=1.7),
     "pretension_relaxation": Case({"fraction": 0.05, "time_constant_s": 2.0}),
     "pulley_runout": Case({"eccentricity_m": 3e-4, "phase_rad": 0.7}),
-    "routing_friction": Case({"mu_angle": 0.3, "arc_length_m": 0.01}),
-    "series_compliance": Case({"compliance_rad_per_Nm": 5e-3}),
+    "routing_friction": Case({"mu_angle": 0.3, "arc_length_m": 0.01, "skew": 0.7}, form=":unlike_paths"),
+    "series_compliance": Case({"compliance_rad_per_Nm": 5e-3, "skew": 0.9}, form=":one_way"),
     "strand_break": Case({"fraction": 0.15, "time_s": EVENT_S}),
     "strand_friction": Case({"fraction": 0.5, "yield_N": 8.0}),
-    "termination_backlash": Case({"gap_rad": 1e-3}),
-    "thermal_pretension": Case({"coefficient_per_K": 0.02, "reference_degC": 20.0}, ("temperature_degC",)),
+    "termination_backlash": Case({"gap_rad": 1e-3, "drag_Nm": 0.15}, form=":dragging_link"),
+    "thermal_pretension": Case(
+        {"coefficient_per_K": 0.03, "reference_degC": 20.0, "lag_s": 2.0},
+        ("temperature_degC",),
+        form=":lagged",
+    ),
     "viscous_slip": Case({"coefficient_Ns_per_m_rad": 2e5}),
 }
 
@@ -62,7 +70,7 @@ def recording(effect: str, case: Case) -> dict[str, FloatArray]:
         "temperature_degC": 20.0 + 4.0 * np.sin(0.9 * time),
         "other_1": np.sin(1.3 * time),
     }
-    specs = [] if effect == "motor_friction" else [EffectSpec(effect, case.values)]
+    specs = [] if effect == "motor_friction" else [EffectSpec(effect + case.form, case.values)]
     found = simulate(
         PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=specs, **given
     ).channels()
