@@ -130,6 +130,8 @@ class Thresholds:
     """Cost after a linear step over the cost before, above which a dependence on session or condition is not tried."""
     dependences: int = 3
     """Dependences of a round that are fitted, best first."""
+    pairs: int = 2
+    """Effects, best first, that are tried with a pretension of each session's own where neither helps alone."""
     conditions: int = 3
     """Values of a condition from which a gain by it may be asked for: two tell a line from nothing else."""
 

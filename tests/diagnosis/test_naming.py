@@ -20,8 +20,8 @@ EVENT_S = 11.0
 
 
 class Case(NamedTuple):
-    """An effect's values in the plant, and what its recording needs beyond the common one; `form`: the law that the plant
-    has it with, where that is not the usual one."""
+    """An effect's values in the plant, and what its recording needs beyond the common one; `form`: the law that the
+    plant has it with, where that is not the usual one."""
 
     values: dict[str, float]
     channels: tuple[str, ...] = ()

@@ -26,6 +26,7 @@ from cablecomp.diagnosis.explain.model import (
     runs_away,
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
+from cablecomp.diagnosis.explain.pairs import with_own_pretensions
 from cablecomp.diagnosis.explain.scores import demanded, left_out, scales, score_difference, selected_in
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
 from cablecomp.diagnosis.folds import Groups
@@ -92,16 +93,50 @@ def one_round(at: Beginning, rng: np.random.Generator) -> Round:
     if fine is not None:
         there = [anchor(fine.fit)]
         answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], at) else a for a in answers]
-    chosen = _chosen(*_begun(at, answers), at)
+    begun = _begun(at, answers)
+    tried = _tried(_chosen(*begun, at), at, fine, rng)
+    if not _good(tried, at):
+        tried += _tried(_pairs(begun[0], at), at, fine, rng)
+    good = _good(tried, at)
+    return Round(at.model, tuple(tried), good[0] if good else None)
+
+
+def _good(tried: Sequence[Tried], at: Beginning) -> list[Tried]:
+    """What data left out demand."""
+    return [t for t in tried if demanded(t.difference, first=at.number == 0)]
+
+
+def _tried(
+    chosen: Sequence[Begun], at: Beginning, fine: Model | None, rng: np.random.Generator
+) -> list[Tried]:
+    """What is chosen fitted to the end and compared with the model; once the time is up the first alone."""
 
     def finish(c: Begun) -> Model | None:
         at.tell(f"fitting {c.terms[0].name}")
         return None if at.pace.over and c is not chosen[0] else _finished(c, at, fine)
 
     models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], at.groups)
-    tried = _compared(models, at, fine, rng)
-    good = [t for t in tried if demanded(t.difference, first=at.number == 0)]
-    return Round(at.model, tuple(tried), good[0] if good else None)
+    return _compared(models, at, fine, rng)
+
+
+def _pairs(begun: Sequence[Begun], at: Beginning) -> list[Begun]:
+    """The effects that came nearest, each with a pretension of every session's own: where the drive is known by order
+    of magnitude, and what one of them adds does not help alone."""
+    cold = at.cold
+    if cold is None or at.number == 0 or at.pace.over or at.model.fit.problem.fine:
+        return []
+    near = [(c, h) for c in begun for h in c.terms[:1] if isinstance(h, Hypothesis) and h.trades]
+
+    def begin(pair: tuple[Begun, Hypothesis]) -> list[Begun]:
+        at.tell(f"trying {pair[1].name} with a pretension of each session's own")
+        found = with_own_pretensions(pair[0].problem, pair[1], at.model.fit.values, cold, at.groups.by)
+        if found is None:
+            return []
+        dependence, fit = found
+        return [Begun(fit.cost, (pair[1], dependence), fit.problem, fit.x, fit.J)]
+
+    found = [b for part in side_by_side(begin, near[: LIMITS.pairs]) for b in part]
+    return [b for b in found if b.cost < at.cost]
 
 
 def _asked(at: Beginning) -> list[list[Answer]]:

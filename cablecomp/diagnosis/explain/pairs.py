@@ -1,0 +1,96 @@
+"""An effect and a pretension of each session's own, tried together: where a mounting or a posture leaves the cables far
+less tight, neither is worth anything without the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.parameter import own_of
+from cablecomp.estimation.problem import Problem
+from cablecomp.signal.smoothing import FloatArray
+
+PRETENSION: Final = "pretension_N"
+FACTORS: Final = np.geomspace(0.1, 4.0, 9)
+"""A session's pretension over the common one, at first."""
+AMOUNTS: Final = (0.3, 1.0)
+"""The effect's amount over where it usually begins, at first."""
+
+
+def with_own_pretensions(
+    problem: Problem, h: Hypothesis, values: Mapping[str, float], cold: Mapping[str, float], by: str
+) -> tuple[Dependence, Fit] | None:
+    """A rough fit of a problem that has effect `h`, every session with a pretension of its own; None where sessions
+    cannot have one.
+
+    `values`: where the model without the effect stands; `cold`: where effects begin; `by`: what is left out in turn.
+    Each session begins at the factor that suits its own recordings best, all other things being equal.
+    """
+    common = next((p for p in problem.parameters if p.name == PRETENSION), None)
+    sessions = problem.sessions
+    shown = sessions if by == "block" else problem.repeated
+    if common is None or len(sessions) < 2 or len(shown) < 2:
+        return None
+    place = problem.parameters.index(common)
+    free = (*problem.parameters[:place], *own_of(common, sessions), *problem.parameters[place + 1 :])
+    own = replace(problem, parameters=free)
+    begin = {**cold, **values}
+    amount = h.key(h.amount.name)
+    best: tuple[float, FloatArray] | None = None
+    for share in AMOUNTS:
+        given = {**begin, amount: share * cold.get(amount, begin.get(amount, 0.0))}
+        found = _scanned(own, given, begin.get(PRETENSION, common.start))
+        if found is not None and (best is None or found[0] < best[0]):
+            best = found
+    if best is None:
+        return None
+    try:
+        return Dependence(PRETENSION, "session"), solve(own, best[1], LIMITS.rough + 3, LIMITS.tolerance)
+    except InputError:
+        return None
+
+
+def _scanned(
+    problem: Problem, values: Mapping[str, float], pretension_N: float
+) -> tuple[float, FloatArray] | None:
+    """(cost, x) with the best of `FACTORS` for each session: what the pretension of one does, its own rows tell."""
+    at = [p.session for p in problem.parameters]
+    found = []
+    for factor in FACTORS:
+        x = np.array(
+            [
+                p.x(factor * pretension_N if p.session else values.get(p.name, p.start))
+                for p in problem.parameters
+            ]
+        )
+        r = problem.followed(x)
+        if r is not None:
+            found.append((x, _by_session(problem, r)))
+    if not found:
+        return None
+    costs = np.stack([c for _, c in found])
+    best = np.argmin(costs, axis=0)
+    x = found[0][0].copy()
+    for k, s in enumerate(problem.sessions):
+        for j in [j for j, owner in enumerate(at) if owner == s]:
+            x[j] = found[int(best[k])][0][j]
+    return float(np.sum(costs[best, np.arange(costs.shape[1])])), x
+
+
+def _by_session(problem: Problem, residual: FloatArray) -> FloatArray:
+    """Half the sum of squares of each session's rows."""
+    place = {s: k for k, s in enumerate(problem.sessions)}
+    total = np.zeros(len(place))
+    for c, span in problem.spans().items():
+        owners = problem.owners(c)
+        mine = np.array([place[e.session] for e in problem.evidence])[owners]
+        total += 0.5 * np.bincount(mine, residual[span] ** 2, minlength=len(place))
+    return total
