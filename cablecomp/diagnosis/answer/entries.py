@@ -66,19 +66,19 @@ def candidates(found: Sequence[Weighed], selection: Selection, final: Model) -> 
     """Effects of the final model that are not sure enough, then what else stood out in a round: no name, for the model
     does without it."""
     rows = [named_of(w, final) for w in found if w.confidence < LIMITS.name]
-    known = {w.term.name for w in found}
+    known = {(w.term.effect.id, w.term.channel) for w in found}
     held = {w.term.effect.id for w in found if not w.term.channel}
     for r in selection.rounds:
         for t in r.tried:
             if (
-                t.term.name in known
+                isinstance(t.term, Dependence)
+                or (t.term.effect.id, t.term.channel) in known
                 or t.difference.gain < LIMITS.gain
                 or t.difference.z < LIMITS.z_candidate
-                or isinstance(t.term, Dependence)
                 or t.term.effect.id in held
             ):
                 continue
-            known.add(t.term.name)
+            known.add((t.term.effect.id, t.term.channel))
             effect = t.term.effect
             more = f"{r.tried[0].term.name} takes off more; with it known, this one is not missed"
             if t is r.tried[0]:

@@ -96,7 +96,9 @@ def one_round(at: Beginning, rng: np.random.Generator) -> Round:
     begun = _begun(at, answers)
     tried = _tried(_chosen(*begun, at), at, fine, rng)
     if not _good(tried, at):
-        tried += _tried(_pairs(begun[0], at), at, fine, rng)
+        tried = sorted(
+            [*tried, *_tried(_pairs(begun[0], at), at, fine, rng)], key=lambda t: -t.difference.gain
+        )
     good = _good(tried, at)
     return Round(at.model, tuple(tried), good[0] if good else None)
 
