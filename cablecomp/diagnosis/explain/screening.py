@@ -47,13 +47,14 @@ def anchor(fit: Fit) -> Anchor:
 @dataclass(frozen=True)
 class Answer:
     """What a hypothesis promises at its best start: cost after it (half the sum of squares), its problem with
-    the effect in it, where to begin, the derivative there."""
+    the effect in it, where to begin, the derivative there; `plain`: the same without a shape that it may do without."""
 
     hypothesis: Hypothesis
     cost: float
     problem: Problem
     x: FloatArray
     J: FloatArray
+    plain: Answer | None = None
 
 
 def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
@@ -89,13 +90,16 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
                 best = other
     if best is None:
         return None
-    if h.further and not here.fit.problem.fine:
-        best = _shaped(here, h, best)
     cost, values, d, size = best
-    return _answer(here, h, values, cost, d, size)
+    plain = _answer(here, h, values, cost, d, size)
+    shaped = _shaped(here, h, best) if h.further and not here.fit.problem.fine else None
+    if shaped is None:
+        return plain
+    cost, values, d, size = shaped
+    return replace(_answer(here, h, values, cost, d, size), plain=plain)
 
 
-def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best:
+def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event that takes
     its time is asked for with its middle where the sudden one lies."""
     values = best[1]
@@ -104,7 +108,7 @@ def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best:
         begun = {h.instant: float(values[h.instant]) - 0.5 * shape[h.duration]} if h.duration in shape else {}
         starts.append(Start({**values, **begun, **shape}))
     other = _best(here, replace(h, starts=tuple(starts)))
-    return other if other is not None and other[0] < LIMITS.shaped * best[0] else best
+    return other if other is not None and other[0] < LIMITS.shaped * best[0] else None
 
 
 def _best(here: Anchor, h: Hypothesis) -> _Best | None:
@@ -219,6 +223,20 @@ def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     return sorted((a for a in asked if a is not None), key=lambda a: a.cost)
 
 
+def _begun(a: Answer, evaluations: int) -> Fit | None:
+    """A short fit from where an answer begins; without the shape that it may do without, where that is as good."""
+    # of the effect's further parameters the answer tells no derivative
+    known = {int(k): a.J[:, k] for k in np.flatnonzero(np.any(a.J != 0.0, axis=0))}
+    try:
+        fit = approach(a.problem, a.x, known, 3 if a.problem.fine else evaluations, LIMITS.tolerance)
+    except InputError:
+        fit = None
+    plain = None if a.plain is None else _begun(a.plain, evaluations)
+    if plain is not None and (fit is None or fit.cost > LIMITS.shaped * plain.cost):
+        return plain
+    return fit
+
+
 def rough(
     answers: Sequence[Answer], evaluations: int, further: Sequence[Mapping[str, float]] = ()
 ) -> list[Fit]:
@@ -226,15 +244,8 @@ def rough(
 
     `further`: values to begin from as well (what they do not name, at its start).
     """
-    fits = []
-    problem = answers[0].problem
-    for a in answers:
-        # of the effect's further parameters the answer tells no derivative
-        known = {int(k): a.J[:, k] for k in np.flatnonzero(np.any(a.J != 0.0, axis=0))}
-        try:
-            fits.append(approach(a.problem, a.x, known, 3 if problem.fine else evaluations, LIMITS.tolerance))
-        except InputError:
-            continue
+    fits = [f for f in (_begun(a, evaluations) for a in answers) if f is not None]
+    problem = fits[0].problem if fits else answers[0].problem
     for values in further:
         x = np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters])
         try:
