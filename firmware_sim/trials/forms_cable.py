@@ -168,5 +168,6 @@ CABLE = (
     Suspect("clamp_slip:overload", ANY, _overload),
     Suspect("strand_break:in_steps", ANY, _breaking),
     Suspect("strand_break:fraying", ANY, _fraying),
+    Suspect("strand_break:accelerating", ANY, _fraying),
     Suspect("strand_break:other_cable", ANY, _other_break, closed=True),
 )

@@ -17,12 +17,12 @@ from firmware_sim.trials.history import uneven, with_history
 from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
 from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
 from firmware_sim.trials.measures import PlainDrive
-from firmware_sim.trials.order import OTHER_FORMS, Order, Wanted, order
+from firmware_sim.trials.order import CATALOGUE_FORMS, OTHER_FORMS, Order, Wanted, order
 from firmware_sim.trials.scene import PAUSE_S, is_slack, plain_scene, usable
 from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
 from firmware_sim.trials.spoil import Recorded, record
-from firmware_sim.trials.suspects import CATALOGUE, Scene, Shape, Suspect
+from firmware_sim.trials.suspects import Scene, Shape, Suspect
 from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
 
 SAMPLES = (10_000, 12_000)
@@ -255,7 +255,9 @@ def _sized(
 
 def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: set[str]) -> Suspect:
     """A further effect that the course can show, of the laws asked for."""
-    laws = {"catalogue": CATALOGUE, "other": OTHER_FORMS, "mixed": (*CATALOGUE, *OTHER_FORMS)}[wanted.laws]
+    laws = {
+        "catalogue": CATALOGUE_FORMS, "other": OTHER_FORMS, "mixed": (*CATALOGUE_FORMS, *OTHER_FORMS)
+    }[wanted.laws]  # fmt: skip
     closed = scene.joint.true.circuit == "closed"
     fit = [
         s

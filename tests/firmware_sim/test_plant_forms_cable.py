@@ -197,7 +197,7 @@ def test_a_clamp_that_is_pulled_too_hard_creeps_by_the_excess() -> None:
 
 def test_wires_that_fray_or_break_in_steps_end_where_they_break_at_once() -> None:
     once = _alone(EffectSpec("strand_break", {"fraction": 0.4, "time_s": 1.0}))
-    for form, more in (("fraying", {}), ("in_steps", {"steps": 4.0})):
+    for form, more in (("fraying", {}), ("accelerating", {}), ("in_steps", {"steps": 4.0})):
         run = _alone(
             EffectSpec(f"strand_break:{form}", {"fraction": 0.4, "time_s": 1.0, "duration_s": 2.0, **more})
         )

@@ -77,10 +77,23 @@ def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:
     cases = {
         "stiffening": ({"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4}, 4e-4 * np.arcsinh(path / 0.4)),
         "one_way": ({"compliance_rad_per_Nm": 1e-3, "skew": 1.0}, 2e-3 * np.maximum(path, 0.0)),
+        "rubber": ({"compliance_rad_per_Nm": 1e-3, "share": 0.5, "lag_s": 0.0}, 1e-3 * path),
     }
     for form, (parameters, expected) in cases.items():
         run = play(f"series_compliance:{form}", **parameters)
         np.testing.assert_allclose(run.joint_position_rad - plain.joint_position_rad, expected, atol=1e-12)
+
+
+def test_rubber_gives_way_exponentially_to_a_step_of_load() -> None:
+    load, still = np.full(300, 0.5), np.zeros(300)
+    load[:100] = 0.0
+    config, law = joint(), {"compliance_rad_per_Nm": 2e-2, "share": 0.4, "lag_s": 0.3}
+    run = simulate(config, clock(load), still, load, effects=(EffectSpec("series_compliance:rubber", law),))
+    late = (
+        0.5 - (run.joint_position_rad - simulate(config, clock(load), still, load).joint_position_rad) / 2e-2
+    )
+    since = clock(load)[100:] - clock(load)[99]
+    np.testing.assert_allclose(late[100:], 0.4 * 0.5 * np.exp(-since / 0.3), rtol=0.03, atol=2e-4)
 
 
 def _crossing(form: str, load: np.ndarray, motor: np.ndarray, **parameters: float) -> np.ndarray:
@@ -98,6 +111,12 @@ def test_grease_lets_the_key_cross_its_gap_at_the_speed_of_the_load() -> None:
     crossing = -1e-3 + 0.5 / 250.0 * 0.01 * np.arange(1, 80)
     np.testing.assert_allclose(added[101:180], crossing, atol=1.1e-5)
     np.testing.assert_allclose(added[220:], 1e-3, atol=1e-12)
+
+
+def test_a_key_on_springs_follows_the_load_until_its_gap_is_closed() -> None:
+    load = course(-0.6, 0.6, points=120)
+    added = _crossing("sprung", load, 0 * load, gap_rad=2e-3, closes_Nm=0.2)
+    np.testing.assert_allclose(added, 1e-3 * np.clip(load / 0.2, -1.0, 1.0), atol=1e-12)
 
 
 def test_a_dragging_link_stands_still_while_it_is_not_loaded() -> None:

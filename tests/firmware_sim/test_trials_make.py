@@ -14,7 +14,7 @@ import pytest
 
 from firmware_sim.plant import FORMS, PlantError
 from firmware_sim.trials.make import main, make
-from firmware_sim.trials.order import KINDS, OTHER_FORMS, Wanted, order
+from firmware_sim.trials.order import ALIKE, CATALOGUE_FORMS, KINDS, OTHER_FORMS, Wanted, order
 from firmware_sim.trials.suspects import CATALOGUE
 from firmware_sim.trials.tabletop import CASES
 
@@ -32,7 +32,13 @@ def _truth(folder: Path) -> tuple[dict[str, Any], Any]:
 
 
 def test_everything_that_the_plant_can_do_otherwise_can_be_concealed() -> None:
-    assert {s.id for s in OTHER_FORMS} == set(FORMS) - PRIVATE
+    assert {s.id for s in OTHER_FORMS} == set(FORMS) - PRIVATE - ALIKE
+    assert {s.id for s in CATALOGUE_FORMS} == {s.id for s in CATALOGUE} | ALIKE
+
+
+def test_every_effect_has_two_laws_at_least_that_the_catalogue_has_not() -> None:
+    count = Counter(s.id.partition(":")[0] for s in OTHER_FORMS)
+    assert min(count[s.id] for s in CATALOGUE) >= 2
 
 
 def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
@@ -41,7 +47,8 @@ def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
         drawn = [order(wanted, k).suspects[0].id for k in range(4 * len(CATALOGUE))]
         effects = Counter(name.partition(":")[0] for name in drawn)
         assert effects == {s.id: 4 for s in CATALOGUE}
-        others = sum(":" in name for name in drawn)
+        known = {s.id for s in CATALOGUE_FORMS}
+        others = sum(name not in known for name in drawn)
         assert {"catalogue": others == 0, "other": others == len(drawn)}.get(laws, 20 < others < 52)
     every = Wanted(3, KINDS, "mixed", "none")
     assert [order(every, k).kind for k in range(len(KINDS))] == list(KINDS)

@@ -1,4 +1,4 @@
-"""Series compliance in other forms: a coupling that stiffens, and one that is softer one way."""
+"""Series compliance in other forms: a coupling that stiffens, one that is softer one way, one of rubber."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import PATH, Q_OUT
+from firmware_sim.plant.columns import PATH, Q_OUT, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.forms.courses import low_passed
 from firmware_sim.plant.records import Floats
 
 _SOFT = Parameter("compliance_rad_per_Nm", "c", low=0.0, neutral=0.0)
@@ -50,4 +51,28 @@ ONE_WAY = form(
     _one_way,
 )
 
-KINDS: tuple[EffectKind, ...] = (STIFFENING, ONE_WAY)
+
+def _rubber(build: Build, p: Mapping[str, float]) -> None:
+    def yields(inputs: Floats, outputs: Floats) -> None:
+        path = outputs[:, PATH]
+        slow = low_passed(path, inputs[:, TIME], p["lag_s"])
+        outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * ((1.0 - p["share"]) * path + p["share"] * slow)
+
+    build.mounts.append(yields)
+
+
+RUBBER = form(
+    "series_compliance",
+    "rubber",
+    "A coupling of rubber: part of it gives way at once, + c (1 − s) M, the rest in its own time, "
+    "+ c s y with t_l ẏ = M − y.",
+    (
+        _SOFT,
+        Parameter("share", "s, of what gives way late", 0.4, 0.0, 1.0),
+        Parameter("lag_s", "t_l", 0.3, 0.0),
+    ),
+    ("load", "load_rate"),
+    _rubber,
+)
+
+KINDS: tuple[EffectKind, ...] = (STIFFENING, ONE_WAY, RUBBER)

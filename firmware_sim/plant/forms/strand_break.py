@@ -1,4 +1,4 @@
-"""Wires that break in other forms: one after another, fraying, the other cable's."""
+"""Wires that break in other forms: one after another, fraying, ever faster, the other cable's."""
 
 from __future__ import annotations
 
@@ -52,6 +52,20 @@ FRAYING = form(
 )
 
 
+def _faster(build: Build, p: Mapping[str, float]) -> None:
+    schedule(build, _column(p), p["fraction"], lambda t: ramp(t, p["time_s"], p["duration_s"]) ** 2)
+
+
+ACCELERATING = form(
+    "strand_break",
+    "accelerating",
+    "Each wire that breaks loads the others: EA falls ever faster, by the square of the time, and then no more.",
+    (_LOST, _TIME, Parameter("duration_s", "how long", 15.0, 0.0), _WHICH),
+    ("time", "load"),
+    _faster,
+)
+
+
 def _other(build: Build, p: Mapping[str, float]) -> None:
     schedule(build, SOFTENED_L, p["fraction"], lambda t: ramp(t, p["time_s"], 0.0))
 
@@ -65,4 +79,4 @@ OTHER_CABLE = form(
     _other,
 )
 
-KINDS: tuple[EffectKind, ...] = (IN_STEPS, FRAYING, OTHER_CABLE)
+KINDS: tuple[EffectKind, ...] = (IN_STEPS, FRAYING, OTHER_CABLE, ACCELERATING)

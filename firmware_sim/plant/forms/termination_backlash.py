@@ -1,4 +1,4 @@
-"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances."""
+"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, a key on springs."""
 
 from __future__ import annotations
 
@@ -96,4 +96,21 @@ TWO = form(
     _two,
 )
 
-KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO)
+
+def _sprung(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * np.clip(outputs[:, PATH] / p["closes_Nm"], -1.0, 1.0)
+
+    build.mounts.append(shift)
+
+
+SPRUNG = form(
+    "termination_backlash",
+    "sprung",
+    "A key that springs hold amid its gap: it moves with the load, + (b/2) M/M_c, until |M| = M_c closes the gap.",
+    (_GAP, Parameter("closes_Nm", "M_c", low=1e-9)),
+    ("load",),
+    _sprung,
+)
+
+KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, SPRUNG)
