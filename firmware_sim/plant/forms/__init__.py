@@ -1,7 +1,7 @@
 """Further forms of the catalogue's laws: the same physics in other words, one file per effect.
 
-A form goes by `effect:form`. Which of them the catalogue has as shapes of its own laws stands in `trials/order.py`; a
-diagnosis that knows the effect should know the others again. Imports what an effect is, `effects/base.py`. Start
+A form goes by `effect:form`. Some of them the catalogue has as shapes of its own laws (the trials' order says which);
+a diagnosis that knows the effect should know the others again. Imports what an effect is, `effects/base.py`. Start
 reading at any file.
 """
 
