@@ -6,11 +6,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from cablecomp.config import Empirical
-from cablecomp.diagnosis.describe.empirical import refitted, value_of
+from cablecomp.diagnosis.describe.empirical import _held, _Rows, refitted, value_of
+from cablecomp.diagnosis.folds import Groups
 from cablecomp.estimation.evidence import JOINT, Evidence, gather
 from cablecomp.estimation.simulate import simulator
+from cablecomp.signal.smoothing import FloatArray
 from tests.diagnosis.test_diagnose import joint, recording
 
 LAW = Empirical(
@@ -30,6 +33,32 @@ def test_what_is_counted_for_a_law_is_what_the_observer_adds() -> None:
     kept = here.counted[JOINT]
     added = simulator(with_law).predict(here)[JOINT][kept] - simulator(plain).predict(here)[JOINT][kept]
     np.testing.assert_allclose(value_of(LAW, here), added, atol=1e-12)
+
+
+@pytest.mark.parametrize(("by_level", "kept"), [(False, True), (True, False)])
+def test_a_law_by_load_has_to_hold_where_recordings_reach_further(by_level: bool, kept: bool) -> None:
+    """Recordings at four levels of load: a ripple that is the same curve at every level is a law; one that turns over
+    at the greatest level, as another law's remainder does, is none, though it helps with recordings left out."""
+    parts = []
+    left = []
+    for k, level in enumerate((0.4, 0.4, 0.4, 0.6, 0.6, 0.6, 0.8, 0.8, 0.8, 1.0, 1.0)):
+        one = gather(joint(), f"small/{k}", scaled(level, k), "small", fine_rows=600, judged_rows=200)
+        load = one.at_rows("joint_torque_Nm")[one.counted[JOINT]]
+        turned = -0.3 if by_level and level == 1.0 else 1.0
+        parts.append(one)
+        left.append(
+            turned * 1e-3 * np.sin(4.0 * load) + 1e-4 * np.random.default_rng(k).standard_normal(len(load))
+        )
+    owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
+    groups = Groups(owner, owner, "recording", np.zeros_like(owner))
+    rows = _Rows(parts, np.concatenate(left), np.ones(len(owner)), groups)
+    assert (_held("joint_torque_Nm", rows) is not None) is kept
+
+
+def scaled(level: float, seed: int) -> dict[str, FloatArray]:
+    """A recording whose load goes this far."""
+    columns = recording([], seed)
+    return {**columns, "joint_torque_Nm": level * columns["joint_torque_Nm"]}
 
 
 def test_a_series_fitted_again_finds_the_curve_that_is_there() -> None:

@@ -84,7 +84,7 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
     T = _basis(x, centre, half) * rows.weight[:, None]
     predicted = _crossed(T, rows.left, rows.groups.fold)
     step = score_difference(rows.left - predicted, rows.left, rows.groups)
-    if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
+    if not (step.z > LIMITS.z and step.gain > LIMITS.gain and _holds_further(x, channel, rows)):
         return None
     name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace("position", "angle")
     law = Empirical(
@@ -92,6 +92,26 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
         coefficients_rad=(0.0, *(float(c) for c in _ridge(T, rows.left))),
     )  # fmt: skip
     return _Held(Found(law, step), predicted)
+
+
+def _holds_further(x: FloatArray, channel: str, rows: _Rows) -> bool:
+    """Whether the series, learnt from the other recordings, helps on those that reach further in its channel than they
+    do: a curve over the load may be what another law does at these loads, and mislead at the next."""
+    counts = [int(e.counted[JOINT].sum()) for e in rows.evidence]
+    owner = np.repeat(np.arange(len(counts)), counts)
+    away = np.abs(x - np.median(x))
+    reach = np.array([np.max(away[owner == k], initial=0.0) for k in range(len(counts))])
+    further = reach > np.quantile(reach, 1.0 - LIMITS.law_further)
+    if len(counts) < LIMITS.recordings or not further.any():
+        return True
+    if reach[further].min() < LIMITS.law_reach * reach[~further].max():
+        return True
+    out = further[owner]
+    centre, half = 0.5 * float(x[~out].max() + x[~out].min()), 0.5 * float(np.ptp(x[~out]))
+    T = _basis(x, centre, half) * rows.weight[:, None]
+    predicted = T @ _ridge(T[~out], rows.left[~out])
+    there = replace(rows.groups, block=np.where(out, rows.groups.block, -1))
+    return score_difference(rows.left - predicted, rows.left, there).gain > 0.0
 
 
 def value_of(law: Empirical, recording: Evidence) -> FloatArray:
