@@ -102,9 +102,8 @@ def _holds_further(x: FloatArray, channel: str, rows: _Rows) -> bool:
     away = np.abs(x - np.median(x))
     reach = np.array([np.max(away[owner == k], initial=0.0) for k in range(len(counts))])
     further = reach > np.quantile(reach, 1.0 - LIMITS.law_further)
+    further &= reach > LIMITS.law_reach * np.max(reach[~further], initial=0.0)
     if len(counts) < LIMITS.recordings or not further.any():
-        return True
-    if reach[further].min() < LIMITS.law_reach * reach[~further].max():
         return True
     out = further[owner]
     centre, half = 0.5 * float(x[~out].max() + x[~out].min()), 0.5 * float(np.ptp(x[~out]))
