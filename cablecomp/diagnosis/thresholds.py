@@ -168,11 +168,10 @@ class Thresholds:
     """Draws of blocks for `selected_in` and for the model confidence set."""
     rival: float = 0.10
     """Level of the model confidence set: models that are as good in a tenth of resampled bodies of data stay in."""
-    law_further: float = 0.25
-    """Share of the recordings, those that reach furthest in a channel, that a law without a name is held against when
-    learnt from the others (the jaw: a curve by load, learnt to 40 %, made 50 % worse by two thirds)."""
     law_reach: float = 1.05
-    """Their reach over that of the others, from which it is asked whether the law holds there."""
+    """Reach in a channel of one recording over that of the next smaller, from which a law without a name by this channel
+    has to hold where recordings of such a reach are left out (the jaw: a curve by load made 50 % left out worse by two
+    thirds, and 40 % by a sixth)."""
 
     # --- verdict and names
     followed: float = 0.9

@@ -84,7 +84,7 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
     T = _basis(x, centre, half) * rows.weight[:, None]
     predicted = _crossed(T, rows.left, rows.groups.fold)
     step = score_difference(rows.left - predicted, rows.left, rows.groups)
-    if not (step.z > LIMITS.z and step.gain > LIMITS.gain and _holds_further(x, channel, rows)):
+    if not (step.z > LIMITS.z and step.gain > LIMITS.gain and _holds_elsewhere(x, channel, rows)):
         return None
     name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace("position", "angle")
     law = Empirical(
@@ -94,23 +94,30 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
     return _Held(Found(law, step), predicted)
 
 
-def _holds_further(x: FloatArray, channel: str, rows: _Rows) -> bool:
-    """Whether the series, learnt from the other recordings, helps on those that reach further in its channel than they
-    do: a curve over the load may be what another law does at these loads, and mislead at the next."""
+def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:
+    """Whether the series helps on recordings that reach about as far in its channel, learnt from those that reach less
+    and more, and on those that reach furthest: a curve over the load may be what another law does at these loads, and
+    mislead at others."""
     counts = [int(e.counted[JOINT].sum()) for e in rows.evidence]
     owner = np.repeat(np.arange(len(counts)), counts)
     away = np.abs(x - np.median(x))
     reach = np.array([np.max(away[owner == k], initial=0.0) for k in range(len(counts))])
-    further = reach > np.quantile(reach, 1.0 - LIMITS.law_further)
-    further &= reach > LIMITS.law_reach * np.max(reach[~further], initial=0.0)
-    if len(counts) < LIMITS.recordings or not further.any():
+    order = np.argsort(reach)
+    level = np.empty(len(counts), dtype=np.int64)
+    steps = reach[order][1:] > LIMITS.law_reach * reach[order][:-1]
+    level[order] = np.concatenate([[0], np.cumsum(steps)])
+    of_row, furthest = level[owner], int(level.max())
+    if len(counts) < LIMITS.recordings or furthest == 0:
         return True
-    out = further[owner]
-    centre, half = 0.5 * float(x[~out].max() + x[~out].min()), 0.5 * float(np.ptp(x[~out]))
-    T = _basis(x, centre, half) * rows.weight[:, None]
-    predicted = T @ _ridge(T[~out], rows.left[~out])
-    there = replace(rows.groups, block=np.where(out, rows.groups.block, -1))
-    return score_difference(rows.left - predicted, rows.left, there).gain > 0.0
+    predicted = np.zeros(len(x))
+    for k in range(furthest + 1):
+        out = of_row == k
+        seen = x[~out]
+        centre, half = 0.5 * float(seen.max() + seen.min()), 0.5 * float(np.ptp(seen))
+        T = _basis(x, centre, half) * rows.weight[:, None]
+        predicted[out] = T[out] @ _ridge(T[~out], rows.left[~out])
+    there = replace(rows.groups, block=np.where(of_row == furthest, rows.groups.block, -1))
+    return all(score_difference(rows.left - predicted, rows.left, g).gain > 0.0 for g in (rows.groups, there))
 
 
 def value_of(law: Empirical, recording: Evidence) -> FloatArray:
