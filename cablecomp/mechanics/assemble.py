@@ -169,7 +169,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             radius=(stage.output_radius_m, stage.input_radius_m),
             mu=(stage.mu_output, stage.mu_input),
             wrap=(stage.wrap_output_rad, stage.wrap_input_rad),
-            law=_laws(stage, sign, config),
+            law=_laws(stage, sign, config, extra),
             length=stage.free_length_m + extra.extra_length_m,
             EA=stage.EA_N,
             T0=stage.pretension_N,
@@ -189,11 +189,13 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
     ]
 
 
-def _laws(stage: Stage, sign: float, config: JointConfig) -> tuple[int, int]:
-    """Law tables of a cable's output drum and of its input drum: the joint's and the motor's have their own."""
+def _laws(stage: Stage, sign: float, config: JointConfig, extra: Change) -> tuple[int, int]:
+    """Law tables of a cable's output drum and of its input drum: the joint's has its own, the motor's where its groove
+    is uneven (tables that are alike are one, and stay in the processor's cache)."""
     first, last = config.drive.stage[0], config.drive.stage[-1]
+    uneven = stage is first and extra.motor_angle_factor is not None
     on_joint, on_motor = (ON_H, IN_H) if sign > 0.0 else (ON_L, IN_L)
-    return on_joint if stage is last else ELSEWHERE, on_motor if stage is first else ELSEWHERE
+    return on_joint if stage is last else ELSEWHERE, on_motor if uneven else ELSEWHERE
 
 
 def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:
