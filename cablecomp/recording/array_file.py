@@ -138,13 +138,20 @@ def open_mat(path: Path) -> RawTable:
 
     try:
         numeric = ("double", "single", "logical")
+        listed = whosmat(str(path))
         held = {
             name: tuple(int(n) for n in shape)
-            for name, shape, kind in whosmat(str(path))
+            for name, shape, kind in listed
             if kind in numeric or kind.startswith(("int", "uint"))
         }
     except Exception as error:  # whatever scipy's parser makes of a damaged file
         raise InputError(f"{path}: is a damaged MATLAB file ({first_line(error)}); save it anew") from None
+    structures = [name for name, _, kind in listed if kind == "struct"]
+    if structures and not any(max(shape, default=0) > 1 for shape in held.values()):
+        raise InputError(
+            f"{path}: holds structures ({', '.join(structures[:12])}), which are not looked into; save one's fields as "
+            f"arrays: save('recording.mat', '-struct', '{structures[0]}')"
+        )
     if sum(math.prod(shape) for shape in held.values()) > _MOST_VALUES:
         raise InputError(f"{path}: holds more than {_MOST_VALUES:,} numbers; save it in parts, or as CSV")
     shapes = {name: _upright(shape) for name, shape in held.items()}

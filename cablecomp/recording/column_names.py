@@ -32,6 +32,7 @@ _SIDES: Final = {
 _BEGINS: Final = ("motor", "joint", "actuator", "output", "input", "link")
 _ASKED: Final = _set("cmd command commanded des desired target ref reference setpoint goal sp want")
 _MADE: Final = _set("err error residual raw filtered filt model predicted est estimate")
+_SENSED: Final = _set("wrench ft")
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]+?)\s*[\])>}]\s*$")
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _CHANNELS: Final = {
@@ -71,6 +72,10 @@ def read_name(column: str) -> list[NameReading]:
             continue
         fit = 0.5 + 0.2 * (unit is not None) + _side_fit(side, sides, words)
         fit -= 0.3 * bool(words & _ASKED) + 0.15 * bool(words & _MADE)
+        if (
+            words & _SENSED
+        ):  # three forces and three torques of a sensor at the joint, on no cable and at no motor
+            fit -= 0.3 * (channel != "joint_torque_Nm" or "force" in words)
         if quantity == "time" and len(quantities) > 1:
             fit -= 0.2
         if fit > 0.2:

@@ -32,6 +32,8 @@ _COUNTS: Final = (
     40000,
     65536,
 )
+_STILL: Final = 0.3
+"""How much less a column that never changes fits than its name says."""
 _SURE: Final = 0.3
 """Least correlation from which on a sign is read off."""
 
@@ -65,8 +67,11 @@ def suggest(
 
 
 def as_mapping(suggestions: list[Suggestion]) -> ColumnMap:
-    """The suggestions as a mapping."""
-    return ColumnMap(schema=1, channel={s.channel: s.source for s in suggestions})
+    """The suggestions as a mapping; `time_s` means itself, also where it is made by joining messages."""
+    return ColumnMap(
+        schema=1,
+        channel={s.channel: s.source for s in suggestions if s.source != Source(column="time_s", unit="s")},
+    )
 
 
 def _by_names(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> list[Suggestion]:
@@ -78,7 +83,10 @@ def _by_names(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> li
             offers.append((2.0, k, name, NameReading(own.name, 1.0, None)))
             continue
         stated = f"{name} [{units[name]}]" if name in units else name
-        offers += [(reading.fit, k, name, reading) for reading in read_name(stated)]
+        still = _STILL * (
+            not np.nanmax(columns[name], initial=-np.inf) > np.nanmin(columns[name], initial=np.inf)
+        )
+        offers += [(r.fit - still, k, name, r) for r in read_name(stated) if r.fit > still]
     taken: dict[str, Suggestion] = {}
     used: set[str] = set()
     for fit, _, name, reading in sorted(offers, key=lambda offer: (-offer[0], offer[1])):
@@ -193,6 +201,8 @@ def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rat
         angle = _in_si(joint, values[joint.source.column])
         slope = _slope(q, angle)[0] if ratio is None else ratio
         bent = angle - slope * q
+    if load is not None and bent is not None:
+        _axis(found, values, bent)
     M = None if load is None else values[load.source.column]
     if load is not None and M is not None and bent is not None:
         strength = _slope(bent, M)[1]
@@ -212,6 +222,25 @@ def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rat
     if size > 0.0 and abs(power) > 0.2 * size:
         words = "does net work" if power > 0.0 else "would take work out of friction"
         _change(effort, words, sign=1 if power > 0.0 else -1)
+
+
+def _axis(found: dict[str, Suggestion], values: Mapping[str, FloatArray], bent: FloatArray) -> None:
+    """Of columns whose names fit the load alike (the axes of one sensor), the one that the joint gives way to."""
+    load = found["joint_torque_Nm"]
+    chosen = load.source.column
+    if meaning(chosen) is not None:
+        return
+
+    def fit(name: str) -> float:
+        return max((r.fit for r in read_name(name) if r.channel == load.channel), default=0.0)
+
+    alike = [name for name in values if fit(name) >= fit(chosen) > 0.0]
+    best = max(alike, key=lambda name: (abs(_slope(bent, values[name])[1]), name == chosen), default=chosen)
+    if best != chosen:
+        for channel in [c for c, s in found.items() if s.source.column == best]:
+            del found[channel]
+        unit = next(r.unit for r in read_name(best) if r.channel == load.channel)
+        _change(load, f"of {len(alike)} named so, what the joint follows most", column=best, unit=unit)
 
 
 def _change(here: Suggestion, why: str, **changes: object) -> None:

@@ -56,14 +56,19 @@ def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap)
     table = Table(box=None, show_header=True)
     for name in ("column", "from", "to", "channel", "sure", "because"):
         table.add_column(
-            name, justify="right" if name in ("from", "to", "sure") else "left", no_wrap=name == "channel"
+            name,
+            justify="right" if name in ("from", "to", "sure") else "left",
+            no_wrap=name == "channel",
+            overflow="fold",
         )
     by_column = {source.column: channel for channel, source in mapping.channel.items()}
     reasons = {s.source.column: s for s in found}
     for name, values in raw.columns.items():
         finite = values[np.isfinite(values)]
         low, high = (f"{finite.min():.5g}", f"{finite.max():.5g}") if len(finite) else ("–", "–")
-        channel, reason = by_column.get(name, ""), reasons.get(name)
+        reason = reasons.get(name)
+        itself = reason.channel if reason is not None and reason.channel == name else ""
+        channel = by_column.get(name, itself)
         told = reason is not None and reason.channel == channel
         sure = f"{100 * min(reason.sure, 1.0):.0f} %" if told and reason is not None else ""
         words = "; ".join(reason.why) if told and reason is not None else ("as mapped" if channel else "")

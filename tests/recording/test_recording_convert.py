@@ -11,6 +11,7 @@ from flipped_bits import same_or_refused
 from springy_joint import joint
 
 from cablecomp.cli.app import main
+from cablecomp.errors import InputError
 from cablecomp.recording.mapping import mapping_from
 from cablecomp.recording.reader import open_recording, read_all
 
@@ -61,6 +62,15 @@ def test_what_is_written_opens_in_pandas_and_polars_with_their_defaults(tmp_path
         for k, name in enumerate(names):
             assert "float" in str(frame[name].dtype).lower()
             np.testing.assert_array_equal(np.asarray(frame[name].to_numpy(), dtype=np.float64), rows[:, k])
+
+
+def test_a_matlab_structure_is_answered_with_what_to_save_in_its_place(tmp_path: Path) -> None:
+    import scipy.io
+
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"bench": {"time": np.arange(9.0), "torque": np.arange(9.0)}, "rate": 50.0})
+    with pytest.raises(InputError, match=r"structures \(bench\).*'-struct', 'bench'"):
+        open_recording(path)
 
 
 def test_matlab_files_of_both_kinds_read_alike(tmp_path: Path) -> None:

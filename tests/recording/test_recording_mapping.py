@@ -11,6 +11,7 @@ import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from message_files import write_messages
 from springy_joint import RATIO, joint
 
 from cablecomp.cli.app import main
@@ -294,3 +295,30 @@ def test_units_that_the_file_states_count_in_a_suggestion(tmp_path: Path) -> Non
     found = {s.channel: s.source for s in suggest(columns, units={"t": "ms", "m_pos": "deg"})}
     assert found["time_s"].unit == "ms"
     assert found["motor_position_rad"].unit == "deg"
+
+
+def test_of_a_wrench_the_axis_is_taken_that_the_joint_gives_way_to(tmp_path: Path) -> None:
+    """Six channels are named alike; what is saved reads the log as it is."""
+    pytest.importorskip("mcap", reason="optional package mcap is not installed")
+    step_ns, messages = 20_000_000, []
+    true = joint(400)
+    rows = zip(
+        *(true[n].tolist() for n in ("motor_position_rad", "joint_position_rad", "joint_torque_Nm")),
+        strict=True,
+    )
+    for k, (motor, angle, load) in enumerate(rows):
+        state = {"name": ["motor", "wrist"], "position": [motor, angle], "velocity": [], "effort": []}
+        axes = {"x": 0.0, "y": 0.1 * math.sin(9.0 * k), "z": load}
+        wrench = {"force": {"x": 1.0 * k, "y": 0.0, "z": 0.0}, "torque": axes}
+        messages += [("/joints", k * step_ns, state), ("/ft", k * step_ns, {"wrench": wrench})]
+    path = tmp_path / "a.mcap"
+    kinds = {
+        t: ("json", kind, "jsonschema", b"{}") for t, kind in (("/joints", "JointState"), ("/ft", "Wrench"))
+    }
+    write_messages(path, kinds, messages)
+    assert main(["inspect", str(path), "--save"]) == 0
+    saved = load_mapping(tmp_path / "cablecomp.map.toml")
+    assert saved.channel["joint_torque_Nm"].column == "/ft.wrench.torque.z"
+    read = read_all(path, saved).columns
+    np.testing.assert_allclose(np.abs(read["joint_torque_Nm"]), np.abs(true["joint_torque_Nm"]))
+    assert not [name for name in read if name.startswith(("tension", "motor_torque"))]
