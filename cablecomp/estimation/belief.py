@@ -7,8 +7,8 @@ does not pass for one. What is said is a suspicion with its numbers; nothing is 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from math import log, pi
+from dataclasses import dataclass, replace
+from math import inf, log, pi
 from typing import Final
 
 import numpy as np
@@ -31,13 +31,18 @@ RATIO_OFF: Final = 0.05
 SCALE_OFF: Final = 4.0
 """Factor between the compliance seen and the nominal one that friction, stiffening and tolerances do not make."""
 LATE_GAIN: Final = 0.75
-"""A delay is believed where it takes what a straight line leaves down to this share."""
+"""A delay is believed where it takes what nothing else follows down to this share."""
+LATE_OR_LOST_GAIN: Final = 0.5
+"""The same, where all moves at one speed."""
 MOST_LATE_S: Final = 0.25
 """Greatest delay that is looked for."""
 DELAY_ROWS: Final = 1500
 """Rows on which delays are looked for."""
-LOST: Final = np.array((0.004, 0.012, 0.035, 0.1))
+LOST: Final = np.array((0.004, 0.008, 0.016, 0.032, 0.064, 0.128, 0.256))
 """Half widths of lost motion, as shares of a channel's range, that are tried in a delay's place."""
+OF_SPEED: Final = 0.3
+"""Share of what a shift changes that no loop of a width of its own, whatever the speed, follows: from there on the
+speeds tell a delay from lost motion. Two that are as 1 to 2 leave 0.32."""
 GAP: Final = 10.0
 """Usual steps that make a gap."""
 MOVED: Final = 0.05
@@ -84,9 +89,12 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     if len(rows["time_s"]) < 40:
         return tuple(found)
     view = _View(config, rows, load)
-    found += view.angles()
-    found += view.torques()
-    found += view.delays() if not found else []
+    fits = [*view.angles(), *view.torques()]
+    if found or any(f.kind == "unit" for f in fits):
+        return (*found, *fits)
+    late = view.delays()
+    in_time = view.shifted(late[0]) if fits and late else view
+    found += late if not fits or not (in_time.angles() or in_time.torques()) else view.in_doubt(fits)
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
         found += _motor_torque(config, _rows(columns, (INPUT, MOTOR, "joint_torque_Nm")))
     return tuple(found)
@@ -184,24 +192,59 @@ class _View:
         """Whether the load, or the joint angle, comes late or early: the nominal drive, which knows its own
         hysteresis, is run with each of them shifted.
 
-        Lost motion trails by an angle, whatever the speed; a delay by a time. So both may explain what is left, and a
-        delay is believed only for what it takes beyond lost motion of any width.
+        Lost motion trails by an angle, whatever the speed; a delay by a time. So both may explain what is left: a
+        delay is said only for what it takes beyond lost motion of any width, and both are where all moves at one speed.
         """
         found = []
         wanted = [JOINT, *([self.channel] if self.channel and np.ptp(self.M) > 0.0 else [])]
         step = float(np.median(np.diff(self.time)))
         for name in wanted:
             late, before, after = self._best_shift(name)
-            if abs(late) >= 1.5 * step and after < LATE_GAIN * before:
+            if abs(late) < 1.5 * step or not after < LATE_GAIN * before < inf:
+                continue
+            of_speed = self._of_speed(name, late)
+            if of_speed > OF_SPEED or after < LATE_OR_LOST_GAIN * before:
                 how = "late" if late > 0.0 else "early"
+                both = (
+                    ""
+                    if of_speed > OF_SPEED
+                    else ", or to trail by lost motion (at one speed they look alike)"
+                )
                 words = (
-                    f"{name} seems to come {1e3 * abs(late):.3g} ms {how}: the "
+                    f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}: the "
                     f"nominal drive leaves {_mrad(before)} RMS, "
                     f"{_mrad(after)} with it shifted"
                 )
-                numbers = {"late_s": late, "rms_rad": before, "left_rad": after}
+                numbers = {"late_s": late, "rms_rad": before, "left_rad": after, "of_speed": of_speed}
                 found.append(Suspicion("delay", name, words, numbers))
+        at_rest = self.ratio * np.ptp(self.q) < 0.1 * np.ptp(self.y)
+        if at_rest and any(
+            s.numbers["late_s"] > 0.0 for s in found
+        ):  # an early joint is a late load, and what is late
+            found = [s for s in found if s.numbers["late_s"] > 0.0]  # is the usual one
         return sorted(found, key=lambda s: s.numbers["left_rad"])[:1]
+
+    def in_doubt(self, fits: list[Suspicion]) -> list[Suspicion]:
+        """The same, where the load follows from the motor's way and its direction with a word on what else trails so:
+        lost motion, or an angle that is late, is then seen as a compliance."""
+        if not (np.ptp(self.q) > 0.0 and np.ptp(self.M) > 0.0):
+            return fits
+        every = max(1, len(self.time) // DELAY_ROWS)
+        q, M = self.q[::every], self.M[::every]
+        later = slice(len(q) // 4, None)
+        own = _rms(_beyond(np.column_stack((np.ones_like(q), q, _trailing(q))), M)) / max(
+            _rms(M[later]), 1e-300
+        )
+        word = "; or an angle comes late, or trails by lost motion (the load follows the motor, so they look alike)"
+        return [
+            replace(f, text=f.text + word) if own < OF_SPEED and f.channel == self.channel else f
+            for f in fits
+        ]
+
+    def shifted(self, delay: Suspicion) -> _View:
+        """The rows with that channel brought in time."""
+        moved = np.interp(self.time + delay.numbers["late_s"], self.time, self.rows[delay.channel])
+        return _View(self.config, {**self.rows, delay.channel: moved}, self.channel)
 
     def _best_shift(self, name: str) -> tuple[float, float, float]:
         """(how late, s; RMS as it is; RMS shifted)."""
@@ -221,22 +264,40 @@ class _View:
 
     def _left_shifted(self, name: str, shift_s: float) -> float:
         every = max(1, len(self.time) // DELAY_ROWS)
-        time, q = self.time[::every], self.q[::every]
-        y, M = self.y[::every], self.M[::every]
+        time, y, M = self.time[::every], self.y[::every], self.M[::every]
         if name == JOINT:
             y = np.interp(time + shift_s, self.time, self.y)
         else:
             M = np.interp(time + shift_s, self.time, self.M)
         try:
-            bent = Observer(_bare(self.config)).run({"time_s": time, INPUT: q, "joint_torque_Nm": M})[
-                "deflection_rad"
-            ]
+            followers = self._followers(time, self.q[::every], M)
         except CablecompError:  # such a load the nominal drive cannot bear
-            return float("inf")
-        lost = (_trailing(q), _trailing(M)) if np.ptp(M) > 0.0 else (_trailing(q),)
-        A = np.column_stack((np.ones_like(q), q - q.mean(), M - M.mean(), bent, *lost))
-        later = slice(len(q) // 4, None)  # what went before is not known
-        return _rms((y - A @ np.linalg.lstsq(A[later], y[later], rcond=None)[0])[later])
+            return inf
+        return _rms(_beyond(followers, y))
+
+    def _followers(self, time: FloatArray, q: FloatArray, M: FloatArray) -> FloatArray:
+        """What follows angle and load whatever the speed, a column each: straight lines, the nominal drive, lost
+        motion of several widths."""
+        columns = {"time_s": time, INPUT: q, "joint_torque_Nm": M}
+        bent = Observer(_bare(self.config)).run(columns)["deflection_rad"]
+        lost = [_trailing(x) for x in (q, M) if np.ptp(x) > 0.0]
+        return np.column_stack((np.ones_like(q), q - q.mean(), M - M.mean(), bent, *lost))
+
+    def _of_speed(self, name: str, shift_s: float) -> float:
+        """Share of what that shift changes in a channel that nothing follows which knows no speed, 0 to 1."""
+        every = max(1, len(self.time) // DELAY_ROWS)
+        time, q, M = self.time[::every], self.q[::every], self.M[::every]
+        followers = self._followers(time, q, M)
+        whole = self.ratio * self.q + np.interp(self.time, time, followers[:, 3]) if name == JOINT else self.M
+        ahead, behind = (np.interp(time + k * shift_s, self.time, whole) for k in (0.5, -0.5))
+        changed = ahead - behind
+        return _rms(_beyond(followers, changed)) / max(_rms(changed[len(time) // 4 :]), 1e-300)
+
+
+def _beyond(A: FloatArray, y: FloatArray) -> FloatArray:
+    """What no sum of A's columns makes of y, the first quarter left out: what went before it is not known."""
+    A, y = A[len(y) // 4 :], y[len(y) // 4 :]
+    return np.asarray(y - A @ np.linalg.lstsq(A, y, rcond=None)[0])
 
 
 def _trailing(x: FloatArray) -> FloatArray:

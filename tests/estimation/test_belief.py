@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from turning import JOINT, recorded
 
-from cablecomp.estimation.belief import suspicions
+from cablecomp.estimation.belief import Suspicion, suspicions
 from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import EffectSpec, PlantConfig, StageConfig, simulate
 
 COLUMNS = recorded()
+TIME = np.arange(0.0, 20.0, 0.02)
+ONE_SPEED = 0.3 * TIME  # turns
+TWO_SPEEDS = np.where(TIME < 10.0, 0.2 * TIME, 2.0 + 0.6 * (TIME - 10.0))
+BACKLASH = EffectSpec("termination_backlash", {"gap_rad": 0.003})
+FRICTION = EffectSpec("bearing_friction", {"torque_Nm": 0.2})
 
 
 def kinds(**changed: FloatArray) -> list[tuple[str, str]]:
@@ -66,3 +74,48 @@ def test_a_gap_over_which_the_joint_moved() -> None:
     (said,) = suspicions(JOINT, {n: v[kept] for n, v in COLUMNS.items()})
     assert said.kind == "gap"
     assert said.numbers["gap_s"] == pytest.approx(2.0, abs=0.05)
+
+
+def plant(motor_rad: FloatArray, load_Nm: FloatArray, *effects: EffectSpec) -> dict[str, FloatArray]:
+    """The joint as the independent plant has it, with its encoder's noise."""
+    stage = StageConfig(**{f.name: getattr(JOINT.drive.stage[0], f.name) for f in fields(StageConfig)})
+    seen = simulate(PlantConfig("bench", "closed", (stage,), effects=effects), TIME, motor_rad, load_Nm)
+    noise = 2e-5 * np.random.default_rng(1).standard_normal(len(TIME))
+    angle = seen.joint_position_rad + noise
+    return {
+        "time_s": TIME,
+        "motor_position_rad": motor_rad,
+        "joint_torque_Nm": load_Nm,
+        "joint_position_rad": angle,
+    }
+
+
+def swung(turns: FloatArray, later_rad: float = 0.0) -> FloatArray:
+    return np.sin(2.0 * np.pi * turns + later_rad) * (1.0 - np.exp(-TIME))
+
+
+def delays_of(columns: dict[str, FloatArray], late: str = "", late_s: float = 0.0) -> list[Suspicion]:
+    if late:
+        columns = {**columns, late: np.interp(TIME - late_s, TIME, columns[late])}
+    return [s for s in suspicions(JOINT, columns) if s.kind == "delay"]
+
+
+@pytest.mark.parametrize("lost", [BACKLASH, FRICTION])
+def test_where_all_moves_at_one_speed_a_delay_is_not_said_without_lost_motion(lost: EffectSpec) -> None:
+    found = delays_of(plant(1.8 * swung(ONE_SPEED), 1.2 * swung(ONE_SPEED, 1.0), lost))
+    assert [s for s in found if "lost motion" not in s.text] == []
+
+
+@pytest.mark.parametrize("lost", [BACKLASH, FRICTION])
+def test_two_speeds_tell_a_delay_from_lost_motion(lost: EffectSpec) -> None:
+    columns = plant(1.8 * swung(TWO_SPEEDS), np.full_like(TIME, 0.8), lost)
+    assert delays_of(columns) == []
+    (said,) = delays_of(columns, "joint_position_rad", 0.05)
+    assert said.numbers["late_s"] == pytest.approx(0.05, abs=0.01)
+    assert "lost motion" not in said.text
+
+
+def test_of_a_late_load_and_an_early_joint_that_look_alike_the_late_one_is_said() -> None:
+    (said,) = delays_of(plant(np.zeros_like(TIME), 1.6 * swung(TWO_SPEEDS)), "joint_torque_Nm", 0.05)
+    assert said.channel == "joint_torque_Nm"
+    assert said.numbers["late_s"] == pytest.approx(0.05, abs=0.01)
