@@ -7,7 +7,9 @@ A command's module is imported when it is called, so that `--help` need not wait
 from __future__ import annotations
 
 import ast
+import difflib
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -149,13 +151,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         shown = getattr(error, "format_message", None)
         if shown is None:  # neither ours nor the command line's: a bug, whose traceback is worth having
             raise
-        return _fail(f"{shown()}; see cablecomp --help", 2)
+        return _fail(_misused(error, shown().rstrip(".")), 2)
 
 
 def _fail(text: str, code: int) -> int:
     with suppress(OSError):  # whoever was to read it may be gone
         print(f"cablecomp: {printable(text)}", file=sys.stderr)
     return code
+
+
+def _misused(error: Exception, said: str) -> str:
+    """What the command line found wrong, the command that is nearest, and whose help to read."""
+    context = getattr(error, "ctx", None)
+    asked = f" {context.info_name}" if context is not None and context.parent is not None else ""
+    meant = re.search(r"No such command '([^']*)'", said)
+    close = difflib.get_close_matches(meant[1], COMMANDS, 1) if meant else []
+    return f"{said}{f'; did you mean `{close[0]}`?' if close else ''}; see cablecomp{asked} --help"
 
 
 def _drop_output() -> None:

@@ -39,6 +39,8 @@ from cablecomp.report.replay_figures import Scale
 
 _DRAWN: Final = 6
 """Recordings whose curves are drawn."""
+_BY_CHANCE: Final = 0.05
+"""p-value from which on a mismatch is said to sit nowhere."""
 
 
 def diagnosis_page(d: Diagnosis, augmented_toml: str = "", concealed: Mapping[str, Any] | None = None) -> str:
@@ -171,7 +173,7 @@ def _where(d: Diagnosis, mismatch: Sequence[Mapping[str, Any]], unit: Scale) -> 
     first = mismatch[0]
     floor = max(d.noise_floor_rad, 1e-12)
     name = first["covariate"]
-    if first["p_value"] < 0.05:
+    if first["p_value"] < _BY_CHANCE:
         low, high = (page.number(v, figures.unit_of(name)) for v in first["range"])
         lead = (
             f"Before any name: {covariate(name)} accounts for {100 * first['share']:.0f} % of the calibrated drive's "
@@ -207,13 +209,12 @@ def _grid_axis(usable: Sequence[str]) -> str:
 def _overlays(d: Diagnosis, unit: Scale) -> Section:
     first = shown_first(d)
     assert first is not None
-    intervals = d.location.mismatch[0].intervals_s if d.location.mismatch else ()
-    body = page.figure(
-        figures.overlay(first, [i for i in intervals if _inside(i, first)], unit),
-        f"{short(first.name)}. Shaded above: not fitted (unknown history, or kept "
-        f"for the end). Shaded in the middle: where the "
-        "mismatch sits.",
-    )
+    most = d.location.mismatch[0] if d.location.mismatch else None
+    sure = most is not None and most.p_value < _BY_CHANCE
+    intervals = [i for i in most.intervals_s if _inside(i, first)] if most is not None and sure else []
+    said = f"{short(first.name)}. Shaded above: not fitted (unknown history, or kept for the end)."
+    middle = " Shaded in the middle: where the mismatch sits." if intervals else ""
+    body = page.figure(figures.overlay(first, intervals, unit), said + middle)
     body += page.figure(
         figures.loops(first, unit), "The loop measured (broad), before (left) and after (right)."
     )
@@ -269,7 +270,11 @@ def _open_questions(d: Diagnosis) -> Iterator[Section]:
 def _unseen(d: Diagnosis) -> Section:
     rows = []
     for u in sorted(d.could_be_unseen, key=lambda u: u["below"] is None):
-        below = "could be any size" if u["below"] is None else f"{page.number(u['below'])} {u['unit']}"
+        below = (
+            "could be any size"
+            if u["below"] is None
+            else f"{page.number(u['below'], u['unit'].removeprefix('-'))}"
+        )
         rows.append((plain(u["effect"]), u["parameter"], below))
     table = page.table(("effect", "parameter", "would have been seen above"), rows)
     lead = "How large each effect that is not named could be without showing in these data, in its least visible shape."

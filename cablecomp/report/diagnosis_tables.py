@@ -107,7 +107,8 @@ def calibration(entries: Mapping[str, Mapping[str, Any]]) -> str:
         if entry["session"] is not None:
             continue
         nominal, value, sd = (known(entry[key]) for key in ("nominal", "value", "sd"))
-        change = f"{100.0 * (value / nominal - 1.0):+.1f} %" if np.isfinite(nominal) and nominal else "–"
+        share = np.isfinite(nominal) and nominal and "_offset_" not in name  # a zero has no share
+        change = f"{100.0 * (value / nominal - 1.0):+.1f} %" if share else "–"
         rows.append((name, page.number(nominal, digits=5), with_sd(value, sd), change.replace("-", "−")))
     return page.table(("parameter", "configured", "calibrated", "change"), rows) if rows else ""
 

@@ -10,7 +10,14 @@ from rich.table import Table
 from rich.text import Text
 
 from cablecomp.report.diagnosis_tables import unit_for
-from cablecomp.report.diagnosis_words import ANSWERS, dependences, depends, plain, values_of
+from cablecomp.report.diagnosis_words import (
+    ANSWERS,
+    dependences,
+    depends,
+    plain,
+    repeats_limit,
+    values_of,
+)
 from cablecomp.report.replay_figures import Scale
 
 _COLOUR: Final[Mapping[str, str]] = {
@@ -60,7 +67,7 @@ def _errors(result: Mapping[str, Any]) -> Table:
         ("on what was fitted", "rmse_rad"),
     ):
         table.add_row(words, _shown(result["baseline"][key], unit), _shown(result["augmented"][key], unit))
-    if result["repeatability_rad"] is not None:
+    if repeats_limit(result):
         table.add_row("the machine itself repeats to", "", _shown(result["repeatability_rad"], unit))
     table.add_row("sensors' noise", "", _shown(result["noise_floor_rad"], unit))
     return table

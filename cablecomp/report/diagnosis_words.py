@@ -93,6 +93,13 @@ def dependences(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
+def repeats_limit(result: Mapping[str, Any]) -> bool:
+    """Whether the scatter between repeats limits a model: one that leaves less has seen that they differ (in what
+    went before them), and then their scatter says nothing of the machine."""
+    scatter, left = result["repeatability_rad"], result["augmented"]["rmse_rad"]
+    return scatter is not None and (left is None or scatter < 1.5 * left)
+
+
 def base_value(result: Mapping[str, Any], parameter: str) -> float | None:
     """The common value of a parameter that depends on a condition; None where there is none."""
     for m in result["missing_physics"]:

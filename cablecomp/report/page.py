@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import re
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -54,12 +55,12 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
 
 def paragraph(text: str) -> str:
     """Return plain text as a paragraph."""
-    return f"<p>{escape(text)}</p>"
+    return f"<p>{_words(text)}</p>"
 
 
 def bullets(lines: Iterable[str]) -> str:
     """Return plain lines as a list; no lines give an empty string."""
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    items = "".join(f"<li>{_words(line)}</li>" for line in lines)
     return f"<ul>{items}</ul>" if items else ""
 
 
@@ -93,7 +94,7 @@ def figure(fig: Any, caption: str = "", least_px: int = 0) -> str:
     opened. `least_px`: on a narrower screen it keeps that width and scrolls."""
     data = _figure_data(fig)
     height = int(fig.layout.height or 450)
-    note = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    note = f"<figcaption>{_words(caption)}</figcaption>" if caption else ""
     width, scrolls = (f";min-width:{least_px}px", ' class="scroll"') if least_px else ("", "")
     return (
         f'<figure{scrolls}><div class="plot" style="height:{height}px{width}"></div>'
@@ -164,7 +165,7 @@ def _packed(text: str) -> str:
 
 
 def _section(index: int, section: Section) -> str:
-    lead = f'<p class="lead">{escape(section.lead)}</p>' if section.lead else ""
+    lead = f'<p class="lead">{_words(section.lead)}</p>' if section.lead else ""
     return f'<section id="s{index}"><h2>{escape(section.title)}</h2>{lead}{section.body}</section>'
 
 
@@ -181,7 +182,12 @@ def _cell(cell: object) -> str:
         return f'<td class="number">{escape(number(cell, digits=5))}</td>'
     text = str(cell)
     kind = ' class="long"' if len(text) > LONG_TEXT else ""
-    return f"<td{kind}>{escape(text)}</td>"
+    return f"<td{kind}>{_words(text)}</td>"
+
+
+def _words(text: str) -> str:
+    """Plain text as HTML; what stands between backticks is code."""
+    return _CODE.sub(r"<code>\1</code>", escape(text))
 
 
 def _superscript(exponent: int) -> str:
@@ -190,6 +196,7 @@ def _superscript(exponent: int) -> str:
 
 LONG_TEXT: Final = 60
 """Characters from which on a cell is a sentence, and keeps a width that it can be read at."""
+_CODE: Final = re.compile("`([^`]+)`")
 _LONG: Final = (64, 16_384)
 """Lengths between which an array is worth packing, and 65 534 steps are finer than its points."""
 _CONFIG: Final = json.dumps({

@@ -29,11 +29,12 @@ class RunData:
 
     @property
     def controlled(self) -> NDArray[np.bool_]:
-        """Rows under control, from half a second after it began."""
+        """Rows under control, from half a second after it began; in a short run, from a tenth of it on."""
         time, on = self.recording["time_s"], self.cycles["controlled"] > 0.0
         if not np.any(on):
             return np.asarray(on, dtype=np.bool_)
-        return np.asarray(on & (time > time[np.argmax(on)] + 0.5), dtype=np.bool_)
+        held = time[on]
+        return np.asarray(on & (time > held[0] + min(0.5, 0.1 * (held[-1] - held[0]))), dtype=np.bool_)
 
     @property
     def time_s(self) -> Floats:

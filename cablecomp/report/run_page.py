@@ -97,7 +97,7 @@ def deflection_figure(data: RunData) -> Any:
     curve(fig, time, 1e3 * p["deflection_rad"], "predicted", style.PREDICTED, 1)
     curve(fig, time, 1e3 * data.cycles["deflection_ahead_rad"], "made up for", style.CABLE_L, 1)
     curve(fig, time, 1e3 * p["residual_rad"], "residual", style.RESIDUAL, 2)
-    style.keep_range(fig, [c[data.controlled] for c in (measured, 1e3 * p["deflection_rad"])], row=1)
+    style.keep_range(fig, [measured, 1e3 * p["deflection_rad"]], row=1)
     style.keep_range(fig, [1e3 * p["residual_rad"][data.controlled]], row=2)
     style.axes(fig, "", style.label("deflection", "mrad"), row=1, col=1)
     style.axes(fig, TIME, style.label("residual", "mrad"), row=2, col=1)

@@ -55,6 +55,17 @@ def test_an_unknown_command_is_one_line(capsys: pytest.CaptureFixture[str]) -> N
     assert said.count("\n") == 1
 
 
+def test_a_wrong_word_is_answered_with_the_nearest_and_whose_help_to_read(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["calibrat"]) == 2
+    assert "did you mean `calibrate`?; see cablecomp --help" in capsys.readouterr().err
+    assert main(["info"]) == 2
+    said = capsys.readouterr().err
+    assert "--config" in said
+    assert said.endswith("; see cablecomp info --help\n")
+
+
 def test_an_option_given_twice_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "--config", "capstan-arm", "--config", "wrist-capstan"]) == 2
     assert "--config is given 2 times" in capsys.readouterr().err

@@ -132,6 +132,29 @@ def test_a_page_without_series_or_mismatch_still_stands(found: Diagnosis) -> Non
     assert "Before and after" not in text
 
 
+def test_nothing_is_shaded_where_the_mismatch_is_what_chance_does(found: Diagnosis) -> None:
+    by_chance = tuple(replace(m, p_value=0.5) for m in found.location.mismatch)
+    assert "where the mismatch sits" in text_of(diagnosis_page(found))
+    calm = replace(found, location=replace(found.location, mismatch=by_chance))
+    assert "where the mismatch sits" not in text_of(diagnosis_page(calm))
+
+
+def test_repeats_are_said_where_they_limit_what_a_model_can_do(found: Diagnosis) -> None:
+    assert "The machine repeats to" in text_of(diagnosis_page(found))
+    assert "the machine itself repeats to" in terminal(found)
+    apart = replace(found, repeatability_rad=3.0 * found.augmented.rmse_rad)
+    assert "The machine repeats to" not in text_of(diagnosis_page(apart))
+    assert "the machine itself repeats to" not in terminal(apart)
+
+
+def test_a_zero_changes_by_no_share_and_a_number_without_a_unit_has_none(found: Diagnosis) -> None:
+    moved = (*found.calibration, Value("joint_position_offset_rad", -4e-6, 7e-7, -7e-7))
+    number = {"effect": "strand_break", "parameter": "fraction", "below": 0.25, "unit": "-", "why": ""}
+    text = text_of(diagnosis_page(replace(found, calibration=moved, could_be_unseen=(number,))))
+    assert re.search(r"joint_position_offset_rad −7·10⁻⁷ −4·10⁻⁶ ± 7·10⁻⁷ –", text)
+    assert re.search(r"fraction 0\.25(?! -)", text)
+
+
 def test_a_joint_without_load_is_drawn_over_its_motor(found: Diagnosis) -> None:
     trace = found.traces[0]
     free = replace(trace, covariates={**trace.covariates, "load": np.zeros(len(trace.measured_rad))})

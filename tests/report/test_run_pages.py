@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rendering import as_text
 
@@ -12,8 +13,9 @@ from cablecomp.config_text import joint_text
 from cablecomp.control.design import design_loop
 from cablecomp.control.options import load_control
 from cablecomp.recording.replay import PredictionCsv
+from cablecomp.report import page
 from cablecomp.report.design_page import design_page, design_rows, design_tables
-from cablecomp.report.run_data import load_run
+from cablecomp.report.run_data import RunData, load_run
 from cablecomp.runtime.log import CYCLE
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -41,6 +43,18 @@ def test_a_joint_written_back_reads_as_the_same_joint(path: Path, tmp_path: Path
     again = tmp_path / "again.toml"
     again.write_text(joint_text(config, ("a remark",)), encoding="utf-8")
     assert load_joint(again) == config
+
+
+@pytest.mark.parametrize(("duration_s", "settled_s"), [(1.0, 0.1), (20.0, 0.5)])
+def test_a_short_run_is_not_all_beginning(duration_s: float, settled_s: float) -> None:
+    time = np.arange(0.0, duration_s, 0.01)
+    data = RunData({"time_s": time}, {}, {"controlled": np.ones_like(time)})
+    assert time[data.controlled][0] == pytest.approx(settled_s, abs=0.011)
+
+
+def test_what_stands_between_backticks_is_code_and_is_escaped() -> None:
+    assert page.paragraph("say `a<b` & go") == "<p>say <code>a&lt;b</code> &amp; go</p>"
+    assert page.bullets(["one ` alone"]) == "<ul><li>one ` alone</li></ul>"
 
 
 TABLES = {
