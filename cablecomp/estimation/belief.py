@@ -89,8 +89,11 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     if len(rows["time_s"]) < 40:
         return tuple(found)
     view = _View(config, rows, load)
-    fits = [*view.angles(), *view.torques()]
-    if found or any(f.kind == "unit" for f in fits):
+    fits = view.angles()
+    if any(f.kind == "unit" for f in fits):  # all else would be told in that unit
+        return (*found, *fits)
+    fits += view.torques()
+    if found:
         return (*found, *fits)
     late = view.delays()
     in_time = view.shifted(late[0]) if fits and late else view

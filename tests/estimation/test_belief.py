@@ -39,7 +39,7 @@ def test_signs() -> None:
 
 def test_units_and_gears() -> None:
     for name in ("joint_position_rad", "motor_position_rad"):
-        (said, *_) = suspicions(JOINT, {**COLUMNS, name: np.degrees(COLUMNS[name])})
+        (said,) = suspicions(JOINT, {**COLUMNS, name: np.degrees(COLUMNS[name])})
         assert said.text.startswith(f"{name} seems to be in degrees")
     (gear,) = suspicions(JOINT, {**COLUMNS, "motor_position_rad": 8.0 * COLUMNS["motor_position_rad"]})
     assert (gear.kind, gear.numbers["slope_over_ratio"]) == ("ratio", pytest.approx(1.0 / 8.0, rel=1e-2))
@@ -48,7 +48,7 @@ def test_units_and_gears() -> None:
 
 def test_both_angles_in_degrees() -> None:
     both = {n: np.degrees(COLUMNS[n]) for n in ("joint_position_rad", "motor_position_rad")}
-    assert ("unit", "joint_position_rad") in kinds(**both)
+    assert kinds(**both) == [("unit", "joint_position_rad")]
 
 
 @pytest.mark.parametrize("late_s", [0.1, -0.1])
