@@ -168,10 +168,10 @@ class Thresholds:
     """Draws of blocks for `selected_in` and for the model confidence set."""
     rival: float = 0.10
     """Level of the model confidence set: models that are as good in a tenth of resampled bodies of data stay in."""
-    law_reach: float = 1.05
+    law_reach: float = 1.15
     """Reach in a channel of one recording over that of the next smaller, from which a law without a name by this
     channel has to hold where recordings of such a reach are left out (the jaw: a curve by load made 50 % left out worse
-    by two thirds, and 40 % by a sixth)."""
+    by two thirds, and 40 % by a sixth; its loads lie a quarter and more apart, its two sessions' angles 6 %)."""
 
     # --- verdict and names
     followed: float = 0.9
