@@ -169,11 +169,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 1
         every = list(mutants(module, text))
         every = random.Random(1).sample(every, min(asked.most, len(every)))
-        left = [m.key for m in every if not killed(module, m.text)]
+        left = []
+        for k, mutant in enumerate(every):
+            if not killed(module, mutant.text):
+                left.append(mutant.key)
+                word = "explained" if mutant.key in accounted else "SURVIVES"
+                print(f"  {k + 1} of {len(every)}, {word}: {mutant.key}", flush=True)
         share = 1.0 - len(left) / len(every)
         print(f"{name}: {len(every)} mutants, {100.0 * share:.1f} % killed", flush=True)
-        for key in left:
-            print(f"  {'explained' if key in accounted else 'SURVIVES'}: {key}", flush=True)
         fine = fine and share >= LEAST_KILLED and accounted.issuperset(left)
     return 0 if fine else 1
 
