@@ -19,6 +19,7 @@ from cablecomp.links.mit import P_TOP, V_TOP, MitRange, Packed, clipping, count
 from cablecomp.links.records import EXTENDED, Frame
 
 POSITION_PER_DEG: Final = 10_000.0
+STATUS_STEP_DEG: Final = 0.1
 CURRENT_PER_A: Final = 1000.0
 INT32: Final = 2**31 - 1
 _INT: Final = Struct(">i")
@@ -130,4 +131,4 @@ def parse_status(data: bytes) -> Status:
     if len(data) != 8:
         raise InputError(f"CubeMars status: {len(data)} bytes; 8 are accepted")
     position, velocity, current, temperature, error = _STATUS.unpack(data)
-    return Status(0.1 * position, 10.0 * velocity, 0.01 * current, temperature, error)
+    return Status(STATUS_STEP_DEG * position, 10.0 * velocity, 0.01 * current, temperature, error)

@@ -122,6 +122,7 @@ class Cia402Drive:
             per_turn_s = device.velocity_counts_per_turn_s / _TURN
         thousandths = 1e3 / device.rated_torque_Nm
         self._position = chain(Linear(1 / per_turn), gear.from_shaft("motor_position_rad"))
+        readings.motor_step_rad = abs(self._position.gain)
         self._velocity = chain(Linear(1 / per_turn_s), gear.from_shaft("motor_velocity_rad_s"))
         self._torque = chain(Linear(1 / thousandths), gear.from_shaft("motor_torque_Nm"))
         self._to = {

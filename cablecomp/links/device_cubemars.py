@@ -79,6 +79,7 @@ class CubeMarsDrive:
         gear = Gear(end)
         erpm = 2 * pi / 60 / turns
         self._position = chain(Linear(pi / 180), gear.from_shaft("motor_position_rad"))
+        readings.motor_step_rad = cubemars.STATUS_STEP_DEG * abs(self._position.gain)
         self._velocity = chain(Linear(erpm), gear.from_shaft("motor_velocity_rad_s")).gain
         self._torque = chain(Linear(per_A), gear.from_shaft("motor_torque_Nm")).gain
         self._current = gear.from_shaft("motor_current_A").gain

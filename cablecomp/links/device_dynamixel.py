@@ -121,6 +121,7 @@ class DynamixelDrive:
                 (TEMPERATURE, 1.0, "temperature_degC"),
             )
         )
+        readings.motor_step_rad = position / end.gear_ratio
         self._to = {
             Mode.POSITION: chain(gear.position(), Linear(1 / position)),
             Mode.VELOCITY: Linear(gear.velocity() / velocity),

@@ -118,6 +118,7 @@ class MitDrive:
         )
         # value = gain * count + offset, calibration and count-to-value in one
         self._p = (position.gain * 2 * p / mit.P_TOP, position.offset - position.gain * p)
+        self._readings.motor_step_rad = abs(self._p[0])
         self._v = (velocity.gain * 2 * v / mit.V_TOP, -velocity.gain * v)
         self._t = (torque.gain * 2 * t / mit.V_TOP, -torque.gain * t)
         self._to_position = gear.position()

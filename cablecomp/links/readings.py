@@ -124,8 +124,9 @@ class JointReadings:
     `values` SI, at the pulleys (NaN = never came); `arrived_s` by the caller's clock (NaN = never);
     `device_s` by the device's own clock (NaN = not stamped); `updates` counts values taken. `saturated`:
     CLIP_* bits of the last drive reply; `state`, `error`: the drive's; `sensor_flags`: the sensor node's, as
-    it sends them. `sent`, `replies`, `unanswered`: commands sent, drive replies taken, commands sent since
-    the last reply. `messages`: statistics of each message.
+    it sends them. `motor_step_rad`: what the drive rounds its position to (0 = hardly at all). `sent`, `replies`,
+    `unanswered`: commands sent, drive replies taken, commands sent since the last reply. `messages`: statistics of
+    each message.
     """
 
     __slots__ = (
@@ -133,6 +134,7 @@ class JointReadings:
         "device_s",
         "error",
         "messages",
+        "motor_step_rad",
         "name",
         "others",
         "replies",
@@ -156,6 +158,7 @@ class JointReadings:
         self.state = DriveState.UNKNOWN
         self.error = 0
         self.sensor_flags = 0
+        self.motor_step_rad = 0.0
         self.saturated = 0
         self.sent = 0
         self.replies = 0

@@ -81,7 +81,8 @@ class Checked(NamedTuple):
 class Health:
     """Watches one joint. `needs_torque`, `needs_joint`: channels that the feed-forward lives on;
     `others`: places of the further channels that the observer reads, in its order; `preload_Nm`: by which an
-    open circuit's pretension pulls at the motor.
+    open circuit's pretension pulls at the motor; `motor_step_rad`: what the drive rounds its position to, so that a
+    motor that moves by less shows no change.
 
     Motor position, joint torque, joint position are held at their last plausible value; all else passes
     as it came.
@@ -98,10 +99,11 @@ class Health:
         needs_joint: bool = False,
         others: tuple[int, ...] = (),
         preload_Nm: float = 0.0,
+        motor_step_rad: float = 0.0,
     ) -> None:
         o = options
         limit = inf if o.torque_max_Nm is None else o.torque_max_Nm
-        self.motor = Channel(o.motor_rate_rad_s, 0.002, fresh_s)
+        self.motor = Channel(o.motor_rate_rad_s, 0.002 + motor_step_rad, fresh_s)
         self.joint = Channel(o.joint_rate_rad_s, 0.002, fresh_s)
         self.torque = Channel(o.torque_rate_Nm_s, 0.05, fresh_s, limit)
         self._channels = (
@@ -121,7 +123,7 @@ class Health:
         self._others = others
         self._unanswered = o.unanswered
         self._lead_rad = inf if o.lead_rad is None else o.lead_rad
-        self._stuck_rad = inf if o.stuck_rad is None else o.stuck_rad
+        self._stuck_rad = inf if o.stuck_rad is None else o.stuck_rad + 2.0 * motor_step_rad
         self._mismatch_Nm = inf if o.torque_mismatch_Nm is None else o.torque_mismatch_Nm
         self._residual = Sustained(o.confirm_s)
         self._far = Sustained(_FAR_S)

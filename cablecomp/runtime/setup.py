@@ -149,6 +149,7 @@ def joint_setup(
         needs_joint=both,
         others=_places(bus.joints[c.place], observer.channels),
         preload_Nm=compensator.preload_Nm,
+        motor_step_rad=bus.joints[c.place].motor_step_rad,
     )
     limits = GateLimits.of(c.config.limits, bus.wire(c.place), age_s=times.motor_stop_s)
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)

@@ -229,6 +229,20 @@ def test_a_motor_is_stuck_once_it_is_heard_to_stand_while_its_target_went_far() 
     assert fed.cycle(target=0.9 + 1.1 / 64, **moved).fatal
 
 
+def test_a_motor_that_follows_is_neither_stuck_nor_jumping_however_coarsely_its_drive_tells() -> None:
+    """It trails its target by 1/64 rad, and is told in steps of 1/32 rad."""
+    step, wanted = 1 / 32, options(stuck_rad=1 / 64, motor_rate_rad_s=1.0)
+    coarse, unknown = Fed(wanted, motor_step_rad=step), Fed(wanted)
+    flags, mistaken = set(), set()
+    for k in range(200):
+        target = 0.001 * k
+        told = {**ALL, "motor": step * round((target - 1 / 64) / step)}
+        flags.add(coarse.cycle(target=target, **told).flags)
+        mistaken.add(unknown.cycle(target=target, **told).flags)
+    assert flags == {0}
+    assert max(mistaken) & (h.MOTOR_STUCK | h.MOTOR_JUMP)
+
+
 @pytest.mark.parametrize("preload_Nm", [0.0, 0.5])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_joint_torque_and_motor_torque_have_to_balance(sign: float, preload_Nm: float) -> None:
