@@ -9,7 +9,7 @@ from pathlib import Path
 from firmware_sim.bench import Bench, Stepping
 from firmware_sim.errors import SimError
 from firmware_sim.faults import DeviceFault, Fault, FaultyPort, LineFault, WireFault
-from firmware_sim.firmware import DriveConfig, Mode, SensorNodeConfig
+from firmware_sim.firmware import DriveConfig, Gearbox, Mode, SensorNodeConfig
 from firmware_sim.joint import SimulatedJoint, Timing
 from firmware_sim.plantlike import PlantLike
 from firmware_sim.ports.base import Port
@@ -33,7 +33,7 @@ MakePlant = Callable[[int], PlantLike]
 @dataclass(frozen=True)
 class BenchConfig:
     """What a bench consists of, apart from its plants and its port; `gains_per_turn`: a moteus's own kp and kd
-    (N m/turn, N m s/turn); `units`: of a CiA 402 drive."""
+    (N m/turn, N m s/turn); `units`: of a CiA 402 drive; `drive`: at its own shaft, on the far side of `gearbox`."""
 
     protocol: str = "mit"
     joints: int = 1
@@ -46,6 +46,7 @@ class BenchConfig:
     gains_per_turn: tuple[float, float] = (4.0, 0.05)
     units: Units = field(default_factory=Units)
     drive: DriveConfig = field(default_factory=DriveConfig)
+    gearbox: Gearbox = field(default_factory=Gearbox)
     sensor: SensorNodeConfig = field(default_factory=SensorNodeConfig)
     timing: Timing = field(default_factory=Timing)
     stepping: Stepping = "command"
@@ -104,6 +105,7 @@ def make_bench(config: BenchConfig, make_plant: MakePlant, port: Port, faults: S
             replace(config.sensor, status_phase=number - 1),
             config.timing,
             device,
+            config.gearbox,
         )
         for number in range(1, config.joints + 1)
     ]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from firmware_sim.errors import SimError
 from firmware_sim.faults.device import DeviceFault, Node
-from firmware_sim.firmware import Drive, DriveConfig, Request, SensorNode, SensorNodeConfig
+from firmware_sim.firmware import Drive, DriveConfig, Gearbox, Request, SensorNode, SensorNodeConfig
 from firmware_sim.plantlike import PlantLike, Readings, readings_of
 from firmware_sim.wire.base import Answer, DriveWire
 from firmware_sim.wire.frame import Frame
@@ -63,6 +63,7 @@ class SimulatedJoint:
         sensor: SensorNodeConfig | None = None,
         timing: Timing | None = None,
         faults: Iterable[DeviceFault] = (),
+        gearbox: Gearbox | None = None,
     ) -> None:
         self.number = number
         self.plant = plant
@@ -70,6 +71,7 @@ class SimulatedJoint:
         self.drive = Drive(DriveConfig() if drive is None else drive)
         self.node = SensorNode(SensorNodeConfig() if sensor is None else sensor)
         self.timing = Timing() if timing is None else timing
+        self.gearbox = Gearbox() if gearbox is None else gearbox
         self.faults = tuple(f for f in faults if f.joint in (0, number))
         self.truth: Readings | None = None
         self.lost_s = 0.0
@@ -119,7 +121,8 @@ class SimulatedJoint:
         self._resets()
         command = 0.0
         if self._seen is not None:
-            command = self.drive.update(self._seen, self.timing.step_s, self.time_s)
+            shaft = self.gearbox.at_shaft(self._seen)
+            command = self.gearbox.at_pulley(self.drive.update(shaft, self.timing.step_s, self.time_s))
         for fault in self.faults:
             command = fault.torque(command, self.time_s)
         self.truth = readings_of(self.plant.step(self.timing.step_s, command))
@@ -128,7 +131,7 @@ class SimulatedJoint:
         for fault in self.faults:
             seen = fault.sense(seen, self.time_s)
         self._seen = seen
-        self.drive.observe(seen)
+        self.drive.observe(self.gearbox.at_shaft(seen))
         return self._publish(seen) if self._steps % self.timing.steps_per_sample == 0 else []
 
     def _publish(self, seen: Readings) -> list[Frame]:

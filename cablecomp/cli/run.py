@@ -34,6 +34,7 @@ from cablecomp.control.protocol import Protocol, load_protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
 from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.load import load_link
+from cablecomp.links.schema import LinkConfig, SerialBus
 from cablecomp.report.page import CSS
 from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.clock import Tick
@@ -47,6 +48,8 @@ from cablecomp.runtime.ways_out import WaysOut
 
 CALIBRATE = Path("calibrate")
 """The protocol of this name comes with the project."""
+SIMULATED = ("virtual", "udp_multicast", "slcan")
+"""Interfaces whose other end a simulated joint can take without hardware."""
 
 
 def run(
@@ -54,7 +57,8 @@ def run(
     link: Annotated[
         Path | None,
         typer.Option(
-            help="link file (TOML) or the name of an example; with --sim a bus inside of the process"
+            help="link file (TOML) or the name of an example; with --sim a bus inside of this process stands "
+            "for a CAN adapter"
         ),
     ] = None,
     sim: Annotated[
@@ -108,6 +112,7 @@ def run(
     """
     joint = read_joint(config, effects)
     bus = load_link(DEMO_LINK if link is None else link)
+    bus = _rehearsed(bus, errors()) if sim else bus
     wanted = control_of(control, joint, None if sim else stated_gains(bus))
     bus, wanted = matched(bus, wanted, own_link=not sim)
     if link is None and not sim:
@@ -147,6 +152,15 @@ def run(
             if simulation is not None:
                 simulation.close()
         _finish(report, joint, config, beside, as_json)
+
+
+def _rehearsed(link: LinkConfig, said: Console) -> LinkConfig:
+    """The link as a simulated joint can sit on it: a bus inside of this process stands for a CAN adapter."""
+    bus = link.bus
+    if isinstance(bus, SerialBus) or bus.interface in SIMULATED:
+        return link
+    said.print(f"--sim: a bus inside of this process stands for {bus.interface} {bus.channel}")
+    return link.redirect("virtual", f"{link.name}, rehearsed")
 
 
 def _asked(
@@ -237,14 +251,12 @@ def _show(report: RunReport) -> None:
         if joint.cycles == 0:
             table.add_row(joint.name, "never under control")
             continue
-        true = (
-            ""
-            if joint.true_position_rad != joint.true_position_rad
-            else f", true {1e3 * joint.true_position_rad:.4f}"
-        )
-        table.add_row(f"{joint.name}: position error, RMS", f"{1e3 * joint.position_rad:.4f} mrad{true}")
-        table.add_row(f"{joint.name}: deflection, RMS", f"{1e3 * joint.deflection_rad:.4f} mrad")
-        table.add_row(f"{joint.name}: prediction residual, RMS", f"{1e3 * joint.residual_rad:.4f} mrad")
+        true = ""
+        if joint.true_position_rad == joint.true_position_rad:
+            true = f", true {1e3 * joint.true_position_rad:.4f}"
+        table.add_row(f"{joint.name}: position error, RMS", f"{_mrad(joint.position_rad)}{true}")
+        table.add_row(f"{joint.name}: deflection, RMS", _mrad(joint.deflection_rad))
+        table.add_row(f"{joint.name}: prediction residual, RMS", _mrad(joint.residual_rad))
         if joint.torque_Nm == joint.torque_Nm:
             table.add_row(
                 f"{joint.name}: torque error, RMS",
@@ -253,3 +265,7 @@ def _show(report: RunReport) -> None:
     for name, words in report.timing.rows():
         table.add_row(name, words)
     console.print(table)
+
+
+def _mrad(angle_rad: float) -> str:
+    return "not measured" if angle_rad != angle_rad else f"{1e3 * angle_rad:.4f} mrad"

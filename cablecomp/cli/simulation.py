@@ -25,7 +25,7 @@ from cablecomp.runtime.simulated import Simulation, SimulationWish
 from firmware_sim.build import BenchConfig
 from firmware_sim.errors import SimError
 from firmware_sim.faults import parse_fault
-from firmware_sim.firmware import DriveConfig
+from firmware_sim.firmware import DriveConfig, Gearbox
 from firmware_sim.hosted import OFF_NOMINAL, HostedJoints, HostedSpec, off_nominal
 from firmware_sim.joint import Timing
 from firmware_sim.plant import LinkSpec, MotorSpec, PlantConfig
@@ -42,12 +42,13 @@ def start_simulation(joint: Path, wish: SimulationWish) -> Simulation:
     torque = float(data.get("limits", {}).get("motor_torque_max_Nm", math.nan))
     torque = torque if torque == torque else 20.0 * motor.stiffness_Nm_per_rad * 0.01 + 1.0
     travel = _travel(data)
+    bench = _bench(wish, torque, one_sided=data.get("drive", {}).get("circuit") == "open")
     try:
         spec = HostedSpec(
             data,
             _bus(wish.link),
-            _bench(wish, torque, one_sided=data.get("drive", {}).get("circuit") == "open"),
-            _motor(motor, torque),
+            bench,
+            _motor(motor, torque, bench.torque_constant * abs(bench.gearbox.turns)),
             LinkSpec(motor.output_inertia_kgm2, 0.0, 0.0, motor.output_viscous_Nms_per_rad),
             seed=wish.seed,
             off_nominal_seed=wish.seed if wish.off_nominal else None,
@@ -76,12 +77,14 @@ class _Joints(HostedJoints):
             raise DeviceError(f"simulated joint: {error}") from None
 
 
-def _motor(motor: MotorModel, torque: float) -> MotorSpec:
+def _motor(motor: MotorModel, torque: float, per_A: float) -> MotorSpec:
+    """The motor as seen at the input pulley; `per_A`: torque there per ampere."""
     return MotorSpec(
         motor.inertia_kgm2,
         torque,
         motor.viscous_Nms_per_rad,
         motor.coulomb_Nm,
+        torque_constant_Nm_per_A=per_A,
         current_bandwidth_Hz=motor.torque_bandwidth_Hz,
     )
 
@@ -90,21 +93,29 @@ def _bench(wish: SimulationWish, torque: float, *, one_sided: bool) -> BenchConf
     ends = wish.link.joint[0]
     if ends.motor is None:
         raise InputError(f"joint `{ends.name}` has no motor on this link; add [joint.motor]")
-    if ends.motor.gear_ratio != 1.0 or ends.motor.sign != 1 or ends.motor.position_offset_rad != 0.0:
-        raise InputError(
-            "--sim: the simulated drive sits at the input pulley; leave gear_ratio, sign and offset out"
-        )
-    device = wish.link.device_of(ends.motor)
-    drive = DriveConfig(torque_limit_Nm=torque)
-    if one_sided:  # the pretension pulls at the motor: it needs a brake before it is enabled, and afterwards
-        motor = wish.control.motor
-        drive = DriveConfig(
-            torque_limit_Nm=torque,
-            fault_damping_Nms_per_rad=motor.damping_Nms_per_rad,
-            brake_Nm_per_rad=motor.stiffness_Nm_per_rad,
-        )
-    made = _bench_of(device, ends.motor)
-    return replace(made, joints=wish.joints, drive=drive, timing=_timing(wish.link.rate_Hz))
+    made = _bench_of(wish.link.device_of(ends.motor), ends.motor)
+    return replace(
+        made,
+        joints=wish.joints,
+        drive=_drive(wish.control.motor, torque, ends.motor.gear_ratio, one_sided=one_sided),
+        gearbox=Gearbox(ends.motor.sign * ends.motor.gear_ratio, ends.motor.position_offset_rad),
+        timing=_timing(wish.link.rate_Hz),
+    )
+
+
+def _drive(motor: MotorModel, torque: float, gear: float, *, one_sided: bool) -> DriveConfig:
+    """A drive that holds its motor as the model says; its own numbers are those at its shaft."""
+    stiffness, damping = motor.stiffness_Nm_per_rad / gear**2, motor.damping_Nms_per_rad / gear**2
+    made = DriveConfig(
+        torque_limit_Nm=torque / gear,
+        velocity_limit_rad_s=gear * DriveConfig.velocity_limit_rad_s,
+        position_gain_per_s=stiffness / damping,
+        velocity_gain_Nms_per_rad=damping,
+    )
+    if not one_sided:
+        return made
+    # the pretension pulls at the motor: it needs a brake before it is enabled, and afterwards
+    return replace(made, fault_damping_Nms_per_rad=damping, brake_Nm_per_rad=stiffness)
 
 
 def _timing(rate_Hz: float) -> Timing:
@@ -124,7 +135,8 @@ def _bench_of(device: Device, end: MotorEnd) -> BenchConfig:
         gains = (device.kp_Nm_per_turn or 4.0, device.kd_Nms_per_turn or 0.05)
         return BenchConfig(protocol="moteus", gains_per_turn=gains)
     if isinstance(device, CanSimpleDevice):
-        return BenchConfig(protocol="odrive", firmware=device.firmware)
+        per_A = device.torque_constant_Nm_per_A or BenchConfig.torque_constant
+        return BenchConfig(protocol="odrive", firmware=device.firmware, torque_constant=per_A)
     if isinstance(device, Cia402Device):
         turn = device.counts_per_turn
         second = device.joint_encoder_counts_per_turn or turn
@@ -148,8 +160,7 @@ def _bus(link: LinkConfig) -> str:
         port = bus.options.get("port")
         return f"udp_multicast:{bus.channel}" + (f":{port}" if port is not None else "")
     raise InputError(
-        f"--sim: link `{link.name}` is on a {bus.interface} bus; virtual, udp_multicast, slcan and serial are "
-        "accepted; start `python -m firmware_sim` on the other end of that bus instead"
+        f"link `{link.name}` is on a {bus.interface} bus; virtual, udp_multicast, slcan and serial are accepted"
     )
 
 

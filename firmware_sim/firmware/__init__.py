@@ -5,6 +5,7 @@ Imports what it asks of a plant (`plantlike.py`) and errors alone. Start reading
 
 from firmware_sim.firmware.drive import Drive, DriveReport
 from firmware_sim.firmware.drive_config import DriveConfig
+from firmware_sim.firmware.gearbox import Gearbox
 from firmware_sim.firmware.records import (
     DriveFlag,
     DriveState,
@@ -24,6 +25,7 @@ __all__ = [
     "DriveFlag",
     "DriveReport",
     "DriveState",
+    "Gearbox",
     "InputMode",
     "Mode",
     "Request",

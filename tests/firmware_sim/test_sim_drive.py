@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sim_two_mass import TwoMass
 
-from firmware_sim.firmware import Drive, DriveConfig, DriveFlag, DriveState, Mode, Request, Setpoint
+from firmware_sim.firmware import Drive, DriveConfig, DriveFlag, DriveState, Gearbox, Mode, Request, Setpoint
 from firmware_sim.firmware.states import TABLE
 from firmware_sim.plantlike import Readings
 from firmware_sim.scenario import Scenario, plant_maker
@@ -158,6 +158,24 @@ def test_commands_that_are_not_finite_are_refused() -> None:
     drive.command(Setpoint(torque_Nm=math.nan), 0.0)
     assert drive.flags & DriveFlag.BAD_FRAME
     assert drive.update(STILL, STEP, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("turns", [8.0, -3.0])
+def test_a_drive_behind_a_gear_moves_the_pulley_as_one_without(turns: float) -> None:
+    """Its gains are 1/turns^2, its angles turns (q + offset), its torque 1/turns of those at the pulley."""
+    gear, offset = Gearbox(turns, 0.25), 0.25
+    plain, geared, one, other = enabled(), enabled(DriveConfig(torque_limit_Nm=100.0)), TwoMass(), TwoMass()
+    near, far = one.step(STEP, 0.0), other.step(STEP, 0.0)
+    for _ in range(400):
+        plain.command(Setpoint(0.1, 0.0, 0.05, 20.0, 0.2), one.time_s)
+        geared.command(
+            Setpoint(turns * (0.1 + offset), 0.0, 0.05 / turns, 20.0 / turns**2, 0.2 / turns**2), other.time_s
+        )
+        near = one.step(STEP, plain.update(near, STEP, one.time_s))
+        far = other.step(STEP, gear.at_pulley(geared.update(gear.at_shaft(far), STEP, other.time_s)))
+        assert far.motor_position_rad == pytest.approx(near.motor_position_rad, abs=1e-9)
+    assert near.motor_position_rad > 0.05
+    assert geared.position_rad == pytest.approx(turns * (near.motor_position_rad + offset), abs=1e-2)
 
 
 @pytest.mark.parametrize("start", [-0.7, 0.05, 0.7])
