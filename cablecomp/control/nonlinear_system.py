@@ -3,6 +3,7 @@ operators."""
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import control
@@ -40,6 +41,8 @@ def to_nlsys(
     frequency responses are quick; what turning of the drums does to the history is not in it. Its error on the loops
     that it was fitted to is `params["rms_rad"]`. Raises InputError.
     """
+    if not 0.0 < period_s < inf:
+        raise InputError(f"period_s is {period_s}; a time above 0 s is accepted")
     if states is None:
         return _exact(config, period_s, name)
     if not 1 <= states <= 64:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +41,7 @@ class StiffnessRange(NamedTuple):
 def greatest_load(config: JointConfig, load_max_Nm: float | None = None) -> float:
     """The load to design for: as given, else the joint's limit, else half of what slackens a cable (R T0)."""
     if load_max_Nm is not None:
-        if not load_max_Nm > 0.0:
+        if not 0.0 < load_max_Nm < inf:
             raise InputError(f"load_max_Nm is {load_max_Nm}; a number above 0 is accepted")
         return load_max_Nm
     if config.limits.joint_torque_max_Nm is not None:

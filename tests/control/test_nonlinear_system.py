@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import control
@@ -111,3 +112,15 @@ def test_what_tries_states_of_its_own_is_sent_to_the_reduced_system() -> None:
 def test_a_number_of_states_that_makes_no_sense_is_refused(states: int) -> None:
     with pytest.raises(InputError, match="1 to 64"):
         to_nlsys(JOINT, states=states)
+
+
+@pytest.mark.parametrize("time_s", [0.0, -1e-3, math.nan, math.inf])
+def test_a_period_that_is_no_time_is_refused(time_s: float) -> None:
+    with pytest.raises(InputError, match="period_s"):
+        to_nlsys(JOINT, time_s)
+
+
+@pytest.mark.parametrize("load_Nm", [0.0, math.nan, math.inf])
+def test_a_load_that_none_is_fitted_to_is_refused(load_Nm: float) -> None:
+    with pytest.raises(InputError, match="load_max_Nm"):
+        to_nlsys(JOINT, states=4, load_max_Nm=load_Nm)
