@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markdown import Markdown
 from rich.table import Table
 
+from cablecomp.durable import write_durably
 from cablecomp.errors import InputError
 from cablecomp.guide.topics import names, text_of, title_of
 
@@ -26,7 +27,7 @@ def show_guide(
         from cablecomp.guide.page import guide_page  # brings the look of all pages, and so plotly
 
         try:
-            html.write_text(guide_page(), encoding="utf-8")
+            write_durably(html, guide_page().encode())
         except OSError as error:
             raise InputError(f"{html}: cannot be written ({error.strerror}); give another file") from None
         console.print(f"guide: {html}", soft_wrap=True)

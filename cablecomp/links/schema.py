@@ -133,6 +133,11 @@ class LinkConfig(Frozen):
 
     @model_validator(mode="after")
     def _references(self) -> Self:
+        if self.timeouts.hold_s < 1.0 / self.rate_Hz:
+            raise ValueError(
+                f"timeouts.hold_s is {self.timeouts.hold_s:g} s, so that nothing that comes once in a period of "
+                f"rate_Hz = {self.rate_Hz:g} stays fresh; {1.0 / self.rate_Hz:g} s or more are accepted"
+            )
         ids = [d.id for d in self.device]
         _distinct("device.id", ids)
         _distinct("joint.name", [j.name for j in self.joint])

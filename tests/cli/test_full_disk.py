@@ -25,6 +25,7 @@ COMMANDS = {
     "gzip": ["convert", "a.csv", "out.csv.gz"],
     "parquet": ["convert", "a.csv", "out.parquet"],
     "npz": ["convert", "a.csv", "out.npz"],
+    "guide": ["guide", "--html", "guide.html"],
     "inspect": ["inspect", "a.csv", "--save"],
     "example": ["example", "links/wrist-virtual"],
     "init": ["init", *(word for answer in ANSWERS for word in ("--set", answer))],

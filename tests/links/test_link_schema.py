@@ -45,6 +45,7 @@ def test_there_is_one_for_every_kind_of_wire() -> None:
         ('model = "AK80-9"', 'model = "AK81"', "unknown MIT model `AK81`"),
         ("node = 1\nreply_id = 0", 'node = "1"\nreply_id = 0', "node"),
         ("hold_s = 0.01", "hold_s = 0.3", "hold_s < fade_s <= stop_s"),
+        ("rate_Hz = 1000.0", "rate_Hz = 50.0", "0.02 s or more are accepted"),
         ("hold_s = 0.01", "hold_s = -1", "hold_s"),
         ("hold_s = 0.01", "hold_s = nan", "hold_s"),
         ('device = "drive"', 'device = "driver"', "accepted: drive, joint-node"),
