@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 from rich.console import Console
@@ -19,7 +19,7 @@ from cablecomp.errors import InputError
 from cablecomp.fleet.fleet import Work, run_fleet
 from cablecomp.fleet.places import nights
 from cablecomp.recording.atomic import atomic_file
-from cablecomp.report.fleet_page import fleet_page, fleet_table
+from cablecomp.report.fleet_page import failures, fleet_page, fleet_table
 
 WorkersOption = Annotated[
     int | None,
@@ -32,6 +32,8 @@ WorkersOption = Annotated[
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", help="a fleet, worked on by the Dask cluster at this address")
 ]
+_MOST: Final = 6
+"""Failed nights that the terminal names."""
 
 
 def asked_for(workers: int | None, scheduler: str | None) -> Workers | None:
@@ -65,6 +67,11 @@ def work_fleet(
         echo_json({**asdict(found), "report": out / "fleet.html"})
     else:
         console.print(fleet_table(found))
+        failed = failures(found)
+        for line in failed[:_MOST]:
+            console.print(f"failed: {line}", soft_wrap=True)
+        if len(failed) > _MOST:
+            console.print(f"failed: {len(failed) - _MOST} more, which the report names")
         if found.reused:
             console.print(f"{found.reused} nights were there already")
         console.print(f"report: {out / 'fleet.html'}", soft_wrap=True)

@@ -46,7 +46,7 @@ def design_tables(design: LoopDesign) -> RenderableType:
         head.add_row(name, value)
     table = Table(title="Margins over the stiffness range")
     for name in MARGINS:
-        table.add_column(name, justify="left" if name == "loop" else "right")
+        table.add_column(name, justify="left" if name == "loop" else "right", overflow="fold")
     for loop in design.loops:
         for row in margin_rows(loop):
             table.add_row(*row, style="red" if row[-1] == "no" else "")

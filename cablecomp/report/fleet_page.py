@@ -23,9 +23,7 @@ _ANGLES: Final[Mapping[str, str]] = {
 
 def fleet_table(fleet: Fleet) -> Table:
     """What `replay` and `diagnose` print of a fleet."""
-    table = Table(
-        title=f"{len(fleet.joints)} joints, {len(fleet.rows)} nights", title_justify="left", box=None
-    )
+    table = Table(title=_counted(fleet), title_justify="left", box=None)
     for name in ("joint", "nights", "failed", "what", "seen"):
         table.add_column(name, justify="right" if name in ("nights", "failed") else "left")
     for j in _worst_first(fleet):
@@ -38,8 +36,18 @@ def fleet_table(fleet: Fleet) -> Table:
 
 def fleet_page(fleet: Fleet, command: str) -> str:
     """The page as HTML that opens offline; `command` made it."""
-    lead = f"{len(fleet.joints)} joints, {len(fleet.rows)} nights, each by itself: {fleet.work}."
+    lead = f"{_counted(fleet)}, each by itself: {fleet.work}."
     return page.page("Fleet", lead, _sections(fleet, command))
+
+
+def failures(fleet: Fleet) -> list[str]:
+    """Which nights failed, and why, a line each."""
+    return [f"{row['joint']}/{row['night']}: {row['failed']}" for row in fleet.rows if row["failed"]]
+
+
+def _counted(fleet: Fleet) -> str:
+    counts = ((len(fleet.joints), "joint"), (len(fleet.rows), "night"))
+    return ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for n, what in counts)
 
 
 def _worst_first(fleet: Fleet) -> list[JointStory]:
@@ -68,8 +76,9 @@ def _sections(fleet: Fleet, command: str) -> Iterator[Section]:
             f"Zero and compliance of each night, worst joints first.{more}",
         )
     if failed:
-        lines = [f"{row['joint']}/{row['night']}: {row['failed']}" for row in failed]
-        yield Section("What failed", page.bullets(lines), "Tried again when the command is given again.")
+        yield Section(
+            "What failed", page.bullets(failures(fleet)), "Tried again when the command is given again."
+        )
     yield Section(
         "Every night", page.fold(f"{len(fleet.rows)} rows", _all_rows(fleet.rows)) + page.code(command)
     )

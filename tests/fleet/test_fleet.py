@@ -15,7 +15,7 @@ from cablecomp.fleet.change import EVIDENCE, change
 from cablecomp.fleet.fleet import run_fleet
 from cablecomp.fleet.places import Night, nights
 from cablecomp.fleet.rows import Compliance, Parts
-from cablecomp.report.fleet_page import FLAGS, _over_nights, fleet_page, fleet_table
+from cablecomp.report.fleet_page import FLAGS, _over_nights, failures, fleet_page, fleet_table
 
 rng = np.random.default_rng(7)
 
@@ -67,6 +67,9 @@ def test_each_joint_is_told_by_what_it_does(tmp_path: Path, made_up: list[str]) 
     text = fleet_page(found, "cablecomp replay in --workers 2")
     assert all(word in text for word in (*FLAGS, "is cut off", "night-04.csv on"))
     assert fleet_table(found).row_count == 4
+    (failed,) = failures(found)
+    assert "/night-03.csv: " in failed
+    assert "is cut off" in failed
     layout = _over_nights(found, "fraying").layout
     assert [axis.title.text.partition(" /")[0] for axis in (layout.xaxis, layout.yaxis, layout.yaxis2)] == [
         "night", "zero", "compliance",
