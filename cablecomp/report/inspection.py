@@ -85,7 +85,8 @@ def _show_quality(seen: Inspection, console: Console) -> None:
     )
     table = Table(box=None)
     for name in ("channel", "least", "greatest", "noise", "step", "odd"):
-        table.add_column(name, justify="left" if name in ("channel", "odd") else "right")
+        left, whole = name in ("channel", "odd"), name == "channel"
+        table.add_column(name, justify="left" if left else "right", no_wrap=whole, overflow="fold")
     for c in seen.channels:
         noise = "–" if c.noise is None else f"{'≥ ' if c.coloured else ''}{c.noise:.3g}"
         step = f"{c.step:.3g}" if c.step else "–"
@@ -102,7 +103,7 @@ def _odd(c: ChannelQuality, seen: Inspection) -> list[str]:
     found = []
     if c.least == c.greatest:
         found.append("constant")
-    elif c.stuck_s > 0.05 * seen.duration_s:
+    elif c.stuck_s > 0.05 * seen.duration_s and not c.name.startswith("other_"):  # no sensor of the drive's
         found.append(f"rests {c.stuck_s:.3g} s while the motor moves: stuck?")
     if c.clipped > 0.0:
         found.append(f"clipped in {100 * c.clipped:.2g} % of the rows")
