@@ -65,3 +65,10 @@ class Drive(Frozen):
     def ratio(self) -> float:
         """Joint angle over motor angle of the rigid drive: product of r/R over the stages (thesis, 6-2)."""
         return math.prod(stage.ratio for stage in self.stage)
+
+    @property
+    def preload_Nm(self) -> float:
+        """Torque (at the input pulley) by which an open circuit's pretension pulls at the motor: r T0, for the external
+        moment is counted from the pretensioned state; 0 in a closed circuit, whose cables balance."""
+        first = self.stage[0]
+        return first.input_radius_m * first.pretension_N if self.circuit == "open" else 0.0

@@ -66,14 +66,6 @@ def given_gains(options: CompensatorOptions) -> Gains | None:
     return None if any(value is None for value in found) else Gains(*found)
 
 
-def preload_of(config: JointConfig) -> float:
-    """Torque (Nm, at the input pulley) by which an open circuit's pretension pulls at the motor: r T0, for the
-    external moment is counted from the pretensioned state; 0 in a closed circuit, whose cables balance.
-    """
-    first = config.drive.stage[0]
-    return first.input_radius_m * first.pretension_N if config.drive.circuit == "open" else 0.0
-
-
 class Compensator:
     """Controls one joint; the state is in the open attributes, time comes with the sample.
 
@@ -99,7 +91,7 @@ class Compensator:
         self.gains = gains_of(options, gains)
         self.observer = observer
         self.ratio = config.drive.ratio
-        self.preload_Nm = preload_of(config)
+        self.preload_Nm = config.drive.preload_Nm
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = Ahead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
@@ -231,7 +223,8 @@ class Compensator:
         if source == "encoders":
             return self.observer.step_inverse(sample)
         if source == "motor_torque":
-            sample = sample._replace(joint_torque_Nm=-sample.motor_torque_Nm / self.ratio)
+            load_Nm = -(sample.motor_torque_Nm + self.preload_Nm) / self.ratio
+            sample = sample._replace(joint_torque_Nm=load_Nm)
         return self.observer.step(sample)
 
     def _force(self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate) -> Command:

@@ -20,8 +20,8 @@ def block_of(config: JointConfig, channels: Sequence[str], columns: Mapping[str,
     read.motor[:] = columns["motor_position_rad"]
     source, sensors = config.observer.load, config.sensors
     if source == "motor_torque":
-        torque = _need(columns, "motor_torque_Nm") - sensors.motor_torque_offset_Nm
-        read.load[:] = -torque / config.drive.ratio
+        zero = sensors.motor_torque_offset_Nm - config.drive.preload_Nm
+        read.load[:] = -(_need(columns, "motor_torque_Nm") - zero) / config.drive.ratio
     elif source == "none":
         read.load[:] = sensors.joint_torque_offset_Nm
     elif source == "joint_torque":

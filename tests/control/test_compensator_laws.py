@@ -12,7 +12,7 @@ import pytest
 
 from cablecomp.config import load_joint
 from cablecomp.control.command import FULL, Feed, Reference
-from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains, preload_of
+from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
 from cablecomp.control.shaping import Ahead, Bump, Slope
 from cablecomp.errors import InputError
@@ -219,8 +219,8 @@ def test_an_open_circuit_is_held_against_its_pretension_and_a_closed_one_against
     configs = Path(__file__).parents[2] / "configs/joints"
     one_sided, balanced = (load_joint(configs / f"snow-{kind}-rig.toml") for kind in ("open", "closed"))
     stage = one_sided.drive.stage[0]
-    assert preload_of(one_sided) == stage.input_radius_m * stage.pretension_N
-    assert preload_of(balanced) == 0.0
+    assert one_sided.drive.preload_Nm == stage.input_radius_m * stage.pretension_N
+    assert balanced.drive.preload_Nm == 0.0
 
 
 class StepByStep:

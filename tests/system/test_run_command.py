@@ -12,7 +12,6 @@ from fault_runs import CONFIGS, GAINS, JOINT, REACH
 from cablecomp import cli
 from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
-from cablecomp.control.compensator import preload_of
 from cablecomp.control.motors import control_for
 from cablecomp.links.load import load_link
 from cablecomp.runtime.setup import matched
@@ -154,4 +153,4 @@ def test_the_brake_holds_the_pretension_of_an_open_circuit() -> None:
         torque = simulation.bench.joints[0].truth.motor_torque_Nm
     finally:
         simulation.close()
-    assert torque == pytest.approx(-preload_of(joint), rel=0.02)
+    assert torque == pytest.approx(-joint.drive.preload_Nm, rel=0.02)

@@ -1,0 +1,50 @@
+"""The load told by the motor's torque, where no sensor sits at the joint: held against the simulated plant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from joints import WIDE
+
+from cablecomp.config import JointConfig, parse_joint
+from cablecomp.estimation.simulate import load_of
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
+from firmware_sim.plant import PlantConfig, simulate
+
+TIME = np.arange(0.0, 4.0, 0.01)
+MOTOR = 0.6 * np.sin(1.3 * TIME)
+LOAD = 0.8 * np.sin(2.9 * TIME) * (1.0 - np.exp(-TIME))
+
+
+def drive(circuit: str) -> dict[str, object]:
+    return {"schema": 1, "name": circuit, "drive": {"circuit": circuit, "stage": [WIDE]}}
+
+
+def joint(circuit: str, offset_Nm: float) -> JointConfig:
+    more = {"observer": {"load": "motor_torque"}, "sensors": {"motor_torque_offset_Nm": offset_Nm}}
+    return parse_joint({**drive(circuit), **more}, circuit)
+
+
+@pytest.mark.parametrize("offset_Nm", [0.0, 0.02])
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+def test_the_motors_torque_tells_the_load_beside_what_holds_the_pretension(
+    circuit: str, offset_Nm: float
+) -> None:
+    """At rest the motor of an open circuit holds r T0: that is no load."""
+    true = simulate(PlantConfig.from_dict(drive(circuit)), TIME, MOTOR, LOAD)
+    columns = {
+        "time_s": TIME,
+        "motor_position_rad": MOTOR,
+        "motor_torque_Nm": true.channels()["motor_torque_Nm"] + offset_Nm,
+    }
+    config = joint(circuit, offset_Nm)
+    angle = true.channels()["joint_position_rad"]
+    deflection = np.ptp(angle - config.drive.ratio * MOTOR)
+    assert Observer(config).run(columns)["joint_position_rad"] == pytest.approx(angle, abs=0.01 * deflection)
+    one = Observer(config)
+    for k in range(3):
+        step = one.step(Sample(TIME[k], MOTOR[k], 0.0, motor_torque_Nm=columns["motor_torque_Nm"][k]))
+    assert step.joint_position_rad == pytest.approx(angle[2], abs=0.01 * deflection)
+    if offset_Nm == 0.0:
+        assert load_of(config, columns) == pytest.approx(LOAD, abs=0.01)
