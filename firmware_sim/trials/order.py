@@ -23,7 +23,6 @@ from firmware_sim.trials.tabletop import Case, case_in_turn
 T = TypeVar("T")
 
 KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded")
-LAWS = ("catalogue", "other", "mixed")
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:other_cable", "strand_break:fraying", "strand_break:other_cable",
@@ -36,6 +35,8 @@ OTHER_FORMS = tuple(s for s in FORMS if s.id not in ALIKE)
 """What can be concealed of laws that the catalogue does not hold."""
 CATALOGUE_FORMS = (*CATALOGUE, *(s for s in FORMS if s.id in ALIKE))
 """What can be concealed of laws that it holds."""
+LAWS = {"catalogue": CATALOGUE_FORMS, "other": OTHER_FORMS, "mixed": (*CATALOGUE_FORMS, *OTHER_FORMS)}
+"""What can be concealed, by whose laws are asked for."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Wanted:
     def __post_init__(self) -> None:
         for what, given, known in (
             ("kind", self.kinds, KINDS),
-            ("laws", (self.laws,), LAWS),
+            ("laws", (self.laws,), tuple(LAWS)),
             ("imperfections", (self.imperfections,), IMPERFECTIONS),
         ):
             for name in given:
@@ -96,8 +97,7 @@ def form_of(wanted: Wanted, effect: Suspect, place: int) -> Suspect:
     """The law by which an effect goes the `place`-th time: the catalogue's, or one of its other forms in turn."""
     rng = np.random.default_rng([wanted.seed, 5, place])
     known = wanted.laws == "catalogue" or (wanted.laws == "mixed" and rng.uniform() < 0.5)
-    pool = CATALOGUE_FORMS if known else OTHER_FORMS
-    forms = [s for s in pool if s.id.partition(":")[0] == effect.id]
+    forms = [s for s in LAWS["catalogue" if known else "other"] if s.id.partition(":")[0] == effect.id]
     return forms[int(rng.integers(len(forms)))]
 
 

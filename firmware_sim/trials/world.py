@@ -17,7 +17,7 @@ from firmware_sim.trials.history import uneven, with_history
 from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
 from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
 from firmware_sim.trials.measures import PlainDrive
-from firmware_sim.trials.order import CATALOGUE_FORMS, OTHER_FORMS, Order, Wanted, order
+from firmware_sim.trials.order import LAWS, Order, Wanted, order
 from firmware_sim.trials.scene import PAUSE_S, is_slack, plain_scene, usable
 from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
@@ -255,13 +255,10 @@ def _sized(
 
 def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: set[str]) -> Suspect:
     """A further effect that the course can show, of the laws asked for."""
-    laws = {
-        "catalogue": CATALOGUE_FORMS, "other": OTHER_FORMS, "mixed": (*CATALOGUE_FORMS, *OTHER_FORMS)
-    }[wanted.laws]  # fmt: skip
     closed = scene.joint.true.circuit == "closed"
     fit = [
         s
-        for s in laws
+        for s in LAWS[wanted.laws]
         if scene.course.kind in s.courses
         and s.id.partition(":")[0] not in taken
         and not (s.warm or s.neighbour or s.two_sided or (s.closed and not closed))
