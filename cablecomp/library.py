@@ -25,8 +25,9 @@ from cablecomp.diagnosis.calibrate import calibrate as _calibrate
 from cablecomp.diagnosis.diagnose import diagnose as _diagnose
 from cablecomp.diagnosis.pace import Progress
 from cablecomp.diagnosis.result import Diagnosis, report_json
-from cablecomp.estimation.belief import Suspicion, suspicions
+from cablecomp.estimation.belief import suspicions
 from cablecomp.estimation.standing import as_it_stood
+from cablecomp.estimation.view import Suspicion
 from cablecomp.observer import Observer
 from cablecomp.recording.arrays import as_recording, columns_of
 from cablecomp.recording.mapping import ColumnMap, load_mapping, mapping_from

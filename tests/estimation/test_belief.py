@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from turning import JOINT, recorded
 
-from cablecomp.estimation.belief import Suspicion, suspicions
+from cablecomp.estimation.belief import suspicions
+from cablecomp.estimation.view import Suspicion
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, StageConfig, simulate
 
