@@ -39,6 +39,12 @@ class JointConfig(Frozen):
     depends: Annotated[tuple[Depends, ...], listed(16)] = ()
 
     @property
+    def motor_zero_Nm(self) -> float:
+        """What the motor's torque reads where no load acts: the sensor's offset less what holds the pretension. A
+        reading tells the load -(reading - this)/ratio."""
+        return self.sensors.motor_torque_offset_Nm - self.drive.preload_Nm
+
+    @property
     def sessions(self) -> tuple[Session, ...]:
         """The sessions that have a name."""
         return tuple(s for s in self.session if s.name)

@@ -92,6 +92,7 @@ class Compensator:
         self.observer = observer
         self.ratio = config.drive.ratio
         self.preload_Nm = config.drive.preload_Nm
+        self.motor_zero_Nm = config.motor_zero_Nm
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = Ahead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
@@ -223,7 +224,7 @@ class Compensator:
         if source == "encoders":
             return self.observer.step_inverse(sample)
         if source == "motor_torque":
-            load_Nm = -(sample.motor_torque_Nm + self.preload_Nm) / self.ratio
+            load_Nm = -(sample.motor_torque_Nm - self.motor_zero_Nm) / self.ratio
             sample = sample._replace(joint_torque_Nm=load_Nm)
         return self.observer.step(sample)
 

@@ -92,7 +92,7 @@ def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray
     if source is None:
         return 0.0
     if source == MOTOR:
-        return -(columns[MOTOR] + joint.drive.preload_Nm) / joint.drive.ratio
+        return -(columns[MOTOR] - joint.motor_zero_Nm) / joint.drive.ratio
     return columns["joint_torque_Nm"]
 
 

@@ -20,8 +20,7 @@ def block_of(config: JointConfig, channels: Sequence[str], columns: Mapping[str,
     read.motor[:] = columns["motor_position_rad"]
     source, sensors = config.observer.load, config.sensors
     if source == "motor_torque":
-        zero = sensors.motor_torque_offset_Nm - config.drive.preload_Nm
-        read.load[:] = -(_need(columns, "motor_torque_Nm") - zero) / config.drive.ratio
+        read.load[:] = -(_need(columns, "motor_torque_Nm") - config.motor_zero_Nm) / config.drive.ratio
     elif source == "none":
         read.load[:] = sensors.joint_torque_offset_Nm
     elif source == "joint_torque":

@@ -66,7 +66,7 @@ class Observer:
         self._spare = int(self._named.size.spare_at)
         self._last_time = -math.inf
         self._source = config.observer.load
-        self._motor_zero = config.sensors.motor_torque_offset_Nm - config.drive.preload_Nm
+        self._motor_zero = config.motor_zero_Nm
         self._zero_load = config.sensors.joint_torque_offset_Nm
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
 

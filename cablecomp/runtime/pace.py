@@ -55,7 +55,7 @@ def motion(config: JointConfig, period_s: float) -> list[Sample]:
     for k in range(SAMPLES):
         phase = 2.0 * pi * k / SAMPLES
         load = load_Nm * sin(3.0 * phase) * cos(phase)
-        motor_torque = config.sensors.motor_torque_offset_Nm - drive.preload_Nm - drive.ratio * load
+        motor_torque = config.motor_zero_Nm - drive.ratio * load
         sample = Sample(
             k * period_s, turn_rad * sin(2.0 * phase), load, 0.0, motor_torque, 20.0,
             (0.0,) * len(observer.channels),
