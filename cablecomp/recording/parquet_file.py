@@ -13,6 +13,7 @@ import polars as pl
 
 from cablecomp.errors import InputError
 from cablecomp.recording.array_file import first_line
+from cablecomp.recording.native import held_errors
 from cablecomp.recording.raw import NumberRows, RawTable
 from cablecomp.recording.table import FloatArray
 
@@ -27,9 +28,10 @@ def open_parquet(path: Path) -> RawTable:
     Damage that changes values shows only in a file that states checksums; a note says if it does not.
     """
     try:
-        schema = pl.read_parquet_schema(path)
-        total = int(pl.scan_parquet(path).select(pl.len()).collect().item())
-        stated = pl.read_parquet_metadata(path).get(_CHECKSUMS)
+        with held_errors():
+            schema = pl.read_parquet_schema(path)
+            total = int(pl.scan_parquet(path).select(pl.len()).collect().item())
+            stated = pl.read_parquet_metadata(path).get(_CHECKSUMS)
         sums = {} if stated is None else {str(k): int(v) for k, v in json.loads(stated).items()}
     except (*_FAILURES, ValueError, AttributeError) as error:
         raise InputError(f"{path}: is damaged or cut Parquet ({first_line(error)}); export it anew") from None
@@ -67,7 +69,8 @@ def write_parquet(path: Path, columns: Mapping[str, FloatArray]) -> None:
 def _slice(path: Path, first: int, names: Sequence[str]) -> dict[str, FloatArray]:
     wanted = [pl.col(name).cast(pl.Float64) for name in names]
     try:
-        frame = pl.scan_parquet(path).slice(first, _ROWS).select(wanted).collect()
+        with held_errors():
+            frame = pl.scan_parquet(path).slice(first, _ROWS).select(wanted).collect()
     except _FAILURES as error:
         where = f"{path}: row {first + 1} or after"
         raise InputError(f"{where}: damaged Parquet ({first_line(error)}); export it anew") from None
