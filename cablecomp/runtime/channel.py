@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, inf, isfinite, nan, pi
+from math import expm1, inf, isfinite, isnan, nan, pi
 
 
 class Channel:
@@ -106,7 +106,7 @@ class Latency:
         """Take a sample's arrival and its stamp (both s, each by its own clock); stamps seen before
         change nothing.
         """
-        if device_s != device_s or device_s == self._device_s:
+        if isnan(device_s) or device_s == self._device_s:
             return self.excess_s
         late = arrived_s - device_s
         if not device_s > self._device_s:
@@ -126,17 +126,15 @@ class Shaking:
     __slots__ = ("_follow", "_forget", "_slow", "square")
 
     def __init__(self, period_s: float) -> None:
-        self._follow = 1.0 - exp(-2.0 * pi * 10.0 * period_s)
-        self._forget = 1.0 - exp(-period_s / 0.03)
+        self._follow = -expm1(-2.0 * pi * 10.0 * period_s)
+        self._forget = -expm1(-period_s / 0.03)
         self._slow = nan
         self.square = 0.0
 
     def step(self, value: float) -> float:
         """Take a value once a period; returns the mean square. NaN is left out."""
-        if value == value:
-            slow = self._slow
-            if slow != slow:
-                slow = value
+        if not isnan(value):
+            slow = value if isnan(self._slow) else self._slow
             slow += self._follow * (value - slow)
             self._slow = slow
             quick = value - slow

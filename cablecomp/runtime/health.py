@@ -4,7 +4,7 @@ each other.
 
 from __future__ import annotations
 
-from math import exp, inf, nan
+from math import expm1, inf, isnan, nan
 from typing import Final, NamedTuple
 
 from cablecomp.control.options import HealthOptions
@@ -131,7 +131,7 @@ class Health:
         self._lags = Sustained(o.confirm_s)
         self._shakes = Sustained(0.2 * o.confirm_s)
         self._mean_mismatch = 0.0
-        self._share = 1.0 - exp(-period_s / o.confirm_s)
+        self._share = -expm1(-period_s / o.confirm_s)
         self._shake_square = inf if o.shake_Nm is None else o.shake_Nm**2
         self._motor_changed_s = nan
         self._motor_heard_s = inf
@@ -148,11 +148,11 @@ class Health:
         flags = self._take(values, readings.arrived_s, readings.updates)
         motor, torque, joint, fresh = self.motor, self.torque, self.joint, self._fresh_s
         stamp = readings.device_s[JOINT_TORQUE]
-        late = self.latency.take(readings.arrived_s[JOINT_TORQUE], stamp) if stamp == stamp else 0.0
+        late = self.latency.take(readings.arrived_s[JOINT_TORQUE], stamp) if not isnan(stamp) else 0.0
         motor_age = now_s - motor.arrived_s
         torque_age = now_s - torque.arrived_s + late
         joint_age = now_s - joint.arrived_s + late
-        has_joint, has_torque = joint.value == joint.value, torque.value == torque.value
+        has_joint, has_torque = not isnan(joint.value), not isnan(torque.value)
         if motor_age > fresh:
             flags |= MOTOR_STALE
         if has_torque and torque_age > fresh:
@@ -161,7 +161,8 @@ class Health:
             flags |= LATE if late > fresh else JOINT_STALE
         if readings.unanswered > self._unanswered:
             flags |= UNANSWERED
-        flags |= self._encoders(now_s, predicted_rad, target_rad) | self._torques(values[MOTOR_TORQUE], now_s)
+        flags |= self._encoders(now_s, predicted_rad, target_rad)
+        flags |= self._torques(values[MOTOR_TORQUE], now_s)
         load_age = 0.0
         if self._needs_torque:
             load_age = self._shakes.age_s
@@ -172,7 +173,7 @@ class Health:
         if self._needs_joint:
             load_age = max(load_age, joint_age, self._residual.age_s)
         ready = (
-            motor.value == motor.value
+            not isnan(motor.value)
             and (has_torque or not self._needs_torque)
             and (has_joint or not self._needs_joint)
         )
@@ -186,9 +187,7 @@ class Health:
             values[TEMPERATURE],
             tuple([values[place] for place in others]) if others else (),
         )
-        if flags == 0:  # nearly always
-            return Checked(sample, motor_age, load_age, 0, ready, has_joint and joint_age <= fresh, False)
-        joint_ok = has_joint and not flags & (JOINT_RESIDUAL | JOINT_STUCK) and joint_age <= fresh
+        joint_ok = has_joint and joint_age <= fresh and not flags & (JOINT_RESIDUAL | JOINT_STUCK)
         return Checked(sample, motor_age, load_age, flags, ready, joint_ok, bool(flags & FATAL))
 
     def _take(self, values: list[float], arrived: list[float], updates: list[int]) -> int:
@@ -208,7 +207,8 @@ class Health:
         flags, limit, motor = 0, self._o.joint_residual_rad, self.motor
         if limit is not None and not self.joint.suspect:
             residual = abs(self.joint.value - predicted_rad)
-            if (residual > limit or self._residual.begun) and self._residual.step(residual > limit, now_s):
+            off = residual > limit
+            if (off or self._residual.begun) and self._residual.step(off, now_s):
                 flags |= JOINT_RESIDUAL
             far = residual > _FAR * limit
             if (far or self._far.begun) and self._far.step(far, now_s):
@@ -216,8 +216,6 @@ class Health:
         leads = abs(target_rad - motor.value) > self._lead_rad
         if (leads or self._lags.begun) and self._lags.step(leads, now_s):
             flags |= MOTOR_LAGS
-        if target_rad != target_rad:
-            return flags
         if motor.changed_s != self._motor_changed_s or self._target_then != self._target_then:
             self._motor_changed_s, self._target_then = motor.changed_s, target_rad
         elif abs(target_rad - self._target_then) > self._stuck_rad and motor.arrived_s > self._motor_heard_s:
@@ -245,7 +243,7 @@ class Health:
     def _torques(self, motor_torque: float, now_s: float) -> int:
         flags, torque = 0, self.torque.value
         mismatch = torque + (motor_torque + self._preload_Nm) / self._ratio
-        if mismatch == mismatch:
+        if not isnan(mismatch):
             self._mean_mismatch += self._share * (mismatch - self._mean_mismatch)
         off = not -self._mismatch_Nm <= self._mean_mismatch <= self._mismatch_Nm
         if (off or self._mismatch.begun) and self._mismatch.step(off, now_s):

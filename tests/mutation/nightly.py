@@ -1,15 +1,16 @@
 """Change the last gate, the descent and the health watch in every way that Cosmic Ray knows, one at a time, and see
-whether their tests notice: `nice -n 19 python tests/mutation/nightly.py [--module gate] [--most 50]`.
+whether their tests notice: `nice -n 19 python tests/mutation/nightly.py [--module gate] [--most 50] [--workers 2]`.
 
 Exit code 1 where fewer than 95 % of a module's mutants are killed, or one survives that `survivors.txt` does not
-explain. Every mutant runs in a process of its own that is forked from this one, with everything else imported; it never
-touches a file.
+explain. Every mutant runs in a process of its own that is forked from this one, with everything else imported, up to
+the first test that fails, whose example is not made smaller; it never touches a file.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import gc
 import importlib
 import importlib.abc
 import importlib.util
@@ -17,7 +18,7 @@ import os
 import random
 import resource
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
@@ -113,27 +114,41 @@ class Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self._text, f"<{self._module}, changed>", "exec"), module.__dict__)
 
 
-def killed(module: str, text: str) -> bool:
-    """Whether the module's tests notice that it has become this text."""
-    child = os.fork()
-    if child == 0:
-        os._exit(_in_child(module, text))
-    _, status = os.waitpid(child, 0)
-    return os.waitstatus_to_exitcode(status) != 0
+def survivors(module: str, every: Iterable[Mutant], workers: int = 1) -> Iterator[tuple[int, Mutant]]:
+    """Those that the module's tests do not notice, with their places, as they are found."""
+    running: dict[int, tuple[int, Mutant]] = {}
+    for place, mutant in enumerate(every):
+        if len(running) == workers:
+            yield from _first_to_end(running)
+        child = os.fork()
+        if child == 0:
+            os._exit(_in_child(module, mutant.text))
+        running[child] = place, mutant
+    while running:
+        yield from _first_to_end(running)
+
+
+def _first_to_end(running: dict[int, tuple[int, Mutant]]) -> Iterator[tuple[int, Mutant]]:
+    child, status = os.wait()
+    ended = running.pop(child)
+    if status == 0:
+        yield ended
 
 
 def _in_child(module: str, text: str) -> int:
     import pytest
+    from hypothesis import Phase, settings
 
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S + 1))
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
         os.dup2(nowhere, number)
     sys.meta_path.insert(0, Instead(module, text))
-    options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", "--hypothesis-seed=1"]
-    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+    settings.register_profile("first failure", deadline=None, phases=[Phase.explicit, Phase.generate])
+    options = ["-x", "-q", "--tb=no", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:benchmark"]
+    options += ["--hypothesis-seed=1", "--hypothesis-profile=first failure", "-o", "addopts="]
     try:
-        code = pytest.main([*options, "-o", "addopts=", *TESTS[module]])
+        code = pytest.main([*options, *TESTS[module]])
     except BaseException:
         return 1
     return int(code)
@@ -156,25 +171,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--most", type=int, default=10**6, help="so many mutants of a module, drawn at random"
     )
+    parser.add_argument("--workers", type=int, default=1, help="processes at a time")
     asked = parser.parse_args(arguments)
     os.chdir(ROOT)
+    gc.freeze()
     accounted, fine = explained(), True
     for module in TESTS:
         name = module.rpartition(".")[2]
         if asked.module and name not in asked.module:
             continue
         text = (ROOT / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
-        if killed(module, text):
+        if not list(survivors(module, [Mutant(name, text)])):
             print(f"{name}: its tests fail without any change", flush=True)
             return 1
         every = list(mutants(module, text))
         every = random.Random(1).sample(every, min(asked.most, len(every)))
         left = []
-        for k, mutant in enumerate(every):
-            if not killed(module, mutant.text):
-                left.append(mutant.key)
-                word = "explained" if mutant.key in accounted else "SURVIVES"
-                print(f"  {k + 1} of {len(every)}, {word}: {mutant.key}", flush=True)
+        for place, mutant in survivors(module, every, asked.workers):
+            left.append(mutant.key)
+            word = "explained" if mutant.key in accounted else "SURVIVES"
+            print(f"  {place + 1} of {len(every)}, {word}: {mutant.key}", flush=True)
         share = 1.0 - len(left) / len(every)
         print(f"{name}: {len(every)} mutants, {100.0 * share:.1f} % killed", flush=True)
         fine = fine and share >= LEAST_KILLED and accounted.issuperset(left)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, nan
+from math import exp, expm1, nan
 
 import pytest
 
@@ -113,8 +113,10 @@ def test_a_channel_is_fresh_up_to_its_time_and_that_included() -> None:
     fed.health = h.Health(options(), N, 2.0 * T, T)
     fed.cycle(**ALL)
     fed.cycle()
+    fed.readings.unanswered = 1000
     at = fed.cycle()
-    assert (at.flags, at.joint_ok) == (0, True)
+    assert (at.flags, at.joint_ok) == (h.UNANSWERED, True)
+    fed.readings.unanswered = 0
     over = fed.cycle()
     assert over.flags == h.MOTOR_STALE | h.TORQUE_STALE | h.JOINT_STALE
     assert not over.joint_ok
@@ -150,7 +152,7 @@ def test_a_drive_may_leave_as_many_commands_unanswered_as_stated() -> None:
         assert fed.cycle(**ALL).flags == flags
 
 
-@pytest.mark.parametrize(("torque", "flags"), [(3.9, 0), (4.0, 64), (-3.9, 0), (-4.0, 64)])
+@pytest.mark.parametrize(("torque", "flags"), [(3.9, 0), (4.0, 64), (-3.9, 0), (-4.0, 64), (5.0, 64)])
 def test_a_torque_sensor_at_its_limit_is_named(torque: float, flags: int) -> None:
     assert Fed().cycle(motor=0.0, torque=torque, joint=0.0).flags == flags
 
@@ -163,7 +165,7 @@ def test_the_joint_encoder_is_distrusted_once_it_has_been_off_for_so_long(sign: 
         Fed(options(joint_residual_rad=1 / 64)),
     )
     for k in range(20):
-        assert near.cycle(predicted=sign / 64, **ALL).flags == 0
+        assert near.cycle(predicted=sign / (63 if k == 0 else 64), **ALL).flags == 0
         checked = fed.cycle(predicted=sign / 63, **ALL)
         assert checked.flags == (h.JOINT_RESIDUAL if k >= 8 else 0)
         assert checked.joint_ok == (k < 8)
@@ -182,10 +184,11 @@ def test_of_two_encoders_far_apart_the_one_that_rests_lies(motor: float, joint: 
     for k in range(12):
         fed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k)
     seen = [
-        fed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k + 5.1 / 64).flags
+        fed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k + 5.1 / 64)
         for k in range(12, 17)
     ]
-    assert seen == [0, 0, 0, 0, flag]  # 4 T = 3.9 ms
+    assert [checked.flags for checked in seen] == [0, 0, 0, 0, flag]  # 4 T = 3.9 ms
+    assert [checked.joint_ok for checked in seen] == [True] * 4 + [flag != h.JOINT_STUCK]
     allowed = Fed(options(joint_residual_rad=1 / 64))
     for k in range(8):
         checked = allowed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k + 5 / 64)
@@ -241,6 +244,57 @@ def test_a_motor_that_follows_is_neither_stuck_nor_jumping_however_coarsely_its_
         mistaken.add(unknown.cycle(target=target, **told).flags)
     assert flags == {0}
     assert max(mistaken) & (h.MOTOR_STUCK | h.MOTOR_JUMP)
+
+
+@pytest.mark.parametrize("asked", [0.5, nan])
+def test_a_target_that_is_none_yet_says_nothing_about_the_motor(asked: float) -> None:
+    """Stuck counts from the first target on, be there cycles without one before it or not."""
+    fed = Fed(options(stuck_rad=1 / 64))
+    for target in (nan, nan, asked, 0.5, 0.5):
+        assert fed.cycle(target=target, **ALL).flags == 0
+    assert fed.cycle(target=0.5 + 1.1 / 64, **ALL).flags == h.MOTOR_STUCK
+
+
+def test_a_motor_may_trail_by_two_steps_of_its_drive_more_than_stated() -> None:
+    fed = Fed(options(stuck_rad=1 / 64), motor_step_rad=1 / 64)
+    for target, flags in ((0.5, 0), (0.5 + 3.0 / 64, 0), (0.5 + 3.1 / 64, h.MOTOR_STUCK)):
+        assert fed.cycle(target=target, **ALL).flags == flags
+
+
+def test_a_motor_that_says_nothing_is_not_called_stuck_by_the_joint_that_moves() -> None:
+    """Silent for as long as a value is fresh, that included, it is taken at its last word."""
+    fed = Fed(options(joint_residual_rad=1 / 64))
+    fed.health = h.Health(options(joint_residual_rad=1 / 64), N, 16.0 * T, T)
+    for k in range(30):
+        moving = {"torque": 0.0, "joint": 0.01 * k}
+        flags = fed.cycle(predicted=0.01 * k + 0.2, **({**moving, "motor": 0.0} if k == 0 else moving)).flags
+        far = flags & (h.MOTOR_STUCK | h.ENCODERS_DISAGREE)
+        assert far == (h.MOTOR_STUCK if 9 <= k <= 16 else h.ENCODERS_DISAGREE if k > 3 else 0)
+
+
+def test_what_came_once_is_judged_once() -> None:
+    fed = Fed()
+    fed.cycle(**ALL)
+    fed.cycle(**{**ALL, "motor": 9.0})
+    for _ in range(3):
+        fed.cycle()
+    assert (fed.health.motor.refused, fed.health.joint.refused) == (1, 0)
+
+
+@pytest.mark.parametrize("missing", ["motor", "torque", "joint"])
+def test_control_waits_for_every_channel_that_it_lives_on(missing: str) -> None:
+    fed, came = Fed(needs_joint=True), {name: 0.0 for name in ALL if name != missing}
+    assert not fed.cycle(**came).ready
+    assert fed.cycle(**ALL).ready
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_mean_mismatch_on_its_very_limit_is_allowed(sign: float) -> None:
+    """After one cycle it is the share of one period; without the motor's torque it stays there."""
+    fed = Fed(options(torque_mismatch_Nm=-expm1(-1.0 / 8.0)))
+    assert fed.cycle(motor=0.0, torque=sign, joint=0.0, motor_torque=0.0).flags == 0
+    for _ in range(20):
+        assert fed.cycle(motor=0.0, torque=sign, joint=0.0).flags == 0
 
 
 @pytest.mark.parametrize("preload_Nm", [0.0, 0.5])
