@@ -32,8 +32,15 @@ class Taken(NamedTuple):
     refused: int
 
 
-def random_joint(rng: np.random.Generator, effects: bool = True) -> JointConfig:
-    """Wraps of 0.01 to 60 rad, friction of 1e-6 to 3, strains under pretension of 1e-5 to 0.1."""
+ANY_STRAIN = 1e-5, 0.1
+SOFT_STRAIN = 1e-3, 0.1
+"""Of a cable under its pretension: with the soft ones a deflection itself unwinds a drum."""
+
+
+def random_joint(
+    rng: np.random.Generator, effects: bool = True, strain: tuple[float, float] = ANY_STRAIN
+) -> JointConfig:
+    """Wraps of 0.01 to 60 rad, friction of 1e-6 to 3, strains under pretension within `strain`."""
 
     def between(low: float, high: float) -> float:
         return exp(rng.uniform(log(low), log(high)))
@@ -45,7 +52,7 @@ def random_joint(rng: np.random.Generator, effects: bool = True) -> JointConfig:
             "input_radius_m": between(0.003, 0.1),
             "free_length_m": between(0.005, 0.5),
             "pretension_N": tension,
-            "EA_N": tension / between(1e-5, 0.1),
+            "EA_N": tension / between(*strain),
             "mu_output": between(1e-6, 3.0),
             "mu_input": between(1e-6, 3.0),
             "wrap_output_rad": between(0.01, 60.0),
