@@ -193,14 +193,11 @@ def _follow(
     even = _within(wanted, before, reach)
     if step == 0.0:
         return even, 0.0, even != wanted
-    # the one before is on the wire, so there is always one that may be sent
-    slack = 1e-6 * step
-    least, most = before - reach - slack, before + reach + slack
+    least, most = before - reach, before + reach
     carried = _carried(even, low if low > least else least, high if high < most else most, grid)
     value = before if carried is None else carried
-    if not coarse:
-        return value, 0.0, even != wanted
-    return value, max(min(reach - abs(value - before), step), 0.0), even != wanted
+    spare = min(reach - abs(value - before), step) if coarse else 0.0
+    return value, spare, even != wanted
 
 
 def _carried(value: float, low: float, high: float, grid: Grid) -> float | None:

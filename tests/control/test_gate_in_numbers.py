@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from math import floor, nan
 
 import pytest
@@ -127,6 +127,25 @@ def test_what_passes_is_the_nearest_that_the_message_can_carry(
         assert abs(value - asked) == pytest.approx(nearest, abs=1e-5)
 
 
+def test_what_is_finite_is_cut_however_large_it_is() -> None:
+    huge = 1e200
+    last = SafeCommand(0.0, 0.0, 0.0, 0)
+    safe = gate(Command(huge, huge, huge), last, huge, 0.0, T, LIMITS)
+    assert safe[:3] == (0.025, 20.0, 0.4)
+    assert safe.flags == POSITION_LIMITED | RATE_LIMITED | VELOCITY_LIMITED | TORQUE_LIMITED
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("step", "moved"), [(0.0, 0.025), (0.005, 0.025), (0.04, 0.0)])
+def test_a_rate_that_cuts_says_so_on_any_wire(step: float, moved: float, sign: float) -> None:
+    limits = replace(FREE, position_rate_rad_s=25.0, wire=Wire(Grid(0.0, step, -4.0, 4.0)))
+    last = SafeCommand(0.0, 0.0, 0.0, 0)
+    for asked, flags in ((0.02, 0), (0.03, RATE_LIMITED)):
+        safe = gate(Command(sign * asked, 0.0, 0.0), last, 0.0, 0.0, T, limits)
+        assert safe.flags == flags
+    assert safe.motor_position_rad == pytest.approx(sign * moved)
+
+
 def test_a_tie_between_two_steps_goes_down() -> None:
     """As where the wire itself rounds: 0.5 of a step above is the lower one."""
     limits = replace(FREE, wire=Wire(Grid(0.0, 0.5, -4.0, 4.0)))
@@ -159,6 +178,8 @@ def test_nothing_is_saved_up_where_the_wire_is_fine() -> None:
         assert last.spare_rad == 0.0
     last = gate(Command(2.0, 0.0, 0.0), last, 0.0, 0.0, T, limits)
     assert last.motor_position_rad == pytest.approx(0.02)
+    even = replace(FREE, position_rate_rad_s=32.0, wire=Wire(Grid(0.0, 1 / 32, -4.0, 4.0)))
+    assert gate(Command(0.0, 0.0, 0.0), SafeCommand(0, 0, 0, 0), 0.0, 0.0, 1 / 1024, even).spare_rad == 0.0
 
 
 def test_the_narrower_of_joint_and_wire_holds() -> None:
@@ -202,11 +223,38 @@ def test_a_wire_that_cannot_say_zero_or_nearly_so_is_refused() -> None:
     with pytest.raises(InputError, match="carries no velocity"):
         replace(LIMITS, velocity_max_rad_s=4.0, wire=Wire(velocity=five))
     assert replace(LIMITS, velocity_max_rad_s=6.0, wire=Wire(velocity=five)).wire.velocity is five
+    below, beyond = Grid(-1.0, 20.0, -45.0, 45.0), Grid(0.0, 0.0, 50.0, 60.0)
+    assert replace(LIMITS, wire=Wire(velocity=below, torque=below)).wire.torque is below
+    with pytest.raises(InputError, match="carries no velocity"):
+        replace(LIMITS, wire=Wire(velocity=beyond))
 
 
 @pytest.mark.parametrize("at", [-3.0, 3.0, 0.7])
 def test_the_first_command_is_given_anywhere_within_the_limits(at: float) -> None:
     assert first_command(at, LIMITS) == SafeCommand(at, 0.0, 0.0, 0)
+
+
+def test_no_first_command_is_given_where_the_wire_has_none() -> None:
+    """And one where joint and wire have a single angle in common."""
+    for wire, at in ((Grid(0.0, 0.0, 3.0, 9.0), 3.0), (Grid(0.0, 0.0, -9.0, -3.0), -3.0)):
+        assert first_command(at, replace(LIMITS, wire=Wire(wire))).motor_position_rad == at
+    for at in (0.0, 3.0):
+        with pytest.raises(InputError, match="the motor stands at"):
+            first_command(at, replace(LIMITS, wire=Wire(Grid(0.0, 0.0, 5.0, 9.0))))
+
+
+def test_unless_told_otherwise_a_motor_goes_anywhere_at_40_rad_s() -> None:
+    limits = GateLimits()
+    for at in (-1e3, 1e3):
+        assert first_command(at, limits).motor_position_rad == at
+        safe = gate(Command(at + 0.3, 50.0, 1e3), SafeCommand(at, 0.0, 0.0, 0), at, 0.1, T, limits)
+        assert safe[:3] == pytest.approx([at + 0.04, 40.0, 1e3], abs=1e-9)
+        assert gate(Command(at, 0.0, 0.0), safe, at, 0.101, T, limits).flags == STALE
+
+
+def test_limits_stay_as_they_were_made() -> None:
+    with pytest.raises(FrozenInstanceError):
+        GateLimits().torque_max_Nm = 9.0  # type: ignore[misc]
 
 
 def test_unless_told_otherwise_no_command_is_more_than_half_a_radian_from_the_motor() -> None:
