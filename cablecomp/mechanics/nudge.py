@@ -38,7 +38,7 @@ def wrap_nudge(step: Any, p: Points, n: int, mu: float, dv: float, dw: float) ->
         step.total = stretch + total
     else:
         steep = mu if v > before else -mu
-        if y == step.w:
+        if y == step.w or (step.end_v - before) * steep <= 0.0:  # no edge, or one that turns about
             return False
         if k >= 0:
             y0, y1 = p[k].y, p[k + 1].y
