@@ -155,7 +155,14 @@ def _values(effect: Effect, entry: EffectEntry, config: JointConfig) -> dict[str
     missing = [name for name in sorted(allowed) if name not in values]
     if missing:
         raise InputError(f"{config.name}: effect `{effect.id}` lacks key `{missing[0]}`; add it")
+    amounts = [p.name for p in effect.parameters if not p.shape]
+    if amounts and not entry.parameters.keys() & set(amounts):
+        raise InputError(f"{config.name}: effect `{effect.id}` says not how much; add {_any_of(amounts)}")
     return values
+
+
+def _any_of(names: Sequence[str]) -> str:
+    return " or ".join(f"`{name}`" for name in names)
 
 
 def _number(value: object, parameter: Parameter, config: JointConfig) -> float:

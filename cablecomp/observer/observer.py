@@ -16,17 +16,14 @@ from cablecomp.effects import extend
 from cablecomp.effects.catalogue import is_bounded, other_channels
 from cablecomp.errors import InputError, InternalError
 from cablecomp.mechanics.assemble import Model, assemble
-from cablecomp.mechanics.drive import Arrays
-from cablecomp.mechanics.invariants import heights_fit, profile_violations, violations
-from cablecomp.mechanics.pointer import kernel_address
+from cablecomp.mechanics.invariants import profile_violations, violations
 from cablecomp.mechanics.profile import Floats, Ints
-from cablecomp.mechanics.start import joint_start
 from cablecomp.mechanics.status import STATUS_OK
-from cablecomp.observer import stepper as st
 from cablecomp.observer.block import block_of, estimates
 from cablecomp.observer.bounds import BoundPair
+from cablecomp.observer.compiled import CompiledJoint
 from cablecomp.observer.refusal import refused
-from cablecomp.observer.rows import PLACES, answers, put_asked, put_sample, readings
+from cablecomp.observer.rows import answers
 from cablecomp.observer.snapshot import pack, unpack
 from cablecomp.observer.wraps import WrapProfile, wrap_profiles
 from cablecomp.signals import NAN, Estimate, Sample
@@ -47,25 +44,12 @@ class Observer:
     def __init__(self, config: JointConfig, *, bounds: bool = False) -> None:
         self.config = config
         self.model: Model = assemble(config, extend(config))
-        m = self.model
         self.channels = other_channels(config)
-        self._memory, self._heights = m.memory.copy(), m.heights.copy()
-        # every array is written in place for good, so one tuple serves all calls
-        self._arrays = Arrays(m.fixed, m.layout, self._memory, self._heights, m.laws)
-        # the first row of each is a step's, the second what `step_ahead` predicts
-        self._reading = readings(2, len(self.channels))
-        self._cells = self._reading.rows.data.cast("B")
-        self._second = self._reading.rows.strides[0]
-        outs, self._answer = answers(2)
-        self._out = outs[0]
-        self._one = (*self._arrays, self._reading.rows[:1], outs[:1])
-        self._address = 0
-        self._places: Ints | None = None
+        self._joint = CompiledJoint(self.model, len(self.channels))
         self._ratio = config.drive.ratio
-        self._named = m.named(self._memory, self._heights)
-        self._spare = int(self._named.size.spare_at)
         self._last_time = -math.inf
         self._source = config.observer.load
+        self._inverts = self._source == "both_encoders"
         self._motor_zero = config.motor_zero_Nm
         self._zero_load = config.sensors.joint_torque_offset_Nm
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
@@ -75,39 +59,38 @@ class Observer:
     def step(self, sample: Sample) -> Estimate:
         """Commit one sample and say what the joint does."""
         fresh = self._read(sample)
-        if self._source == "both_encoders":
-            return self._taken(sample, self._walk_inverse(True), fresh)
-        return self._taken(sample, st.walk(*self._one, True)[1], fresh)
+        if self._inverts:
+            return self._taken(sample, self._joint.walk_inverse(True)[1], fresh)
+        return self._taken(sample, self._joint.walk(True)[1], fresh)
 
     def step_ahead(
         self, sample: Sample, time_s: float, motor_position_rad: float, joint_torque_Nm: float
     ) -> tuple[Estimate, float]:
         """`step` a sample and `peek_deflection` of the other three, in one compiled call; the deflection is NaN where
         it has to be asked for by itself."""
-        if self._source == "both_encoders":
+        if self._inverts:
             return self.step(sample), NAN
         fresh = self._read(sample)
-        put_asked(self._cells, self._second, time_s, motor_position_rad, joint_torque_Nm)
-        places = self._located() if self._places is None else self._places
-        status, ahead = st.walk_ahead(places, self._arrays.laws)
+        self._joint.put_ahead(time_s, motor_position_rad, joint_torque_Nm)
+        status, ahead = self._joint.walk_ahead()
         estimate = self._taken(sample, status, fresh)
         if ahead != STATUS_OK:
             return estimate, NAN
-        return estimate, float(self._answer.joint[1]) - self._ratio * motor_position_rad
+        return estimate, float(self._joint.joint[1]) - self._ratio * motor_position_rad
 
     def peek(self, sample: Sample) -> Estimate:
         """Predict the joint for a sample (for instance the load expected next) and commit nothing."""
         fresh = self._read(sample)
-        return self._peeked(sample, st.walk(*self._one, False)[1], fresh)
+        return self._peeked(sample, self._joint.walk(False)[1], fresh)
 
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the
         last sample."""
-        put_asked(self._cells, 0, time_s, motor_position_rad, joint_torque_Nm)
-        _, status = st.walk(*self._one, False)
+        self._joint.put_asked(time_s, motor_position_rad, joint_torque_Nm)
+        _, status = self._joint.walk(False)
         if status != STATUS_OK:
             self._refuse(status, time_s, False)
-        return float(self._answer.joint[0]) - self._ratio * motor_position_rad
+        return float(self._joint.joint[0]) - self._ratio * motor_position_rad
 
     def run(self, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
         """Step through a block of samples given as canonical channels; returns the estimates as columns.
@@ -118,28 +101,27 @@ class Observer:
         read = block_of(self.config, self.channels, columns)
         count = len(read.rows)
         outs, answer = answers(count)
-        low = np.full(count, NAN)
-        high = np.full(count, NAN)
+        interval = np.full((count, 2), NAN)
         fresh = count > 0 and self._last_time == -math.inf
         if fresh:
             self._start(read.time[0], read.motor[0])
-        done, status = self._run_rows(read.rows, outs, low, high)
+        done, status = self._joint.run(read.rows, outs, self._inverts, self._bounds, interval)
         if done:
             self._last_time = float(read.time[done - 1])
         if status != STATUS_OK:
-            self._out[:] = outs[done]
+            self._joint.said[:] = outs[done]
             self._refuse(status, read.time[done], fresh and done == 0, done)
-        return estimates(answer, low, high, self._ratio * read.motor)
+        return estimates(answer, interval[:, 0], interval[:, 1], self._ratio * read.motor)
 
     def inverse(self, sample: Sample) -> Estimate:
         """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
         fresh = self._read(sample)
-        return self._peeked(sample, self._walk_inverse(False), fresh)
+        return self._peeked(sample, self._joint.walk_inverse(False)[1], fresh)
 
     def step_inverse(self, sample: Sample) -> Estimate:
         """As `inverse`, and commits the sample with the torque found."""
         fresh = self._read(sample)
-        return self._taken(sample, self._walk_inverse(True), fresh)
+        return self._taken(sample, self._joint.walk_inverse(True)[1], fresh)
 
     # --- state ----------------------------------------------------------------------------------------------------
 
@@ -179,29 +161,20 @@ class Observer:
     def vector(self) -> Floats:
         """The state as one vector of floats, bounds left out; `set_vector` takes it up (for solvers that own
         the state)."""
-        return np.concatenate(
-            [self._memory[: self._spare], self._heights.astype(np.float64), [self._last_time]]
-        )
+        return np.append(self._joint.vector(), self._last_time)
 
     def set_vector(self, vector: Floats) -> None:
         """Take up a state given by `vector` of an observer of the same configuration; all zeros = nothing is known yet.
 
         Raises InputError, and changes nothing, if it cannot be such a state.
         """
-        heights = vector[self._spare : -1]
-        known = bool(np.any(heights))
-        if len(vector) != self._spare + len(self._heights) + 1 or (
-            known and not heights_fit(self.model, heights)
-        ):
+        if not self._joint.take_up(vector[:-1]):
             raise InputError(
                 f"{self.config.name}: this vector is no state of the joint; give one from Observer.vector"
             )
-        if not known:
-            self._forget()
-            return
-        self._memory[: self._spare] = vector[: self._spare]
-        self._heights[:] = heights
         self._last_time = float(vector[-1])
+        if self.pieces() == 0:
+            self._forget()
 
     def check_state(self) -> None:
         """Verify every invariant of the state (`mechanics.invariants`); raises InternalError that names the
@@ -221,7 +194,6 @@ class Observer:
     def compile(self) -> None:
         """Have what a loop calls (step, peek, inverse, bounds) compiled, or read from the cache, before it is
         armed; the state stays as it is."""
-        self._located()
         twin = Observer(self.config, bounds=self._bounds is not None)
         still = Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(self.channels))
         twin.step(still)
@@ -233,25 +205,24 @@ class Observer:
         """As `compile`, for what the bounds alone call."""
         if self._bounds is not None:
             self._bounds.start(0.0, 0.0)
-            self._bounds.compile(self._arrays)
+            self._bounds.compile(self._joint.arrays)
             self._bounds.forget()
 
     def stiffness(self) -> float:
         """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
-        return 1.0 / float(self._named.context.compliance)
+        return 1.0 / self._joint.compliance()
 
     def merge_error_rad(self) -> float:
         """Bound [rad] on the error of the present deflection that merging of profile pieces can have made."""
-        pairs = zip(self._named.cables, self._named.states, strict=True)
-        return float(sum(cable.weight * state.error for cable, state in pairs))
+        return self._joint.merge_error()
 
     def pieces(self) -> int:
         """Number of points that describe all profiles: the memory in use."""
-        return int(self._heights.sum())
+        return int(self._joint.heights.sum())
 
     def profiles(self) -> list[WrapProfile]:
         """The tension profile on every wrap, termination first."""
-        return wrap_profiles(self.config, self.model, self._memory, self._heights)
+        return wrap_profiles(self.config, self.model, self._joint.memory, self._joint.heights)
 
     # --- inside ---------------------------------------------------------------------------------------------------
 
@@ -261,7 +232,7 @@ class Observer:
 
     def _parts(self) -> tuple[list[tuple[Floats, Ints]], list[Floats]]:
         """All that makes up the state: histories, further numbers."""
-        states: list[tuple[Floats, Ints]] = [(self._memory, self._heights)]
+        states: list[tuple[Floats, Ints]] = [(self._joint.memory, self._joint.heights)]
         if self._bounds is None:
             return states, []
         return states + self._bounds.states(), [self._bounds.numbers]
@@ -273,20 +244,20 @@ class Observer:
     def _violations(self) -> list[str]:
         if self._last_time == -math.inf:
             return []
-        found = violations(self.model, self._memory, self._heights)
+        found = violations(self.model, self._joint.memory, self._joint.heights)
         for memory, heights in [] if self._bounds is None else self._bounds.states():
             found += profile_violations(self.model, memory, heights)
         return found
 
     def _start(self, time_s: float, motor: float) -> None:
-        m = self.model
-        joint_start(m.fixed, m.layout, self._memory, self._heights, m.laws, time_s, motor, 0.0)
+        self._joint.start(time_s, motor)
         if self._bounds is not None:
             self._bounds.start(time_s, motor)
 
     def _forget(self) -> None:
         """Know nothing, as before the first sample."""
-        self._memory[:], self._heights[:], self._last_time = self.model.memory, self.model.heights, -math.inf
+        self._joint.forget()
+        self._last_time = -math.inf
         if self._bounds is not None:
             self._bounds.forget()
 
@@ -297,55 +268,13 @@ class Observer:
             load = -(torque - self._motor_zero) / self._ratio
         elif self._source == "none":
             load = self._zero_load
-        put_sample(self._cells, 0, time, motor, load, joint, temperature)
+        self._joint.put_sample(time, motor, load, joint, temperature)
         if self.channels:
-            read = self._reading.other[0]
-            read[: len(self.channels)] = NAN
-            for k, value in enumerate(other[: len(self.channels)]):
-                read[k] = value
+            self._joint.put_other(other)
         if self._last_time != -math.inf:
             return False
         self._start(time, motor)
         return True
-
-    def _run_rows(self, rows: Floats, outs: Floats, low: Floats, high: Floats) -> tuple[int, int]:
-        """Run a block by the compiled loop that does what is wanted; returns rows done and the last status."""
-        known = len(rows), STATUS_OK
-        if self.config.observer.load == "both_encoders":
-            before = self._memory.copy(), self._heights.copy()
-            known = st.walk_inverse(self._walk_at(), *self._arrays, rows, outs, True)
-            if self._bounds is None:
-                return known
-            # every row's load is known by now: once more, with the bounds
-            self._memory[:], self._heights[:] = before
-        if self._bounds is None:
-            return st.walk(*self._arrays, rows, outs, True)
-        interval = np.empty((len(rows), 2))
-        ended = self._bounds.run(self._walk_at(), self._arrays, rows[: known[0]], outs, interval)
-        low[:], high[:] = interval[:, 0], interval[:, 1]
-        return ended if ended[1] != STATUS_OK else known
-
-    def _walk_inverse(self, commit: bool) -> int:
-        """`walk` for the sample that was read, its load found from both encoders: the status."""
-        return int(st.walk_inverse(self._walk_at(), *self._one, commit)[1])
-
-    def _walk_at(self) -> int:
-        """Where the machine code of `walk` lies for this observer's arrays."""
-        if self._address == 0:
-            self._address = kernel_address(st.walk, *self._one, True)
-        return self._address
-
-    def _located(self) -> Ints:
-        """Where this observer's arrays lie, for `walk_ahead`."""
-        names = ("fixed", "layout", "memory", "heights")
-        arrays = dict(zip(names, self._arrays, strict=False))
-        two = {"rows": self._one[5], "outs": self._one[6]}
-        at = np.zeros(1, PLACES)
-        at["walk"] = self._walk_at()
-        for name, array in {**arrays, **two}.items():
-            at[name] = array.ctypes.data, array.shape[-1]
-        self._places = at.view(np.int64)
-        return self._places
 
     def _taken(self, sample: Sample, status: int, fresh: bool) -> Estimate:
         """What a step ends with: the estimate, or the refusal."""
@@ -354,7 +283,7 @@ class Observer:
         self._last_time = sample.time_s
         low, high = NAN, NAN
         if self._bounds is not None:
-            low, high = self._bounds.step(self._arrays)
+            low, high = self._bounds.step(self._joint.arrays)
         return self._estimate(sample, low, high)
 
     def _peeked(self, sample: Sample, status: int, fresh: bool) -> Estimate:
@@ -368,11 +297,11 @@ class Observer:
     def _refuse(self, status: int, time_s: float, fresh: bool, index: int | None = None) -> NoReturn:
         if fresh:
             self._forget()
-        raise refused(status, float(time_s), self._last_time, float(self._answer.strength[0]), index)
+        raise refused(status, float(time_s), self._last_time, float(self._joint.strength[0]), index)
 
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
         # in the order of `Answer`, which itself would cost 0.4 us of a step's 4
-        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque, _ = self._out.tolist()
+        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque, _ = self._joint.said.tolist()
         rigid = self._ratio * sample.motor_position_rad
         shift = joint - drive - rigid
         # made without Python's own call of its class, which took a third longer

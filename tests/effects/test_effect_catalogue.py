@@ -37,6 +37,13 @@ def test_an_unknown_or_missing_key_is_named() -> None:
     )
 
 
+def test_an_effect_has_to_say_how_much_even_where_each_of_its_amounts_may_be_left_out() -> None:
+    """A groove may be rough on either drum alone, so neither amplitude is asked for by itself."""
+    text = refusal(("position_dependent_friction", {"phase_rad": 0.5}))
+    assert "says not how much; add `amplitude` or `input_amplitude`" in text
+    extend(with_effects(joint(), [("position_dependent_friction", {"input_amplitude": 0.1})]))
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), "much", True, None, [1.0]])
 def test_only_finite_numbers_are_taken(value: object) -> None:
     text = refusal(("bearing_friction", {**BEARING, "torque_Nm": value}))

@@ -24,6 +24,6 @@ def test_a_wrong_integral_is_found(effects: tuple[tuple[str, dict[str, float]], 
     load = 0.5 * np.sin(np.linspace(0.0, 6.0, 30))
     observer.run({"time_s": np.arange(30.0), "motor_position_rad": 0.1 * load, "joint_torque_Nm": load})
     observer.check_state()
-    observer.model.named(observer._memory, observer._heights).profiles[0, 1].stretch += 1e-3
+    observer._joint.named.profiles[0, 1].stretch += 1e-3
     with pytest.raises(InternalError, match="profile 0: its running integral"):
         observer.check_state()

@@ -252,9 +252,7 @@ def test_an_impossible_state_is_told_and_no_snapshot_of_it_is_taken_up() -> None
         poisoned.step(sample)
         sound.step(sample)
     before = sound.snapshot()
-    poisoned.model.named(poisoned._memory, poisoned._heights).profiles[
-        0, 1
-    ].y += 1e-3  # the first wrap's second point
+    poisoned._joint.named.profiles[0, 1].y += 1e-3  # the first wrap's second point
     with pytest.raises(InternalError, match="profile 0"):
         poisoned.check_state()
     with pytest.raises(InputError, match="impossible state"):
