@@ -25,6 +25,7 @@ from cablecomp.diagnosis.calibrate import calibrate as _calibrate
 from cablecomp.diagnosis.diagnose import diagnose as _diagnose
 from cablecomp.diagnosis.pace import Progress
 from cablecomp.diagnosis.result import Diagnosis, report_json
+from cablecomp.errors import InputError
 from cablecomp.estimation.belief import suspicions
 from cablecomp.estimation.standing import as_it_stood
 from cablecomp.estimation.view import Suspicion
@@ -217,7 +218,13 @@ class _Rows:
 
 
 def _joint(config: JointConfig | Path | str) -> JointConfig:
-    return config if isinstance(config, JointConfig) else load_joint(config)
+    if isinstance(config, JointConfig):
+        return config
+    if not isinstance(config, str | Path):
+        raise InputError(
+            f"`config` is a {type(config).__name__}; give a JointConfig (`load_joint`, `parse_joint`) or a file's path"
+        )
+    return load_joint(config)
 
 
 def _mapping(given: Mapped) -> ColumnMap | None:

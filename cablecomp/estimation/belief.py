@@ -15,7 +15,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.estimation.evidence import JOINT, MOTOR
 from cablecomp.estimation.evidence import load_channel as channel_of_load
-from cablecomp.estimation.lateness import delays, in_doubt
+from cablecomp.estimation.lateness import delays, rather_late
 from cablecomp.estimation.view import INPUT, Suspicion, View, mrad, partial, rms
 from cablecomp.signal.smoothing import FloatArray
 
@@ -69,11 +69,18 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     if found:
         return (*found, *fits)
     late = delays(view)
-    in_time = view.shifted(late[0]) if fits and late else view
-    found += late if not fits or not (_angles(in_time) or _torques(in_time)) else in_doubt(view, fits)
+    if not fits or (late and not _linear(view.shifted(late[0]))):
+        found += late
+    else:
+        found += rather_late(view, fits, _linear)
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
         found += _motor_torque(config, _rows(columns, (INPUT, MOTOR, "joint_torque_Nm")))
     return tuple(found)
+
+
+def _linear(view: View) -> list[Suspicion]:
+    """What straight lines tell."""
+    return _angles(view) + _torques(view)
 
 
 def _angles(view: View) -> list[Suspicion]:

@@ -7,7 +7,9 @@ lost motion of any width, and both are where all moves at one speed.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from math import inf
 from typing import Final
 
@@ -21,8 +23,6 @@ from cablecomp.signal.smoothing import FloatArray
 
 LATE_GAIN: Final = 0.75
 """A delay is believed where it takes what nothing else follows down to this share."""
-LATE_OR_LOST_GAIN: Final = 0.5
-"""The same, where all moves at one speed."""
 MOST_LATE_S: Final = 0.25
 """Greatest delay that is looked for."""
 DELAY_ROWS: Final = 1500
@@ -40,22 +40,10 @@ def delays(view: View) -> list[Suspicion]:
     wanted = [JOINT, *([view.channel] if view.channel and np.ptp(view.M) > 0.0 else [])]
     step = float(np.median(np.diff(view.time)))
     for name in wanted:
-        late, before, after = _best_shift(view, name)
+        late, before, after = _least(partial(_left_shifted, view, name), _most(view))
         if abs(late) < 1.5 * step or not after < LATE_GAIN * before < inf:
             continue
-        of_speed = _of_speed(view, name, late)
-        if of_speed > OF_SPEED or after < LATE_OR_LOST_GAIN * before:
-            how = "late" if late > 0.0 else "early"
-            both = (
-                "" if of_speed > OF_SPEED else ", or to trail by lost motion (at one speed they look alike)"
-            )
-            words = (
-                f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}: the "
-                f"nominal drive leaves {mrad(before)} RMS, "
-                f"{mrad(after)} with it shifted"
-            )
-            numbers = {"late_s": late, "rms_rad": before, "left_rad": after, "of_speed": of_speed}
-            found.append(Suspicion("delay", name, words, numbers))
+        found.append(_delay(view, name, late, before, after))
     at_rest = view.ratio * np.ptp(view.q) < 0.1 * np.ptp(view.y)
     if at_rest and any(
         s.numbers["late_s"] > 0.0 for s in found
@@ -64,21 +52,71 @@ def delays(view: View) -> list[Suspicion]:
     return sorted(found, key=lambda s: s.numbers["left_rad"])[:1]
 
 
-def in_doubt(view: View, fits: list[Suspicion]) -> list[Suspicion]:
-    """The same, where the load follows from the motor's way and its direction with a word on what else trails so:
-    lost motion, or an angle that is late, is then seen as a compliance."""
+def rather_late(
+    view: View, fits: Sequence[Suspicion], told: Callable[[View], Sequence[Suspicion]]
+) -> list[Suspicion]:
+    """What is to be said of `fits` (signs, ratio, scale) where the joint may be late instead: at one speed a late
+    angle is as a straight line a compliance, of either sign, and a ratio.
+
+    The drive as it stands, the joint in time, is held against the drive with the load as `fits` have it. `told`: what
+    is said of other rows of this kind, which has to be nothing once the joint is in time.
+    """
     if not (np.ptp(view.q) > 0.0 and np.ptp(view.M) > 0.0):
-        return fits
-    some = _some(view)
-    q, M = view.q[some], view.M[some]
-    later = slice(len(q) // 4, None)
-    own = rms(_beyond(np.column_stack((np.ones_like(q), q, _trailing(q))), M)) / max(rms(M[later]), 1e-300)
-    word = (
-        "; or an angle comes late, or trails by lost motion (the load follows the motor, so they look alike)"
+        return list(fits)
+    late, before, after = _in_time(view, _bent(view, 1.0))
+    _, otherwise, _ = _in_time(view, _bent(view, _factor(view, fits)))
+    if not after < min(LATE_GAIN * before, otherwise / LATE_GAIN):
+        return list(fits)
+    said = _delay(view, JOINT, late, before, after)
+    if told(view.shifted(said)):
+        return list(fits)
+    if after < LATE_GAIN * otherwise:
+        return [said]
+    kinds = " or ".join(f"the {f.kind} of {f.channel}" for f in fits)
+    return [replace(said, text=f"{said.text}; or {kinds} is off: these data do not tell them apart")]
+
+
+def _delay(view: View, name: str, late: float, before: float, after: float) -> Suspicion:
+    """The words for a channel that is so late [s], and what the nominal drive leaves [rad] as it is and shifted."""
+    of_speed = _of_speed(view, name, late)
+    how = "late" if late > 0.0 else "early"
+    both = "" if of_speed > OF_SPEED else ", or to trail by lost motion (at one speed they look alike)"
+    words = (
+        f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}: the nominal drive leaves {mrad(before)} RMS, "
+        f"{mrad(after)} with it shifted"
     )
-    return [
-        replace(f, text=f.text + word) if own < OF_SPEED and f.channel == view.channel else f for f in fits
-    ]
+    numbers = {"late_s": late, "rms_rad": before, "left_rad": after, "of_speed": of_speed}
+    return Suspicion("delay", name, words, numbers)
+
+
+def _factor(view: View, fits: Sequence[Suspicion]) -> float:
+    """By what the load is to be multiplied, as signs and scale have it."""
+    of_load = {f.kind: f.numbers["compliance_over_nominal"] for f in fits if f.channel == view.channel}
+    turned = -1.0 if "sign" in of_load else 1.0
+    return of_load.get("scale", turned)
+
+
+def _bent(view: View, factor: float) -> FloatArray | None:
+    """What the nominal drive gives under so many times the load [rad]; None where it cannot bear that."""
+    some = _some(view)
+    columns = {"time_s": view.time[some], INPUT: view.q[some], "joint_torque_Nm": factor * view.M[some]}
+    try:
+        return Observer(bare(view.config)).run(columns)["deflection_rad"]
+    except CablecompError:
+        return None
+
+
+def _in_time(view: View, bent: FloatArray | None) -> tuple[float, float, float]:
+    """(how late the joint is, s; RMS of what ratio and this deflection leave of it; RMS shifted)."""
+    if bent is None:
+        return 0.0, inf, inf
+    some = _some(view)
+    line = np.column_stack((np.ones_like(bent), view.q[some]))
+
+    def left(shift_s: float) -> float:
+        return rms(_beyond(line, np.interp(view.time[some] + shift_s, view.time, view.y) - bent))
+
+    return _least(left, _most(view), 1e-5)
 
 
 def _some(view: View) -> slice:
@@ -86,18 +124,16 @@ def _some(view: View) -> slice:
     return slice(None, None, max(1, len(view.time) // DELAY_ROWS))
 
 
-def _best_shift(view: View, name: str) -> tuple[float, float, float]:
-    """(how late, s; RMS as it is; RMS shifted)."""
-    most = min(MOST_LATE_S, 0.02 * float(view.time[-1] - view.time[0]))
-    left: dict[float, float] = {}
+def _most(view: View) -> float:
+    """Greatest delay that is looked for in so long a recording [s]."""
+    return min(MOST_LATE_S, 0.02 * float(view.time[-1] - view.time[0]))
 
-    def at(shift: float) -> float:
-        if shift not in left:
-            left[shift] = _left_shifted(view, name, shift)
-        return left[shift]
 
+def _least(left: Callable[[float], float], most: float, close: float = 0.005) -> tuple[float, float, float]:
+    """(shift within `most` that leaves least, what is left without one, what with it), to this share of `most`."""
+    at = cache(left)
     best, width = 0.0, 0.5 * most
-    while width > 0.005 * most:  # the least of three, closer and closer
+    while width > close * most:  # the least of three, closer and closer
         best = min((best - width, best, best + width), key=at)
         width *= 0.5
     return best, at(0.0), at(best)

@@ -120,3 +120,38 @@ def test_of_a_late_load_and_an_early_joint_that_look_alike_the_late_one_is_said(
     (said,) = delays_of(plant(np.zeros_like(TIME), 1.6 * swung(TWO_SPEEDS)), "joint_torque_Nm", 0.05)
     assert said.channel == "joint_torque_Nm"
     assert said.numbers["late_s"] == pytest.approx(0.05, abs=0.01)
+
+
+def late_by(columns: dict[str, FloatArray], name: str, by_s: float) -> dict[str, FloatArray]:
+    return {**columns, name: np.interp(TIME - by_s, TIME, columns[name])}
+
+
+@pytest.fixture(scope="module")
+def at_one_speed() -> dict[str, FloatArray]:
+    """Load and motor a fixed phase apart: as a straight line a late joint is then a load of either sign and a ratio."""
+    return plant(1.8 * swung(ONE_SPEED), 1.2 * swung(ONE_SPEED, 1.0))
+
+
+@pytest.mark.parametrize("by_s", [0.02, 0.05, -0.05])
+def test_a_late_joint_at_one_speed_is_no_ratio_and_no_turned_load(
+    at_one_speed: dict[str, FloatArray], by_s: float
+) -> None:
+    (said,) = suspicions(JOINT, late_by(at_one_speed, "joint_position_rad", by_s))
+    assert (said.kind, said.channel) == ("delay", "joint_position_rad")
+    assert said.numbers["late_s"] == pytest.approx(by_s, abs=1e-3)
+    assert "lost motion" in said.text
+
+
+@pytest.mark.parametrize(
+    ("changed", "factor", "told"),
+    [
+        ("joint_torque_Nm", -1.0, ("sign", "joint_torque_Nm")),
+        ("joint_torque_Nm", 6.0, ("scale", "joint_torque_Nm")),
+        ("motor_position_rad", 1.1, ("ratio", "joint_position_rad")),
+    ],
+)
+def test_at_one_speed_a_turned_load_a_scale_and_a_ratio_are_no_delay(
+    at_one_speed: dict[str, FloatArray], changed: str, factor: float, told: tuple[str, str]
+) -> None:
+    found = suspicions(JOINT, {**at_one_speed, changed: factor * at_one_speed[changed]})
+    assert [(s.kind, s.channel) for s in found] == [told]

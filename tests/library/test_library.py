@@ -59,3 +59,8 @@ def test_errors_are_one_line(given: object, words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         cablecomp.replay(given, JOINT)
     assert "\n" not in str(caught.value)
+
+
+def test_a_recording_in_the_joints_place_is_told_in_one_line() -> None:
+    with pytest.raises(InputError, match="`config` is a dict; give a JointConfig"):
+        cablecomp.replay(JOINT, COLUMNS)  # type: ignore[arg-type]
