@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any, Final
 
 import numpy as np
+from plotly.subplots import make_subplots
 from rich.table import Table
 
 from cablecomp.fleet.fleet import Fleet, JointStory
+from cablecomp.fleet.rows import Row
 from cablecomp.report import page, style
 from cablecomp.report.page import Fact, Section
+from cablecomp.signal.smoothing import FloatArray
 
 FLAGS: Final = ("drifts", "slips", "loses strands")
 _DRAWN: Final = 12
@@ -66,14 +70,15 @@ def _sections(fleet: Fleet, command: str) -> Iterator[Section]:
     )
     rows = [(j.joint, j.nights, ", ".join(j.flags) or "–", "; ".join(j.words)) for j in _worst_first(fleet)]
     yield Section("Answer", page.facts(cards) + page.table(("joint", "nights", "what", "seen"), rows))
-    drawn = [j for j in _worst_first(fleet) if _curve(fleet, j.joint)[1].size > 1][:_DRAWN]
+    drawn = [j for j in _worst_first(fleet) if len(_curve(fleet, j.joint)) > 1][:_DRAWN]
     if drawn:
         figures = [f"<h3>{escape(j.joint)}</h3>" + page.figure(_over_nights(fleet, j.joint)) for j in drawn]
+        what = "Zero and compliance of each night" if fleet.work == "replay" else "Error of each night"
         more = f" The first {_DRAWN} joints." if len(fleet.joints) > _DRAWN else ""
         yield Section(
             "Over the nights",
             page.columns(*figures),
-            f"Zero and compliance of each night, worst joints first.{more}",
+            f"{what}, worst joints first.{more}",
         )
     if failed:
         yield Section(
@@ -84,34 +89,73 @@ def _sections(fleet: Fleet, command: str) -> Iterator[Section]:
     )
 
 
-def _curve(fleet: Fleet, joint: str) -> tuple[list[str], Any]:
+def _curve(fleet: Fleet, joint: str) -> list[Row]:
+    """The nights of a joint that its figure shows."""
     key = "zero_rad" if fleet.work == "replay" else "before_rad"
-    rows = [row for row in fleet.rows if row["joint"] == joint and row.get(key) is not None]
-    return [row["night"] for row in rows], np.array([row[key] for row in rows])
+    return [row for row in fleet.rows if row["joint"] == joint and row.get(key) is not None]
 
 
 def _over_nights(fleet: Fleet, joint: str) -> Any:
-    nights, values = _curve(fleet, joint)
-    number = np.arange(1, len(nights) + 1)
-    name = "zero" if fleet.work == "replay" else "error before"
-    fig = style.axes(style.figure(300), "night", style.label(name, "mrad"))
-    fig.update_xaxes(dtick=-(-len(nights) // 10))  # whole nights
-    fig.add_scatter(
-        x=number, y=1e3 * values, mode="lines+markers", name=f"{name} / mrad", hovertext=nights,
-        line={"color": style.PREDICTED, "width": 2},
-    )  # fmt: skip
-    ratios = [r.get("compliance_ratio") for r in fleet.rows if r["joint"] == joint and r["night"] in nights]
-    if any(r is not None for r in ratios):
-        percent = np.array([np.nan if r is None else 100.0 * (r - 1.0) for r in ratios])
-        fig.add_scatter(
-            x=number, y=percent, mode="lines+markers", name="compliance beyond the model / %", yaxis="y2",
-            line={"color": style.RESIDUAL, "width": 2, "dash": "dot"}, hovertext=nights,
-        )  # fmt: skip
-        fig.update_layout(
-            yaxis2={"overlaying": "y", "side": "right", "showgrid": False, "title": "compliance / %"}
-        )
-        fig.update_layout(margin={"r": 64})
+    """What moves from night to night: each quantity on an axis of its own, in a range that scatter does not fill."""
+    rows = _curve(fleet, joint)
+    panels = _of_replay(rows) if fleet.work == "replay" else _of_diagnosis(rows)
+    fig = make_subplots(rows=len(panels), cols=1, shared_xaxes=True, vertical_spacing=0.1)
+    fig.update_layout(template=style.template(), height=170 + 130 * len(panels))
+    nights = [row["night"] for row in rows]
+    for k, panel in enumerate(panels, start=1):
+        for name, values, colour in panel.lines:
+            fig.add_scatter(
+                x=np.arange(1, len(rows) + 1), y=values, mode="lines+markers", name=name, hovertext=nights,
+                line={"color": colour, "width": 2}, row=k, col=1,
+            )  # fmt: skip
+        style.axes(fig, "night" if k == len(panels) else "", panel.title, row=k, col=1)
+        fig.update_yaxes(range=panel.extent(), tickformat="~g", nticks=5, row=k, col=1)
+    fig.update_xaxes(dtick=-(-len(rows) // 10))  # whole nights
     return fig
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """One axis: `least`, in its unit, is what it shows at the least; `from_zero`: it begins there."""
+
+    title: str
+    lines: tuple[tuple[str, FloatArray, str], ...]
+    least: float
+    from_zero: bool = False
+
+    def extent(self) -> tuple[float, float]:
+        """Range of the axis."""
+        values = np.concatenate([v[np.isfinite(v)] for _, v, _ in self.lines])
+        low, high = (float(np.min(values)), float(np.max(values))) if len(values) else (0.0, 0.0)
+        low = 0.0 if self.from_zero else low
+        wanting = max(self.least - (high - low), 0.0)
+        edge = 0.06 * max(high - low, self.least)
+        if self.from_zero:
+            return low, high + wanting + edge
+        return low - 0.5 * wanting - edge, high + 0.5 * wanting + edge
+
+
+def _of_replay(rows: Sequence[Row]) -> list[_Panel]:
+    zero = 1e3 * np.array([row["zero_rad"] for row in rows])
+    title = style.label("zero moved", "mrad")
+    panels = [_Panel(title, (("zero, from the first night's", zero - zero[0], style.PREDICTED),), 0.2)]
+    ratios = np.array([_number(row.get("compliance_ratio")) for row in rows])
+    if np.any(np.isfinite(ratios)):
+        line = ("compliance beyond the model", 100.0 * (ratios - 1.0), style.RESIDUAL)
+        panels.append(_Panel(style.label("compliance", "%"), (line,), 2.0))
+    return panels
+
+
+def _of_diagnosis(rows: Sequence[Row]) -> list[_Panel]:
+    before, after = (
+        1e3 * np.array([_number(row.get(key)) for row in rows]) for key in ("before_rad", "after_rad")
+    )
+    lines = (("before", before, style.RESIDUAL), ("after", after, style.PREDICTED))
+    return [_Panel(style.label("RMS error", "mrad"), lines, 0.05, from_zero=True)]
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)
 
 
 def _all_rows(rows: Sequence[Mapping[str, Any]]) -> str:

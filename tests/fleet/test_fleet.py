@@ -72,9 +72,12 @@ def test_each_joint_is_told_by_what_it_does(tmp_path: Path, made_up: list[str]) 
     assert "is cut off" in failed
     layout = _over_nights(found, "fraying").layout
     assert [axis.title.text.partition(" /")[0] for axis in (layout.xaxis, layout.yaxis, layout.yaxis2)] == [
-        "night", "zero", "compliance",
+        "", "zero moved", "compliance",
     ]  # fmt: skip
-    assert layout.xaxis.dtick == 1
+    assert (layout.xaxis2.title.text, layout.xaxis2.dtick) == ("night", 1)
+    assert (
+        layout.yaxis.range[1] - layout.yaxis.range[0] > 0.2
+    )  # mrad: scatter of a night's zero does not fill it
 
     made_up.clear()  # again: only what failed, or was changed meanwhile, is worked on
     (place / "drifting/night-00.csv").write_text("time_s\n0\n1\n", encoding="utf-8")
