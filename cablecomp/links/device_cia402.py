@@ -70,6 +70,19 @@ def claims(device: Cia402Device, end: MotorEnd) -> tuple[Claim, ...]:
     )
 
 
+def _check(device: Cia402Device, mode: Mode, has_second: bool, joint: str) -> None:
+    """Raise InputError for a mode that the profile lacks, or a second encoder without its counts."""
+    if mode not in cia402.CYCLIC:
+        raise InputError(
+            f"joint `{joint}`: CiA 402 has no mode `{mode.value}`; accepted: {', '.join(cia402.CYCLIC)}"
+        )
+    if has_second and device.joint_encoder_counts_per_turn is None:
+        raise InputError(
+            f"device `{device.id}`: joint_encoder_counts_per_turn is missing, though it is the sensor of joint "
+            f"`{joint}`; state it"
+        )
+
+
 class Cia402Drive:
     """Encodes commands to, and decodes what comes from, one drive.
 
@@ -89,16 +102,7 @@ class Cia402Drive:
         self._node, self._host, self._readings, self._device = end.node, device.host, readings, device
         self._round = round_
         self._mode = Mode(end.mode)
-        if self._mode not in cia402.CYCLIC:
-            raise InputError(
-                f"joint `{readings.name}`: CiA 402 has no mode `{end.mode}`; "
-                f"accepted: {', '.join(cia402.CYCLIC)}"
-            )
-        if joint is not None and device.joint_encoder_counts_per_turn is None:
-            raise InputError(
-                f"device `{device.id}`: joint_encoder_counts_per_turn is missing, though it is the sensor of joint "
-                f"`{readings.name}`; state it"
-            )
+        _check(device, self._mode, joint is not None, readings.name)
         self._watch_s = end.command_timeout_s or 0.0
         self._dialogue = SetUpDialogue(
             end.node,
@@ -116,13 +120,31 @@ class Cia402Drive:
                 )
             ),
         )
-        gear, per_turn = Gear(end), device.counts_per_turn / _TURN
+        self._scale(Gear(end), joint)
+        readings.motor_step_rad = abs(self._position.gain)
+        entries = cia402.command_entries(self._mode, device.feed_forward)
+        self._feed_forward = len(entries) == 3
+        self._pdo = Struct("<H" + "".join({2: "h", 4: "i"}[e.size] for e in entries[1:]))
+        self._has_second = joint is not None
+        second = ("second encoder",) if self._has_second else ()
+        self._stats = {
+            name: MessageStats(f"{readings.name}: {device.id} {name}")
+            for name in ("status", "velocity", *second, "heartbeat")
+        }
+        readings.messages += self._stats.values()
+        self._sent = (0,) * (len(entries) - 1)
+        self._health = Supervision(readings, self._dialogue, cia402.CYCLIC[self._mode], device.heartbeat_s)
+        self._now_s, self._told_s = 0.0, -inf
+
+    def _scale(self, gear: Gear, joint: SensorEnd | None) -> None:
+        """From the drive's counts to SI units of the joint's motor, and back."""
+        device = self._device
+        per_turn = device.counts_per_turn / _TURN
         per_turn_s = per_turn
         if device.velocity_counts_per_turn_s is not None:
             per_turn_s = device.velocity_counts_per_turn_s / _TURN
         thousandths = 1e3 / device.rated_torque_Nm
         self._position = chain(Linear(1 / per_turn), gear.from_shaft("motor_position_rad"))
-        readings.motor_step_rad = abs(self._position.gain)
         self._velocity = chain(Linear(1 / per_turn_s), gear.from_shaft("motor_velocity_rad_s"))
         self._torque = chain(Linear(1 / thousandths), gear.from_shaft("motor_torque_Nm"))
         self._to = {
@@ -130,26 +152,9 @@ class Cia402Drive:
             Mode.VELOCITY: Linear(gear.velocity() * per_turn_s),
             Mode.TORQUE: Linear(gear.torque() * thousandths),
         }
-        entries = cia402.command_entries(self._mode, device.feed_forward)
-        self._feed_forward = len(entries) == 3
-        self._pdo = Struct("<H" + "".join({2: "h", 4: "i"}[e.size] for e in entries[1:]))
         if joint is not None and device.joint_encoder_counts_per_turn is not None:
             turn = Linear(_TURN / device.joint_encoder_counts_per_turn)
             self._second = chain(turn, calibration(joint, "joint_position_rad"))
-        self._has_second = joint is not None
-        self._stats = {
-            name: MessageStats(f"{readings.name}: {device.id} {name}")
-            for name in (
-                "status",
-                "velocity",
-                *(("second encoder",) if joint is not None else ()),
-                "heartbeat",
-            )
-        }
-        readings.messages += self._stats.values()
-        self._sent = (0,) * (len(entries) - 1)
-        self._health = Supervision(readings, self._dialogue, cia402.CYCLIC[self._mode], device.heartbeat_s)
-        self._now_s, self._told_s = 0.0, -inf
 
     # ---- what comes ------------------------------------------------------------------------------
 
