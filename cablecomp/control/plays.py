@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from cablecomp.config import JointConfig
-from cablecomp.control.stiffness import full, greatest_load, plain
+from cablecomp.control.stiffness import greatest_load, held, plain
 from cablecomp.observer import Observer
-from cablecomp.signals import Sample
 
 Floats = NDArray[np.float64]
 
@@ -42,8 +41,7 @@ def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None =
     for k, load in enumerate(loads):
         z = play(z, load, radii)
         rows.append([load, load * load, *z])
-        found = observer.step(full(Sample(1e3 * k, 0.0, float(load), 0.0, 0.0, 20.0), observer))
-        wanted.append(found.deflection_rad)
+        wanted.append(held(observer, k, float(load), most_Nm).deflection_rad)
     A, b = np.array(rows), np.array(wanted)
     size = np.maximum(np.abs(A).max(axis=0), 1e-300)
     least = np.zeros(states + 2)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.observer import Observer
-from cablecomp.signals import Sample
+from cablecomp.observer import Observer, SampleRefused
+from cablecomp.observer.refusal import REASONS
+from cablecomp.signals import Estimate, Sample
 
 Floats = NDArray[np.float64]
 
@@ -72,9 +73,7 @@ def stiffness_range(
     observer = Observer(plain(config))
     rows: list[tuple[float, float]] = []
     for k, load in enumerate(way):
-        found = observer.step(
-            Sample(1e3 * k, 0.0, float(load), 0.0, 0.0, 20.0, (0.0,) * len(observer.channels))
-        )
+        found = held(observer, k, float(load), most)
         rows.append((found.deflection_rad, observer.stiffness()))
     deflection, stiffness = (np.array(c) for c in zip(*rows, strict=True))
     n = samples // 4
@@ -92,6 +91,17 @@ def stiffness_range(
         deflection,
         stiffness,
     )
+
+
+def held(observer: Observer, k: int, load_Nm: float, most_Nm: float) -> Estimate:
+    """Step k of a load cycle up to `most_Nm` with the motor held; InputError if the joint cannot bear the load."""
+    try:
+        return observer.step(full(Sample(1e3 * k, 0.0, load_Nm, 0.0, 0.0, 20.0), observer))
+    except SampleRefused as error:
+        raise InputError(
+            f"{load_Nm:.4g} Nm, of the +-{most_Nm:.4g} Nm that are designed for (joint_torque_max_Nm, else R T0): "
+            f"{REASONS[error.reason]}"
+        ) from None
 
 
 def full(sample: Sample, observer: Observer) -> Sample:

@@ -25,6 +25,7 @@ from cablecomp.control.plant_model import (
     response,
     stable_when_closed,
 )
+from cablecomp.control.plays import fit_plays
 from cablecomp.control.shaping import Ahead, Slope
 from cablecomp.control.stiffness import stiffness_range
 from cablecomp.control.synthesis import DesignWork
@@ -53,6 +54,19 @@ def test_the_stiffness_range_begins_at_the_free_spans_alone() -> None:
     assert found.high_Nm_per_rad == pytest.approx(spans, rel=1e-6)
     assert found.low_Nm_per_rad < found.secant_Nm_per_rad < found.zero_Nm_per_rad
     assert sheet is not None
+
+
+def test_a_load_that_the_joint_cannot_bear_is_named_as_the_design_s() -> None:
+    """A tenth above the pretension the cable breaks, before the limit's load; no sample of anybody's is to blame."""
+    stage = JOINT.drive.stage[0]
+    weak = stage.model_copy(update={"breaking_force_N": 1.1 * stage.pretension_N})
+    joint = JOINT.model_copy(update={"drive": JOINT.drive.model_copy(update={"stage": (weak,)})})
+    most = JOINT.limits.joint_torque_max_Nm
+    for of in (stiffness_range, fit_plays):
+        with pytest.raises(
+            InputError, match=rf"of the \+-{most:.4g} Nm that are designed for .*breaking_force_N"
+        ):
+            of(joint)
 
 
 def test_filter_and_path_of_the_model_are_the_compensator_s_own() -> None:

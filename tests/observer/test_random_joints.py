@@ -19,6 +19,6 @@ def test_what_a_random_joint_takes_leaves_a_sound_state() -> None:
 
 @pytest.mark.parametrize("seed", [100373, 100385])
 def test_a_small_step_that_turns_the_slip_about_keeps_the_stretch(seed: int) -> None:
-    """Two soft joints of four thousand in which Newton's last step does."""
+    """Soft joints in which Newton's last step does."""
     rng = np.random.default_rng(seed)
     assert drive_hard(random_joint(rng, strain=SOFT_STRAIN), rng, 130).accepted > 40
