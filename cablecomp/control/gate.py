@@ -64,11 +64,11 @@ class GateLimits:
             raise InputError("gate: lead_max_rad and age_s must be above 0")
         if not self.position_min_rad < self.position_max_rad:
             raise InputError("gate: position_min_rad must lie below position_max_rad; exchange them")
-        if _carried(0.0, -self.velocity_max_rad_s, self.velocity_max_rad_s, self.wire.velocity) is None:
+        if not _carries(self.wire.velocity, self.velocity_max_rad_s):
             raise InputError(
                 "gate: the message carries no velocity within the limits; wire.velocity is wrong"
             )
-        if _carried(0.0, -self.torque_max_Nm, self.torque_max_Nm, self.wire.torque) is None:
+        if not _carries(self.wire.torque, self.torque_max_Nm):
             raise InputError(
                 f"gate: the message carries no torque within +-{self.torque_max_Nm:g} Nm; "
                 "raise motor_torque_max_Nm, or give the drive a finer range"
@@ -177,8 +177,8 @@ def gate(
     )
     if cut:
         flags |= RATE_LIMITED
-    if wire.velocity.step > 0.0:
-        slow = _carried(slow, -limits.velocity_max_rad_s, limits.velocity_max_rad_s, wire.velocity) or 0.0
+    fast = limits.velocity_max_rad_s
+    slow = _carried(slow, -fast, fast, wire.velocity) or 0.0
     return SafeCommand(position, slow, torque, flags, spare_rad, spare_Nm)
 
 
@@ -191,13 +191,16 @@ def _follow(
     coarse = step > reach
     reach += spare
     even = _within(wanted, before, reach)
-    if step == 0.0:
-        return even, 0.0, even != wanted
     least, most = before - reach, before + reach
     carried = _carried(even, low if low > least else least, high if high < most else most, grid)
     value = before if carried is None else carried
     spare = min(reach - abs(value - before), step) if coarse else 0.0
     return value, spare, even != wanted
+
+
+def _carries(grid: Grid, most: float) -> bool:
+    """Whether the wire carries any value within +-most."""
+    return _carried(0.0, -most, most, grid) is not None
 
 
 def _carried(value: float, low: float, high: float, grid: Grid) -> float | None:
