@@ -64,7 +64,7 @@ def _take_over(made: Path) -> None:
 
 
 def _still(config: JointConfig) -> Sample:
-    return Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(other_channels(config)))
+    return Sample(0.0, 0.0, 0.0, 0.0, config.motor_zero_Nm, 0.0, (0.0,) * len(other_channels(config)))
 
 
 if __name__ == "__main__":

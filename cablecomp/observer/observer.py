@@ -195,7 +195,7 @@ class Observer:
         """Have what a loop calls (step, peek, inverse, bounds) compiled, or read from the cache, before it is
         armed; the state stays as it is."""
         twin = Observer(self.config, bounds=self._bounds is not None)
-        still = Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0,) * len(self.channels))
+        still = Sample(0.0, 0.0, 0.0, 0.0, self._motor_zero, 0.0, (0.0,) * len(self.channels))
         twin.step(still)
         twin.peek(still)
         twin.inverse(still)

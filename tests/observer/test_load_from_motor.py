@@ -47,3 +47,12 @@ def test_the_motors_torque_tells_the_load_beside_what_holds_the_pretension(
         step = one.step(Sample(TIME[k], MOTOR[k], 0.0, motor_torque_Nm=columns["motor_torque_Nm"][k]))
     assert step.joint_position_rad == pytest.approx(angle[2], abs=0.01 * deflection)
     assert load_of(config, columns) == pytest.approx(LOAD, abs=0.01)
+
+
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+def test_an_observer_of_the_motors_torque_is_made_ready_for_a_loop(circuit: str) -> None:
+    """A motor without torque would let an open circuit's cable hang; what is compiled with is a joint at rest."""
+    observer = Observer(joint(circuit, 0.02))
+    before = observer.snapshot()
+    observer.compile()
+    assert observer.snapshot() == before
