@@ -29,7 +29,7 @@ from cablecomp.cli.shared import (
 )
 from cablecomp.config import JointConfig
 from cablecomp.config_text import joint_text
-from cablecomp.control.options import ControlMode
+from cablecomp.control.options import ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol, load_protocol
 from cablecomp.control.standard import calibration_protocol, force_protocol, reaching_protocol
 from cablecomp.errors import DeviceError, InputError
@@ -111,14 +111,7 @@ def run(
     `replay` accepts.
     """
     joint = read_joint(config, effects)
-    bus = load_link(DEMO_LINK if link is None else link)
-    bus = _rehearsed(bus, errors()) if sim else bus
-    wanted = control_of(control, joint, None if sim else stated_gains(bus))
-    bus, wanted = matched(bus, wanted, own_link=not sim)
-    if link is None and not sim:
-        raise InputError("--link is missing; give a link file, or --sim for a simulated joint")
-    if link is None:
-        bus = same_joint(bus, [joint.name])
+    bus, wanted = _bus_and_control(link, control, joint, sim)
     if comparison:
         from cablecomp.cli.demo import compare_controllers  # brings the plant
 
@@ -152,6 +145,19 @@ def run(
             if simulation is not None:
                 simulation.close()
         _finish(report, joint, config, beside, as_json)
+
+
+def _bus_and_control(
+    link: Path | None, control: Path | None, joint: JointConfig, sim: bool
+) -> tuple[LinkConfig, ControlConfig]:
+    """The bus, as it is or rehearsed, and the controller for it; raises InputError where one does not fit the other."""
+    bus = load_link(DEMO_LINK if link is None else link)
+    bus = _rehearsed(bus, errors()) if sim else bus
+    wanted = control_of(control, joint, None if sim else stated_gains(bus))
+    bus, wanted = matched(bus, wanted, own_link=not sim)
+    if link is None and not sim:
+        raise InputError("--link is missing; give a link file, or --sim for a simulated joint")
+    return (same_joint(bus, [joint.name]) if link is None else bus), wanted
 
 
 def _rehearsed(link: LinkConfig, said: Console) -> LinkConfig:
