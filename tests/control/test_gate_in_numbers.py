@@ -243,6 +243,14 @@ def test_no_first_command_is_given_where_the_wire_has_none() -> None:
             first_command(at, replace(LIMITS, wire=Wire(Grid(0.0, 0.0, 5.0, 9.0))))
 
 
+def test_a_limit_holds_to_a_millionth_of_the_wire_s_step() -> None:
+    """A ten-thousandth of a step below 3 rad the next value that may be sent lies a whole step below."""
+    limits = replace(LIMITS, position_max_rad=3.0 - 1e-6, wire=Wire(Grid(0.0, 0.01, -9.0, 9.0)))
+    assert first_command(3.0 - 1e-6, limits).motor_position_rad == pytest.approx(2.99, abs=1e-9)
+    near = replace(limits, position_max_rad=3.0 - 5e-9)
+    assert first_command(3.0 - 5e-9, near).motor_position_rad == pytest.approx(3.0, abs=1e-9)
+
+
 def test_unless_told_otherwise_a_motor_goes_anywhere_at_40_rad_s() -> None:
     limits = GateLimits()
     for at in (-1e3, 1e3):
