@@ -70,12 +70,18 @@ def catalogue() -> dict[str, Effect]:
     return {**_built_in(), **_registered}
 
 
-def role_of(name: str) -> Role | None:
-    """The role of the effect's parameter `effect.ID.KEY`; None for any other name."""
+def parameter_of(name: str) -> Parameter | None:
+    """The effect's parameter that is named `effect.ID.KEY`; None for any other name."""
     if not name.startswith("effect."):
         return None
     _, effect, key = name.split(".")
-    return _look_up(effect).parameter(key).role
+    return _look_up(effect).parameter(key)
+
+
+def role_of(name: str) -> Role | None:
+    """The role of that parameter."""
+    found = parameter_of(name)
+    return None if found is None else found.role
 
 
 def with_effects(config: JointConfig, effects: Sequence[tuple[str, Mapping[str, Any]]]) -> JointConfig:

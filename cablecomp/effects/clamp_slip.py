@@ -1,4 +1,4 @@
-"""Clamp slip: a termination or clamp of one cable gives way, at once or for a while."""
+"""Clamp slip: a termination or clamp of one cable gives way, or a drum slips on its shaft, at once or for a while."""
 
 from __future__ import annotations
 
@@ -9,20 +9,27 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import DURATION, Change, Effect, Parameter, drum_radius, term, wrap_deflection
 
 
-@term(parameters=("slip", "instant", "duration"))
+@term(parameters=("slip", "instant", "duration", "taken_up"))
 def _slip(c: Any, p: Any, s: Any) -> None:
-    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s]."""
+    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s], share that the other takes up."""
     since = c.time - p.instant
     if since >= 0.0:
         done = since / p.duration if since < p.duration else 1.0
         if p.slip > 0.0:
             c.length_h -= p.slip * done
+            c.length_l += p.slip * done * p.taken_up
         else:
             c.length_l += p.slip * done
+            c.length_h -= p.slip * done * p.taken_up
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    slip = _slip(slip=values["slip_m"], instant=values["time_s"], duration=values["duration_s"])
+    slip = _slip(
+        slip=values["slip_m"],
+        instant=values["time_s"],
+        duration=values["duration_s"],
+        taken_up=values["taken_up"],
+    )
     return Change(terms=slip)
 
 
@@ -34,10 +41,11 @@ def _loop_arc(config: JointConfig) -> float:
 EFFECT = Effect(
     id="clamp_slip",
     statement="A clamp or termination slipped, at once or little by little (of cable h where the length is "
-    "positive, of l where it is negative): the "
-    "joint stands off from then on, and the pretension is lower.",
-    equation="length of cable h + g s, s > 0; of cable l + g |s|, s < 0; g = (t - t*)/d within 0..1, d = 0: a step",
-    source="kinematics; in a closed circuit the joint moves by about s/(2R), and both tensions fall",
+    "positive, of l where it is negative): the joint stands off from then on, and the pretension is lower; "
+    "or it is kept, where a drum, the link or its encoder slipped on the shaft (taken_up near 1).",
+    equation="length of cable h + g s, of cable l - g k s, s > 0; of cable l + g |s|, of cable h - g k |s|, s < 0; "
+    "g = (t - t*)/d within 0..1, d = 0: a step; k = taken_up",
+    source="kinematics; in a closed circuit the joint moves by about s (1 + k)/(2R), and both tensions fall as 1 - k",
     parameters=(
         Parameter(
             "slip_m",
@@ -52,6 +60,19 @@ EFFECT = Effect(
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
         DURATION,
+        Parameter(
+            "taken_up",
+            "-",
+            0.0,
+            0.0,
+            1.0,
+            "k, share of it that the other cable is shorter by: 0 where one cable slips, 1 where a drum does",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+            tries=(1.0,),
+        ),
     ),
     acts_through=("time",),
     bounded=True,

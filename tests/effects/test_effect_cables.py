@@ -176,6 +176,21 @@ def test_a_clamp_that_slips_shifts_the_joint_and_loosens_both_sides() -> None:
     assert (plain["tension_l_N"] - found["tension_l_N"])[late] == pytest.approx(lost, rel=5e-3)
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_drum_that_slips_turns_the_joint_and_loosens_neither_side(way: float) -> None:
+    """What one cable lets go the other takes up: by kinematics alone the joint stands off by s/R."""
+    config = joint(free_length_m=LONG)
+    columns = small_steps(config)
+    plain = run(config, columns)
+    slip = {"slip_m": way * 0.05, "time_s": 2.0, "taken_up": 1.0}
+    found = run(config, columns, ("clamp_slip", slip))
+    late = columns["time_s"] >= 2.0
+    moved = (found["deflection_rad"] - plain["deflection_rad"])[late]
+    assert moved == pytest.approx(way * 0.05 / config.drive.stage[0].output_radius_m, rel=2e-3)
+    for side in ("tension_h_N", "tension_l_N"):
+        assert found[side][late] == pytest.approx(plain[side][late], rel=2e-3)
+
+
 @pytest.mark.parametrize(
     ("effect", "amount"), [("clamp_slip", {"slip_m": 2e-3}), ("strand_break", {"fraction": 0.3})]
 )

@@ -111,9 +111,9 @@ def features(
     `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
     the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`:
     share of the remainder that still follows what the effect acts through. `unsteady`: difference of its amount
-    between halves of the data, in units of it. `at_bound`: one of its parameters, lengths apart, is on a bound.
-    `tries`: points that it was asked at (an event: many instants), the best of which counts. `terms`: effects in the
-    final model.
+    between halves of the data, in units of it. `at_bound`: one of its parameters, lengths and shares apart, is on a
+    bound. `tries`: points that it was asked at (an event: many instants), the best of which counts. `terms`: effects in
+    the final model.
     """
     return {
         "log_gain": _log_gain(gain),

@@ -17,7 +17,8 @@ from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.effects.catalogue import role_of
+from cablecomp.effects import Parameter
+from cablecomp.effects.catalogue import parameter_of
 from cablecomp.signal.smoothing import FloatArray
 
 ALONE = ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
@@ -102,9 +103,15 @@ def _weighed(
 
 def _at_bound(model: Model, term: Hypothesis) -> bool:
     """Whether a parameter of the effect ended on a bound; that all of a cable lies on its guides is an answer, as that
-    none does."""
+    none does, or that all of a slip is taken up."""
     names = (name.partition("@")[0].partition("~")[0] for name in model.fit.at_bound())
-    return any(n.startswith(f"effect.{term.effect.id}.") and role_of(n) != "length" for n in names)
+    found = (parameter_of(n) for n in names if n.startswith(f"effect.{term.effect.id}."))
+    return any(p is not None and p.role != "length" and not _is_share(p) for p in found)
+
+
+def _is_share(p: Parameter) -> bool:
+    """Whether a shape goes from none to all."""
+    return p.shape and p.unit == "-" and (p.minimum, p.maximum) == (0.0, 1.0)
 
 
 def _selected(selection: Selection, term: Hypothesis) -> float:
