@@ -74,6 +74,10 @@ class Thresholds:
     counts for."""
     promise: float = 0.98
     """Cost after a linear step over the cost before, above which a hypothesis is not tried at all."""
+    reach: float = 0.01
+    """Share of the cost that a linear step by one in a parameter (e times as much, or as much again) costs where
+    hypotheses are asked: of a sloppy model steps by e to the fifth promised a quarter of the cost, on the jaw, that no
+    fit could win."""
     rough: int = 5
     """Evaluations (residual and derivative) of a first fit from each anchor."""
     promising: int = 6
@@ -156,10 +160,10 @@ class Thresholds:
     """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
     gain_sure: float = 0.03
     """That share."""
-    z_zero_step: float = 0.0
-    """Standard errors by which an event has to predict better than a plain step of the encoder's zero at its instant:
-    an event steps the zero too, so the step stands in for it only where it predicts better. (Over a pretension of each
-    session's own an effect needs `z`, as over any smaller model.)"""
+    z_zero_step: float = -1.0
+    """Standard errors by which an event has to predict better than a plain step of the encoder's zero at its instant. A
+    drum or a link that slips on its shaft is such a step, so the step stands in only where it predicts better beyond
+    chance. (Over a pretension of each session's own an effect needs `z`, as over any smaller model.)"""
     z_candidate: float = 2.0
     """Standard errors from which what stood out in a round, and is not in the final model, is told as a candidate."""
     tail: float = 3.0

@@ -65,7 +65,7 @@ def solve(
     `J`: a derivative that is roughly known at x, for the first round. Raises InputError if the drive cannot
     follow the recordings where the fit begins and ends.
     """
-    x = _inside(problem, problem.start if x is None else x)
+    x = inside(problem, problem.start if x is None else x)
     residual = problem.residual(x)
     rough = J is not None and J.shape == (len(residual), len(x))
     fit = Fit(problem, x, residual, J if rough and J is not None else problem.jacobian(x, residual))
@@ -89,7 +89,7 @@ def approach(
 ) -> Fit:
     """A few steps from x with columns of the derivative that are known about there, improved by secants: what
     comes of it is good for a comparison, and its own derivative is rough. Raises InputError as `solve` does."""
-    x = _inside(problem, x)
+    x = inside(problem, x)
     residual = problem.residual(x)
     found, _ = _steps(
         Fit(problem, x, residual, problem.jacobian(x, residual, beside)), evaluations, tolerance
@@ -99,7 +99,8 @@ def approach(
     return found
 
 
-def _inside(problem: Problem, x: FloatArray) -> FloatArray:
+def inside(problem: Problem, x: FloatArray) -> FloatArray:
+    """The point itself, or the nearest one well inside of the bounds."""
     low, high = problem.bounds()
     margin = 1e-6 * (high - low)
     return np.asarray(np.clip(x, low + margin, high - margin), dtype=np.float64)

@@ -17,42 +17,60 @@ from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, approach, solve
+from cablecomp.estimation.least_squares import Fit, approach, inside, solve
+from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
 
 @dataclass(frozen=True)
 class Anchor:
-    """A point to ask from: a fit of the model so far, and an orthonormal basis of what its parameters can do."""
+    """A point to ask from: a fit of the model so far, and an orthonormal basis of what its parameters can do.
+
+    Below the residual's rows stands one for each parameter, what a step in it costs: far steps are beyond what a
+    straight line tells, and a promise that rests on them is none.
+    """
 
     fit: Fit
     Q: FloatArray
+    J: FloatArray
+
+    def step(self, v: FloatArray) -> FloatArray:
+        """Where the anchor's parameters go, by a linear step, to make up for a residual v."""
+        scale = np.sqrt(np.maximum(np.sum(self.J**2, axis=0), 1e-300))
+        return np.asarray(-np.linalg.lstsq(self.J / scale, self._below(v))[0] / scale, dtype=np.float64)
 
     def beyond(self, v: FloatArray) -> FloatArray:
         """What the anchor's parameters cannot do of v."""
-        return np.asarray(v - self.Q @ (self.Q.T @ v), dtype=np.float64)
+        whole = self._below(v)
+        return np.asarray(whole - self.Q @ (self.Q.T @ whole), dtype=np.float64)
+
+    def _below(self, v: FloatArray) -> FloatArray:
+        return np.concatenate([v, np.zeros(self.J.shape[1])])
 
 
 def anchor(fit: Fit) -> Anchor:
     """An anchor at a fit (or any evaluated point)."""
-    J = fit.J
-    if not J.shape[1]:
-        return Anchor(fit, np.empty((len(fit.residual), 0)))
+    count = fit.J.shape[1]
+    cost = np.sqrt(LIMITS.reach * 2.0 * fit.cost) * np.eye(count)
+    J = np.concatenate([fit.J, cost])
+    if not count:
+        return Anchor(fit, np.empty((len(J), 0)), J)
     scale = np.sqrt(np.maximum(np.sum(J**2, axis=0), 1e-300))
     u, s, _ = np.linalg.svd(J / scale, full_matrices=False)
-    return Anchor(fit, u[:, s > 1e-6])
+    return Anchor(fit, u[:, s > 1e-6], J)
 
 
 @dataclass(frozen=True)
 class Answer:
     """What a hypothesis promises at its best start: cost after it (half the sum of squares), its problem with
-    the effect in it, where to begin, the derivative there; `plain`: the same without a shape that it may do without."""
+    the effect in it, points to begin from, the derivative there; `plain`: the same without a shape that it may do
+    without."""
 
     hypothesis: Hypothesis
     cost: float
     problem: Problem
-    x: FloatArray
+    starts: tuple[FloatArray, ...]
     J: FloatArray
     plain: Answer | None = None
 
@@ -64,6 +82,9 @@ def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
     return replace(problem, config=joint, parameters=(*problem.parameters, *h.free(values, problem.config)))
 
 
+PART = 0.3
+"""Of what a linear answer promises, gone at first where the whole of it leads astray."""
+
 _Best = tuple[float, dict[str, float | str], FloatArray, float]
 """Of the best start: cost, values with the linear amount, contribution of the size asked, that size."""
 
@@ -72,22 +93,7 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     """The best linear answer over the hypothesis's starts; None if it cannot be simulated or shows nothing."""
     if h.has_phase:
         return _ask_pair(here, h)
-    best = _best(here, h)
-    if best is not None and h.has_instant:
-        t = float(best[1][h.instant])
-        times = sorted(float(s.values[h.instant]) for s in h.starts)
-        width = times[1] - times[0]
-        for _ in range(2 if here.fit.problem.fine else 4):
-            width *= 0.5
-            closer = _best(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
-            if closer is not None and closer[0] < best[0]:
-                best = closer
-                t = float(best[1][h.instant])
-        if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
-            mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
-            other = _best(here, mirrored)
-            if other is not None and other[0] < best[0]:
-                best = other
+    best = _event(here, h) if h.has_instant else _best(here, h)
     if best is None:
         return None
     cost, values, d, size = best
@@ -99,15 +105,43 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     return replace(_answer(here, h, values, cost, d, size), plain=plain)
 
 
+def _event(here: Anchor, h: Hypothesis) -> _Best | None:
+    """The best linear answer over the instants of an event, looked for more closely about the best of them."""
+    best = _best(here, h)
+    if best is None:
+        return None
+    t = float(best[1][h.instant])
+    times = sorted(float(s.values[h.instant]) for s in h.starts)
+    width = times[1] - times[0]
+    for _ in range(2 if here.fit.problem.fine else 4):
+        width *= 0.5
+        closer = _best(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
+        if closer is not None and closer[0] < best[0]:
+            best = closer
+            t = float(best[1][h.instant])
+    if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
+        mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
+        other = _best(here, mirrored)
+        if other is not None and other[0] < best[0]:
+            best = other
+    return best
+
+
 def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event that takes
-    its time is asked for with its middle where the sudden one lies."""
+    its time is asked for with its middle where the sudden one lies, one of another shape at every instant."""
     values = best[1]
+    found = []
     starts = []
     for shape in h.further:
+        if h.has_instant and h.duration not in shape:
+            everywhere = tuple(Start({**s.values, **shape}) for s in h.starts)
+            found.append(_event(here, replace(h, starts=everywhere)))
+            continue
         begun = {h.instant: float(values[h.instant]) - 0.5 * shape[h.duration]} if h.duration in shape else {}
         starts.append(Start({**values, **begun, **shape}))
-    other = _best(here, replace(h, starts=tuple(starts)))
+    found.append(_best(here, replace(h, starts=tuple(starts))))
+    other = min((f for f in found if f is not None), key=lambda f: f[0], default=None)
     return other if other is not None and other[0] < LIMITS.shaped * best[0] else None
 
 
@@ -130,6 +164,7 @@ def _best(here: Anchor, h: Hypothesis) -> _Best | None:
         factor = float(left @ own) / square
         if not h.two_sided:
             factor = max(factor, 0.0)
+        factor = min(max(factor, h.amount.minimum / size), h.amount.maximum / size)
         cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
         values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
         if best is None or cost < best[0]:
@@ -185,6 +220,9 @@ def _answer(
     count = len(here.fit.problem.parameters)
     new = problem.parameters[count:]
     x = np.concatenate([here.fit.x, [p.x(p.start) for p in new]])
+    share = float(values[h.amount.name]) / size
+    along = np.concatenate([here.step(here.fit.residual - share * d), np.zeros(len(new))])
+    part = _with_amount(x, new, count, h, PART * float(values[h.amount.name]))
     rows = here.fit.problem
     # rows of the residual: data first, then priors of old and new parameters
     data = len(here.fit.residual) - len(rows.parameters)
@@ -194,7 +232,17 @@ def _answer(
     for k, p in enumerate(new):
         if p.base.endswith("." + h.amount.name):
             J[:data, count + k] = -d[:data] / size * p.slope(x[count + k])
-    return Answer(h, cost, problem, x, J)
+    starts = (x, x + along, part + PART * along, part)
+    return Answer(h, cost, problem, tuple(inside(problem, s) for s in starts), J)
+
+
+def _with_amount(x: FloatArray, new: Sequence[Free], count: int, h: Hypothesis, amount: float) -> FloatArray:
+    """The same point with another amount of the effect, whose parameters come behind `count` others."""
+    moved = x.copy()
+    for k, p in enumerate(new):
+        if p.base.endswith("." + h.amount.name):
+            moved[count + k] = p.x(amount)
+    return moved
 
 
 def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
@@ -208,6 +256,7 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
     own = np.column_stack((here.beyond(d0) / s0, here.beyond(d1) / s1))
     scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
     pair = np.linalg.lstsq(own / scale, left, rcond=1e-6)[0] / scale
+    pair = pair * min(1.0, h.amount.maximum / max(float(np.hypot(*pair)), 1e-300))
     cost = 0.5 * float(np.sum((left - own @ pair) ** 2))
     size, phase = float(np.hypot(*pair)), float(np.arctan2(pair[1], pair[0]))
     if not size > 0.0:
@@ -228,13 +277,21 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     # of the effect's further parameters the answer tells no derivative
     known = {int(k): a.J[:, k] for k in np.flatnonzero(np.any(a.J != 0.0, axis=0))}
     try:
-        fit = approach(a.problem, a.x, known, 3 if a.problem.fine else evaluations, LIMITS.tolerance)
+        fit = approach(a.problem, _lowest(a), known, 3 if a.problem.fine else evaluations, LIMITS.tolerance)
     except InputError:
         fit = None
     plain = None if a.plain is None else _begun(a.plain, evaluations)
     if plain is not None and (fit is None or fit.cost > LIMITS.shaped * plain.cost):
         return plain
     return fit
+
+
+def _lowest(a: Answer) -> FloatArray:
+    """The point to begin from that leaves least: what the effect does together with a step of all else may, where it is
+    put beside them as they are, be far off."""
+    found = [(a.problem.followed(x), x) for x in (a.starts[:2] if a.problem.fine else a.starts)]
+    costs = [np.inf if r is None else float(r @ r) for r, _ in found]
+    return found[int(np.argmin(costs))][1]
 
 
 def rough(
