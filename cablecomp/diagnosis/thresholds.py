@@ -117,6 +117,10 @@ class Thresholds:
     """Share of what the best model so far takes off, by which one without its effects has to take off more (trials
     seed 604: two right effects took off twice as much as a wrong one; on a jaw friction at both ends took off 2 % more
     than the path's)."""
+    dethrone_left: float = 0.5
+    """Or share of what the best model leaves: of a calibrated drive far off a tenth is more than there is left (45
+    recordings of a jaw: friction of path, motor and jaw with a stiffening cable left half of what two of them and a
+    slip left, which was 5 % of what these had taken off)."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0

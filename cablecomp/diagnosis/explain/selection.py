@@ -118,7 +118,9 @@ def _dethrones(model: Model, best: Model, baseline: Model, groups: Groups) -> bo
     """Whether a model takes off so much of what the best one leaves that it may do without that one's effects."""
     size = common([model], groups)
     left = loss(best, size, groups)
-    return left - loss(model, size, groups) > LIMITS.dethrone * (loss(baseline, size, groups) - left)
+    gone = left - loss(model, size, groups)
+    taken_off = loss(baseline, size, groups) - left
+    return gone > min(LIMITS.dethrone * taken_off, LIMITS.dethrone_left * left)
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
