@@ -262,7 +262,7 @@ def test_unless_told_otherwise_a_motor_goes_anywhere_at_40_rad_s() -> None:
 
 def test_limits_stay_as_they_were_made() -> None:
     with pytest.raises(FrozenInstanceError):
-        GateLimits().torque_max_Nm = 9.0  # type: ignore[misc]
+        GateLimits().torque_max_Nm = 9.0  # type: ignore[misc]  # wrong on purpose
 
 
 def test_unless_told_otherwise_no_command_is_more_than_half_a_radian_from_the_motor() -> None:

@@ -63,4 +63,4 @@ def test_errors_are_one_line(given: object, words: str) -> None:
 
 def test_a_recording_in_the_joints_place_is_told_in_one_line() -> None:
     with pytest.raises(InputError, match="`config` is a dict; give a JointConfig"):
-        cablecomp.replay(JOINT, COLUMNS)  # type: ignore[arg-type]
+        cablecomp.replay(JOINT, COLUMNS)  # type: ignore[arg-type]  # wrong on purpose
