@@ -164,10 +164,11 @@ class Thresholds:
     """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
     gain_sure: float = 0.03
     """That share."""
-    z_zero_step: float = -1.0
-    """Standard errors by which an event has to predict better than a plain step of the encoder's zero at its instant. A
-    drum or a link that slips on its shaft is such a step, so the step stands in only where it predicts better beyond
-    chance. (Over a pretension of each session's own an effect needs `z`, as over any smaller model.)"""
+    z_zero_step: float = 0.0
+    """Standard errors by which an event has to predict better than a plain step of the encoder's zero at its instant:
+    an event steps the zero too, so the step stands in for it only where it predicts better. A slip while a recording
+    lasts is not held against it: it may be such a step. (Over a pretension of each session's own an effect needs `z`,
+    as over any smaller model.)"""
     z_candidate: float = 2.0
     """Standard errors from which what stood out in a round, and is not in the final model, is told as a candidate."""
     tail: float = 3.0

@@ -181,6 +181,8 @@ class Effect:
     """Where its law counts from T0: the same law with T0 this many times as high."""
     at_reference: Callable[[Mapping[str, float], float], Restated] | None = None
     """Where it has a reference: the same law with this one."""
+    steps: bool = False
+    """Among its shapes is a plain step of the joint, which a step of the encoder's zero cannot be told from."""
     flag: str = ""
     """What a joint does that has it, in a list of many joints, where that changes from night to night."""
     rank: int = 0

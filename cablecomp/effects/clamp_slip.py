@@ -77,5 +77,6 @@ EFFECT = Effect(
     acts_through=("time",),
     bounded=True,
     change=_change,
+    steps=True,
     flag="slips",
 )

@@ -148,3 +148,13 @@ def test_of_many_recordings_in_which_nothing_is_missing_all_are_reported() -> No
     found = diagnose(JOINT, parts, budget_s=0.0)
     assert found.named == ()
     assert len(found.final) + len(found.traces) == len(parts)
+
+
+@pytest.mark.parametrize("sigmas", [8.0, 40.0])
+def test_a_zero_set_anew_between_recordings_is_no_slip(sigmas: float) -> None:
+    """A drum that slips between two recordings would show the same, so no name is given."""
+    first, second = recording([], seed=3), recording([], seed=4)
+    second["joint_position_rad"] += sigmas * SMALL_NOISE["joint_position_rad"]
+    found = diagnose(joint(), {"small/1": first, "small/2": second})
+    assert not found.named
+    assert found.verdict in ("consistent", "recalibrate")

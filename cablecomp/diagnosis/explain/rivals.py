@@ -25,7 +25,7 @@ from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
@@ -105,7 +105,8 @@ def _plain(model: Model, base: Model, term: Hypothesis, groups: Groups) -> dict[
 
 
 def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> Plain | None:
-    """A plain step, or creep, of the joint's zero in place of an event: what an encoder's hub does when it slips."""
+    """A plain step, or creep, of the joint's zero in place of an event; none while a recording lasts for one that may
+    itself be such a step (nobody sets a zero then; between recordings it may be either)."""
     if not term.has_instant:
         return None
     values = model.fit.values
@@ -114,6 +115,8 @@ def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> P
         float(values.get(term.key(term.duration), 0.0)),
     )
     fit, problem = base.fit, base.fit.problem
+    if term.effect.steps and any(_lasts_at(e, instant_s) for e in problem.evidence):
+        return None
     since = [e.at_rows("time_s") - instant_s for e in problem.evidence]
     after = [np.clip(s / lasts_s, 0.0, 1.0) if lasts_s else (s >= 0.0).astype(np.float64) for s in since]
     struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)
@@ -130,6 +133,11 @@ def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> P
     step = np.linalg.lstsq(A, -fit.residual, rcond=None)[0]
     left = left_out_linearly(fit.residual + A @ step, A, groups)
     return Plain("a step of the joint encoder's zero", left, LIMITS.z_zero_step)
+
+
+def _lasts_at(e: Evidence, instant_s: float) -> bool:
+    time = e.columns["time_s"]
+    return float(time[0]) <= instant_s <= float(time[-1])
 
 
 def _mounted_anew(base: Model, groups: Groups) -> Plain | None:
