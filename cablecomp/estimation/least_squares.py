@@ -85,12 +85,18 @@ def solve(
 
 
 def approach(
-    problem: Problem, x: FloatArray, beside: Mapping[int, FloatArray], evaluations: int, tolerance: float
+    problem: Problem,
+    x: FloatArray,
+    beside: Mapping[int, FloatArray],
+    evaluations: int,
+    tolerance: float,
+    residual: FloatArray | None = None,
 ) -> Fit:
     """A few steps from x with columns of the derivative that are known about there, improved by secants: what
-    comes of it is good for a comparison, and its own derivative is rough. Raises InputError as `solve` does."""
+    comes of it is good for a comparison, and its own derivative is rough. `residual`: that at x, where it is known and
+    x lies well inside of the bounds. Raises InputError as `solve` does."""
     x = inside(problem, x)
-    residual = problem.residual(x)
+    residual = problem.residual(x) if residual is None else residual
     found, _ = _steps(
         Fit(problem, x, residual, problem.jacobian(x, residual, beside)), evaluations, tolerance
     )

@@ -18,7 +18,6 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instant
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, approach, inside, solve
-from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
@@ -215,34 +214,23 @@ def _difference(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> 
 def _answer(
     here: Anchor, h: Hypothesis, values: dict[str, float | str], cost: float, d: FloatArray, size: float
 ) -> Answer:
-    entry = h.entry(values)
-    problem = with_entry(here.fit.problem, h, entry)
-    count = len(here.fit.problem.parameters)
-    new = problem.parameters[count:]
+    problem = with_entry(here.fit.problem, h, h.entry(values))
+    old = here.fit.problem.parameters
+    count, new = len(old), problem.parameters[len(old) :]
+    (amount,) = (k for k, p in enumerate(new) if p.base.endswith("." + h.amount.name))
     x = np.concatenate([here.fit.x, [p.x(p.start) for p in new]])
-    share = float(values[h.amount.name]) / size
-    along = np.concatenate([here.step(here.fit.residual - share * d), np.zeros(len(new))])
-    part = _with_amount(x, new, count, h, PART * float(values[h.amount.name]))
-    rows = here.fit.problem
+    value = float(values[h.amount.name])
+    along = np.concatenate([here.step(here.fit.residual - value / size * d), np.zeros(len(new))])
+    part = x.copy()
+    part[count + amount] = new[amount].x(PART * value)
     # rows of the residual: data first, then priors of old and new parameters
-    data = len(here.fit.residual) - len(rows.parameters)
+    data = len(here.fit.residual) - count
     J = np.zeros((data + len(problem.parameters), len(problem.parameters)))
     J[:data, :count] = here.fit.J[:data]
     J[data : data + count, :count] = here.fit.J[data:]
-    for k, p in enumerate(new):
-        if p.base.endswith("." + h.amount.name):
-            J[:data, count + k] = -d[:data] / size * p.slope(x[count + k])
+    J[:data, count + amount] = -d[:data] / size * new[amount].slope(x[count + amount])
     starts = (x, x + along, part + PART * along, part)
     return Answer(h, cost, problem, tuple(inside(problem, s) for s in starts), J)
-
-
-def _with_amount(x: FloatArray, new: Sequence[Free], count: int, h: Hypothesis, amount: float) -> FloatArray:
-    """The same point with another amount of the effect, whose parameters come behind `count` others."""
-    moved = x.copy()
-    for k, p in enumerate(new):
-        if p.base.endswith("." + h.amount.name):
-            moved[count + k] = p.x(amount)
-    return moved
 
 
 def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
@@ -276,8 +264,9 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     """A short fit from where an answer begins; without the shape that it may do without, where that is as good."""
     # of the effect's further parameters the answer tells no derivative
     known = {int(k): a.J[:, k] for k in np.flatnonzero(np.any(a.J != 0.0, axis=0))}
+    x, residual = _lowest(a)
     try:
-        fit = approach(a.problem, _lowest(a), known, 3 if a.problem.fine else evaluations, LIMITS.tolerance)
+        fit = approach(a.problem, x, known, 3 if a.problem.fine else evaluations, LIMITS.tolerance, residual)
     except InputError:
         fit = None
     plain = None if a.plain is None else _begun(a.plain, evaluations)
@@ -286,12 +275,12 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     return fit
 
 
-def _lowest(a: Answer) -> FloatArray:
-    """The point to begin from that leaves least: what the effect does together with a step of all else may, where it is
-    put beside them as they are, be far off."""
-    found = [(a.problem.followed(x), x) for x in (a.starts[:2] if a.problem.fine else a.starts)]
-    costs = [np.inf if r is None else float(r @ r) for r, _ in found]
-    return found[int(np.argmin(costs))][1]
+def _lowest(a: Answer) -> tuple[FloatArray, FloatArray | None]:
+    """The point to begin from that leaves least, with its residual: what the effect does together with a step of all
+    else may, where it is put beside them as they are, be far off. The first without one if none can be followed."""
+    starts = a.starts[:2] if a.problem.fine else a.starts
+    found = [(x, r) for x in starts if (r := a.problem.followed(x)) is not None]
+    return min(found, key=lambda f: float(f[1] @ f[1]), default=(starts[0], None))
 
 
 def rough(
