@@ -209,6 +209,8 @@ def strain(stiffening: float, tau: float) -> float:
 def slid(tau: float, width: float, mu: float, exponent: float, stiffening: float) -> tuple[float, float]:
     """int strain dθ over cable whose tension rises from tau by dT/dθ = mu (T/T0)^-n T, at most up to T0 or over
     `width`; T/T0 at its end."""
+    if tau > 1.0 - 1e-9:  # at T0 already, to within the root finder's rounding: nothing slides
+        return 0.0, tau
 
     def slope(_: float, state: np.ndarray) -> list[float]:
         return [mu * state[0] ** (1.0 - exponent), strain(stiffening, state[0])]
