@@ -53,7 +53,9 @@ _WORDS: Final = (
 )
 _FAR = 5.0  # times the joint residual's limit: no joint moves there in a few samples
 _FAR_S = 0.003
+_FAR_PERIODS = 2.5  # at least: of a slow loop two samples would be enough
 _STILL_S = 0.008
+_STILL_PERIODS = 7.5
 
 
 def health_names(flags: int) -> tuple[str, ...]:
@@ -126,7 +128,8 @@ class Health:
         self._stuck_rad = inf if o.stuck_rad is None else o.stuck_rad + 2.0 * motor_step_rad
         self._mismatch_Nm = inf if o.torque_mismatch_Nm is None else o.torque_mismatch_Nm
         self._residual = Sustained(o.confirm_s)
-        self._far = Sustained(_FAR_S)
+        self._far = Sustained(max(_FAR_S, _FAR_PERIODS * period_s))
+        self._still_s = max(_STILL_S, _STILL_PERIODS * period_s)
         self._mismatch = Sustained(o.confirm_s)
         self._lags = Sustained(o.confirm_s)
         self._shakes = Sustained(0.2 * o.confirm_s)
@@ -230,8 +233,8 @@ class Health:
         """
         if now_s - self.motor.arrived_s > self._fresh_s:
             return ENCODERS_DISAGREE
-        motor_still = now_s - self.motor.changed_s > _STILL_S
-        joint_still = now_s - self.joint.changed_s > _STILL_S
+        motor_still = now_s - self.motor.changed_s > self._still_s
+        joint_still = now_s - self.joint.changed_s > self._still_s
         if joint_still and not motor_still:
             self._stuck_since_s = self.joint.changed_s
         elif motor_still and not joint_still:

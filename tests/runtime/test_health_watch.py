@@ -12,6 +12,7 @@ from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION
 from cablecomp.runtime.channel import Channel, Latency, Shaking, Sustained
 from cablecomp.runtime.health import (
     ENCODERS_DISAGREE,
+    FATAL,
     JOINT_JUMP,
     JOINT_RESIDUAL,
     JOINT_STUCK,
@@ -45,9 +46,10 @@ OPTIONS = HealthOptions(
 class Wire:
     """Readings fed by hand, one cycle at a time."""
 
-    def __init__(self, **needs: bool) -> None:
+    def __init__(self, period_s: float = T, **needs: bool) -> None:
         self.readings = JointReadings("joint", ())
-        self.health = Health(OPTIONS, N, 2.5 * T, T, **needs)
+        self.health = Health(OPTIONS, N, 2.5 * period_s, period_s, **needs)
+        self.period_s = period_s
         self.k = 0
 
     def cycle(
@@ -61,7 +63,7 @@ class Wire:
     ) -> Checked:
         """One period: what is None does not come."""
         self.k += 1
-        now, r = self.k * T, self.readings
+        now, r = self.k * self.period_s, self.readings
         for place, value in ((MOTOR_POSITION, motor), (JOINT_TORQUE, torque), (JOINT_POSITION, joint)):
             if value is not None:
                 r.values[place] = value
@@ -143,6 +145,18 @@ def test_the_encoder_that_does_not_change_is_the_one_that_is_stuck() -> None:
     assert not flags[0] & JOINT_STUCK
     assert flags[1] & JOINT_STUCK
     assert not flags[1] & MOTOR_STUCK
+
+
+@pytest.mark.parametrize("period_s", [T, 10.0 * T])
+def test_two_wrong_samples_are_not_enough_for_encoders_to_disagree(period_s: float) -> None:
+    """Nor are a few that are the same those of a stuck encoder, however slow the loop."""
+    wire = Wire(period_s)
+    for k in range(40):
+        assert not wire.cycle(1e-3 * k, 0.0, 1e-4 * k, predicted=1e-4 * k).fatal
+    seen = [wire.cycle(1e-3 * k, 0.0, 4e-3, predicted=0.15).flags for k in range(40, 45)]
+    disagree = [flags & (FATAL | JOINT_STUCK) for flags in seen]
+    assert disagree[:3] == [0, 0, 0]
+    assert disagree[4] == ENCODERS_DISAGREE
 
 
 def test_a_motor_encoder_that_stands_while_its_target_moves_is_fatal_at_once() -> None:
