@@ -2,7 +2,8 @@
 
 A step that is small (1e-7 of the tension) changes a wrap's pending profile in a way that is known to second order: the
 cone's edge moves in parallel and meets the same piece of the old profile a little further in or out. What is left is
-of the order of the step's square, 1e-14. Where the edge would leave its piece, the answer is no.
+of the order of the step's square, 1e-14. Where the edge would leave its piece, or the piece is nearly as steep as the
+edge itself, so that they meet far from where they met, the answer is no.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from cablecomp.mechanics.profile import Points
 from cablecomp.mechanics.records import IN, OUT
 
 SMALL = 1e-7  # greatest step, as a share of the tension and in rad
+NEAR = 1e-5  # greatest way of the meeting point, in v: what is left out is of its third order
 
 
 @leaf_kernel
@@ -45,7 +47,7 @@ def wrap_nudge(step: Any, p: Points, n: int, mu: float, dv: float, dw: float) ->
             slope = (p[k + 1].v - p[k].v) / (y1 - y0)
             dy = (dv - steep * dw) / (slope - steep)
             y += dy
-            if not (y0 <= y <= y1 and y < w):
+            if not (y0 <= y <= y1 and y < w and abs(steep * dy) <= NEAR):
                 return False
             stretch += dy * (grown(tau, 0.5 * slope * dy) - 1.0)
             step.stretch_error += p[k + 1].merged * dy * tau
