@@ -40,7 +40,7 @@ from cablecomp.control.compensator import Gains
 from cablecomp.control.design import design_gains
 from cablecomp.control.options import ControlConfig
 from cablecomp.control.standard import reaching_protocol
-from cablecomp.errors import DeviceError
+from cablecomp.errors import DeviceError, InputError
 from cablecomp.links.schema import LinkConfig
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
@@ -251,7 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             folder = asked.out / f"minute-{len(minutes) + 1}"
             try:
                 minute = one_minute(len(minutes) + 1, folder, resume, rng, bench)
-            except AssertionError as error:
+            except (AssertionError, InputError) as error:
                 print(f"minute {len(minutes) + 1}, {folder}: {error}", flush=True)
                 return 1
             os.replace(folder / "observer.snapshot", kept)
