@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from cablecomp.estimation.departures import departures
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.limits import HOPELESS, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
@@ -177,7 +178,7 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
     """What a misfit counts for, out of what this fit leaves: RMS by channel times the root of the longest memory, never
     below `floor`; the recordings' zeros by how they scatter (one step of expectation-maximisation)."""
     problem = fit.problem
-    sigma, zero_sd, size, memory = {}, {}, {}, 1.0
+    sigma, zero_sd, moved, size, memory = {}, {}, {}, {}, 1.0
     for c in problem.channels:
         parts = []
         for r, m in zip(problem.evidence, problem.left(fit.x, c), strict=True):
@@ -189,16 +190,11 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
     for c in problem.channels:
         # one memory for all: a channel whose misfit wanders may not be given up for the sake of another
         sigma[c] = max(size[c] * float(np.sqrt(memory)), floor.sigma[c])
-        zeros = problem.zeros(fit.x)[c]
-        spread = [
-            float(zeros[r.name][0] - zeros[r.session][0])
-            for r in problem.evidence
-            if r.session in problem.repeated
-        ]
-        if spread:
-            seen = min(float(np.sqrt(np.mean(np.square(spread)))), ZERO * size[c])
-            zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
-    return Weighing(sigma, zero_sd)
+        scatter = departures(problem, problem.zeros(fit.x)[c])
+        if scatter is not None:
+            seen = min(scatter.sd, ZERO * size[c])
+            zero_sd[c], moved[c] = max(seen, floor.zero_sd.get(c, 0.0)), scatter.moved
+    return Weighing(sigma, zero_sd, moved)
 
 
 def refit(fit: Fit, weighing: Weighing, evaluations: int = 10) -> Fit:

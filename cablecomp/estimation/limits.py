@@ -22,6 +22,13 @@ INSTANT_REACH_S: Final = 3.0
 ZERO: Final = 0.5
 """How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up
 what compliances do."""
+TELLING: Final = 4
+"""Recordings, beyond sessions and coefficients by load, from which their zeros tell what follows the load and what was
+set anew."""
+MOVED: Final = 4.0
+"""Standard deviations (scaled median) beyond which a recording's zero was set anew."""
+MOVED_SD: Final = 30.0
+"""Prior sd of such a zero, in that of the others."""
 CARRYOVER_SD: Final = 1.0
 """Prior sd of a recording's carry-over, in what the assumed histories add in the mean (RMS)."""
 HISTORY_CUTS: Final = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)

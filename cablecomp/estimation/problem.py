@@ -19,7 +19,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, STEP
+from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing
@@ -48,10 +48,11 @@ class Zeros:
 @dataclass(frozen=True)
 class Weighing:
     """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero
-    departs from its session's."""
+    departs from its session's; `moved`: recordings whose zero was set anew and may be anywhere."""
 
     sigma: Mapping[str, float]
     zero_sd: Mapping[str, float]
+    moved: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
 
 class Aside(NamedTuple):
@@ -334,6 +335,8 @@ class Problem:
             blocks.append(block)
         matrix = np.vstack(blocks)
         penalty = np.zeros((n_dep + sum(carried), matrix.shape[1]))
-        penalty[:, own:] = np.diag([1.0 / spread] * n_dep + [1.0 / CARRYOVER_SD] * sum(carried))
+        moved = self.weighing.moved.get(channel, ())
+        departing = [1.0 / (spread * (MOVED_SD if r.name in moved else 1.0)) for r in self.evidence[:n_dep]]
+        penalty[:, own:] = np.diag(departing + [1.0 / CARRYOVER_SD] * sum(carried))
         Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
         return Zeros(Q, R, len(penalty))

@@ -134,7 +134,7 @@ def _sharper(fit: Fit, drive: Calibrated) -> Weighing:
     """A search's weights beyond the better of this fit and the drive alone."""
     mine, theirs = searching(fit), searching(drive.fit)
     sigma = {c: min(mine.sigma[c], theirs.sigma[c]) for c in mine.sigma}
-    return Weighing(sigma, mine.zero_sd)
+    return replace(mine, sigma=sigma)
 
 
 def _step(whole: Fit, drive: Calibrated, evidence: Sequence[Evidence], groups: Groups) -> ScoreDifference:

@@ -12,7 +12,7 @@ from cablecomp.config import JointConfig, Limits, with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.least_squares import covariance, solve, weighed
-from cablecomp.estimation.limits import STEP
+from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
@@ -40,9 +40,14 @@ def problem(parts: tuple[Evidence, ...], spread: float = SPREAD, joint: JointCon
     return Problem(joint, of_drive(joint), parts, Weighing({ANGLE: SIGMA}, {ANGLE: spread} if spread else {}))
 
 
-def test_zeros_projected_out_are_those_of_an_explicit_least_squares_fit(three: tuple[Evidence, ...]) -> None:
-    """min over zeros of |w (m - z)/s|^2 + |d/spread|^2, z = session's + recording's departure d."""
+@pytest.mark.parametrize("moved", [(), ("1",)])
+def test_zeros_projected_out_are_those_of_an_explicit_least_squares_fit(
+    three: tuple[Evidence, ...], moved: tuple[str, ...]
+) -> None:
+    """min over zeros of |w (m - z)/s|^2 + |d/spread|^2, z = session's + recording's departure d; spread is larger for
+    one that was set anew."""
     p = problem(three)
+    p = p.with_weighing(replace(p.weighing, moved={ANGLE: frozenset(moved)}))
     misfits = p.misfits(p.start)[ANGLE]
     rows, design = [], []
     for k, (e, m) in enumerate(zip(three, misfits, strict=True)):
@@ -52,7 +57,8 @@ def test_zeros_projected_out_are_those_of_an_explicit_least_squares_fit(three: t
         columns[:, p.sessions.index(e.session)] = w
         columns[:, 2 + k] = w
         design.append(columns)
-    penalty = np.hstack([np.zeros((3, 2)), np.eye(3) / SPREAD])
+    spreads = [SPREAD * (MOVED_SD if e.name in moved else 1.0) for e in three]
+    penalty = np.hstack([np.zeros((3, 2)), np.diag(1.0 / np.array(spreads))])
     A = np.vstack([*design, penalty])
     b = np.concatenate([*rows, np.zeros(3)])
     solved = np.linalg.lstsq(A, b, rcond=None)[0]

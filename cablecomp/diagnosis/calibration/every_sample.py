@@ -66,7 +66,7 @@ def settled(fit: Fit, floor: Weighing, times: int = 1) -> Fit:
         weighing = weighed(fit, floor)
         trust = trusted(fit.problem)
         sigma = {c: float(np.hypot(s, trust.get(c, 0.0))) for c, s in weighing.sigma.items()}
-        fit = refit(fit, Weighing(sigma, weighing.zero_sd), 6)
+        fit = refit(fit, replace(weighing, sigma=sigma), 6)
     return fit
 
 

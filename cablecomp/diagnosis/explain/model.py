@@ -107,7 +107,7 @@ def searching(fit: Fit) -> Weighing:
     for c in problem.channels:
         usual = problem.weighing.zero_sd.get(c, 0.0) * (sigma[c] / problem.weighing.sigma[c] if told else 1.0)
         spread[c] = float(np.clip(usual, 0.1 * sigma[c], LIMITS.zero * sigma[c]))
-    return Weighing(sigma, spread)
+    return Weighing(sigma, spread, problem.weighing.moved)
 
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
