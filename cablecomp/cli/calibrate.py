@@ -13,6 +13,8 @@ import typer
 from cablecomp.cli.beliefs import believe
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
+    BudgetOption,
+    ChanceOption,
     Config,
     EffectsOption,
     JsonOption,
@@ -37,10 +39,8 @@ def calibrate_joint(
     out: Annotated[Path, out_option("folder for joint.calibrated.toml, calibration.json")] = Path(
         "calibration"
     ),
-    seed: Annotated[int, typer.Option(min=0, help="of the noise replicas")] = 0,
-    budget: Annotated[
-        float, typer.Option(min=0.0, help="seconds after which no further step begins: the best so far")
-    ] = inf,
+    seed: ChanceOption = 0,
+    budget: BudgetOption = inf,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
     reading: Reading,

@@ -15,6 +15,8 @@ from cablecomp.cli.beliefs import believe
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
+    BudgetOption,
+    ChanceOption,
     Config,
     EffectsOption,
     JsonOption,
@@ -58,10 +60,8 @@ def diagnose_recordings(
             help="one mounting: each recording, each folder, or all; [[session]], else each folder if absent"
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="of surrogates and resampling")] = 0,
-    budget: Annotated[
-        float, typer.Option(min=0.0, help="seconds after which no hypothesis is begun: the best so far")
-    ] = inf,
+    seed: ChanceOption = 0,
+    budget: BudgetOption = inf,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
     reading: Reading,

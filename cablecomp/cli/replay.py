@@ -15,6 +15,7 @@ from cablecomp.cli.beliefs import believe_streamed
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
+    BoundsOption,
     Config,
     EffectsOption,
     JsonOption,
@@ -45,9 +46,7 @@ def replay(
     ],
     config: Config,
     out: Annotated[Path, out_option("folder for prediction.csv, replay.json, report.html")] = Path("replay"),
-    bounds: Annotated[
-        bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
-    ] = True,
+    bounds: BoundsOption = True,
     session: Annotated[
         str | None,
         typer.Option(help="whose own values hold; the [[session]] that names the recording if absent"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
@@ -17,6 +17,7 @@ from cablecomp.cli.folders import out_option
 from cablecomp.cli.live import LiveRun
 from cablecomp.cli.shared import (
     DEMO_LINK,
+    BoundsOption,
     Config,
     Control,
     EffectsOption,
@@ -52,108 +53,113 @@ SIMULATED = ("virtual", "udp_multicast", "slcan")
 """Interfaces whose other end a simulated joint can take without hardware."""
 
 
+LinkFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--link",
+        help="link file (TOML) or the name of an example; with --sim a bus inside of this process stands "
+        "for a CAN adapter",
+    ),
+]
+ProtocolFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--protocol",
+        help="what is asked for over time (TOML), or `calibrate`: about 60 s that `cablecomp calibrate` needs",
+    ),
+]
+Fast = Annotated[bool, typer.Option("--fast", help="simulated time, as fast as it goes")]
+Sim = Annotated[bool, typer.Option("--sim", help="start the simulated joint as well; nothing else is needed")]
+Compare = Annotated[
+    bool, typer.Option("--compare", help="motor-side control, linear stiffness and observer side by side")
+]
+Faults = Annotated[
+    list[str] | None, typer.Option("--fault", help="fault of the simulated joint, such as drop:p=0.1")
+]
+Live = Annotated[
+    bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
+]
+View = Annotated[
+    bool,
+    typer.Option("--view", help="a page to look on, on this machine; Foxglove too where it is installed"),
+]
+PlotJuggler = Annotated[
+    bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
+]
+WithoutTimeout = Annotated[
+    bool,
+    typer.Option(
+        "--without-drive-timeout",
+        help="run though a drive would stay enabled if this process were killed",
+    ),
+]
+
+
 def run(
     config: Config,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="link file (TOML) or the name of an example; with --sim a bus inside of this process stands "
-            "for a CAN adapter"
-        ),
-    ] = None,
-    sim: Annotated[
-        bool, typer.Option("--sim", help="start the simulated joint as well; nothing else is needed")
-    ] = False,
+    link: LinkFile = None,
+    sim: Sim = False,
     control: Control = None,
-    protocol: Annotated[
-        Path | None,
-        typer.Option(
-            help="what is asked for over time (TOML), or `calibrate`: about 60 s that `cablecomp calibrate` needs"
-        ),
-    ] = None,
+    protocol: ProtocolFile = None,
     mode: Annotated[ControlMode | None, typer.Option(help="what is controlled")] = None,
     duration: Annotated[float | None, typer.Option(help="end after this many seconds", min=0.0)] = None,
     out: Annotated[Path, out_option("folder for recording, predictions, report")] = Path("run"),
-    fast: Annotated[bool, typer.Option("--fast", help="simulated time, as fast as it goes")] = False,
-    bounds: Annotated[
-        bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
-    ] = True,
-    comparison: Annotated[
-        bool, typer.Option("--compare", help="motor-side control, linear stiffness and observer side by side")
-    ] = False,
+    fast: Fast = False,
+    bounds: BoundsOption = True,
+    comparison: Compare = False,
     resume: Annotated[Path | None, typer.Option(help="observer snapshot to go on from")] = None,
-    fault: Annotated[
-        list[str] | None, typer.Option(help="fault of the simulated joint, such as drop:p=0.1")
-    ] = None,
+    fault: Faults = None,
     seed: Annotated[int, typer.Option(min=0, help="of simulated noise, true parameters and motions")] = 1,
     nominal: Annotated[bool, typer.Option("--nominal", help="simulated joint exactly as configured")] = False,
-    live: Annotated[
-        bool, typer.Option("--live", help="watch the residual: raise mismatches, keep the data around them")
-    ] = False,
-    view: Annotated[
-        bool,
-        typer.Option("--view", help="a page to look on, on this machine; Foxglove too where it is installed"),
-    ] = False,
-    plotjuggler: Annotated[
-        bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
-    ] = False,
+    live: Live = False,
+    view: View = False,
+    plotjuggler: PlotJuggler = False,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
-    without_drive_timeout: Annotated[
-        bool,
-        typer.Option(
-            "--without-drive-timeout",
-            help="run though a drive would stay enabled if this process were killed",
-        ),
-    ] = False,
+    without_drive_timeout: WithoutTimeout = False,
 ) -> None:
     """Control a joint over a link, real or simulated; ends with a timing report and a recording that
     `replay` accepts.
     """
     joint = read_joint(config, effects)
-    bus, wanted = _bus_and_control(link, control, joint, sim)
+    bus, wanted = _bus_and_control(link, control, joint, None if comparison else mode, sim=sim)
     if comparison:
         from cablecomp.cli.demo import compare_controllers  # brings the plant
 
         length = 30.0 if duration is None else duration
         compare_controllers(config, joint, bus, wanted, out, seed, length, as_json)
         return
-    if mode is not None:
-        wanted = wanted.model_copy(
-            update={"compensator": wanted.compensator.model_copy(update={"mode": mode})}
-        )
     asked = _asked(protocol, joint, wanted.compensator.mode, seed, duration)
     wish = SimulationWish(bus, wanted, 1, not nominal, seed, tuple(fault or ()))
     options = RunOptions(
         duration, fast, out, bounds, resume=resume, without_drive_timeout=without_drive_timeout
     )
+    said = errors() if as_json else console
     with WaysOut() as ways_out:
-        simulation = _simulation(config, wish) if sim else None
-        beside: LiveRun | None = None
-        try:
-            if simulation is not None and asked.mode == "force":
-                simulation.set_wall(1, 0.0)
-            said = errors() if as_json else console
-            with (
-                LiveView(said) as shown,
-                _onlookers(joint, out, shown.watch, view, plotjuggler, said) as watch,
-            ):
-                beside = LiveRun(joint, bus.rate_Hz, out, watch, stepped=fast) if live else None
-                watch = watch if beside is None else beside.watch
-                report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
-        finally:
+        with ExitStack() as last:
+            simulation = _simulation(config, wish) if sim else None
             if simulation is not None:
-                simulation.close()
+                last.callback(simulation.close)
+                if asked.mode == "force":
+                    simulation.set_wall(1, 0.0)
+            shown = last.enter_context(LiveView(said))
+            watch = last.enter_context(_onlookers(joint, out, shown.watch, view, plotjuggler, said))
+            beside = LiveRun(joint, bus.rate_Hz, out, watch, stepped=fast) if live else None
+            watch = watch if beside is None else beside.watch
+            report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
         _finish(report, joint, config, beside, as_json)
 
 
 def _bus_and_control(
-    link: Path | None, control: Path | None, joint: JointConfig, sim: bool
+    link: Path | None, control: Path | None, joint: JointConfig, mode: ControlMode | None, *, sim: bool
 ) -> tuple[LinkConfig, ControlConfig]:
     """The bus, as it is or rehearsed, and the controller for it; raises InputError where one does not fit the other."""
     bus = load_link(DEMO_LINK if link is None else link)
     bus = _rehearsed(bus, errors()) if sim else bus
     wanted = control_of(control, joint, None if sim else stated_gains(bus))
+    if mode is not None:
+        chosen = wanted.compensator.model_copy(update={"mode": mode})
+        wanted = wanted.model_copy(update={"compensator": chosen})
     bus, wanted = matched(bus, wanted, own_link=not sim)
     if link is None and not sim:
         raise InputError("--link is missing; give a link file, or --sim for a simulated joint")

@@ -48,6 +48,13 @@ EffectsOption = Annotated[
     list[Path] | None, typer.Option("--effects", help="Python file that registers an effect of your own")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the result as JSON in place of the summary")]
+BoundsOption = Annotated[
+    bool, typer.Option("--bounds/--no-bounds", help="guaranteed bounds beside the prediction")
+]
+BudgetOption = Annotated[
+    float, typer.Option("--budget", min=0.0, help="seconds after which nothing is begun: the best so far")
+]
+ChanceOption = Annotated[int, typer.Option("--seed", min=0, help="of noise replicas and resampling")]
 
 
 def read_joint(path: Path, effects: Sequence[Path] | None = None) -> JointConfig:

@@ -32,43 +32,23 @@ def control_for(config: JointConfig, stated: DriveGains | None = None) -> Contro
 
     Good for simulation and for a first look at a design; for hardware, state the real values.
     """
-    ratio = config.drive.ratio
+    ratio, load = config.drive.ratio, greatest_load(config)
     stiffness = stiffness_range(config, samples=80)
     inertia = stiffness.zero_Nm_per_rad / (2.0 * pi * _LINK_HZ) ** 2
-    rotor = 2.0 * inertia * ratio**2
-    load = greatest_load(config)
     limit = config.limits.motor_torque_max_Nm
     torque = 3.0 * ratio * load if limit is None else limit
-    swing = 2.0 * pi * _DRIVE_HZ
-    step = config.sensors.motor_position_resolution_rad
-    if step is not None and step > 0.0:
-        # one count of a coarse encoder, seen through the drive's velocity filter, must not shake the motor
-        most = _SHAKE * torque / (step * 2.0 * pi * MotorModel().velocity_bandwidth_Hz)
-        swing = min(swing, most / (2.0 * _DAMPING * rotor))
-    rotor = min(rotor, _STIFFEST / swing**2)
+    rotor, swing = _rotor(2.0 * inertia * ratio**2, torque, config.sensors.motor_position_resolution_rad)
     if stated is not None:
         swing = 2.0 * _DAMPING * stated.stiffness_Nm_per_rad / stated.damping_Nms_per_rad
         rotor = stated.stiffness_Nm_per_rad / swing**2
-    coulomb = 0.005 * torque
     motor = MotorModel(
         inertia_kgm2=rotor,
         viscous_Nms_per_rad=0.02 * rotor * swing,
-        coulomb_Nm=coulomb,
+        coulomb_Nm=0.005 * torque,
         stiffness_Nm_per_rad=rotor * swing**2,
         damping_Nms_per_rad=2.0 * _DAMPING * rotor * swing,
         output_inertia_kgm2=inertia,
         output_viscous_Nms_per_rad=0.005 * inertia * 2.0 * pi * _LINK_HZ,
-    )
-    widest = float(abs(stiffness.deflection_rad).max())
-    health = HealthOptions(
-        motor_rate_rad_s=_FASTER * GateLimits.of(config.limits).position_rate_rad_s,
-        torque_rate_Nm_s=1000.0 * load,
-        torque_max_Nm=2.0 * load,
-        joint_residual_rad=2.0 * widest,
-        torque_mismatch_Nm=0.5 * load,
-        stuck_rad=20.0 * coulomb / (rotor * swing**2) + 50.0 * (step or 0.0) + 0.002,
-        shake_Nm=0.15 * load,
-        lead_rad=max(0.2, 20.0 * widest / ratio),
     )
     spring = min(load / _YIELDS_RAD, 0.2 * stiffness.low_Nm_per_rad)  # softer than the cable itself
     moved = inertia + rotor / ratio**2
@@ -76,4 +56,30 @@ def control_for(config: JointConfig, stated: DriveGains | None = None) -> Contro
         impedance_stiffness_Nm_per_rad=spring,
         impedance_damping_Nms_per_rad=2.0 * _DAMPING * sqrt(spring * moved),
     )
-    return ControlConfig(motor=motor, compensator=compensator, health=health)
+    widest = float(abs(stiffness.deflection_rad).max())
+    return ControlConfig(motor=motor, compensator=compensator, health=_health(config, motor, load, widest))
+
+
+def _rotor(inertia_kgm2: float, torque_Nm: float, step_rad: float | None) -> tuple[float, float]:
+    """Inertia [kg m2] of the motor and how fast its drive lets it swing [rad/s]; `step_rad`: its encoder's count."""
+    swing = 2.0 * pi * _DRIVE_HZ
+    if step_rad:
+        # one count of a coarse encoder, seen through the drive's velocity filter, must not shake the motor
+        most = _SHAKE * torque_Nm / (step_rad * 2.0 * pi * MotorModel().velocity_bandwidth_Hz)
+        swing = min(swing, most / (2.0 * _DAMPING * inertia_kgm2))
+    return min(inertia_kgm2, _STIFFEST / swing**2), swing
+
+
+def _health(config: JointConfig, motor: MotorModel, load_Nm: float, widest_rad: float) -> HealthOptions:
+    """What readings of such a joint can be, under its greatest load and deflection."""
+    step = config.sensors.motor_position_resolution_rad or 0.0
+    return HealthOptions(
+        motor_rate_rad_s=_FASTER * GateLimits.of(config.limits).position_rate_rad_s,
+        torque_rate_Nm_s=1000.0 * load_Nm,
+        torque_max_Nm=2.0 * load_Nm,
+        joint_residual_rad=2.0 * widest_rad,
+        torque_mismatch_Nm=0.5 * load_Nm,
+        stuck_rad=20.0 * motor.coulomb_Nm / motor.stiffness_Nm_per_rad + 50.0 * step + 0.002,
+        shake_Nm=0.15 * load_Nm,
+        lead_rad=max(0.2, 20.0 * widest_rad / config.drive.ratio),
+    )

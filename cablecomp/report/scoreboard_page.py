@@ -49,52 +49,59 @@ def scoreboard_page(board: Scoreboard) -> str:
     )
     sections = [
         Section("What was reached", _facts(board) + _targets(board) + page.code(command)),
-        Section(
-            "What it hangs on",
-            page.columns(_parts("imperfection", board.by_imperfection), _parts("size / loop", board.by_size))
-            + page.fold("by law", _parts("law", board.by_law)),
-            "Named first and located by the residual itself where decidable; wrong "
-            "names of all trials. An imperfection's trials "
-            "mostly have others too.",
-        ),
-        Section(
-            "Named by size",
-            page.columns(
-                page.figure(figures.naming_by_size(board), "Single effects; bars are 95 % intervals."),
-                page.figure(
-                    figures.confusion(board), "What was concealed, and the first name; trials counted."
-                ),
-            ),
-            "Decidable are the trials in which the true law itself, taken off the "
-            "recorded angle, beats the recalibrated drive on "
-            "data left out by what an effect has to bring.",
-        ),
-        Section(
-            "Confidence",
-            page.columns(
-                page.figure(
-                    figures.reliability(board), "All effects that were weighed, named or not, in bins."
-                ),
-                page.figure(figures.risk(board), "Of the surest share of them, how many are wrong."),
-            ),
-            f"Expected calibration error {page.number(board.trust.error)}, Brier "
-            f"score {page.number(board.trust.brier)}.",
-        ),
-        Section(
-            "How good the models are",
-            page.columns(
-                page.figure(figures.ratios(board)),
-                page.figure(figures.deviations(board), "Values that fall outside are drawn at the edge.")
-                if any(r.estimates for r in board.rows)
-                else page.paragraph(
-                    "No value was stated that has a true one: laws of other forms have other parameters."
-                ),
-            ),
-        ),
+        _hangs_on(board),
+        _named_by_size(board),
+        _confidence(board),
+        _models(board),
         Section("Trials that went wrong", _wrong(board) or page.paragraph("None.")),
         Section("All trials", page.fold("Every trial", _trials(board.rows))),
     ]
     return page.page("Blind trials", lead, sections)
+
+
+def _hangs_on(board: Scoreboard) -> Section:
+    parts = page.columns(_parts("imperfection", board.by_imperfection), _parts("size / loop", board.by_size))
+    return Section(
+        "What it hangs on",
+        parts + page.fold("by law", _parts("law", board.by_law)),
+        "Named first and located by the residual itself where decidable; wrong names of all trials. An "
+        "imperfection's trials mostly have others too.",
+    )
+
+
+def _named_by_size(board: Scoreboard) -> Section:
+    return Section(
+        "Named by size",
+        page.columns(
+            page.figure(figures.naming_by_size(board), "Single effects; bars are 95 % intervals."),
+            page.figure(figures.confusion(board), "What was concealed, and the first name; trials counted."),
+        ),
+        "Decidable are the trials in which the true law itself, taken off the recorded angle, beats the "
+        "recalibrated drive on data left out by what an effect has to bring.",
+    )
+
+
+def _confidence(board: Scoreboard) -> Section:
+    return Section(
+        "Confidence",
+        page.columns(
+            page.figure(figures.reliability(board), "All effects that were weighed, named or not, in bins."),
+            page.figure(figures.risk(board), "Of the surest share of them, how many are wrong."),
+        ),
+        f"Expected calibration error {page.number(board.trust.error)}, Brier "
+        f"score {page.number(board.trust.brier)}.",
+    )
+
+
+def _models(board: Scoreboard) -> Section:
+    values = (
+        page.figure(figures.deviations(board), "Values that fall outside are drawn at the edge.")
+        if any(r.estimates for r in board.rows)
+        else page.paragraph(
+            "No value was stated that has a true one: laws of other forms have other parameters."
+        )
+    )
+    return Section("How good the models are", page.columns(page.figure(figures.ratios(board)), values))
 
 
 def _facts(board: Scoreboard) -> str:

@@ -34,6 +34,7 @@ from cablecomp.runtime.setup import (
     resumed_at_s,
 )
 from cablecomp.runtime.simulated import Simulation
+from cablecomp.runtime.timing import TimingReport
 from cablecomp.runtime.ways_out import WaysOut
 
 
@@ -103,10 +104,9 @@ def run_joints(
     _check(contestants, link, protocol, options, simulation)
     if simulation is not None and simulation.terminal is not None:
         link = link.at_terminal(simulation.terminal)
-    first = contestants[0]
+    first, period = contestants[0], 1.0 / link.rate_Hz
     mode = ControlMode.FORCE if protocol.mode == "force" else first.options.mode
     gains = _gains(first, mode, link, control)
-    period = 1.0 / link.rate_Hz
     bus: Link = BusLink(link)
     references = references_of(protocol, mode is ControlMode.FORCE)
     setups = tuple(
@@ -117,8 +117,6 @@ def run_joints(
     )
     if not options.stepped:
         check_pace([_pace(setup, options) for setup in setups], period)
-    clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
-    timing = _timing(options, protocol, link, first.place, setups)
     truths = TruthTally([c.name for c in contestants])
 
     def after(tick: Tick, stage: Stage) -> None:
@@ -134,19 +132,11 @@ def run_joints(
                 last.callback(_prepare(options.out, setups, options.resume).close)
 
         ways = last.enter_context(WaysOut()) if ways_out is None else ways_out
-        loop = Loop(bus, setups, clock, period, timing, options.out, after, prepare)
+        clock: Clock = SteppedClock() if options.stepped else MonotonicClock()
+        wanted = _wanted(options, protocol, link, first.place, setups)
+        loop = Loop(bus, setups, clock, period, wanted, options.out, after, prepare)
         last.enter_context(ways.asking(loop.ask_to_stop))
-        report = loop.run()
-        found = RunReport(
-            tuple(result_of(joint, truths) for joint in loop.joints),
-            report,
-            loop.stop_reason,
-            tuple(loop.events.last),
-            gains,
-            options.out,
-            tuple(loop.failures),
-        )
-        return found if options.out is None else _reported(found, options.out)
+        return _reported(loop, loop.run(), truths, gains, options.out)
 
 
 def _check(
@@ -174,7 +164,7 @@ def _gains(first: Contestant, mode: ControlMode, link: LinkConfig, control: Cont
     return design_gains(first.config, link.rate_Hz, control.model_copy(update={"compensator": options}))
 
 
-def _timing(
+def _wanted(
     options: RunOptions, protocol: Protocol, link: LinkConfig, place: int, setups: Sequence[JointSetup]
 ) -> LoopOptions:
     """How long the run takes, from when on its clock counts, and how the process gets its time."""
@@ -191,15 +181,28 @@ def _pace(setup: JointSetup, options: RunOptions) -> Pace:
     return Pace(setup.name, setup.config, compensator.options, compensator.gains, options.bounds)
 
 
-def _reported(report: RunReport, out: Path) -> RunReport:
-    """Write `run.json`; what cannot be written is said, and loses nothing of what is there."""
+def _reported(
+    loop: Loop, timing: TimingReport, truths: TruthTally, gains: Gains, out: Path | None
+) -> RunReport:
+    """What came of the run, in `run.json` too; what cannot be written is said, and loses nothing of what is there."""
+    found = RunReport(
+        tuple(result_of(joint, truths) for joint in loop.joints),
+        timing,
+        loop.stop_reason,
+        tuple(loop.events.last),
+        gains,
+        out,
+        tuple(loop.failures),
+    )
+    if out is None:
+        return found
     path = out / "run.json"
     try:
-        write_durably(path, (json.dumps(report.as_dict(), indent=1) + "\n").encode())
+        write_durably(path, (json.dumps(found.as_dict(), indent=1) + "\n").encode())
     except OSError as error:
         failure = f"{path}: cannot be written ({error.strerror}); free some space"
-        return replace(report, failures=(*report.failures, failure))
-    return report
+        return replace(found, failures=(*found.failures, failure))
+    return found
 
 
 def _drive_mode(link: LinkConfig, place: int) -> Mode:

@@ -108,62 +108,87 @@ def scoreboard(rows: Iterable[Row], sha256: str, wish: Mapping[str, Any]) -> Sco
     )
 
 
-def _targets(rows: Sequence[Row], trust: Trust) -> list[Target]:
+def _targets(rows: Sequence[Row], trust: Trust) -> Iterable[Target]:
+    yield from _of_names(rows)
+    yield from _of_confidence(rows, trust)
+    yield from _of_errors(rows)
+    yield from _of_the_rest(rows)
+
+
+def _of_names(rows: Sequence[Row]) -> Iterable[Target]:
+    """Named and located, rightly and wrongly."""
     single = [r for r in rows if r.kind == "single"]
     decidable = [r for r in single if r.decidable]
+    known, other = ([r for r in decidable if r.laws == laws] for laws in ("catalogue", "other"))
     pairs = [r for r in rows if r.kind == "pair" and r.decidable]
     clean = [r for r in rows if r.kind == "none"]
     strange = [r for r in rows if r.kind == "stranger"]
     unlike = [r for r in strange if r.decidable]
-    tied = [r for r in rows if r.kind == "confounded"]
-    depends = [r for r in rows if r.depends is not None]
+    yield _share("single effect named first, catalogue's law, decidable", rate(known, _first), 0.97)
+    yield _share("single effect named first, another law, decidable", rate(other, _first), 0.90)
+    yield _share("single effect: a wrong name", rate(single, lambda r: r.wrong), None, 0.02)
+    yield _share("nothing missing: a wrong name", rate(clean, lambda r: r.wrong), None, 0.01)
+    yield _share("pairs: both named, decidable", rate(pairs, lambda r: r.all_right), 0.80)
+    yield _share("strangers: no wrong name", rate(strange, lambda r: not r.wrong and not r.failed), 0.90)
+    yield _share("strangers: located by the residual itself, decidable", rate(unlike, _located), 0.80)
+    yield _share("single effect: located by the residual itself, decidable", rate(decidable, _located), 0.90)
+
+
+def _of_confidence(rows: Sequence[Row], trust: Trust) -> Iterable[Target]:
+    """Whether what is said to be sure is."""
     z = [(e.z, r) for r in rows for e in r.estimates]
     bounds = [b for r in rows for b in r.bounds]
+    over = trust.area / trust.area_by_z if trust.area_by_z > 0.0 else nan
+    error = "confidence: expected calibration error"
+    yield Target(error, trust.error, (nan, nan), trust.of, None, 0.05, "1")
+    area = "confidence: area under risk–coverage, over that of z alone"
+    yield Target(area, over, (nan, nan), trust.of, None, 1.0, "1")
+    held = rate(z, lambda e: abs(e[0]) <= 1.96)
+    yield _share("95 % intervals that hold the truth, catalogue's laws", held, 0.92, 0.98)
+    yield _share("not named: the truth below its stated bound", rate(bounds, lambda b: b.held), 0.95)
+
+
+def _of_errors(rows: Sequence[Row]) -> Iterable[Target]:
+    """What the models leave, over what they promised and over noise."""
     kept = [r.final_rad / r.heldout_rad for r in rows if r.heldout_rad > 0.0 and isfinite(r.final_rad)]
     ratios = [
         r.heldout_rad / r.true_rad for r in rows if r.laws in ("catalogue", "none") and r.true_rad > 0.0
     ]
+    yield _at("error kept for the end over that left out, median", kept, 0.5, 1.25, "1")
+    yield _at("error kept for the end over that left out, 90 %", kept, 0.9, None, "1")
+    yield _at("error left out over noise, catalogue's laws, median", ratios, 0.5, 1.10, "1")
+    yield _at("error left out over noise, catalogue's laws, 90 %", ratios, 0.9, 1.5, "1")
+
+
+def _of_the_rest(rows: Sequence[Row]) -> Iterable[Target]:
+    """Laws without a name, dependences, what is confounded by design, time."""
+    clean = [r for r in rows if r.kind == "none"]
+    tied = [r for r in rows if r.kind == "confounded"]
+    depends = Rate(*_sum(r.depends for r in rows if r.depends is not None))
     times = [r.seconds for r in rows if isfinite(r.seconds)]
+    yield _share(
+        "nothing missing: a law without a name", rate(clean, lambda r: bool(r.empirical)), None, 0.05
+    )
+    yield _share("dependences found", depends)
+    wrongly = rate(rows, lambda r: r.depends_wrongly > 0)
+    yield _share("dependences that are not true, per trial", wrongly, None, 0.02)
+    yield _share("confounded: said so, named together", rate(tied, lambda r: bool(r.said_tied)))
+    yield _share("confounded: experiment proposed", rate(tied, lambda r: bool(r.proposed)))
+    yield _share("confounded: that experiment settles it", rate(tied, lambda r: bool(r.settled)))
+    yield _at("time of one diagnosis, median", times, 0.5, 10.0, "s")
+    yield _at("time of one diagnosis, 90 %", times, 0.9, 40.0, "s")
+    yield _at("time of one diagnosis, worst", times, 1.0, 90.0, "s")
+    yield _share("diagnoses without a verdict", rate(rows, lambda r: bool(r.failed)), None, 0.0)
 
-    def law(name: str) -> list[Row]:
-        return [r for r in decidable if r.laws == name]
 
-    def share(what: str, r: Rate, least: float | None = None, most: float | None = None) -> Target:
-        return Target(what, r.value, r.interval, r.of, least, most)
+def _share(what: str, r: Rate, least: float | None = None, most: float | None = None) -> Target:
+    return Target(what, r.value, r.interval, r.of, least, most)
 
-    def at(what: str, values: Sequence[float], q: float, most: float | None, unit: str) -> Target:
-        span = bootstrapped(values, lambda v: quantile(v, q))
-        return Target(what, quantile(values, q), span, len(values), None, most, unit)
 
-    return [
-        share("single effect named first, catalogue's law, decidable", rate(law("catalogue"), _first), 0.97),
-        share("single effect named first, another law, decidable", rate(law("other"), _first), 0.90),
-        share("single effect: a wrong name", rate(single, lambda r: r.wrong), None, 0.02),
-        share("nothing missing: a wrong name", rate(clean, lambda r: r.wrong), None, 0.01),
-        share("pairs: both named, decidable", rate(pairs, lambda r: r.all_right), 0.80),
-        share("strangers: no wrong name", rate(strange, lambda r: not r.wrong and not r.failed), 0.90),
-        share("strangers: located by the residual itself, decidable", rate(unlike, _located), 0.80),
-        share("single effect: located by the residual itself, decidable", rate(decidable, _located), 0.90),
-        Target("confidence: expected calibration error", trust.error, (nan, nan), trust.of, None, 0.05, "1"),
-        Target("confidence: area under risk–coverage, over that of z alone",
-               trust.area / trust.area_by_z if trust.area_by_z > 0.0 else nan, (nan, nan), trust.of, None, 1.0, "1"),
-        share("95 % intervals that hold the truth, catalogue's laws", rate(z, lambda e: abs(e[0]) <= 1.96), 0.92, 0.98),
-        share("not named: the truth below its stated bound", rate(bounds, lambda b: b.held), 0.95),
-        at("error kept for the end over that left out, median", kept, 0.5, 1.25, "1"),
-        at("error kept for the end over that left out, 90 %", kept, 0.9, None, "1"),
-        at("error left out over noise, catalogue's laws, median", ratios, 0.5, 1.10, "1"),
-        at("error left out over noise, catalogue's laws, 90 %", ratios, 0.9, 1.5, "1"),
-        share("nothing missing: a law without a name", rate(clean, lambda r: bool(r.empirical)), None, 0.05),
-        share("dependences found", Rate(*_sum(r.depends for r in depends))),
-        share("dependences that are not true, per trial", rate(rows, lambda r: r.depends_wrongly > 0), None, 0.02),
-        share("confounded: said so, named together", rate(tied, lambda r: bool(r.said_tied))),
-        share("confounded: experiment proposed", rate(tied, lambda r: bool(r.proposed))),
-        share("confounded: that experiment settles it", rate(tied, lambda r: bool(r.settled))),
-        at("time of one diagnosis, median", times, 0.5, 10.0, "s"),
-        at("time of one diagnosis, 90 %", times, 0.9, 40.0, "s"),
-        at("time of one diagnosis, worst", times, 1.0, 90.0, "s"),
-        share("diagnoses without a verdict", rate(rows, lambda r: bool(r.failed)), None, 0.0),
-    ]  # fmt: skip
+def _at(what: str, values: Sequence[float], q: float, most: float | None, unit: str) -> Target:
+    """The quantile q of values."""
+    span = bootstrapped(values, lambda v: quantile(v, q))
+    return Target(what, quantile(values, q), span, len(values), None, most, unit)
 
 
 def _first(row: Row) -> bool:
