@@ -38,7 +38,8 @@ from firmware_sim.plant.sensors import SensorSpec
 from firmware_sim.plant.stepping import advance
 
 MAX_STEP_S = 1e-3
-STIFFEST_COUPLING = 1e-5  # rad/(N·m), where the configuration gives the torque sensor no compliance
+RIGID = 1e-3  # compliance of a rigid torque sensor, as a share of the free span's: nothing that a joint shows
+FLANK = 1e-5  # rad/(N·m), of the flanks of a gap that has no compliance besides
 
 
 @dataclass(frozen=True)
@@ -83,11 +84,17 @@ class LinkSpec:
     def for_joint(cls, config: PlantConfig) -> LinkSpec:
         """A link that swings on the drive's zero-load stiffness at about 20 Hz and weighs a fifth of R T0."""
         stage = config.stages[-1]
-        cables = 2 if config.circuit == "closed" else 1
-        stiffness = cables * stage.EA_N * stage.output_radius_m**2 / stage.free_length_m
+        stiffness = span_stiffness(config)
         weight = 0.2 * stage.output_radius_m * stage.pretension_N
         inertia = min(stiffness / (2 * math.pi * 20.0) ** 2, weight / 9.81 * 0.3)
         return cls(inertia, weight, 0.0, 0.2 * inertia)
+
+
+def span_stiffness(config: PlantConfig) -> float:
+    """What the free span of the last stage's cables resists the joint with, N·m/rad."""
+    stage = config.stages[-1]
+    cables = 2 if config.circuit == "closed" else 1
+    return cables * stage.EA_N * stage.output_radius_m**2 / stage.free_length_m
 
 
 @dataclass(frozen=True)
@@ -186,7 +193,7 @@ class Plant:
                 0.02 * self.motor.rotor_inertia_kgm2
             )  # so that slack cables leave it determined
         soft = self.sensors.joint_torque_compliance_rad_per_Nm + build.extra_compliance
-        stiffness = 1.0 / max(soft, STIFFEST_COUPLING)
+        stiffness = 1.0 / max(soft, FLANK if build.gap_rad > 0.0 else RIGID / span_stiffness(self.config))
         damping = 0.04 * math.sqrt(stiffness * self.link.inertia_kgm2)
         build.tails.insert(0, Tail(self.link.inertia_kgm2, stiffness, damping, build.gap_rad))
 
