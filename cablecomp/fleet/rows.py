@@ -16,6 +16,7 @@ from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording, read_all
 from cablecomp.recording.replay import Replayed, replay
 from cablecomp.recording.streams import Moments
+from cablecomp.signal.smoothing import FloatArray
 
 Row = dict[str, Any]
 _PARTS: Final = 32
@@ -72,30 +73,34 @@ class Compliance:
         return float(1.0 + with_r / with_d) if variance > 0.0 and with_d != 0.0 else None
 
 
-class _Sink:
+class Kept:
+    """Sink that keeps of a night's replay what its row needs, in bounded memory."""
+
     def __init__(self) -> None:
-        self.parts, self.compliance, self.residual = Parts(), Compliance(), Moments()
+        self.parts, self.loads, self.compliance = Parts(), Parts(), Compliance()
+        self.residual, self.next_less_this = Moments(), Moments()
 
     def take(self, replayed: Replayed) -> None:
         """Take in one replayed block."""
         if replayed.residual_rad is None:
             return
-        self.residual.add(replayed.residual_rad[np.isfinite(replayed.residual_rad)])
+        usable = replayed.residual_rad[np.isfinite(replayed.residual_rad)]
+        self.residual.add(usable)
+        self.next_less_this.add(np.diff(usable))
         self.parts.add(replayed.residual_rad)
         if replayed.load_Nm is not None:
+            self.loads.add(replayed.load_Nm)
             self.compliance.add(replayed.load_Nm, replayed.predicted["deflection_rad"], replayed.residual_rad)
 
 
 def replayed_row(night: Night) -> Row:
     """Replay a night's recordings one by one, in bounded memory, whatever their length."""
-    sink, samples, seconds = _Sink(), 0, 0.0
+    sink, samples, seconds = Kept(), 0, 0.0
     for path in night.recordings:
         recording = open_recording(path)
         joint, _, _ = as_it_stood(load_joint(night.config), path, recording.head)
         summary = replay(recording, Observer(joint), [sink], config=joint)
         samples, seconds = samples + summary.samples, seconds + summary.duration_s
-    means = sink.parts.means()
-    within = change(means, _scatter(means))
     compared = sink.residual.count > 0
     return {
         "samples": samples,
@@ -103,11 +108,27 @@ def replayed_row(night: Night) -> Row:
         "rmse_rad": sink.residual.rms if compared else None,
         "zero_rad": sink.residual.mean if compared else None,
         "compliance_ratio": sink.compliance.ratio(),
-        "step_within_rad": within.size if within.how == "step" and len(means) >= _PARTS // 2 else 0.0,
+        "step_within_rad": step_within(sink) if compared else 0.0,
     }
 
 
-def _scatter(means: list[float]) -> float:
+def step_within(sink: Kept) -> float:
+    """By how much the zero steps within a night [rad], beyond what follows the load; 0 where it does not.
+
+    Friction remembers noise: a step that single readings hide is none.
+    """
+    means, loads = np.array(sink.parts.means()), np.array(sink.loads.means())
+    if len(means) < _PARTS // 2:
+        return 0.0
+    if len(loads) == len(means) and np.ptp(loads) > 0.0:
+        m = loads - loads.mean()
+        means = means - (m @ means) / (m @ m) * m
+    found = change(means, _scatter(means))
+    noise = sink.next_less_this.rms / np.sqrt(2.0)
+    return found.size if found.how == "step" and abs(found.size) > noise else 0.0
+
+
+def _scatter(means: FloatArray) -> float:
     """What one part's mean is good for: the median change from part to part, which a single step does not move."""
     return float(np.median(np.abs(np.diff(means)))) / 0.954 if len(means) > 2 else 0.0
 

@@ -65,6 +65,16 @@ def test_link_swings_on_the_drive_at_its_natural_frequency() -> None:
     assert found == pytest.approx(expected, rel=0.03)
 
 
+def test_a_torque_sensor_without_compliance_yields_nothing_that_shows() -> None:
+    """The joint's encoder sits behind it: what it reads is the pulley, on the stiffest joint too."""
+    config = joint(EA_N=2e5, free_length_m=0.02)
+    plant = Plant(config, MotorSpec(10.0, 4.0), LINK)
+    last = truths(plant, np.zeros(200), external_torque_Nm=1.0)[-1]
+    yields = last.pulley_position_rad - config.ratio * last.motor_position_rad
+    assert yields > 1e-5
+    assert abs(last.joint_position_rad - last.pulley_position_rad) < 0.005 * yields
+
+
 def test_live_and_bench_plant_are_one_drive() -> None:
     """What the live plant's cables went through, played to the bench plant, gives the same joint angle and
     tensions."""

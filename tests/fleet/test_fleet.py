@@ -14,7 +14,9 @@ from cablecomp.fleet import fleet as fleet_module
 from cablecomp.fleet.change import EVIDENCE, change
 from cablecomp.fleet.fleet import run_fleet
 from cablecomp.fleet.places import Night, nights
-from cablecomp.fleet.rows import Compliance, Parts
+from cablecomp.fleet.rows import Compliance, Kept, Parts, step_within
+from cablecomp.recording.replay import Replayed
+from cablecomp.recording.table import Block
 from cablecomp.report.fleet_page import FLAGS, _over_nights, failures, fleet_page, fleet_table
 
 rng = np.random.default_rng(7)
@@ -117,6 +119,18 @@ def test_changes_are_told_from_scatter(how: str) -> None:
     assert wrong <= 2
     assert change(np.zeros(4), 1.0).how == ""
     assert change(1e-9 * np.arange(20.0), 1.0).evidence < EVIDENCE  # below what one value is known to
+
+
+@pytest.mark.parametrize(("step_rad", "seen"), [(2e-4, True), (1e-5, False)])
+def test_a_step_within_a_night_is_seen_beside_what_follows_the_load(step_rad: float, seen: bool) -> None:
+    """One of ten times the encoder's noise; none that single readings hide, for friction remembers noise."""
+    count = 4_000
+    load = np.sin(np.linspace(0.0, 20.0, count))
+    residual = 3e-4 * load + step_rad * (np.arange(count) > 2_500) + 2e-5 * rng.standard_normal(count)
+    kept = Kept()
+    for r, m in zip(np.array_split(residual, 5), np.array_split(load, 5), strict=True):
+        kept.take(Replayed(Block(1, {}, 1.0), {"deflection_rad": np.zeros(len(r))}, r, None, m))
+    assert step_within(kept) == pytest.approx(step_rad if seen else 0.0, rel=0.2)
 
 
 def test_streams_in_any_blocks_give_the_same() -> None:
