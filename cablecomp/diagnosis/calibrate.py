@@ -17,18 +17,17 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.answer.augmented import augmented_joint
 from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
+from cablecomp.diagnosis.calibration.counts import count_rad
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
-from cablecomp.diagnosis.calibration.every_sample import on_every_sample
+from cablecomp.diagnosis.calibration.every_sample import by_wide_steps, on_every_sample
 from cablecomp.diagnosis.calibration.motion import Advice, what_would_tell
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence, noise_mean
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.limits import EXACT
-from cablecomp.signal.noise import channel_noise
 
 OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure"
 
@@ -101,7 +100,7 @@ def calibrate(
         rms_left(fit),
         rms_left(replace(fit, x=fit.problem.start)),
         noise_mean(fit.problem.evidence, JOINT),
-        (*cut, *_warnings(drive, fit)),
+        (*cut, *_warnings(drive, fit, recordings)),
         fit,
     )
 
@@ -149,7 +148,7 @@ def _without(fit: Fit, names: tuple[str, ...]) -> Fit:
         return fit
     kept = [k for k, p in enumerate(fit.problem.parameters) if p.name not in names]
     problem = replace(fit.problem, parameters=tuple(fit.problem.parameters[k] for k in kept))
-    return refit(solve(problem, fit.x[kept], 6), fit.problem.weighing, 4)
+    return by_wide_steps(refit(solve(problem, fit.x[kept], 6), fit.problem.weighing, 4))
 
 
 def _kept(drive: Calibrated, name: str, why: str) -> Kept:
@@ -180,14 +179,14 @@ def _with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) 
     return joint.model_copy(update={"tolerance": tolerance})
 
 
-def _warnings(drive: Calibrated, fit: Fit) -> tuple[str, ...]:
+def _warnings(drive: Calibrated, fit: Fit, recordings: Mapping[str, Columns]) -> tuple[str, ...]:
     found = []
     if drive.lost_rows:
         total = drive.lost_rows + sum(int(e.counted[JOINT].sum()) for e in drive.fit.problem.evidence)
         found.append(
             f"{100 * drive.lost_rows / total:.0f} % of the rows were given up to the history before the first sample"
         )
-    count = max(_count_rad(e) for e in fit.problem.evidence) * fit.problem.config.drive.ratio
+    count = max(count_rad(c) for c in recordings.values()) * fit.problem.config.drive.ratio
     if count > noise_mean(fit.problem.evidence, JOINT):
         found.append(
             f"one count of the motor encoder turns the joint by {1e6 * count:.2g} "
@@ -196,13 +195,8 @@ def _warnings(drive: Calibrated, fit: Fit) -> tuple[str, ...]:
             "mu_input is what acts then, not the material's"
         )
     if rms_left(fit) > 2.0 * noise_mean(fit.problem.evidence, JOINT):
-        found.append("more than noise is left: `cablecomp diagnose` says what the model lacks")
+        found.append(
+            "more than noise is left, and intervals know only of what the model has: `cablecomp diagnose` says what it "
+            "lacks"
+        )
     return tuple(found)
-
-
-def _count_rad(e: Evidence) -> float:
-    """The motor angle's resolution as the recording shows it [rad]; 0 where it cannot be told."""
-    try:
-        return float(channel_noise(e.columns["time_s"], e.columns["motor_position_rad"]).resolution)
-    except InputError:
-        return 0.0

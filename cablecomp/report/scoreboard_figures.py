@@ -82,7 +82,7 @@ def confusion(board: Scoreboard) -> Any:
         {o for line in board.confusion.values() for o in line}, key=lambda o: (o not in truths, o)
     )
     counts = np.array([[board.confusion[t].get(o, 0) for o in outcomes] for t in truths], dtype=float)
-    fig = style.figure(120 + 24 * len(truths), margin={"l": 220, "r": 44, "t": 30, "b": 200})
+    fig = style.figure(260 + 24 * len(truths), margin={"l": 220, "r": 44, "t": 30, "b": 200})
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
     fig.add_heatmap(
         z=shares,
@@ -95,7 +95,7 @@ def confusion(board: Scoreboard) -> Any:
         xgap=1,
         ygap=1,
     )
-    fig.update_xaxes(tickangle=-50, showgrid=False)
+    fig.update_xaxes(tickangle=-90, showgrid=False)
     fig.update_yaxes(autorange="reversed", showgrid=False)
     return fig
 

@@ -41,14 +41,20 @@ _COLOURS = {"yes": "green", "no": "dim", "opposite": "red"}
 
 def study_table(study: Study) -> Table:
     """What reproduces what, for the terminal; combinations first, best first."""
+    every = (*study.together, *study.findings)
+    answered = dict(zip(QUESTIONS, zip(*(answers(f) for f in every), strict=True), strict=True))
     table = Table(
-        title="What the thesis saw and left open: which physics gives it?", title_justify="left", box=None
-    )
-    for name in ("switched on", "size", *QUESTIONS, "misfit"):
-        table.add_column(name, justify="right" if name == "misfit" else "left", no_wrap=name == "switched on")
-    for finding in (*study.together, *study.findings):
+        title="What the thesis saw and left open: which physics gives it?", title_justify="left", box=None,
+        padding=(0, 1, 0, 0),
+    )  # fmt: skip
+    table.add_column("switched on", no_wrap=True)
+    table.add_column("size")
+    for name in QUESTIONS:
+        table.add_column(name, min_width=max(map(len, " ".join(answered[name]).split())))
+    table.add_column("misfit", justify="right")
+    for finding in every:
         words = [Text(word, _COLOURS.get(word, "yellow")) for word in answers(finding)]
-        name, size = finding.name.replace(" + ", "\n+ "), _size(finding).replace(", ", "\n")
+        name, size = finding.name.replace(" + ", " +\n"), _size(finding).replace(", ", "\n")
         table.add_row(name, size, *words, f"{finding.misfit:.1f}")
     table.add_row("nothing", "", *("no" for _ in QUESTIONS), f"{study.plain_misfit:.1f}", style="dim")
     return table
@@ -80,7 +86,7 @@ def study_page(study: Study, command: str) -> str:
                 ratios_figure(study),
                 "Line: the thesis's number (Table 3.1, trials 136 to 150); shaded: the side it reports without a "
                 "number (M_pk < 0). Dotted: the plain drive.",
-                least_px=900,
+                least_px=1100,
             ),
         ),
         Section(
@@ -148,7 +154,8 @@ def creep_figure(study: Study) -> Any:
         since = trace.since_s[1:]
         for col, values in ((1, trace.loaded), (2, trace.unloaded)):
             fig.add_scatter(
-                x=since, y=100.0 * values[1:], name=finding.name, mode="lines", legendgroup=finding.name,
+                x=since, y=100.0 * values[1:], name=finding.name.replace(" + ", " +<br>"), mode="lines",
+                legendgroup=finding.name,
                 showlegend=moving and col == 1, line={"color": colour, "width": 2 if moving else 1},
                 hovertemplate=f"{finding.name}: %{{y:.2f}} %<extra></extra>", row=1, col=col,
             )  # fmt: skip

@@ -4,7 +4,9 @@ A fit on thinned, cleaned rows is quick, and blind to fast motion: a link that s
 loose where a smoothed recording shows it sticking. Here the kernel runs on all samples, once on raw inputs and once on
 cleaned ones; the inputs that leave less are kept. A law is trusted to `MODEL` of the deflection it predicts, no more:
 such an error lasts as long as the deflection does, and is counted so, beside what the residual itself remembers
-(M. C. Kennedy and A. O'Hagan, J. R. Statist. Soc. B 63, 2001: calibration with model discrepancy).
+(M. C. Kennedy and A. O'Hagan, J. R. Statist. Soc. B 63, 2001: calibration with model discrepancy). What a drive that
+shakes winds onto its drums between two samples is not known either: by how much every other sample matters is counted
+as well.
 """
 
 from __future__ import annotations
@@ -16,11 +18,12 @@ from typing import Final
 import numpy as np
 
 from cablecomp.diagnosis.body import Columns
+from cablecomp.diagnosis.calibration.counts import count_rad, with_places
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, gather
-from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
+from cablecomp.estimation.least_squares import Fit, approach, refit, rms_left, solve, weighed
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray, group_means
@@ -30,6 +33,8 @@ MODEL: Final = 3e-3
 `tests/golden/calibration_coverage.py`, whose true values it puts where a stated sd ought to; others judge it."""
 MOST: Final = 120_000
 """Samples of all recordings together that are run one by one; of more, means of neighbours are."""
+WIDE: Final = 0.2
+"""Share of a parameter's prior sd over which its derivative is taken."""
 SPIKE: Final = 8.0
 """Sensor noises beyond which a raw reading is left cleaned."""
 
@@ -43,7 +48,10 @@ def on_every_sample(drive: Calibrated, recordings: Mapping[str, Columns], pace: 
     total = sum(len(c["time_s"]) for c in recordings.values())
     group = max(1, -(-total // MOST))
     thin = drive.fit.problem
-    cleaned = [_all_rows(thin, e, recordings[e.name], group) for e in thin.evidence]
+    cleaned = [
+        _with_places(thin, _all_rows(thin, e, recordings[e.name], group), recordings[e.name])
+        for e in thin.evidence
+    ]
     raw = [_with_raw_inputs(e, recordings[e.name], group) for e in cleaned]
     best: Fit | None = None
     for evidence in (cleaned, raw):
@@ -60,31 +68,111 @@ def on_every_sample(drive: Calibrated, recordings: Mapping[str, Columns], pace: 
     return settled(best, floor, 1 if pace.over else 2)
 
 
+def by_wide_steps(fit: Fit, rounds: int = 2) -> Fit:
+    """The fit carried on by derivatives over `WIDE` of each prior, and with such a one: a drive that shakes jumps from
+    sample to sample when a value moves a little, and a derivative over a thousandth is that of its jumps."""
+    for _ in range(rounds):
+        J = _wide_jacobian(fit)
+        better = approach(fit.problem, fit.x, dict(enumerate(J.T)), 6, 1e-4)
+        if not better.cost < fit.cost:
+            return replace(fit, J=J)
+        fit = better
+    return replace(fit, J=_wide_jacobian(fit))
+
+
+def _wide_jacobian(fit: Fit) -> FloatArray:
+    """Central differences over `WIDE` prior sds either way; a side on which the drive cannot follow is left out."""
+    problem = fit.problem
+    low, high = problem.bounds()
+    columns = []
+    for k, p in enumerate(problem.parameters):
+        reach = WIDE * min(p.sd, float(high[k] - low[k]))
+        ends = []
+        for side in (-reach, reach):
+            x = fit.x.copy()
+            x[k] = min(max(x[k] + side, low[k]), high[k])
+            found = problem.followed(x)
+            ends.append((fit.x[k], fit.residual) if found is None else (x[k], found))
+        (a, left), (b, right) = ends
+        columns.append((right - left) / (b - a) if b > a else fit.J[:, k])
+    return np.column_stack(columns) if columns else fit.J
+
+
 def settled(fit: Fit, floor: Weighing, times: int = 1) -> Fit:
     """The fit with weights as its own remainder and the trust in the law ask for."""
     for _ in range(times):
         weighing = weighed(fit, floor)
-        trust = trusted(fit.problem)
-        sigma = {c: float(np.hypot(s, trust.get(c, 0.0))) for c, s in weighing.sigma.items()}
-        fit = refit(fit, replace(weighing, sigma=sigma), 6)
+        trust, between = trusted(fit.problem), between_samples(fit)
+        sigma = {
+            c: float(np.sqrt(s**2 + trust.get(c, 0.0) ** 2 + between.get(c, 0.0) ** 2))
+            for c, s in weighing.sigma.items()
+        }
+        fit = by_wide_steps(refit(fit, replace(weighing, sigma=sigma), 6))
     return fit
 
 
 def trusted(problem: Problem) -> dict[str, float]:
     """By channel, the 1-sigma of a row with its memory that comes of the law itself: MODEL x RMS of what it predicts x
     root of the rows for which that lasts."""
-    ratio = problem.config.drive.ratio
     found = {}
     for c in problem.channels:
-        parts = []
-        for e in problem.evidence:
-            if c in e.counted and e.counted[c].sum() > 8:
-                y = e.at_rows(c) - (ratio * e.at_rows("motor_position_rad") if c == JOINT else 0.0)
-                parts.append(y[e.counted[c]] - np.mean(y[e.counted[c]]))
+        parts = [
+            _deflection(problem, e, c) for e in problem.evidence if c in e.counted and e.counted[c].sum() > 8
+        ]
         if parts:
             size = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
             found[c] = MODEL * size * float(np.sqrt(integrated_time_of_parts(parts)))
     return found
+
+
+def between_samples(fit: Fit) -> dict[str, float]:
+    """By channel, the 1-sigma of a row with its memory that comes of what happens between samples: by how much
+    predictions differ from those with every other sample left out, in RMS x root of the rows for which that lasts."""
+    problem = fit.problem
+    halved = [_every_other(e) for e in problem.evidence]
+    try:
+        there = problem.with_evidence(halved).misfits(fit.x)
+    except InputError:
+        return {}
+    here = problem.misfits(fit.x)
+    found = {}
+    for c in problem.channels:
+        parts = [
+            (a[::2] - b)[e.counted[c]]
+            for a, b, e in zip(here[c], there[c], halved, strict=True)
+            if c in e.counted and e.counted[c].sum() > 8
+        ]
+        parts = [p - np.mean(p) for p in parts]
+        if parts:
+            size = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+            found[c] = size * float(np.sqrt(2.0 * integrated_time_of_parts(parts)))
+    return found
+
+
+def _every_other(e: Evidence) -> Evidence:
+    """A recording of which every sample is judged, every other one left out."""
+    return replace(
+        e,
+        columns={k: v[e.rows][::2] for k, v in e.columns.items()},
+        rows=np.arange(len(e.rows[::2])),
+        counted={k: v[::2] for k, v in e.counted.items()},
+        weight=e.weight[::2],
+        carryover={k: v[::2] for k, v in e.carryover.items()},
+    )
+
+
+def _deflection(problem: Problem, e: Evidence, channel: str = JOINT) -> FloatArray:
+    """A channel beyond the rigid drive, about its mean."""
+    rigid = problem.config.drive.ratio * e.at_rows("motor_position_rad") if channel == JOINT else 0.0
+    y = (e.at_rows(channel) - rigid)[e.counted[channel]]
+    return np.asarray(y - np.mean(y), dtype=np.float64)
+
+
+def _with_places(problem: Problem, e: Evidence, columns: Columns) -> Evidence:
+    """The recording with the motor's places inside its counts, where a count is more than the law is trusted to."""
+    count = count_rad(columns)
+    moves = problem.config.drive.ratio * count / np.sqrt(12.0)
+    return with_places(problem.config, e, count) if moves > MODEL * np.std(_deflection(problem, e)) else e
 
 
 def _all_rows(problem: Problem, thin: Evidence, columns: Columns, group: int) -> Evidence:
