@@ -25,7 +25,7 @@ from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT, Evidence, noise_mean
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel, noise_mean
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.limits import EXACT
 
@@ -193,6 +193,11 @@ def _warnings(drive: Calibrated, fit: Fit, recordings: Mapping[str, Columns]) ->
             f"urad, more than the joint encoder's noise: "
             "a motor that hunts within a count shakes friction loose unseen; "
             "mu_input is what acts then, not the material's"
+        )
+    if any(load_channel(fit.problem.config, c) == MOTOR for c in recordings.values()):
+        found.append(
+            "the load is read off the motor's torque, in which the motor's own friction and inertia stand: what is "
+            "found of friction is both, and surer than it is; calibrate with the joint's torque measured"
         )
     if rms_left(fit) > 2.0 * noise_mean(fit.problem.evidence, JOINT):
         found.append(

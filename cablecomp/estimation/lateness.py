@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.errors import CablecompError
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import JOINT, MOTOR
 from cablecomp.estimation.view import INPUT, Suspicion, View, bare, mrad, rms
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
@@ -81,9 +81,10 @@ def _delay(view: View, name: str, late: float, before: float, after: float) -> S
     of_speed = _of_speed(view, name, late)
     how = "late" if late > 0.0 else "early"
     both = "" if of_speed > OF_SPEED else ", or to trail by lost motion (at one speed they look alike)"
+    rubs = ", or the motor's own friction stands in it" if name == MOTOR else ""
     words = (
-        f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}: the nominal drive leaves {mrad(before)} RMS, "
-        f"{mrad(after)} with it shifted"
+        f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}{rubs}: the nominal drive leaves {mrad(before)} "
+        f"RMS, {mrad(after)} with it shifted"
     )
     numbers = {"late_s": late, "rms_rad": before, "left_rad": after, "of_speed": of_speed}
     return Suspicion("delay", name, words, numbers)

@@ -114,3 +114,14 @@ def test_what_went_before_the_first_sample_is_no_misfit() -> None:
     found = calibrate(LIMITED, {f"{k}/1": after_a_history(k) for k in range(2)})
     assert found.rmse_rad < 1.3 * NOISE_RAD
     assert not any("more than noise" in line for line in found.warnings)
+
+
+def test_a_load_read_off_the_motor_is_said_to_hold_its_friction() -> None:
+    columns = recording(NOMINAL, 1)
+    columns["motor_torque_Nm"] = -NOMINAL.drive.ratio * columns["joint_torque_Nm"]
+    by_motor = NOMINAL.model_copy(
+        update={"observer": NOMINAL.observer.model_copy(update={"load": "motor_torque"})}
+    )
+    for config, said in ((by_motor, True), (NOMINAL, False)):
+        found = calibrate(config, {"one": columns}, budget_s=0.0)
+        assert any("motor's own friction" in line for line in found.warnings) == said
