@@ -15,10 +15,10 @@ class Equivalent(NamedTuple):
     """A joint as a spring with dry friction beside it, q_out = ratio q_in + deflection.
 
     The load cycle 0, +most, −most, 0 Nm of the observer (history and effects in it, motor held) gives:
-    `stiffness_Nm_per_rad` = load over deflection between the loop's ends; `backlash_rad` = the loop's greatest
-    width, what a joint whose play is that wide would show; `friction_Nm` = stiffness times half that width,
-    which gives spring and friction side by side the same width. `rms_rad`: what this leaves of the loop, of
-    `reach_rad` in all.
+    `backlash_rad` w = the loop's greatest width, what a joint whose play is that wide would show. Spring and friction
+    side by side go 2 (most - friction)/stiffness from end to end and are 2 friction/stiffness wide; so that this is the
+    loop's reach and its width, `stiffness_Nm_per_rad` = 2 most/(reach + w) and `friction_Nm` = stiffness w/2.
+    `rms_rad`: what this leaves of the loop, of `reach_rad` in all.
     """
 
     ratio: float
@@ -33,8 +33,8 @@ class Equivalent(NamedTuple):
         """What these numbers leave out, one line each."""
         effects = ", ".join(effect.id for effect in config.effect)
         return (
-            f"of the loop at +-{self.most_Nm:.4g} N m the equivalent leaves {1e6 * self.rms_rad:.3g} urad RMS of "
-            f"{1e6 * self.reach_rad:.3g} urad",
+            f"of the loop at +-{self.most_Nm:.4g} N m the equivalent leaves {1e3 * self.rms_rad:.3g} mrad RMS of "
+            f"{1e3 * self.reach_rad:.3g} mrad",
             "smaller loads: their loops are narrower than those of one dry "
             "friction; the drive is stiffer at each reversal",
             "the memory of the wraps: turning either pulley moves what earlier loads have left",
@@ -53,7 +53,7 @@ def equivalent(config: JointConfig) -> Equivalent:
     found = stiffness_range(config, most)
     reach = float(np.ptp(found.deflection_rad))
     span = float(np.ptp(found.load_Nm))
-    stiffness = span / reach
+    stiffness = span / (reach + found.width_rad)
     friction = 0.5 * stiffness * found.width_rad
     n = len(found.load_Nm) // 4
     down = slice(n, 3 * n)  # one whole branch: from the greatest load to the least
