@@ -90,8 +90,8 @@ class Link(Protocol):
         """State of the bus, at next to no cost."""
 
     @property
-    def backlogs(self) -> int:
-        """Polls that left frames for the next one, at next to no cost."""
+    def unread(self) -> tuple[int, int]:
+        """Polls that left frames for the next one, and frames that the system dropped, at next to no cost."""
 
     def status(self) -> LinkStatus:
         """Counts and state of the bus; changes nothing. Takes long: it asks every message of every joint."""
@@ -212,9 +212,9 @@ class BusLink:
         return self._port.state
 
     @property
-    def backlogs(self) -> int:
-        """See `Link.backlogs`."""
-        return self._port.counters.backlogs
+    def unread(self) -> tuple[int, int]:
+        """See `Link.unread`."""
+        return self._port.counters.backlogs, self._port.dropped()
 
     def status(self) -> LinkStatus:
         """See `Link.status`."""

@@ -31,6 +31,7 @@ class _SocketPort(PortBase):
         self._owner: Any = None
         self._buffer = bytearray(4096)
         self._dropped_before = 0
+        self._dropped = 0
 
     def _use(self, own: socket.socket, owner: Any) -> None:
         own.setblocking(False)
@@ -39,12 +40,16 @@ class _SocketPort(PortBase):
         self.state, self.fault = BusState.ACTIVE, ""
 
     def dropped(self) -> int:
-        """Frames that found the socket's buffer full (SO_MEMINFO); 0 where the system does not tell."""
-        return 0 if self._socket is None else _kernel_drops(self._socket) - self._dropped_before
+        """Frames that found the socket's buffer full (SO_MEMINFO), also once it is closed; 0 where the system does
+        not tell."""
+        if self._socket is not None:
+            self._dropped = _kernel_drops(self._socket) - self._dropped_before
+        return self._dropped
 
     def close(self) -> None:
         """See `Port.close`."""
         if self._socket is not None:
+            self.dropped()
             self._socket.close()
             self._socket = None
         if self._owner is not None:

@@ -94,7 +94,7 @@ class Loop:
         self._stage_s = options.begin_s
         self._armed_s = 0.0
         self._asked_to_stop = ""
-        self._backlogs = (0, 0)
+        self._unread = ((0, 0), (0, 0))
 
     @property
     def since_s(self) -> float:
@@ -235,7 +235,7 @@ class Loop:
         if minute is not None:
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
         if tick.number % LOOK_EVERY == 0:
-            self._backlogs = (self._backlogs[1], self.link.backlogs)
+            self._unread = (self._unread[1], self.link.unread)
         if tick.skipped:
             self.events.add(now, "", f"{tick.skipped} ticks skipped")
         why = self._asked_to_stop or self._joint_trouble() or self._bus_trouble()
@@ -254,12 +254,13 @@ class Loop:
 
     def _flood(self) -> str:
         """What is behind data that come too late: frames that nobody waits for, more than can be read."""
-        status = self.link.status()
-        if status.backlogs == self._backlogs[0]:
+        polls, dropped = (now - then for now, then in zip(self.link.unread, self._unread[0], strict=True))
+        if polls == dropped == 0:
             return ""
+        status = self.link.status()
         return (
-            f" (the bus is flooded: {status.backlogs - self._backlogs[0]} polls could not read all that came, "
-            f"{status.ignored + status.foreign} frames were for none of the joints)"
+            f" (the bus is flooded: {polls} polls could not read all that came, {dropped} frames were dropped by the "
+            f"system, {status.ignored + status.foreign} frames were for none of the joints)"
         )
 
     def _bus_trouble(self) -> str:

@@ -193,6 +193,19 @@ def test_noise_is_counted(multicast, payload: bytes) -> None:
     assert port.counters.invalid == before + 1
 
 
+def test_frames_that_the_system_dropped_are_told_also_after_the_end(multicast) -> None:
+    _, sender = multicast
+    port = can_port("udp_multicast", GROUP, None, {"port": PORT, "hop_limit": 0})
+    port.open()
+    payload = msgpack.packb(WELL_FORMED)
+    while port.dropped() == 0:
+        for _ in range(1000):
+            send(sender, payload)
+    dropped = port.dropped()
+    port.close()
+    assert port.dropped() >= dropped
+
+
 def test_a_reply_of_seven_bytes_has_a_temperature_and_no_error(rigs) -> None:
     # CubeMars V1.1 boards: number, position, velocity, torque, degC
     rig = rigs("mit-virtual.toml", {'model = "AK80-9"': 'model = "AK80-9"\nreply_length = 7'})

@@ -18,6 +18,7 @@ from mit_joint import POSITION_STEP, MitJoint, reply
 from test_taking_up import Rig
 
 from cablecomp.control.protocol import parse_protocol
+from cablecomp.links.port_can import VirtualPort
 from cablecomp.runtime.results import RunReport
 
 RATE, LOW, HIGH, TORQUE, SPEED = 30.0, -3.2, 3.2, 1.5, 30.0  # the wrist's [limits]
@@ -149,6 +150,18 @@ def test_a_flood_is_called_a_flood(rig: Rig) -> None:
     assert not report.ended_well
     assert "motor position is stale" in report.stop_reason
     assert "the bus is flooded" in report.stop_reason
+
+
+def test_frames_that_the_system_dropped_are_named_beside_what_is_stale(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(VirtualPort, "dropped", lambda port: 70 if rig.joint.tick >= 300 else 0)
+    report = disturbed(rig, at(300, lambda j: setattr(j, "mute", True)))
+    assert "motor position is stale" in report.stop_reason
+    assert (
+        "the bus is flooded: 0 polls could not read all that came, 70 frames were dropped"
+        in report.stop_reason
+    )
 
 
 def test_a_motion_that_asks_for_too_much_is_cut_to_the_limit_on_the_wire(rig: Rig) -> None:
