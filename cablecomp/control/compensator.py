@@ -19,6 +19,10 @@ from cablecomp.errors import InputError
 from cablecomp.signals import NAN, Estimate, Sample
 
 
+_APPROACH = 0.1
+"""Share of the motor's greatest speed at which a target that is far away, as where a run begins, is gone to."""
+
+
 class ObserverLike(Protocol):
     """What the compensator needs of an observer."""
 
@@ -96,7 +100,9 @@ class Compensator:
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = Ahead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
-        self.bump = Bump(options.blend_s, period_s)
+        self.bump = Bump(
+            options.blend_s, period_s, _APPROACH * (config.limits.motor_velocity_max_rad_s or 20.0)
+        )
         self.deflection_slope = Slope(options.velocity_filter_Hz, period_s)
         self.follow = Ahead(self.gains.follow_filter_Hz, self.gains.follow_lead_s, period_s)
         self.motor_trim_rad = 0.0

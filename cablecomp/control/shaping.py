@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, pi
+from math import exp, inf, pi
 
 from cablecomp.errors import InputError
 
@@ -76,15 +76,17 @@ class Slope:
 
 
 class Bump:
-    """What is added to a target so that a switch costs no step: `size (1 - 3 x^2 + 2 x^3)`, x = time since
-    over `blend_s`."""
+    """What is added to a target so that a switch costs no step: `size (1 - 3 x^2 + 2 x^3)`, x = time since over
+    `blend_s`, or over a longer time where the mean rate were above `most_rad_s`."""
 
-    __slots__ = ("_period", "_total", "left", "size", "slope")
+    __slots__ = ("_blend_s", "_most_rad_s", "_period", "_total", "left", "size", "slope")
 
-    def __init__(self, blend_s: float, period_s: float) -> None:
+    def __init__(self, blend_s: float, period_s: float, most_rad_s: float = inf) -> None:
         if not blend_s > 0.0:
             raise InputError(f"blend_s is {blend_s}; a time above 0 is accepted")
-        self._total = max(1, round(blend_s / period_s))
+        self._blend_s = blend_s
+        self._most_rad_s = most_rad_s
+        self._total = 1
         self._period = period_s
         self.size = 0.0
         self.slope = 0.0
@@ -93,6 +95,7 @@ class Bump:
     def start(self, size: float) -> None:
         """Begin anew with `size`, rad."""
         self.size = size
+        self._total = max(1, round(max(self._blend_s, abs(size) / self._most_rad_s) / self._period))
         self.left = self._total
 
     def step(self) -> float:
