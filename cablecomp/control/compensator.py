@@ -18,7 +18,6 @@ from cablecomp.control.shaping import Ahead, Bump, Slope
 from cablecomp.errors import InputError
 from cablecomp.signals import NAN, Estimate, Sample
 
-
 _APPROACH = 0.1
 """Share of the motor's greatest speed at which a target that is far away, as where a run begins, is gone to."""
 

@@ -1,8 +1,9 @@
 """Hours of control with a fault every minute, in simulated time:
 `nice -n 19 python tests/soak/nightly.py --hours 100 [--rate 100] [--out out/soak]`.
 
-At 100 Hz, on a drive with a rotor that such a loop can hold, a simulated hour takes RATIO of one core: the code is the
-same at every rate, and hours are what is asked for. `--rate 1000` is the wrist as shipped, at several times the cost.
+At 100 Hz, on a drive with a rotor that such a loop can hold, a simulated hour takes four to five minutes of one
+core: the code is the same at every rate, and hours are what is asked for. `--rate 1000` is the wrist as shipped, at
+five to six times the cost.
 
 One joint's life: every minute is a run of its own that resumes from the snapshot of the one before, with a fault drawn
 at random that begins somewhere in it. After each: the stop has its true reason, every row that the observer took is on
