@@ -202,7 +202,7 @@ def test_bump_and_slope() -> None:
 
 
 def test_a_joint_that_stands_far_off_is_led_to_its_reference_slowly() -> None:
-    """3 rad of the motor, of a tenth of its 30 rad/s on the way: in a second, where the blend alone would take 50 ms."""
+    """3 rad of the motor at a tenth of its 30 rad/s: in a second, where the blend alone would take 50 ms."""
     c = controller()
     targets, motor = [], 3.0
     for k in range(1200):
