@@ -37,14 +37,18 @@ def options(**more: float | None) -> HealthOptions:
 class Fed:
     """Readings by hand; what is not given does not come."""
 
-    def __init__(self, chosen: HealthOptions | None = None, count: int = 0, **needs: object) -> None:
+    def __init__(
+        self, chosen: HealthOptions | None = None, count: int = 0, period_s: float = T, **needs: object
+    ) -> None:
         self.readings = JointReadings("joint", tuple(f"other_{k}" for k in range(count)))
-        self.health = h.Health(options() if chosen is None else chosen, N, 2.5 * T, T, **needs)
+        chosen = options() if chosen is None else chosen
+        self.health = h.Health(chosen, N, 2.5 * period_s, period_s, **needs)
+        self.period_s = period_s
         self.k = 0
 
     def cycle(self, predicted: float = nan, target: float = nan, **came: float) -> h.Checked:
         self.k += 1
-        now, r = self.k * T, self.readings
+        now, r = self.k * self.period_s, self.readings
         for name, place in (("motor", MOTOR_POSITION), ("torque", JOINT_TORQUE), ("joint", JOINT_POSITION)):
             if name in came:
                 r.values[place], r.arrived_s[place] = came[name], now
@@ -193,6 +197,23 @@ def test_of_two_encoders_far_apart_the_one_that_rests_lies(motor: float, joint: 
     for k in range(8):
         checked = allowed.cycle(motor=motor * k, torque=0.0, joint=joint * k, predicted=joint * k + 5 / 64)
         assert not checked.flags & flag
+
+
+@pytest.mark.parametrize(("rested", "flag"), [(7, h.ENCODERS_DISAGREE), (8, h.JOINT_STUCK)])
+def test_a_slow_loop_waits_for_as_many_samples(rested: int, flag: int) -> None:
+    """Far apart in four samples, at rest for eight periods, where these are longer than 3 and 8 ms."""
+    fed, joint = Fed(options(joint_residual_rad=1 / 64), period_s=1 / 64), 0.1
+
+    def cycle(joint: float, off: float) -> int:
+        return fed.cycle(motor=0.01 * fed.k, torque=0.0, joint=joint, predicted=joint + off).flags & (
+            h.JOINT_STUCK | h.FATAL
+        )
+
+    for k in range(12):
+        assert cycle(joint - 0.01 * (11 - k), 0.0) == 0  # the last of these changes it for the last time
+    for _ in range(rested - 4):
+        assert cycle(joint, 0.0) == 0
+    assert [cycle(joint, 5.1 / 64) for _ in range(4)] == [0, 0, 0, flag]
 
 
 def test_a_joint_encoder_that_is_known_to_be_stuck_stays_so_while_the_motor_rests() -> None:
