@@ -20,13 +20,15 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter as fitted: value and 1-sigma in its own unit, what was nominal, the session whose own it is."""
+    """A parameter as fitted: value and 1-sigma in its own unit, what was nominal, the session whose own it is; of a
+    named effect's, the 95 % interval by its profile likelihood."""
 
     name: str
     value: float
     sd: float
     nominal: float | None = None
     session: str | None = None
+    interval_95: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,7 @@ def _named(n: Named) -> dict[str, Any]:
         "statement": n.statement,
         "equation": n.equation,
         "parameters": {
-            k: ({"value": v.value, "sd": v.sd} if isinstance(v, Value) else v)
+            k: ({"value": v.value, "sd": v.sd, "interval_95": v.interval_95} if isinstance(v, Value) else v)
             for k, v in n.parameters.items()
         },
         "depends_on": None if n.depends_on is None else dict(n.depends_on),

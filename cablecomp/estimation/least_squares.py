@@ -167,6 +167,16 @@ def derivative_of_part(fit: Fit, part: Sequence[Evidence]) -> FloatArray:
     return np.concatenate([*blocks, J[len(J) - J.shape[1] :]])
 
 
+def derivative_of_rest(fit: Fit, problem: Problem) -> FloatArray | None:
+    """The fit's derivative by the parameters that a smaller problem still has; None where those are others."""
+    names = [p.name for p in fit.problem.parameters]
+    if not all(p.name in names for p in problem.parameters):
+        return None
+    columns = [names.index(p.name) for p in problem.parameters]
+    data = len(fit.J) - len(names)
+    return np.asarray(fit.J[[*range(data), *(data + k for k in columns)]][:, columns], dtype=np.float64)
+
+
 def fitted_to_part(fit: Fit, part: Sequence[Evidence], evaluations: int) -> Fit:
     """A fit about some of its rows only, from where it stands, along secants: what is left out is then
     predicted by it."""

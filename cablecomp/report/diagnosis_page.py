@@ -15,6 +15,7 @@ from cablecomp.report.concealed_page import concealed_section
 from cablecomp.report.diagnosis_answer import answer, shown_first
 from cablecomp.report.diagnosis_tables import (
     angle,
+    between,
     by_recording,
     by_session,
     calibration,
@@ -111,11 +112,13 @@ def _parameter(effect: Effect, name: str, entry: Any) -> tuple[str, str, str, st
     if not isinstance(entry, Mapping):
         return name, str(entry), "", ""
     value, sd = known(entry["value"]), known(entry["sd"])
+    ends = entry.get("interval_95")
     known_as = next((p for p in effect.parameters if p.name == name), None)
     if known_as is None:
-        return name, with_sd(value, sd), "", interval(value, sd)
+        return name, with_sd(value, sd), "", between(*ends) if ends else interval(value, sd)
     least = 0.0 if known_as.low >= 0.0 else known_as.minimum
-    return name, with_sd(value, sd), known_as.unit, interval(value, sd, least, known_as.maximum)
+    words = between(*ends) if ends else interval(value, sd, least, known_as.maximum)
+    return name, with_sd(value, sd), known_as.unit, words
 
 
 def _sessions(d: Diagnosis, result: Mapping[str, Any], laws: Sequence[Mapping[str, Any]]) -> Section:

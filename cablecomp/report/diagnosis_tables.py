@@ -52,7 +52,11 @@ def interval(value: float, sd: float, least: float = -np.inf, most: float = np.i
     """The 95 % interval of a value inside what it can be, a dash if its uncertainty is not known."""
     if not np.isfinite(sd):
         return "–"
-    low, high = max(value - 1.96 * sd, least), min(value + 1.96 * sd, most)
+    return between(max(value - 1.96 * sd, least), min(value + 1.96 * sd, most))
+
+
+def between(low: float, high: float) -> str:
+    """An interval in words."""
     return f"{page.number(low, digits=4)} … {page.number(high, digits=4)}"
 
 

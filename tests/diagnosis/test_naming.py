@@ -106,6 +106,12 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
     )
     found = diagnose(joint, {"small/1": recording(effect, CASES[effect])})
     assert [named.effect for named in found.named] == [effect]
+    for value in found.named[0].parameters.values():
+        if isinstance(value, Value):
+            assert value.interval_95 is not None
+            low, high = value.interval_95
+            assert low <= value.value <= high
+            assert low < high
 
 
 def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> None:

@@ -19,7 +19,7 @@ from diagnosis_example import NOISE, example, without_a_name
 from cablecomp.diagnosis.result import Diagnosis, Value, report_json
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_page import diagnosis_page
-from cablecomp.report.diagnosis_tables import interval
+from cablecomp.report.diagnosis_tables import between, interval
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 from cablecomp.report.replay_figures import Scale
 
@@ -189,6 +189,16 @@ def test_the_law_that_ties_sessions_is_drawn_at_their_values(found: Diagnosis) -
     fig = figures.dependence({"0": 0.1132, "2": 0.1132 + 2 * 0.2}, by_bend["parameter"], "bend")
     (line,) = fig.data
     assert (line.y[1] - line.y[0]) / (line.x[1] - line.x[0]) == pytest.approx(0.2)
+
+
+def test_a_profile_interval_stands_in_place_of_two_standard_deviations(found: Diagnosis) -> None:
+    (named,) = found.named
+    (name, value) = next((k, v) for k, v in named.parameters.items() if isinstance(v, Value))
+    other = replace(value, interval_95=(0.125 * value.value, 8.0 * value.value))
+    d = replace(found, named=(replace(named, parameters={**named.parameters, name: other}),))
+    assert between(0.125 * value.value, 8.0 * value.value) in text_of(diagnosis_page(d))
+    plain = replace(found, named=(replace(named, parameters={name: replace(value, interval_95=None)}),))
+    assert between(0.125 * value.value, 8.0 * value.value) not in text_of(diagnosis_page(plain))
 
 
 def test_an_interval_stays_inside_what_the_value_can_be() -> None:

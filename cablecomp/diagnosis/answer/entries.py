@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,15 +24,19 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, load_channel
 from cablecomp.estimation.least_squares import Fit, rms_left
+from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.profile import profile_interval
 
 
 def named_of(w: Weighed, final: Model) -> Named:
-    """One effect with its parameters, evidence and confidence."""
+    """One effect with its parameters, evidence and confidence; profile intervals where it is named."""
     effect = w.term.effect
     mine = f"effect.{effect.id}."
-    parameters: dict[str, Value | str] = {
-        v.name.removeprefix(mine): v for v in effect_values(final.fit) if v.name.startswith(mine)
-    }
+    values = [v for v in effect_values(final.fit) if v.name.startswith(mine)]
+    if w.confidence >= LIMITS.name:
+        found = side_by_side(lambda v: profile_interval(final.fit, v.name), values)
+        values = [replace(v, interval_95=i) for v, i in zip(values, found, strict=True)]
+    parameters: dict[str, Value | str] = {v.name.removeprefix(mine): v for v in values}
     if w.term.channel:
         parameters[effect.texts[0]] = w.term.channel
     return Named(

@@ -17,7 +17,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
-from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
+from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -203,7 +203,7 @@ def without(model: Model, term: Term, groups: Groups) -> Model | None:
     problem = stripped(model.fit.problem, term)
     start = placed(model.fit, problem)
     try:
-        fit = solve(problem, start, LIMITS.settled, LIMITS.tolerance, _derivative_of_rest(model.fit, problem))
+        fit = solve(problem, start, LIMITS.settled, LIMITS.tolerance, derivative_of_rest(model.fit, problem))
     except InputError:
         return None
     return Model(kept, fit, left_out(fit, groups))
@@ -215,16 +215,6 @@ def stripped(problem: Problem, term: Term) -> Problem:
     entries = tuple(e for e in problem.config.effect if not _is(e.id, e.parameters, term))
     free = tuple(p for p in problem.parameters if not p.name.startswith(f"effect.{term.effect.id}."))
     return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
-
-
-def _derivative_of_rest(fit: Fit, problem: Problem) -> FloatArray | None:
-    """The fit's derivative by the parameters that a smaller problem still has; None where those are others."""
-    names = [p.name for p in fit.problem.parameters]
-    if not all(p.name in names for p in problem.parameters):
-        return None
-    columns = [names.index(p.name) for p in problem.parameters]
-    data = len(fit.J) - len(names)
-    return np.asarray(fit.J[[*range(data), *(data + k for k in columns)]][:, columns], dtype=np.float64)
 
 
 def _is(identifier: str, parameters: Mapping[str, object], term: Hypothesis) -> bool:
