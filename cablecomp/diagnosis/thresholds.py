@@ -118,9 +118,10 @@ class Thresholds:
     seed 604: two right effects took off twice as much as a wrong one; on a jaw friction at both ends took off 2 % more
     than the path's)."""
     dethrone_left: float = 0.5
-    """Or share of what the best model leaves: of a calibrated drive far off a tenth is more than there is left (45
-    recordings of a jaw: friction of path, motor and jaw with a stiffening cable left half of what two of them and a
-    slip left, which was 5 % of what these had taken off)."""
+    """Or share of what the best model leaves, where none of its effects is kept; so much less as are kept: of a
+    calibrated drive far off a tenth is more than there is left (45 recordings of a jaw: friction of path, motor and jaw
+    with a stiffening cable left half of what two of them and a slip left, which was 5 % of what these had taken off;
+    36 of them: the same four left 0.64 of what two and a delay left)."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0

@@ -115,12 +115,15 @@ def _reigning(
 
 
 def _dethrones(model: Model, best: Model, baseline: Model, groups: Groups) -> bool:
-    """Whether a model takes off so much of what the best one leaves that it may do without that one's effects."""
+    """Whether a model takes off so much of what the best one leaves that it may do without effects of that one: the
+    fewer of them, the less it has to."""
     size = common([model], groups)
     left = loss(best, size, groups)
     gone = left - loss(model, size, groups)
     taken_off = loss(baseline, size, groups) - left
-    return gone > min(LIMITS.dethrone * taken_off, LIMITS.dethrone_left * left)
+    given_up = {t.name for t in best.terms} - {t.name for t in model.terms}
+    part = len(given_up) / max(len(best.terms), 1)
+    return gone > min(LIMITS.dethrone * taken_off, LIMITS.dethrone_left * part * left)
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
