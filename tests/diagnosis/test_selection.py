@@ -52,6 +52,13 @@ def test_two_others_that_take_off_much_more_do() -> None:
     assert reigning(model(1.0, "a"), model(0.5, "b", "c")) == "b + c"
 
 
+def test_the_fewer_effects_are_given_up_the_less_has_to_be_gained() -> None:
+    """Of what the best leaves 0.23 gone: more than a sixth, asked for one effect of three, less than for all three."""
+    best = model(1.0, "a", "b", "c")
+    assert reigning(best, model(0.88, "a", "b", "d", "e")) == "a + b + d + e"
+    assert reigning(best, model(0.88, "d", "e")) == "a + b + c"
+
+
 def test_where_others_are_not_enough_better_one_that_adds_to_the_best_is_taken() -> None:
     assert reigning(model(1.0, "a"), model(0.94, "b", "c"), model(0.95, "a", "c")) == "a + c"
 
