@@ -72,11 +72,12 @@ class Law:
 @dataclass(frozen=True)
 class Errors:
     """RMS errors of the joint angle [rad]: on what was fitted, on what was left out in turn, on what nobody had
-    seen."""
+    seen; on what was left out with a zero of each recording's own."""
 
     rmse_rad: float
     heldout_rmse_rad: float
     final_rmse_rad: float
+    heldout_own_zero_rmse_rad: float
 
 
 @dataclass(frozen=True)

@@ -185,8 +185,10 @@ class Thresholds:
 
     # --- verdict and names
     followed: float = 0.9
-    """What the final model leaves of a further channel over what the calibrated drive leaves (RMS), below which it
-    follows that channel better: a name may rest on this where the joint's angle is predicted no better."""
+    """What the final model leaves of a further channel, or of the angle with each recording's own zero taken off, over
+    what the calibrated drive leaves (RMS), below which it follows that better: a name may rest on this where the
+    joint's angle is predicted no better with the session's zero (trials seed 613: zeros five times as far apart as what
+    was missing hid two right effects)."""
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
     beyond_noise: float = 4.0

@@ -61,11 +61,16 @@ def test_each_case_has_its_word(named: bool, structured: bool, calibrated: float
 
 
 def test_a_model_predicts_by_the_angle_left_out_or_by_another_channel_that_it_follows() -> None:
-    before, worse, better = Errors(1.0, 1.0, 1.0), Errors(0.5, 1.1, 1.0), Errors(0.5, 0.9, 1.0)
+    before, worse, better = (
+        Errors(1.0, 1.0, 1.0, 0.2),
+        Errors(0.5, 1.1, 1.0, 0.19),
+        Errors(0.5, 0.9, 1.0, 0.2),
+    )
     assert predicts(leaving(1.0), leaving(0.5), before, better)
     assert not predicts(leaving(1.0), leaving(0.5), before, worse)
     assert predicts(leaving(1.0, torque=1.0), leaving(0.5, torque=0.5), before, worse)
     assert not predicts(leaving(1.0, torque=1.0), leaving(0.5, torque=0.95), before, worse)
+    assert predicts(leaving(1.0), leaving(0.5), before, Errors(0.5, 1.1, 1.0, 0.17))
 
 
 def test_the_share_left_is_all_of_it_where_nothing_was_won_and_none_where_noise_is_left() -> None:

@@ -30,7 +30,8 @@ def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empir
         return _left(again, part.out, _again(again, laws))
 
     parts = [p for found in side_by_side(left_out, left_out_in_turn(fit.problem.evidence, by)) for p in found]
-    return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)))
+    own_zero = [p - np.mean(p) for p in parts]
+    return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)), _rms(own_zero))
 
 
 def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:

@@ -25,12 +25,15 @@ def verdict_of(named: bool, structured: bool, drive: Calibrated, kept: Model) ->
 
 
 def predicts(before: Fit, after: Fit, baseline: Errors, augmented: Errors) -> bool:
-    """Whether a fit done again without a part predicts that part better than the calibrated drive does; or whether
-    another channel than the joint's angle is followed better."""
+    """Whether a fit done again without a part predicts that part better than the calibrated drive does; does so
+    clearly where each recording has a zero of its own (zeros that depart by more than any effect does hide all of
+    them); or whether another channel than the joint's angle is followed better."""
+    if augmented.heldout_rmse_rad < baseline.heldout_rmse_rad:
+        return True
+    if augmented.heldout_own_zero_rmse_rad < LIMITS.followed * baseline.heldout_own_zero_rmse_rad:
+        return True
     others = [c for c in before.problem.channels if c != JOINT]
-    return augmented.heldout_rmse_rad < baseline.heldout_rmse_rad or any(
-        rms_left(after, c) < LIMITS.followed * rms_left(before, c) for c in others
-    )
+    return any(rms_left(after, c) < LIMITS.followed * rms_left(before, c) for c in others)
 
 
 def is_structured(found: Location, series: Series, repeated_rad: float | None, named: bool) -> bool:
