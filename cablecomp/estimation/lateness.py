@@ -23,6 +23,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 LATE_GAIN: Final = 0.75
 """A delay is believed where it takes what nothing else follows down to this share."""
+NOTHING: Final = 1e-9
+"""Share of the joint's range that is rounding: what the drive leaves of a recording that it made itself."""
 MOST_LATE_S: Final = 0.25
 """Greatest delay that is looked for."""
 DELAY_ROWS: Final = 1500
@@ -41,7 +43,7 @@ def delays(view: View) -> list[Suspicion]:
     step = float(np.median(np.diff(view.time)))
     for name in wanted:
         late, before, after = _least(partial(_left_shifted, view, name), _most(view))
-        if abs(late) < 1.5 * step or not after < LATE_GAIN * before < inf:
+        if abs(late) < 1.5 * step or not after < LATE_GAIN * before < inf or before < NOTHING * np.ptp(view.y):
             continue
         found.append(_delay(view, name, late, before, after))
     at_rest = view.ratio * np.ptp(view.q) < 0.1 * np.ptp(view.y)

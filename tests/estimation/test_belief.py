@@ -6,10 +6,11 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from turning import JOINT, recorded
+from turning import JOINT, course, recorded
 
 from cablecomp.estimation.belief import suspicions
 from cablecomp.estimation.view import Suspicion
+from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, StageConfig, simulate
 
@@ -31,6 +32,15 @@ def moved(name: str, late_s: float) -> FloatArray:
 
 def test_a_right_recording_raises_no_suspicion() -> None:
     assert kinds() == []
+
+
+def test_what_is_no_more_than_rounding_is_not_said_to_be_late() -> None:
+    """A load that moves the joint by 1e-11 of its range, and comes 0.1 s late."""
+    slight = course()
+    slight["joint_torque_Nm"] = 1e-8 * slight["joint_torque_Nm"]
+    angle = Observer(JOINT).run(slight)["joint_position_rad"]
+    late = np.interp(slight["time_s"] - 0.1, slight["time_s"], slight["joint_torque_Nm"])
+    assert suspicions(JOINT, {**slight, "joint_torque_Nm": late, "joint_position_rad": angle}) == ()
 
 
 def test_signs() -> None:
