@@ -43,7 +43,8 @@ def delays(view: View) -> list[Suspicion]:
     step = float(np.median(np.diff(view.time)))
     for name in wanted:
         late, before, after = _least(partial(_left_shifted, view, name), _most(view))
-        if abs(late) < 1.5 * step or not after < LATE_GAIN * before < inf or before < NOTHING * np.ptp(view.y):
+        believed = after < LATE_GAIN * before < inf and before > NOTHING * np.ptp(view.y)
+        if abs(late) < 1.5 * step or not believed:
             continue
         found.append(_delay(view, name, late, before, after))
     at_rest = view.ratio * np.ptp(view.q) < 0.1 * np.ptp(view.y)
