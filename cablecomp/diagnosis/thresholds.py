@@ -213,7 +213,8 @@ class Thresholds:
 
     # --- what could be there unseen
     unseen: float = 3.0
-    """Standard deviations of its amount up to which an effect could have stayed unseen."""
+    """Standard deviations of its amount, beyond what the data show of it, up to which an effect could have stayed
+    unseen."""
     unseen_shapes: int = 6
     """Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
     hidden: float = 0.1

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from turning import JOINT, recorded
 
-from cablecomp.config import JointConfig
+from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
@@ -13,6 +14,25 @@ from cablecomp.diagnosis.explain.unseen import could_be_unseen
 from cablecomp.estimation.evidence import JOINT as ANGLE
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
+
+
+def bounds(moment_Nm: float) -> dict[str, float | None]:
+    """What is said of two recordings of a joint that lifts a weight."""
+    entry = EffectEntry(id="gravity_load", moment_Nm=moment_Nm, phase_rad=0.4)
+    lifting = JOINT.model_copy(update={"effect": (entry,)})
+    loose = JOINT.model_copy(update={"tolerance": {"EA_N": 0.2, "pretension_N": 0.1, "mu_output": 0.3}})
+    body = gather_body(loose, {f"a/{k}": recorded(lifting, seed=k) for k in (1, 2)})
+    fit = calibrate_drive(loose, body.used, np.random.default_rng(0)).fit
+    found, _ = could_be_unseen(fit, hypotheses(loose, body.used), [])
+    return {u["effect"]: u["below"] for u in found}
+
+
+@pytest.mark.parametrize("moment_Nm", [0.0, 0.01, 0.2])
+def test_what_is_there_lies_below_its_bound(moment_Nm: float) -> None:
+    """Whether or not it shows: 0.01 N m are three standard deviations, 0.2 N m are sixty."""
+    below = bounds(moment_Nm)["gravity_load"]
+    assert below is not None
+    assert moment_Nm < below < 2.0 * moment_Nm + 0.02
 
 
 def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() -> None:

@@ -49,7 +49,7 @@ def could_be_unseen(
             continue
         shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
         made = [contribution(here, h, h.starts[k]) for k in shapes]
-        sizes = [None if m is None else _bound(here, *m) for m in made]
+        sizes = [None if m is None else _bound(here, *m, h.two_sided) for m in made]
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
         below = max(seen) if seen and len(seen) == len(sizes) else None
@@ -69,9 +69,15 @@ def could_be_unseen(
     return found, sorted(hidden, key=lambda b: -b.visible)[: LIMITS.hidden_most]
 
 
-def _bound(here: Anchor, d: FloatArray, size: float) -> float | None:
-    length = float(np.linalg.norm(here.beyond(d)))
-    return LIMITS.unseen * abs(size) / length if length > 1e-9 else None
+def _bound(here: Anchor, d: FloatArray, size: float, two_sided: bool) -> float | None:
+    """What these data show of an amount of which `size` does d, and `LIMITS.unseen` standard deviations more: an effect
+    that is there and has no name is not held below what would show of noise alone."""
+    own = here.beyond(d)
+    length = float(np.linalg.norm(own))
+    if length <= 1e-9:
+        return None
+    shown = float(here.beyond(here.fit.residual) @ own) / length
+    return (LIMITS.unseen + (abs(shown) if two_sided else max(shown, 0.0))) * abs(size) / length
 
 
 def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float) -> Hidden | None:
