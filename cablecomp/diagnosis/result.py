@@ -146,8 +146,8 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
         "noise_floor_rad": d.noise_floor_rad,
         "repeatability_rad": d.repeatability_rad,
         "nominal": {"rmse_rad": d.nominal_rmse_rad},
-        "baseline": vars(d.baseline),
-        "augmented": vars(d.augmented),
+        "baseline": _errors(d.baseline),
+        "augmented": _errors(d.augmented),
         "heldout": {"by": d.heldout_by, "folds": d.folds, "final": list(d.final)},
         "channels": {
             name: {"baseline_rmse": before, "augmented_rmse": after}
@@ -184,6 +184,11 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
     }
     finite: dict[str, Any] = _finite(report)
     return finite
+
+
+def _errors(e: Errors) -> dict[str, float]:
+    """The three that readers know: the fourth only decides whether a name may be given."""
+    return {k: v for k, v in vars(e).items() if k != "heldout_own_zero_rmse_rad"}
 
 
 def _named(n: Named) -> dict[str, Any]:
