@@ -34,11 +34,13 @@ TESTS = {
     "cablecomp.control.degrade": ["tests/control/test_descent.py"],
     "cablecomp.runtime.health": [
         "tests/runtime/test_health_in_numbers.py",
+        "tests/runtime/test_health_of_encoders.py",
         "tests/runtime/test_health_watch.py",
     ],
     "cablecomp.runtime.channel": [
         "tests/runtime/test_channel_in_numbers.py",
         "tests/runtime/test_health_in_numbers.py",
+        "tests/runtime/test_health_of_encoders.py",
         "tests/runtime/test_health_watch.py",
     ],
 }
