@@ -62,16 +62,12 @@ def _end(fit: Fit, k: int, bound: float) -> float:
         outside = min(FACTOR * outside, 1.0)
     if beyond(outside) <= 0.0:
         return bound
-    for _ in range(TIMES):  # ... and inward until the next one would be inside
+    for _ in range(TIMES):  # ... and inward until the next one is inside
         if beyond(outside / FACTOR) <= 0.0:
+            outside = float(brentq(beyond, outside / FACTOR, outside, xtol=SHARE * outside))
             break
         outside /= FACTOR
-    found = (
-        brentq(beyond, outside / FACTOR, outside, xtol=SHARE * outside)
-        if beyond(outside / FACTOR) <= 0.0
-        else outside
-    )
-    return here + float(found) * way
+    return here + outside * way
 
 
 def _root_of_deviance(fit: Fit, k: int, x: float) -> float:

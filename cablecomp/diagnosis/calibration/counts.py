@@ -16,10 +16,10 @@ from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.simulate import load_of
+from cablecomp.estimation.view import INPUT
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import FloatArray
 
-MOTOR: Final = "motor_position_rad"
 WITHIN: Final = 1.5
 """Counts within which a motor rests: one, and flickering to the next."""
 LEAST_S: Final = 0.2
@@ -33,7 +33,7 @@ MOST: Final = 100
 def count_rad(columns: Mapping[str, FloatArray]) -> float:
     """The motor angle's resolution as a recording shows it [rad]; 0 where it cannot be told."""
     try:
-        return float(channel_noise(columns["time_s"], columns[MOTOR]).resolution)
+        return float(channel_noise(columns["time_s"], columns[INPUT]).resolution)
     except InputError:
         return 0.0
 
@@ -56,7 +56,7 @@ def _rests(config: JointConfig, e: Evidence, count: float) -> Iterator[slice]:
     """Judged rows through which the motor rests while the load goes one way."""
     time = e.at_rows("time_s")
     whole = np.broadcast_to(np.asarray(load_of(config, e.columns)), e.columns["time_s"].shape)
-    motor, load = e.at_rows(MOTOR).tolist(), whole[e.rows].tolist()
+    motor, load = e.at_rows(INPUT).tolist(), whole[e.rows].tolist()
     back = TURNED * float(np.ptp(whole))
     begin = 0
     while begin < len(time) - 1:
