@@ -1,5 +1,5 @@
 """Many joints, many nights: one row for each, and which joints drift, slip or lose strands.
 
-May import the diagnosis and below; start reading at `fleet.py`. A command that is given `--workers` or
+Imports the diagnosis and what lies below. Start reading at `fleet.py`. A command that is given `--workers` or
 `--scheduler` comes here.
 """

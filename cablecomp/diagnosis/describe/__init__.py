@@ -1,4 +1,5 @@
 """What has no name: unknown structure in words and as a sparse law, and series in one channel that a joint can carry.
 
-Imports `locate`, `explain` and `folds.py` beside it and what they import. Start reading at `unknown.py`.
+Imports `locate`, `explain`, `folds.py` and `thresholds.py` beside it and what they import. Start reading at
+`unknown.py`.
 """

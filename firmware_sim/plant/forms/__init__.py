@@ -1,8 +1,8 @@
 """Further forms of the catalogue's laws: the same physics in other words, one file per effect.
 
 A form goes by `effect:form`. Some of them the catalogue has as shapes of its own laws (the trials' order says which);
-a diagnosis that knows the effect should know the others again. Imports what an effect is, `effects/base.py`. Start
-reading at any file.
+a diagnosis that knows the effect should know the others again. Imports what an effect is, `effects/base.py`, and the
+plant's assembly. Start reading at any file.
 """
 
 from __future__ import annotations
