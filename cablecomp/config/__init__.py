@@ -4,7 +4,7 @@ Imports errors, units and the shipped examples alone. Start reading at `schema.p
 `drive.py`; `load.py` reads it.
 """
 
-from cablecomp.config.base import Finite, NonNegative, Positive
+from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
 from cablecomp.config.doubts import doubts
 from cablecomp.config.drive import Drive, Stage, ratios_to_last
 from cablecomp.config.load import load_joint, parse_joint, validated
@@ -20,6 +20,7 @@ __all__ = [
     "EffectEntry",
     "Empirical",
     "Finite",
+    "Frozen",
     "JointConfig",
     "Limits",
     "NonNegative",
@@ -28,6 +29,7 @@ __all__ = [
     "Sensors",
     "Session",
     "Stage",
+    "Text",
     "TomlTable",
     "doubts",
     "in_session",

@@ -19,7 +19,6 @@ class Reference(NamedTuple):
     joint_position_rad: float = 0.0
     joint_velocity_rad_s: float = 0.0
     joint_torque_Nm: float = NAN
-    joint_torque_rate_Nm_s: float = 0.0
     joint_acceleration_rad_s2: float = 0.0
 
 

@@ -21,14 +21,11 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from cablecomp.config import Limits, read_toml, validated
+from cablecomp.config import Finite, Limits, NonNegative, Positive, read_toml, validated
 from cablecomp.control.command import Reference
 from cablecomp.control.segments import Knot, Piece, line, sweep
 from cablecomp.errors import InputError
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Channel = Literal["load", "position"]
 
 
@@ -251,7 +248,7 @@ class Protocol(_Frozen):
             return Reference(self.start_position_rad, 0.0, self.start_load_Nm)
         k = bisect_right(starts, time_s) - 1
         at = pieces[k].at(time_s - starts[k])
-        return Reference(at.position, at.position_rate, at.load, at.load_rate, at.position_rate_rate)
+        return Reference(at.position, at.position_rate, at.load, at.position_rate_rate)
 
     def extremes(self) -> Extremes:
         """What it asks for at most."""

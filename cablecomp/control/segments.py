@@ -15,12 +15,11 @@ class Knot(NamedTuple):
 
 
 class At(NamedTuple):
-    """Values within a piece, with their rates per second."""
+    """Values within a piece; rates of the position per second."""
 
     position: float
     position_rate: float
     load: float
-    load_rate: float
     position_rate_rate: float = 0.0
 
 
@@ -59,9 +58,8 @@ class Line:
         x, span = time_s / self.duration_s, self.end.position - self.begin.position
         v = 30.0 * x * x * (1.0 - x) * (1.0 - x) * span / self.duration_s
         a = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * span / (self.duration_s * self.duration_s)
-        r = (self.end.load - self.begin.load) / self.duration_s
         position = self.begin.position + x * x * x * (10.0 + x * (6.0 * x - 15.0)) * span
-        return At(position, v, self.begin.load + x * (self.end.load - self.begin.load), r, a)
+        return At(position, v, self.begin.load + x * (self.end.load - self.begin.load), a)
 
     def load_range(self) -> tuple[float, float]:
         """See `Piece.load_range`."""
@@ -104,8 +102,8 @@ class Sweep:
         if g != 1.0:
             bend += rate * whole / self.duration_s
         if self.on_load:
-            return At(self.begin.position, 0.0, self.begin.load + value, rate)
-        return At(self.begin.position + value, rate, self.begin.load, 0.0, bend)
+            return At(self.begin.position, 0.0, self.begin.load + value)
+        return At(self.begin.position + value, rate, self.begin.load, bend)
 
     def load_range(self) -> tuple[float, float]:
         """See `Piece.load_range`."""

@@ -12,6 +12,5 @@ from .records import DriveState as DriveState
 from .records import Mode as Mode
 from .records import MotorCommand as MotorCommand
 from .records import Request as Request
-from .records import clip_names as clip_names
 from .schema import LinkConfig as LinkConfig
 from .schema import Timeouts as Timeouts

@@ -120,11 +120,6 @@ def _field(signal: Any, length: int) -> Field:
     )
 
 
-def counts(field: Field, data: bytes) -> int:
-    """Raw counts of an integer field in a frame."""
-    return counts_in(field, int.from_bytes(data, "little"), int.from_bytes(data, "big"))
-
-
 def counts_in(field: Field, little: int, big: int) -> int:
     """Raw counts of an integer field in a frame that has been read as one integer, both ways."""
     n = (big if field.big else little) >> field.shift & field.mask

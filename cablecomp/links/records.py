@@ -57,13 +57,6 @@ CLIP_STIFFNESS: Final = 8
 CLIP_DAMPING: Final = 16
 NOT_TAKEN: Final = 32
 """Beside the CLIP_* bits: the bus did not take the command; the drive still has the one before."""
-_CLIP_NAMES: Final = ("position", "velocity", "torque", "stiffness", "damping")
-
-
-def clip_names(clipped: int) -> tuple[str, ...]:
-    """Names of the command's fields that the wire could not carry and that were saturated, from the bits
-    `send` returns."""
-    return tuple(name for bit, name in enumerate(_CLIP_NAMES) if clipped >> bit & 1)
 
 
 class BusState(IntEnum):

@@ -12,15 +12,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cablecomp.links.schema_devices import (
-    Device,
-    Finite,
-    Frozen,
-    Name,
-    Positive,
-)
+from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
+from cablecomp.links.schema_devices import Device
 
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Sign = Literal[1, -1]
 ModeName = Literal["torque", "velocity", "position", "impedance"]
 
@@ -30,7 +24,7 @@ class CanBus(Frozen):
     `fd` and `data_bitrate`."""
 
     kind: Literal["can"]
-    interface: Name
+    interface: Text
     channel: str | int | None = None
     bitrate: Annotated[int, Field(gt=0)] | None = None
     fd: bool = False
@@ -51,7 +45,7 @@ class SerialBus(Frozen):
     `loop://`)."""
 
     kind: Literal["serial"]
-    port: Name
+    port: Text
     baud: Annotated[int, Field(gt=0)] = 921_600
     max_frames_per_poll: Annotated[int, Field(ge=1, le=100_000)] = 2048
     sync_id: Annotated[int, Field(ge=0, le=0x7FF)] | None = None
@@ -81,7 +75,7 @@ class MotorEnd(Frozen):
     (0 = it does not; absent = not known).
     """
 
-    device: Name
+    device: Text
     node: Annotated[int, Field(ge=0, le=0x1FFF_FFFF)]
     reply_id: Annotated[int, Field(ge=0, le=0x7FF)] | None = None
     sign: Sign = 1
@@ -97,7 +91,7 @@ class SensorEnd(Frozen):
     """The sensor node at the joint: `q_out = position_sign * q - position_offset_rad`, `M = torque_sign * m -
     torque_offset_Nm`."""
 
-    device: Name
+    device: Text
     node: Annotated[int, Field(ge=0, le=0x1FFF_FFFF)] = 0
     position_sign: Sign = 1
     position_offset_rad: Finite = 0.0
@@ -108,7 +102,7 @@ class SensorEnd(Frozen):
 class JointEnds(Frozen):
     """One joint on the bus."""
 
-    name: Name
+    name: Text
     motor: MotorEnd | None = None
     sensor: SensorEnd | None = None
 
@@ -123,7 +117,7 @@ class LinkConfig(Frozen):
     """A link as its TOML file states it; `folder` is where relative paths start."""
 
     schema_: Literal[1] = Field(alias="schema")
-    name: Name
+    name: Text
     rate_Hz: Annotated[float, Field(ge=1, le=20_000, allow_inf_nan=False)] = 1000.0
     bus: Annotated[CanBus | SerialBus, Field(discriminator="kind")]
     timeouts: Timeouts = Timeouts()

@@ -4,22 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
+from cablecomp.config.base import Finite, Frozen, Positive, Text
 from cablecomp.links.cansimple_firmware import FIRMWARES, Datum, FirmwareName
 from cablecomp.links.mit_profiles import Family
 from cablecomp.links.records import CHANNELS
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Name = Annotated[str, Field(min_length=1)]
 Value = Finite | str
-
-
-class Frozen(BaseModel):
-    """Frozen, strict, and closed to unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class MitScale(Frozen):
@@ -40,7 +32,7 @@ class MitDevice(Frozen):
     """
 
     protocol: Literal["mit"]
-    id: Name
+    id: Text
     model: str | None = None
     range: MitScale | None = None
     family: Family | None = None
@@ -65,7 +57,7 @@ class CubeMarsDevice(Frozen):
     """
 
     protocol: Literal["cubemars"]
-    id: Name
+    id: Text
     control: Literal["servo", "force"]
     model: str | None = None
     range: MitScale | None = None
@@ -77,8 +69,8 @@ class RobStrideDevice(Frozen):
     """A RobStride drive in its own protocol; `host`: the number that this side goes by."""
 
     protocol: Literal["robstride"]
-    id: Name
-    model: Name
+    id: Text
+    model: Text
     host: Annotated[int, Field(ge=0, le=0xFF)] = 0xFD
 
 
@@ -90,7 +82,7 @@ class MoteusDevice(Frozen):
     """
 
     protocol: Literal["moteus"]
-    id: Name
+    id: Text
     host: Annotated[int, Field(ge=0, le=127)] = 0
     kp_Nm_per_turn: Positive | None = None
     kd_Nms_per_turn: Positive | None = None
@@ -108,7 +100,7 @@ class Cia402Device(Frozen):
     """
 
     protocol: Literal["cia402"]
-    id: Name
+    id: Text
     host: Annotated[int, Field(ge=1, le=127)] = 127
     counts_per_turn: Positive
     velocity_counts_per_turn_s: Positive | None = None
@@ -126,7 +118,7 @@ class DynamixelDevice(Frozen):
     """
 
     protocol: Literal["dynamixel"]
-    id: Name
+    id: Text
     torque_constant_Nm_per_A: Positive
     current_unit_A: Positive = 2.69e-3
 
@@ -136,7 +128,7 @@ class CanSimpleDevice(Frozen):
     (firmware 0.6: all)."""
 
     protocol: Literal["cansimple"]
-    id: Name
+    id: Text
     firmware: FirmwareName = "0.6"
     cyclic: tuple[Datum, ...] = ("encoder",)
     polled: tuple[Datum, ...] = ()
@@ -167,7 +159,7 @@ class ChannelSource(Frozen):
     signal.
     """
 
-    signal: Name
+    signal: Text
     unit: str | None = None
     gain: Finite = 1.0
     offset: Finite = 0.0
@@ -177,7 +169,7 @@ class ChannelSource(Frozen):
 class StateSource(Frozen):
     """A signal that tells the drive's state: the numbers, or words of the table, that mean each state."""
 
-    signal: Name
+    signal: Text
     disabled: tuple[Value, ...] = ()
     calibrating: tuple[Value, ...] = ()
     enabled: tuple[Value, ...] = ()
@@ -192,7 +184,7 @@ class DbcMessage(Frozen):
     `stamps_sequence` here. `reply`: this message answers a command.
     """
 
-    name: Name
+    name: Text
     channels: dict[str, ChannelSource] = Field(default_factory=dict)
     sequence: str | None = None
     device_time: str | None = None
@@ -223,7 +215,7 @@ class DbcMessage(Frozen):
 class DbcCommand(Frozen):
     """The message that commands motion: the signals that carry each part of a command, and constant ones."""
 
-    message: Name
+    message: Text
     position: str | None = None
     velocity: str | None = None
     torque: str | None = None
@@ -236,7 +228,7 @@ class DbcRequest(Frozen):
     """The message for one request; a value is a number, the table's word, or one of `{mode}`, `{stiffness}`,
     `{damping}`."""
 
-    message: Name
+    message: Text
     values: dict[str, Value] = Field(default_factory=dict)
 
 
@@ -244,8 +236,8 @@ class DbcDevice(Frozen):
     """Any device that a DBC file describes; `dbc` is relative to the link file."""
 
     protocol: Literal["dbc"]
-    id: Name
-    dbc: Name
+    id: Text
+    dbc: Text
     message: tuple[DbcMessage, ...] = ()
     command: DbcCommand | None = None
     request: dict[

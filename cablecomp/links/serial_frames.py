@@ -77,7 +77,7 @@ def pack_record(identifier: int, data: bytes) -> bytes:
     elif len(data) > 8:
         raise InputError(f"serial record: {len(data)} data bytes; 0 to 8 are accepted")
     body = _HEAD.pack(identifier, len(data)) + data
-    return cobs_encode(body + crc_hqx(body, 0xFFFF).to_bytes(2, "big")) + b"\x00"
+    return cobs_encode(body + crc16(body).to_bytes(2, "big")) + b"\x00"
 
 
 class RecordReader:
@@ -113,7 +113,7 @@ class RecordReader:
                 continue
             body = cobs_decode(piece) if len(piece) <= MAX_ENCODED else None
             # The CRC register of data followed by its own CRC ends at zero.
-            if body is None or len(body) < 7 or crc_hqx(body, 0xFFFF) or body[4] != len(body) - 7:
+            if body is None or len(body) < 7 or crc16(body) or body[4] != len(body) - 7:
                 self.invalid += 1
                 continue
             identifier = int.from_bytes(body[:4], "little")

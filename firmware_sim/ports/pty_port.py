@@ -69,11 +69,6 @@ class PtyPort:
         if self.link is not None:
             self.link.unlink(missing_ok=True)
 
-    @property
-    def connected(self) -> bool:
-        """Whether a client has the terminal open."""
-        return self._master >= 0 and not self._hung_up()
-
     def _hung_up(self) -> bool:
         return any(event & select.POLLHUP for _, event in self._poller.poll(0))
 

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from bench_thread import BenchThread
 from sim_two_mass import TwoMass
 
 from firmware_sim.bench import Bench
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.firmware import DriveConfig, DriveState
 from firmware_sim.ports import open_port
-from firmware_sim.runner import BenchThread
 
 sdk = pytest.importorskip("dynamixel_sdk", reason="peer not installed: pip install 'cablecomp[peers]'")
 

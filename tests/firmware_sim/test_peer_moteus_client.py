@@ -11,13 +11,13 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from bench_thread import BenchThread
 from sim_two_mass import TwoMass
 
 from firmware_sim.bench import Bench
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.firmware import Drive, DriveConfig, DriveState
 from firmware_sim.ports import open_port
-from firmware_sim.runner import BenchThread
 from firmware_sim.wire.base import Answer
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.moteus import MoteusWire

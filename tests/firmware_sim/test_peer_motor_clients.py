@@ -10,13 +10,13 @@ from typing import Any
 
 import can
 import pytest
+from bench_thread import BenchThread
 from sim_two_mass import TwoMass
 
 from firmware_sim.bench import Bench
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.firmware import DriveConfig, DriveState
 from firmware_sim.ports import open_port
-from firmware_sim.runner import BenchThread
 
 HINT = "peer not installed: pip install 'cablecomp[peers]'"
 AS_DELIVERED = DriveConfig(command_timeout_s=0.0)

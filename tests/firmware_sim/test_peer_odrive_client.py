@@ -11,12 +11,12 @@ from typing import Any
 import can
 import cantools
 import pytest
+from bench_thread import BenchThread
 from sim_two_mass import TwoMass
 
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.firmware import DriveConfig
 from firmware_sim.ports import open_port
-from firmware_sim.runner import BenchThread
 
 odrive_can = pytest.importorskip("odrive_can", reason="peer not installed: pip install 'cablecomp[peers]'")
 TABLES = {"0.5": "odrive-cansimple-0.5.6", "0.6": "odrive-cansimple-0.6.10"}

@@ -15,9 +15,9 @@ from pathlib import Path
 import can
 import pytest
 import serial
+from sim_process import SimProcess
 
 from firmware_sim.errors import SimError
-from firmware_sim.process import SimProcess
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.serial_records import RecordReader, encode_record
 

@@ -65,7 +65,8 @@ def test_counts_are_those_of_cantools(tmp_path_factory, fields, data: bytes) -> 
     decoded = theirs.decode(data, decode_choices=False)
     for name, field in layout.fields.items():
         assert physical(field, data) == pytest.approx(decoded[name], abs=1e-9)
-        assert dbc.counts(field, data) == round((decoded[name] + 3) / 0.5)
+        read = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+        assert dbc.counts_in(field, *read) == round((decoded[name] + 3) / 0.5)
     ours = dbc.encode(layout, decoded)
     assert ours.clipped == ()
     assert ours.data == theirs.encode(decoded, padding=False)

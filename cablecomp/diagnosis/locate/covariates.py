@@ -13,21 +13,6 @@ from cablecomp.mechanics.jit import njit
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import FloatArray, IntArray, Smooth, fit_to_noise, step_s
 
-NAMES: Final = (
-    "time",
-    "load",
-    "load_direction",
-    "load_rate",
-    "dwell",
-    "reversal",
-    "motor_angle",
-    "joint_angle",
-    "velocity",
-    "acceleration",
-    "temperature",
-)
-"""Public names of the covariates; further channels follow as `other:<name>`."""
-
 UNITS: Final[Mapping[str, str]] = {
     "time": "s",
     "load": "N·m",
@@ -41,6 +26,7 @@ UNITS: Final[Mapping[str, str]] = {
     "acceleration": "rad/s²",
     "temperature": "°C",
 }
+"""Public names of the covariates, and their units; further channels follow as `other:<name>`."""
 
 
 @dataclass(frozen=True)

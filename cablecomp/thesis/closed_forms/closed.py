@@ -125,11 +125,6 @@ def closed_stiffness_Nm_per_rad(
     return stage.EA_N * stage.mu_eff * stage.radius_m * shape
 
 
-def zero_load_stiffness_Nm_per_rad(stage: EquivalentStage) -> float:
-    """Stiffness of any closed drive at zero load, 2 EA R^2/L (4-47): the free spans alone; N m/rad."""
-    return 2.0 * stage.EA_N * stage.radius_m**2 / stage.free_length_m
-
-
 def closed_slip_moment_Nm(stage: EquivalentStage) -> float:
     """Moment at which a wrap first slips to its termination; N m, infinite where wraps never end.
 
