@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planted import columns
 
-from cablecomp.diagnosis.locate.covariates import NAMES, covariates, join, reversals
+from cablecomp.diagnosis.locate.covariates import UNITS, covariates, join, reversals
 from cablecomp.errors import InputError
 
 
@@ -52,7 +52,7 @@ def test_a_reversal_is_dated_back_to_the_turning_point() -> None:
 
 def test_names_are_those_of_the_contract() -> None:
     found = covariates(columns("sweep"))
-    assert set(found.values) == {*NAMES, "other:elbow"}
+    assert set(found.values) == {*UNITS, "other:elbow"}
     assert all(len(values) == found.samples for values in found.values.values())
 
 
