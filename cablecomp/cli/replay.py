@@ -84,6 +84,9 @@ def replay(
         typer.echo(summary.to_json(), nl=False)
     else:
         _show(summary, joint, stood)
+        for note in summary.notes:
+            if note not in said:
+                console.print(f"note: {note}")
         console.print(f"report: {out / 'report.html'}")
     if view:
         _play(source, joint, summary.duration_s, bounds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import subprocess
@@ -129,3 +130,15 @@ def test_a_folder_that_cannot_be_one_is_refused_before_any_work(
     assert "is a file" in said
     assert str(taken) in said
     assert taken.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_packed_recording_with_an_unpacked_name_is_taken_and_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"{1e-3 * k},{2e-3 * k},{7e-4 * k},0.1\n" for k in range(200))
+    head = "time_s,motor_position_rad,joint_position_rad,joint_torque_Nm\n"
+    packed = tmp_path / "night.csv"
+    packed.write_bytes(gzip.compress((head + rows).encode()))
+    out = str(tmp_path / "out")
+    assert main(["replay", str(packed), "--config", "wrist-capstan", "--no-bounds", "--out", out]) == 0
+    assert "note: is gzip although it is named .csv; read unpacked" in capsys.readouterr().out
