@@ -119,6 +119,7 @@ class Compensator:
         self._motor_limit = options.motor_integral_limit_rad
         self._linear = options.linear_stiffness_Nm_per_rad
         self._from_sensor = options.load != "reference"
+        self._goes_to_position = options.mode is ControlMode.POSITION
         self._looks_ahead = options.feed_forward is not FeedForward.LINEAR
 
     def enable(self) -> None:
@@ -147,7 +148,7 @@ class Compensator:
         `joint_ok` False: the joint encoder's value is not to be trusted, feedback on it rests.
         """
         self.observed = False
-        if self.options.mode is ControlMode.POSITION:
+        if self._goes_to_position:
             return self._position(sample, reference, feed, joint_ok)
         before = self.estimate
         if feed.held and before is not None and self.options.torque_from == "encoders":

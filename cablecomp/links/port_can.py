@@ -18,6 +18,7 @@ from cablecomp.links.port_socket import MulticastPort, SocketCanPort
 from cablecomp.links.ports import Port, PortBase, Sink
 from cablecomp.links.records import EXTENDED, FD, REMOTE, SWITCH, BusState
 
+_MUTE = (BusState.CLOSED, BusState.OFF)
 _STANDARD_MASK, _EXTENDED_MASK = 0x7FF, 0x1FFF_FFFF
 
 
@@ -152,7 +153,7 @@ class VirtualPort(PortBase):
 
     def send(self, identifier: int, data: bytes) -> bool:
         """See `Port.send`."""
-        if self.state in (BusState.CLOSED, BusState.OFF):
+        if self.state in _MUTE:
             self.counters.send_failures += 1
             return False
         taken = True

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import inf, nan
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
 
 from cablecomp.config import JointConfig
 from cablecomp.control.command import FULL, Command, Feed, Reference
@@ -23,7 +22,7 @@ from cablecomp.runtime.keeper import Keeper
 from cablecomp.runtime.log import EventLog, JointLog
 from cablecomp.runtime.taking_up import TakingUp
 from cablecomp.runtime.tally import JointTally, View
-from cablecomp.signals import Estimate, Sample
+from cablecomp.signals import Estimate
 
 References = Callable[[float], Reference]
 """What is wanted of a joint at a time (s since the run was armed)."""
@@ -32,6 +31,7 @@ References = Callable[[float], Reference]
 ROWS_EVERY_S = 0.1
 """Of the loop's own time, between two times that rows are handed over: what a process that is killed loses of them."""
 _NOTHING_NEW = Feed(0.0, True)
+_ENABLED = DriveState.ENABLED  # looked up in its class anew it would take ten times as long
 _NOT_RUNNING = (DriveState.FAULT, DriveState.DISABLED)
 _NONE_YET = Command(nan, nan, nan)
 
@@ -51,20 +51,10 @@ class JointSetup:
     reference: References
 
 
-class Seen(NamedTuple):
-    """One cycle: its sample, and what was made of it."""
-
-    now_s: float
-    sample: Sample
-    estimate: Estimate
-    command: Command
-    reference: Reference
-    flags: int
-
-
 class JointLoop:
     """Runs one joint on one link, cycle by cycle; `stop_reason` says why it wants the run stopped ("" = it
-    does not)."""
+    does not). A cycle under control is `look`, `decide`, `act`, `note`.
+    """
 
     def __init__(self, setup: JointSetup, link: Link, folder: Path | None, events: EventLog) -> None:
         self.setup = setup
@@ -79,7 +69,7 @@ class JointLoop:
         self._link = link
         self._folder = folder
         self._events = events
-        self._seen: Seen | None = None
+        self._command = _NONE_YET
         self._sent = SafeCommand(nan, 0.0, 0.0, 0)
         self._predicted = nan
         self._flags = 0
@@ -87,8 +77,9 @@ class JointLoop:
         self._refused = False
         self._rows_due_s = -inf
         self._period_s = setup.compensator.period_s
+        self._fresh_s = setup.times.fresh_s
         self._offset = setup.config.sensors.joint_position_offset_rad
-        self._last_reference = setup.reference(0.0)
+        self._reference = self._last_reference = setup.reference(0.0)
         preload = setup.compensator.preload_Nm
         self.taking_up = TakingUp(
             link, setup.place, setup.limits, setup.times.fresh_s, preload, self._period_s
@@ -97,12 +88,12 @@ class JointLoop:
     @property
     def view(self) -> View | None:
         """The last cycle, for the eye; None before the first one."""
-        seen = self._seen
-        if seen is None:
+        estimate, checked = self.setup.compensator.estimate, self.checked
+        if estimate is None or checked is None:
             return None
-        name, phase = self.setup.name, self.degraded.phase
+        name, phase, sample = self.setup.name, self.degraded.phase, checked.sample
         return View(
-            name, seen.now_s, phase, seen.sample, seen.estimate, seen.command, seen.reference, seen.flags
+            name, sample.time_s, phase, sample, estimate, self._command, self._reference, checked.flags
         )
 
     @property
@@ -131,15 +122,14 @@ class JointLoop:
     def enable(self, now_s: float, mode: Mode) -> None:
         """While the drive is taken up: observe and record, and let it take hold where it is, against the
         pretension of an open circuit."""
-        command = self._observe(now_s, None)
-        checked = self.checked
-        assert checked is not None
+        checked = self._check(now_s, nan)
+        self._observe(checked, now_s, None)
         self._judge(checked, now_s, drive=False)
         if not self.stop_reason:
             motor = checked.sample.motor_position_rad
             wish = self.taking_up.step(self._sent, motor, self.enabled, mode, now_s)
             self._send_gated(wish, checked, now_s)
-        self._finish(command, None)
+        self._finish(None)
 
     def begin(self) -> None:
         """Control starts from where the motor is held."""
@@ -147,18 +137,30 @@ class JointLoop:
         compensator.reset()
         compensator.target_rad = self._sent.motor_position_rad
 
-    def run(self, now_s: float, since_s: float) -> None:
-        """One cycle under control; `since_s` = time since control began."""
-        command = self._observe(now_s, since_s)
-        checked = self.checked
-        if checked is not None and not self.stop_reason:
-            self._send_gated(command, checked, now_s)
-        self._finish(command, since_s)
+    def look(self, now_s: float) -> None:
+        """Under control: judge what has come."""
+        self._judge(self._check(now_s, self._sent.motor_position_rad), now_s)
+
+    def decide(self, now_s: float, since_s: float) -> None:
+        """Under control: observe, and find the next command; `since_s` = time since control began."""
+        assert self.checked is not None
+        self._observe(self.checked, now_s, since_s)
+
+    def act(self, now_s: float) -> None:
+        """Under control: send the command, unless the joint wants the run stopped."""
+        if not self.stop_reason:
+            assert self.checked is not None
+            self._send_gated(self._command, self.checked, now_s)
+
+    def note(self, since_s: float) -> None:
+        """Under control: count and record."""
+        self._finish(since_s)
 
     def stand(self, now_s: float) -> None:
         """After the stop: observe and record what has come, command nothing."""
         if self.checked is not None and self.checked.ready and not self._refused:
-            self._finish(self._observe(now_s, None, told=False), None)
+            self._observe(self._check(now_s, nan), now_s, None, told=False)
+            self._finish(None)
 
     def keep(self, now_s: float) -> None:
         """In idle time: hand what has been recorded and the observer's state to those who write it."""
@@ -202,22 +204,23 @@ class JointLoop:
         if not self._link.send(self.setup.place, command) & NOT_TAKEN:
             self._sent = safe
 
-    def _observe(self, now_s: float, since_s: float | None, *, told: bool = True) -> Command:
-        """Take in what has come; returns what the compensator asks for. `told`: what is wrong with it is an event,
+    def _check(self, now_s: float, target_rad: float) -> Checked:
+        predicted = self._predicted + self._offset
+        checked = self.setup.health.check(self.readings, now_s, predicted, target_rad)
+        self.checked = checked
+        return checked
+
+    def _observe(self, checked: Checked, now_s: float, since_s: float | None, *, told: bool = True) -> None:
+        """Take in what has come, and find what the compensator asks for. `told`: what is wrong with it is an event,
         which the silence of a drive that was stopped is not. A sample that the observer refuses
         ends the run: replay would refuse it as well. So does one that it takes where the next one, as expected, is
         beyond what the joint can take.
         """
         s = self.setup
-        target = self._sent.motor_position_rad if since_s is not None else nan
-        checked = s.health.check(self.readings, now_s, self._predicted + self._offset, target)
-        self.checked = checked
-        if since_s is not None:
-            self._judge(checked, now_s)
         reference = s.reference(self._period_s + (0.0 if since_s is None else since_s))
         begin = perf_counter()
         feed = FULL if self.degraded is NORMAL else feed_of(self.degraded)
-        if since_s is None and max(checked.motor_age_s, checked.load_age_s) > s.times.fresh_s:
+        if since_s is None and max(checked.motor_age_s, checked.load_age_s) > self._fresh_s:
             feed = _NOTHING_NEW
         compensator = s.compensator
         try:
@@ -228,39 +231,39 @@ class JointLoop:
             self.stop_reason = self.stop_reason or f"the observer refuses what {what}: {error}"
             command = _NONE_YET
         self.step_s = perf_counter() - begin
+        self._command, self._reference = command, reference
         estimate = compensator.estimate
         if estimate is not None:
             self._predicted = estimate.joint_position_rad
-            self._seen = Seen(now_s, checked.sample, estimate, command, reference, checked.flags)
         if told and checked.flags != self._flags:
             self._note(checked.flags, now_s)
-        return command
 
-    def _finish(self, command: Command, since_s: float | None) -> None:
+    def _finish(self, since_s: float | None) -> None:
         """Count and record the cycle, once its command has gone out."""
-        seen, checked = self._seen, self.checked
-        if seen is None or checked is None:
+        estimate, checked = self.setup.compensator.estimate, self.checked
+        if estimate is None or checked is None:
             return
-        sample, estimate = seen.sample, seen.estimate
+        sample = checked.sample
         self.tally.phases[self.degraded.phase] += 1
         if since_s is not None and not self._refused:
             self.tally.add(self._last_reference, sample.joint_position_rad - self._offset, estimate)
         if self._folder is not None and self.setup.compensator.observed:
-            self._record(self._folder, sample, estimate, command, checked, since_s is not None)
-        self._last_reference = seen.reference
+            self._record(self._folder, estimate, checked, since_s is not None)
+        self._last_reference = self._reference
 
     def _judge(self, checked: Checked, now_s: float, *, drive: bool = True) -> None:
-        before, s = self.degraded.phase, self.setup
+        fresh = self._fresh_s
         if (
             self.degraded is NORMAL
-            and checked.motor_age_s <= s.times.fresh_s
-            and checked.load_age_s <= s.times.fresh_s
+            and checked.motor_age_s <= fresh
+            and checked.load_age_s <= fresh
             and not checked.fatal
-            and (self.readings.state is DriveState.ENABLED or not drive)
+            and (self.readings.state is _ENABLED or not drive)
         ):
             return  # nearly always: nothing is amiss
-        times, period = s.times, self._period_s
-        self.degraded = degrade(self.degraded, period, checked.motor_age_s, checked.load_age_s, times)
+        s, before = self.setup, self.degraded.phase
+        ages = checked.motor_age_s, checked.load_age_s
+        self.degraded = degrade(self.degraded, self._period_s, *ages, s.times)
         phase = self.degraded.phase
         if phase is not before:
             self._events.add(now_s, s.name, f"{before.name.lower()} -> {phase.name.lower()}")
@@ -277,12 +280,13 @@ class JointLoop:
         s = self.setup
         position = checked.sample.motor_position_rad
         safe = gate(command, self._sent, position, checked.motor_age_s, self._period_s, s.limits)
-        if safe.flags & ~self._gate_flags:
-            words = ", ".join(gate_names(safe.flags & ~self._gate_flags))
+        flags = safe.flags
+        if flags & ~self._gate_flags:
+            words = ", ".join(gate_names(flags & ~self._gate_flags))
             self._events.add(now_s, s.name, f"gate: {words}")
-        self._gate_flags = safe.flags
-        if safe.flags & MUST_STOP:
-            self.stop_reason = self.stop_reason or f"gate: {', '.join(gate_names(safe.flags & MUST_STOP))}"
+        self._gate_flags = flags
+        if flags & MUST_STOP:
+            self.stop_reason = self.stop_reason or f"gate: {', '.join(gate_names(flags & MUST_STOP))}"
         else:
             self._send(safe)
 
@@ -294,15 +298,8 @@ class JointLoop:
         if gone:
             self._events.add(now_s, self.setup.name, "over: " + ", ".join(health_names(gone)))
 
-    def _record(
-        self,
-        folder: Path,
-        sample: Sample,
-        estimate: Estimate,
-        command: Command,
-        checked: Checked,
-        controlled: bool,
-    ) -> None:
+    def _record(self, folder: Path, estimate: Estimate, checked: Checked, controlled: bool) -> None:
+        sample, command = checked.sample, self._command
         if self.log is None:
             self.log = JointLog(folder, sample, self.readings.others)
             self._keeper = Keeper(folder / SNAPSHOT)

@@ -229,8 +229,15 @@ class Loop:
     def _run(self, tick: Tick) -> None:
         now = tick.now_s
         since = now - self._armed_s
+        # Step by step and not joint by joint: what the processor has just run, it runs twice as fast again.
         for joint in self.joints:
-            joint.run(now, since)
+            joint.look(now)
+        for joint in self.joints:
+            joint.decide(now, since)
+        for joint in self.joints:
+            joint.act(now)
+        for joint in self.joints:
+            joint.note(since)
         minute = self.accounts.minute(since, self._skipped, self.link)
         if minute is not None:
             self.events.add(now, "", f"minute {minute.number}: {minute.words()}")
