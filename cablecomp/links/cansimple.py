@@ -30,6 +30,8 @@ _II: Final = Struct("<II")
 _I: Final = Struct("<I4x")
 _COUNT: Final = Struct("<i4x")
 _HEARTBEAT: Final = Struct("<IB3s")
+_SDO: Final = Struct("<BHBf")
+_READ: Final = 0
 
 
 class Cmd(IntEnum):
@@ -149,6 +151,19 @@ def parse_pair(data: bytes) -> Pair:
     if len(data) != 8:
         raise InputError(f"ODrive payload: {len(data)} bytes; 8 are accepted")
     return Pair(*_FF.unpack(data))
+
+
+def read_endpoint(node: int, number: int) -> Frame:
+    """RxSdo: ask for a parameter by its endpoint (firmware 0.6)."""
+    return Frame(identifier(node, Cmd06.RX_SDO), _SDO.pack(_READ, number, 0, 0.0))
+
+
+def parse_endpoint(data: bytes) -> tuple[int, float]:
+    """TxSdo: an endpoint's number, and its float32; raises InputError unless 8 bytes."""
+    if len(data) != 8:
+        raise InputError(f"ODrive TxSdo: {len(data)} bytes; 8 are accepted")
+    _, number, _, value = _SDO.unpack(data)
+    return number, value
 
 
 def set_axis_state(node: int, state: AxisState) -> Frame:

@@ -1,18 +1,18 @@
-"""A joint's drive that is an ODrive (CANSimple)."""
+"""A joint's drive that is an ODrive (CANSimple); the encoder on its second input may be the joint's."""
 
 from __future__ import annotations
 
-from math import pi
+from math import floor, pi
 from typing import Final
 
 from cablecomp.errors import InputError
 from cablecomp.links import cansimple
-from cablecomp.links.cansimple import AxisState, Cmd, ControlMode
+from cablecomp.links.cansimple import AxisState, Cmd, Cmd06, ControlMode
 from cablecomp.links.cansimple_firmware import FIRMWARES, Datum, error_of, error_words, state_of
-from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, chain, grid
+from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, calibration, chain, grid
 from cablecomp.links.readings import JointReadings, MessageStats
-from cablecomp.links.records import Frame, Mode, MotorCommand, Request
-from cablecomp.links.schema import MotorEnd
+from cablecomp.links.records import JOINT_POSITION, Frame, Mode, MotorCommand, Request
+from cablecomp.links.schema import MotorEnd, SensorEnd
 from cablecomp.links.schema_devices import CanSimpleDevice
 from cablecomp.links.units import Linear
 from cablecomp.signals import Wire
@@ -47,13 +47,27 @@ class CanSimpleDrive:
     `torque_constant_Nm_per_A`.
     """
 
-    def __init__(self, device: CanSimpleDevice, end: MotorEnd, readings: JointReadings) -> None:
+    def __init__(
+        self,
+        device: CanSimpleDevice,
+        end: MotorEnd,
+        readings: JointReadings,
+        joint: SensorEnd | None = None,
+    ) -> None:
         self._node = end.node
         cansimple.identifier(end.node, 0)
         self._device = device
         self._readings = readings
         self._firmware = FIRMWARES[device.firmware]
         self._polled = tuple(cansimple.request(end.node, self._firmware.data[d]) for d in device.polled)
+        self._joint = joint
+        if joint is not None:
+            if device.joint_endpoint is None:
+                raise InputError(
+                    f"joint `{readings.name}`: the encoder at the joint is on device `{device.id}`; add its "
+                    "joint_endpoint, the number of spi_encoder0.raw in the flat_endpoints.json of its firmware"
+                )
+            self._polled += (cansimple.read_endpoint(end.node, device.joint_endpoint),)
         self._set_mode(Mode(end.mode))
         gear = Gear(end)
         turns = Linear(_TURN)
@@ -96,6 +110,9 @@ class CanSimpleDrive:
         for name in sorted(wanted):
             identifier = cansimple.identifier(self._node, self._firmware.data[name])
             out.append(Receiver(identifier, self._pair(name, maps[name])))
+        if self._joint is not None:
+            told = cansimple.identifier(self._node, Cmd06.TX_SDO)
+            out.append(Receiver(told, self._joint_encoder(self._joint)))
         return tuple(out)
 
     def _stats(self, name: str) -> MessageStats:
@@ -144,6 +161,31 @@ class CanSimpleDrive:
             stats.received += 1
             stats.last_s = now_s
             return len(places)
+
+        return take
+
+    def _joint_encoder(self, joint: SensorEnd) -> Take:
+        """The joint's encoder tells where in a turn it is, from 0 to 1: the half turn to either side of 0 is
+        meant."""
+        stats, readings, asked = self._stats("joint encoder"), self._readings, self._device.joint_endpoint
+        gain, offset = chain(Linear(_TURN), calibration(joint, "joint_position_rad"))
+
+        def take(data: bytes, now_s: float) -> int:
+            if len(data) != 8:
+                stats.invalid += 1
+                return 0
+            number, turns = cansimple.parse_endpoint(data)
+            if number != asked:  # somebody else's question
+                return 0
+            if turns * 0.0 != 0.0:
+                stats.invalid += 1
+                return 0
+            readings.values[JOINT_POSITION] = gain * (turns - floor(turns + 0.5)) + offset
+            readings.arrived_s[JOINT_POSITION] = now_s
+            readings.updates[JOINT_POSITION] += 1
+            stats.received += 1
+            stats.last_s = now_s
+            return 1
 
         return take
 

@@ -105,10 +105,12 @@ def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings, shared
         return MoteusDrive(device, end, joint, second)
     if isinstance(device, Cia402Device):
         return Cia402Drive(device, end, joint, shared.sync, config.rate_Hz, second)
+    if isinstance(device, CanSimpleDevice):
+        return CanSimpleDrive(device, end, joint, second)
     if second is not None:
         raise InputError(
             f"joint `{ends.name}`: device `{device.id}` speaks `{device.protocol}`, which tells of no second "
-            "encoder; a `dbc` device, a `moteus` or a `cia402` drive is accepted as the joint's sensor"
+            "encoder; a `dbc` device, a `moteus`, a `cia402` or a `cansimple` drive is accepted as the joint's sensor"
         )
     if isinstance(device, DynamixelDevice):
         return DynamixelDrive(device, end, joint, shared.line)
@@ -119,8 +121,6 @@ def make_drive(config: LinkConfig, ends: JointEnds, joint: JointReadings, shared
         return CubeMarsDrive(device, end, joint)
     if isinstance(device, RobStrideDevice):
         return RobStrideDrive(device, end, joint)
-    if isinstance(device, CanSimpleDevice):
-        return CanSimpleDrive(device, end, joint)
     return DbcDrive(device, end, config.folder, joint)
 
 

@@ -125,7 +125,11 @@ class DynamixelDevice(Frozen):
 
 class CanSimpleDevice(Frozen):
     """An ODrive: `cyclic` names what it sends by itself, `polled` what is asked for with every command
-    (firmware 0.6: all)."""
+    (firmware 0.6: all).
+
+    `joint_endpoint`: number of `spi_encoder0.raw` (or of another float in turns) in the `flat_endpoints.json` of the
+    drive's very firmware (618 in 0.6.10): the encoder at the joint, if the joint's sensor is this drive.
+    """
 
     protocol: Literal["cansimple"]
     id: Text
@@ -135,9 +139,14 @@ class CanSimpleDevice(Frozen):
     torque_constant_Nm_per_A: Positive | None = None
     velocity_limit_turns_s: Positive | None = None
     current_limit_A: Positive | None = None
+    joint_endpoint: Annotated[int, Field(ge=1, le=0xFFFF)] | None = None
 
     @model_validator(mode="after")
     def _known_to_firmware(self) -> Self:
+        if self.joint_endpoint is not None and self.firmware != "0.6":
+            raise ValueError(
+                f"firmware {self.firmware} reads no endpoints over CAN; `joint_endpoint` needs 0.6"
+            )
         known = FIRMWARES[self.firmware].data
         for datum in (*self.cyclic, *self.polled):
             if datum not in known:

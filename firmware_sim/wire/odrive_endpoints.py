@@ -79,6 +79,7 @@ ENDPOINTS: dict[int, Endpoint] = {
     416: _shaping("trap_traj.config.vel_limit", "trajectory_velocity_rad_s", TURN),
     417: _shaping("trap_traj.config.accel_limit", "trajectory_acceleration_rad_s2", TURN),
     418: _shaping("trap_traj.config.decel_limit", "trajectory_deceleration_rad_s2", TURN),
+    618: Endpoint("spi_encoder0.raw", "f", lambda d: d.report().second_position_rad / TURN % 1.0),
     442: Endpoint("axis0.pos_vel_mapper.pos_rel", "f", lambda d: d.position_rad / TURN),
     444: Endpoint("axis0.pos_vel_mapper.vel", "f", lambda d: d.velocity_rad_s / TURN),
 }

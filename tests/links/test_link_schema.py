@@ -66,7 +66,7 @@ def test_there_is_one_for_every_kind_of_wire() -> None:
         (
             '[joint.sensor]\ndevice = "joint-node"',
             '[joint.sensor]\ndevice = "drive"',
-            "a `dbc` device, a `moteus` or a `cia402` drive is accepted",
+            "a `dbc` device, a `moteus`, a `cia402` or a `cansimple` drive is accepted",
         ),
     ],
 )  # fmt: skip

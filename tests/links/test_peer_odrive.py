@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
+import struct
 import threading
 import time
 import uuid
@@ -16,8 +18,9 @@ import cantools
 import pytest
 from link_rig import Rig
 
+from cablecomp.errors import InputError
 from cablecomp.links import BusLink, DriveState, MotorCommand, Request, load_link
-from cablecomp.links.records import MOTOR_POSITION
+from cablecomp.links.records import JOINT_POSITION, MOTOR_POSITION
 
 odrive_can = pytest.importorskip("odrive_can", reason="peer not installed: pip install 'cablecomp[peers]'")
 mock = pytest.importorskip("odrive_can.mock", reason="peer not installed: pip install 'cablecomp[peers]'")
@@ -63,6 +66,52 @@ def test_every_frame_sent_is_one_of_odrives_table(rigs: Any, firmware: str) -> N
     zero = {"0.5": "Set_Linear_Count", "0.6": "Set_Absolute_Position"}[firmware]
     assert named[zero] == {"Position": 0}
     assert {"Clear_Errors", "Reboot"} <= set(named)
+
+
+DUAL = "odrive-dual-encoder.toml"
+
+
+def test_the_joints_encoder_is_asked_for_and_read_by_odrives_table(rigs: Any) -> None:
+    turned = {"position_offset_rad = 0.0": "position_offset_rad = 0.1\nposition_sign = -1"}
+    rig: Rig = rigs(DUAL, turned)
+    link, joint, table = rig.link, rig.link.joints[0], table_of("0.6")
+    question = table.get_message_by_name("Axis1_RxSdo")
+    for ask in (lambda: link.send(0, MotorCommand(0.5)), lambda: link.request(0, Request.REPORT)):
+        ask()
+        asked = [question.decode(data) for identifier, data in rig.heard() if identifier == question.frame_id]
+        assert asked == [{"Opcode": "READ", "Endpoint_ID": 618, "Reserved": 0, "Value": 0}]
+
+    def tell(endpoint: int, turns: float) -> int:
+        (bits,) = struct.unpack("<I", struct.pack("<f", turns))
+        told = {"Reserved0": 0, "Endpoint_ID": endpoint, "Reserved1": 0, "Value": bits}
+        answer = table.get_message_by_name("Axis1_TxSdo")
+        rig.tell(answer.frame_id, answer.encode(told))
+        return link.poll(1.0)
+
+    for turns, where in ((0.125, 0.125), (0.875, -0.125), (0.4375, 0.4375)):
+        assert tell(618, turns) == 1
+        assert joint.values[JOINT_POSITION] == pytest.approx(-where * math.tau - 0.1, abs=1e-6)
+    for endpoint, turns in ((182, 0.25), (618, math.nan), (618, math.inf)):
+        assert tell(endpoint, turns) == 0
+    rig.tell(0x25, b"\0" * 4)
+    assert link.poll(2.0) == 0
+    assert joint.updates[JOINT_POSITION] == 3
+    assert link.status().invalid == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"joint_endpoint = 618": ""}, "add its joint_endpoint"),
+        (
+            {'firmware = "0.6"': 'firmware = "0.5"', ', "torques", "temperature"': ""},
+            "joint_endpoint` needs 0.6",
+        ),
+    ],
+)
+def test_an_encoder_that_cannot_be_asked_for_is_refused(rigs: Any, change: dict[str, str], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        rigs(DUAL, change)
 
 
 @pytest.fixture

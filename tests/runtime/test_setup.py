@@ -23,6 +23,7 @@ TORQUE, POSITION = "joint_torque_Nm", "joint_position_rad"
         ("dynamixel-serial", set()),
         ("moteus-dual-encoder", {POSITION}),
         ("cia402-dual-encoder", {POSITION}),
+        ("odrive-dual-encoder", {POSITION}),
     ],
 )
 def test_a_link_is_asked_for_what_the_load_is_to_come_from(name: str, measured: set[str]) -> None:

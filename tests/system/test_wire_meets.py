@@ -99,12 +99,12 @@ def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     meeting.until(lambda: device.drive.state.name in ("DISABLED", "FAULT"))
 
 
-@pytest.mark.parametrize("protocol", ["moteus-dual", "cia402-dual"])
+@pytest.mark.parametrize("protocol", ["moteus-dual", "cia402-dual", "odrive-dual"])
 def test_the_joints_encoder_on_the_drives_second_input(meet: Any, protocol: str) -> None:
     meeting = meet(protocol, "virtual")
     link, joint, device = meeting.link, meeting.link.joints[0], meeting.bench.joints[0]
     gains: tuple[Any, Any] = (None, None)
-    if protocol == "cia402-dual":
+    if protocol != "moteus-dual":
         meeting.climb()
     else:
         gains = (60.0, 2.0)

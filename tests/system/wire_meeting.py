@@ -24,6 +24,7 @@ PROTOCOLS = {
     "damiao": ("damiao-socketcan.toml", {"protocol": "mit", "model": "DM4310", "reply_id": 0x11}),
     "odrive": ("odrive-virtual.toml", {"protocol": "odrive"}),
     "odrive-0.5": ("odrive-v3-socketcan.toml", {"protocol": "odrive", "firmware": "0.5"}),
+    "odrive-dual": ("odrive-dual-encoder.toml", {"protocol": "odrive"}),
     "robstride": ("robstride-socketcan.toml", {"protocol": "robstride", "model": "RS01"}),
     "cubemars-v3": ("cubemars-v3-socketcan.toml", {"protocol": "cubemars"}),
     "cubemars-servo": ("cubemars-servo-socketcan.toml", {"protocol": "cubemars"}),
