@@ -50,8 +50,8 @@ def calibrate_joint(
     data = read_moving(recordings, reading(joint))
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
-    with share_bar() as told:
-        found = calibrate(joint, data, seed, progress=told, budget_s=budget)
+    with share_bar() as progress:
+        found = calibrate(joint, data, seed, progress=progress, budget_s=budget)
     found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         (folder / "joint.calibrated.toml").write_text(calibrated_text(found), encoding="utf-8")

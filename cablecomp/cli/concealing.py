@@ -15,10 +15,10 @@ from cablecomp.cli.shared import plain_counts, warn
 from cablecomp.errors import InputError
 from cablecomp.trials.prove import Wish
 
-Told = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 
 
-def conceal_joints(out: Path, wish: Wish, workers: int, told: Told) -> str:
+def conceal_joints(out: Path, wish: Wish, workers: int, progress: OnProgress) -> str:
     """Write simulated joints' trials and their seals; returns the seals' SHA-256 as that process printed it.
 
     Raises InputError with that process's own line where it fails.
@@ -32,12 +32,12 @@ def conceal_joints(out: Path, wish: Wish, workers: int, told: Told) -> str:
         "--workers": workers,
         "--out": out,
     }
-    return _concealed("firmware_sim.trials", options, told)
+    return _concealed("firmware_sim.trials", options, progress)
 
 
-def conceal_in(pieces: Path, seed: int, out: Path, told: Told) -> str:
+def conceal_in(pieces: Path, seed: int, out: Path, progress: OnProgress) -> str:
     """Conceal physics in pieces of recordings; returns the seals' SHA-256. Raises InputError where that fails."""
-    return _concealed("firmware_sim.conceal", {"--in": pieces, "--seed": seed, "--out": out}, told)
+    return _concealed("firmware_sim.conceal", {"--in": pieces, "--seed": seed, "--out": out}, progress)
 
 
 def experiment(sealed: Path, protocol: Path, out: Path) -> None:
@@ -54,7 +54,7 @@ def _command(module: str, options: Mapping[str, object], *words: str) -> Sequenc
     return [sys.executable, "-m", module, *words, *(str(x) for pair in options.items() for x in pair)]
 
 
-def _concealed(module: str, options: Mapping[str, object], told: Told) -> str:
+def _concealed(module: str, options: Mapping[str, object], progress: OnProgress) -> str:
     sha256, last = "", ""
     with subprocess.Popen(
         _command(module, options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
@@ -63,7 +63,7 @@ def _concealed(module: str, options: Mapping[str, object], told: Told) -> str:
         for line in process.stdout:
             words, last = line.split(), line
             if words[:1] == ["written"]:
-                told(int(words[1]), int(words[3]))
+                progress(int(words[1]), int(words[3]))
             elif words[:1] == ["sha256"]:
                 sha256 = words[1]
             elif words[:1] == ["left"]:
@@ -80,7 +80,7 @@ def _last_line(text: str) -> str:
 
 @contextmanager
 def trial_bar() -> Iterator[Callable[[str, int, int], None]]:
-    """Give a function to be told (what is being done, how much of it, of how much); the bars go when it is over."""
+    """Give a function to call with (what is being done, how much of it, of how much); the bars go when it is over."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),

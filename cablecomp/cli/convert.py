@@ -34,8 +34,8 @@ def convert_recording(
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
     source = reading().open(recording)
-    with progress_bar(f"convert {recording.name}") as told:
-        rows = convert(source, to, (begin, end), told, dict(map(_late, late or ())), ros)
+    with progress_bar(f"convert {recording.name}") as progress:
+        rows = convert(source, to, (begin, end), progress, dict(map(_late, late or ())), ros)
     if as_json:
         echo_json({"written": to, "rows": rows, "channels": source.channels, "notes": source.notes})
         return

@@ -86,8 +86,8 @@ def diagnose_recordings(
     data = read_moving(recordings, reading(joint))
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
-    with share_bar() as told:
-        found = diagnose(joint, data, told, seed, None if session is None else session.value, budget)
+    with share_bar() as progress:
+        found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
     found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:
         write_diagnosis(found, folder)

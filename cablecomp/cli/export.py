@@ -22,7 +22,7 @@ from cablecomp.cli.shared import (
 from cablecomp.config import JointConfig
 from cablecomp.control.plays import fit_plays
 from cablecomp.errors import InputError
-from cablecomp.export.code import LOST, c_source, identifier, write_fmu
+from cablecomp.export.code import LEFT_OUT, c_source, identifier, write_fmu
 from cablecomp.export.equivalent import equivalent
 from cablecomp.export.simulators import mujoco_model, urdf_model
 from cablecomp.recording.atomic import atomic_file
@@ -75,7 +75,7 @@ def _simulators(
 
 def _code(joint: JointConfig, out: Path, c: bool, fmu: bool) -> dict[str, object]:
     found = fit_plays(joint)
-    result: dict[str, object] = {"code_rms_rad": found.rms_rad, "code_leaves_out": LOST}
+    result: dict[str, object] = {"code_rms_rad": found.rms_rad, "code_leaves_out": LEFT_OUT}
     if c:
         result["c"] = _write(out / f"{identifier(joint.name)}.c", c_source(joint, found))
     if fmu:

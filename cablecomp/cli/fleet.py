@@ -55,12 +55,12 @@ def work_fleet(
     with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bar:
         task = bar.add_task(work, total=len(places))
 
-        def told(done: int, of: int) -> None:
+        def progress(done: int, of: int) -> None:
             bar.update(task, completed=done, total=of)
             if not errors.is_terminal:
                 plain(f"{work}: nights", done, of)
 
-        found = run_fleet(work, places, out, workers, told)
+        found = run_fleet(work, places, out, workers, progress)
     with atomic_file(out / "fleet.html") as path:
         path.write_text(fleet_page(found, " ".join(["cablecomp", *sys.argv[1:]])), encoding="utf-8")
     if as_json:

@@ -58,15 +58,15 @@ def init(
         for model, head in _FILES:
             typer.echo(reference(model, f"{head}\n{'=' * len(head)}"))
         return
-    told = dict(read_toml(answers)) if answers is not None else {}
-    told |= dict(_answer(word) for word in given or ())
+    values = dict(read_toml(answers)) if answers is not None else {}
+    values |= dict(_answer(word) for word in given or ())
     if answers is None and not given:
         if not sys.stdin.isatty():
             raise InputError(
                 "init: nobody to ask; give --set KEY=VALUE or --from FILE (cablecomp init --keys lists the keys)"
             )
-        told = _asked()
-    draft = validated(Draft, told, "init" if answers is None else str(answers))
+        values = _asked()
+    draft = validated(Draft, values, "init" if answers is None else str(answers))
     files = {"joint.toml": draft_text(draft), **_link(draft)}
     for name, text in files.items():
         place = out / name
@@ -98,15 +98,15 @@ def _answer(word: str) -> tuple[str, Any]:
 
 def _asked() -> dict[str, Any]:
     """Ask for every key; an empty answer takes the default, or leaves it out."""
-    told: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for key, field in Draft.model_fields.items():
         choices = get_args(field.annotation) if str(get_origin(field.annotation)) == "typing.Literal" else ()
         words = f"{key}: {field.description}" + (f" ({', '.join(map(str, choices))})" if choices else "")
         default = None if field.is_required() else ("" if field.default is None else str(field.default))
         text = typer.prompt(words, default=default, show_default=bool(default))
         if str(text) != "":
-            told |= dict([_answer(f"{key}={text}")])
-    return told
+            values |= dict([_answer(f"{key}={text}")])
+    return values
 
 
 def _link(draft: Draft) -> dict[str, str]:

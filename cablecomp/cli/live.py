@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cablecomp.config import JointConfig
 from cablecomp.runtime.clock import Tick
-from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.loop import Loop, RunStage
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import Watch
 from cablecomp.watch.live import LiveOptions, LiveWatch
@@ -40,7 +40,7 @@ class LiveRun:
         """Hand the last cycle to the watch while the joint is under control."""
         self._beside(loop, tick)
         view = loop.joints[0].view
-        if view is None or loop.stage is not Stage.RUNNING:
+        if view is None or loop.stage is not RunStage.RUNNING:
             return
         self._name, self._now_s = view.name, tick.now_s
         news = self._watch.take(view.sample, view.estimate, view.flags == 0)

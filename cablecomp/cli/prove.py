@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.concealing import Told, conceal_in, conceal_joints, experiment, trial_bar
+from cablecomp.cli.concealing import OnProgress, conceal_in, conceal_joints, experiment, trial_bar
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import JsonOption, announce_compilation, console, echo_json, read_joint, warn
 from cablecomp.cli.sources import Reading, reads_recordings
@@ -74,8 +74,8 @@ def prove_blindly(
 
 
 def _on_joints(wish: Wish, out: Path, by: Workers, as_json: bool) -> None:
-    def conceal(where: Path, wanted: Wish, told: Told) -> str:
-        return conceal_joints(where, wanted, by.processes, told)
+    def conceal(where: Path, wanted: Wish, progress: OnProgress) -> str:
+        return conceal_joints(where, wanted, by.processes, progress)
 
     with trial_bar() as tell:
         board = prove(Blind(out.absolute(), conceal, experiment, by), wish, tell, _announce)

@@ -76,9 +76,9 @@ def replay(
     announce_compilation(joint, bounds)
     source.require(required_channels(joint), f"with [observer] load = {joint.observer.load!r}")
     source = dataclasses.replace(source, notes=(*source.notes, *said, *believe_streamed(joint, source)))
-    with progress_bar(f"replay {recording.name}") as told:
+    with progress_bar(f"replay {recording.name}") as progress:
         summary = write_replay(
-            source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), told
+            source, joint, Observer(joint, bounds=bounds), out, config.read_text(encoding="utf-8"), progress
         )
     if as_json:
         typer.echo(summary.to_json(), nl=False)

@@ -139,13 +139,13 @@ def plain_counts(console: Console) -> Callable[[str, int, int], None]:
     """Function to be told (what, done, of how much) where there is no terminal: a line for every tenth that is full."""
     said: dict[str, int] = {}
 
-    def told(what: str, done: int, of: int) -> None:
+    def progress(what: str, done: int, of: int) -> None:
         tenth = 10 * done // max(of, 1)
         if tenth > said.get(what, 0):
             said[what] = tenth
             console.print(f"{what}: {done} of {of}", soft_wrap=True)
 
-    return told
+    return progress
 
 
 @contextmanager
@@ -174,9 +174,9 @@ def share_bar() -> Iterator[Callable[[str, float], None]]:
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
 
-        def told(what: str, share: float) -> None:
+        def progress(what: str, share: float) -> None:
             nonlocal done
             done = max(done, share)
             bar.update(task, description=what, completed=done)
 
-        yield told
+        yield progress

@@ -20,8 +20,8 @@ def study_bench(
 ) -> None:
     """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""
     rigs = Rigs(load_joint("snow-open-rig"), load_joint("snow-closed-rig"))
-    with share_bar() as told:
-        found = study(rigs, by_plant, told)
+    with share_bar() as progress:
+        found = study(rigs, by_plant, progress)
     page = write_study(found, out, f"cablecomp study --out {out}")
     if as_json:
         echo_json({**found.as_dict(), "report": page})

@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 from cablecomp.config import JointConfig
 from cablecomp.control.command import FULL, Command, Feed, Reference
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
-from cablecomp.control.shaping import Ahead, Bump, Slope
+from cablecomp.control.shaping import BumplessTransfer, LeadFilter, Slope
 from cablecomp.errors import InputError
 from cablecomp.signals import NAN, Estimate, Sample
 
@@ -98,12 +98,12 @@ class Compensator:
         self.motor_zero_Nm = config.motor_zero_Nm
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
-        self.load = Ahead(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
-        self.bump = Bump(
+        self.load = LeadFilter(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
+        self.transfer = BumplessTransfer(
             options.blend_s, period_s, _APPROACH * (config.limits.motor_velocity_max_rad_s or 20.0)
         )
         self.deflection_slope = Slope(options.velocity_filter_Hz, period_s)
-        self.follow = Ahead(self.gains.follow_filter_Hz, self.gains.follow_lead_s, period_s)
+        self.follow = LeadFilter(self.gains.follow_filter_Hz, self.gains.follow_lead_s, period_s)
         self.motor_trim_rad = 0.0
         self.joint_trim_rad = 0.0
         self.force_trim_Nm = 0.0
@@ -177,8 +177,8 @@ class Compensator:
         return self._command(sample, reference, wanted, velocity, torque, used, estimate)
 
     def _observe(self, sample: Sample, reference: Reference, feed: Feed) -> tuple[float, float]:
-        """Take the sample in; returns the load expected next and, where the observer told it along, the deflection
-        under it (else NaN)."""
+        """Take the sample in; returns the load expected next and, where the same call of the observer gives it, the
+        deflection under it (else NaN)."""
         measured = sample.joint_torque_Nm
         if not self._looks_ahead or measured != measured or feed.held:
             self.estimate, self.observed = self.observer.step(sample), True
@@ -288,8 +288,8 @@ class Compensator:
             error = self.target_rad - sample.motor_position_rad
             trim = self.motor_trim_rad + self._motor_share * error
             self.motor_trim_rad = limit if trim > limit else -limit if trim < -limit else trim
-        target = wanted + self.bump.step()
-        self._velocity = velocity + self.bump.slope
+        target = wanted + self.transfer.step()
+        self._velocity = velocity + self.transfer.slope
         self.target_rad = target
         self._reference = reference
         e = estimate
@@ -311,5 +311,5 @@ class Compensator:
         before = self.target_rad
         if before != before:
             before = sample.motor_position_rad
-        self.bump.start(before + self._velocity * self.period_s - wanted)
+        self.transfer.start(before + self._velocity * self.period_s - wanted)
         self._switch = False

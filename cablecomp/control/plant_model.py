@@ -67,8 +67,8 @@ def delayed(system: Any, samples: int) -> Any:
     return control.ss(A, B, C, D, system.dt)
 
 
-def ahead_filter(filter_Hz: float, lead_s: float, period_s: float) -> Any:
-    """`shaping.Ahead` as a system: from a reading to (expected value, its rate)."""
+def lead_filter(filter_Hz: float, lead_s: float, period_s: float) -> Any:
+    """`shaping.LeadFilter` as a system: from a reading to (expected value, its rate)."""
     kept = exp(-2.0 * pi * filter_Hz * period_s)
     a, lag = 1.0 - kept, period_s * kept / (1.0 - kept)
     first, second = np.array([1.0 - a, 0.0]), np.array([a * (1.0 - a), 1.0 - a])
@@ -90,7 +90,7 @@ def load_path(
     """The feed-forward as the compensator runs it: from a reading of the load to (q*, v*, tau*);
     `compliance` in rad/Nm.
     """
-    a, b, c, d = parts(pick(ahead_filter(filter_Hz, lead_s, period_s), [0], [0]))
+    a, b, c, d = parts(pick(lead_filter(filter_Hz, lead_s, period_s), [0], [0]))
     s = 1.0 - exp(-2.0 * pi * slope_Hz * period_s)
     bend, bend_given = compliance * c[0], compliance * d[0, 0]
     # two more states: the last deflection and its filtered rate
@@ -108,7 +108,7 @@ def load_path(
 
 def follow_path(ratio: float, filter_Hz: float, lead_s: float, period_s: float) -> Any:
     """What force mode does with the joint angle: from a reading of it to (q*, v*, tau*)."""
-    a, b, c, d = parts(ahead_filter(filter_Hz, lead_s, period_s))
+    a, b, c, d = parts(lead_filter(filter_Hz, lead_s, period_s))
     C, D = np.vstack([c / ratio, np.zeros((1, 2))]), np.vstack([d / ratio, [[0.0]]])
     return control.ss(a, b, C, D, period_s)
 

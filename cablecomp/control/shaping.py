@@ -1,4 +1,4 @@
-"""Small signal shapers with explicit state: the load expected next, a velocity, a bump that dies away."""
+"""Small signal shapers with explicit state: a lead filter, a filtered derivative, a bumpless transfer."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import exp, inf, pi
 from cablecomp.errors import InputError
 
 
-class Ahead:
+class LeadFilter:
     """Expected value of a signal: `(1 + s lead) / (1 + s tau)^2` of the reading, tau = 1/(2 pi f),
     exact for a held input.
 
@@ -75,9 +75,9 @@ class Slope:
         return self.rate
 
 
-class Bump:
-    """What is added to a target so that a switch costs no step: `size (1 - 3 x^2 + 2 x^3)`, x = time since over
-    `blend_s`, or over a longer time where the mean rate were above `most_rad_s`."""
+class BumplessTransfer:
+    """What is added to a target so that a switch costs no step, and dies away: `size (1 - 3 x^2 + 2 x^3)`, x = time
+    since over `blend_s`, or over a longer time where the mean rate were above `most_rad_s`."""
 
     __slots__ = ("_blend_s", "_most_rad_s", "_period", "_total", "left", "size", "slope")
 

@@ -21,7 +21,7 @@ from cablecomp.diagnosis.explain.search import Search, search, without_effects
 from cablecomp.diagnosis.explain.weighing import Weighed, weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
-from cablecomp.diagnosis.outcome import Case, Left, Outcome
+from cablecomp.diagnosis.outcome import Case, Outcome, Remainder
 from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Diagnosis
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -50,9 +50,9 @@ def diagnose(
     pace = Pace(progress, begin_s + budget_s)
     rng = np.random.default_rng(seed)
     case = _calibrated(config, recordings, sessions, rng, pace)
-    before = case.left_by(case.drive.fit, rng)
+    before = case.remainder_of(case.drive.fit, rng)
     found = search(case.drive, hypotheses(config, case.body.used), rng, pace)
-    after = case.left_by(found.final.fit, rng)
+    after = case.remainder_of(found.final.fit, rng)
     pace.tell("holding each name against its rivals", 0.92)
     weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
     outcome = _judged(case, before, found, after, weighed, rng, pace)
@@ -86,9 +86,9 @@ def _counted(body: Body, fit: Fit) -> tuple[Evidence, ...]:
 
 def _judged(
     case: Case,
-    before: Left,
+    before: Remainder,
     found: Search,
-    after: Left,
+    after: Remainder,
     weighed: Sequence[Weighed],
     rng: np.random.Generator,
     pace: Pace,
@@ -102,19 +102,20 @@ def _judged(
     named = sorted(
         (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: -w.evidence["gain"]
     )  # what is missed most stands first
-    kept, left = final, after
+    kept, remainder = final, after
     if not named:
         kept = without_effects(final, drive, found.groups)
     if kept is not final:
-        left = case.left_by(kept.fit, rng) if kept.terms else before
+        remainder = case.remainder_of(kept.fit, rng) if kept.terms else before
     laws = empirical_laws(final, found.groups) if named else []
     repeated_rad = repeatability(drive.fit.problem.evidence, case.covariates)
-    structured = is_structured(left.location, left.series, repeated_rad, bool(named))
+    structured = is_structured(remainder.location, remainder.series, repeated_rad, bool(named))
     pace.tell("counting errors on data left out", 0.95)
     if kept is not final or laws:
         again = [f.law for f in laws]
         augmented = errors_of(kept.fit, case.body.final, by, again) if kept.terms else baseline
     verdict = verdict_of(bool(named), structured, drive, kept)
     return Outcome(
-        tuple(weighed), tuple(named), kept, tuple(laws), baseline, augmented, left, repeated_rad, structured, verdict
+        tuple(weighed), tuple(named), kept, tuple(laws), baseline, augmented, remainder, repeated_rad, structured,
+        verdict,
     )  # fmt: skip

@@ -21,7 +21,7 @@ from cablecomp.estimation.least_squares import Fit
 
 
 @dataclass(frozen=True)
-class Left:
+class Remainder:
     """What a model leaves of the joint's angle, and where it lies."""
 
     series: Series
@@ -38,10 +38,10 @@ class Case:
     drive: Calibrated
     covariates: tuple[Covariates, ...]
 
-    def left_by(self, fit: Fit, rng: np.random.Generator) -> Left:
+    def remainder_of(self, fit: Fit, rng: np.random.Generator) -> Remainder:
         """What a fit to these recordings leaves."""
         series = series_of(fit, self.covariates, self.drive.floor_rad)
-        return Left(series, locate(series, rng, sensitivities(fit)))
+        return Remainder(series, locate(series, rng, sensitivities(fit)))
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Outcome:
 
     `weighed`: every effect of its model; `named`: those that are sure enough, what is missed most first. `kept`: the
     model to go by, without effects where none is named; `laws`: laws without a name beside it. `baseline`, `augmented`:
-    errors of the calibrated drive, and of what is kept. `left`: what is left over; `repeated_rad`: what the machine
+    errors of the calibrated drive, and of what is kept. `remainder`: what that leaves; `repeated_rad`: what the machine
     itself repeats; `structured`: what is left is more than noise.
     """
 
@@ -60,7 +60,7 @@ class Outcome:
     laws: tuple[Found, ...]
     baseline: Errors
     augmented: Errors
-    left: Left
+    remainder: Remainder
     repeated_rad: float | None
     structured: bool
     verdict: str

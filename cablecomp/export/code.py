@@ -81,7 +81,7 @@ class $cls(Fmi${version}Slave):
         self.joint_position_rad = RATIO * self.motor_position_rad + self.deflection_rad
         return True
 ''')
-LOST: Final = (
+LEFT_OUT: Final = (
     "what turning of the pulleys does to the history",
     "the order of what time does: creep, relaxation, speed",
     "bounds for what came before, cable tensions",
@@ -92,7 +92,7 @@ def c_source(config: JointConfig, found: Plays) -> str:
     """C99 source of `PREFIX_step(state, motor, load)`, PREFIX being the joint's name as an identifier."""
     words = _words(config, found)
     return _C.substitute(
-        words, lost="\n".join(f" *   {line}" for line in LOST), prefix=identifier(config.name)
+        words, lost="\n".join(f" *   {line}" for line in LEFT_OUT), prefix=identifier(config.name)
     )
 
 
@@ -105,7 +105,12 @@ def write_fmu(config: JointConfig, found: Plays, out: Path) -> Path:
         raise InputError("--fmu needs a package: pip install 'cablecomp[fmu]'") from None
     cls = "".join(part.capitalize() for part in identifier(config.name).split("_"))
     source = _SLAVE.substitute(
-        _words(config, found), lost="\n".join(LOST), cls=cls, version="2", package="pythonfmu", real="Real"
+        _words(config, found),
+        lost="\n".join(LEFT_OUT),
+        cls=cls,
+        version="2",
+        package="pythonfmu",
+        real="Real",
     )
     with (
         TemporaryDirectory() as sources,

@@ -126,8 +126,8 @@ class BusLink:
             receivers += sensor_receivers(config, ends, joint)
         self.joints: tuple[JointReadings, ...] = tuple(readings)
         self._drives: tuple[Drive | None, ...] = tuple(drives)
-        self._strangers = Strangers()
-        self._table = dispatch_table(receivers, self._strangers)
+        self._foreign = ForeignFrames()
+        self._table = dispatch_table(receivers, self._foreign)
         self._frames = 0
         self._ignored = 0
         self._sent = 0
@@ -225,7 +225,7 @@ class BusLink:
             port.fault,
             self._frames,
             self._ignored,
-            self._strangers.count,
+            self._foreign.count,
             port.counters.invalid + sum(m.invalid for m in messages),
             sum(m.lost for m in messages),
             sum(m.repeated for m in messages),
@@ -266,7 +266,7 @@ def make_port(config: LinkConfig) -> Port:
     return serial_port(bus.port, bus.baud, dynamixel=packets)
 
 
-class Strangers:
+class ForeignFrames:
     """Counts frames that came on an identifier of ours from a device that is none of ours."""
 
     __slots__ = ("count",)
@@ -275,7 +275,7 @@ class Strangers:
         self.count = 0
 
 
-def dispatch_table(receivers: list[Receiver], strangers: Strangers) -> dict[int, Take]:
+def dispatch_table(receivers: list[Receiver], foreign: ForeignFrames) -> dict[int, Take]:
     """Identifier -> who takes it, whose number in byte 0 is checked however few share the identifier; raises
     InputError where two would take the same frame."""
     table: dict[int, Take] = {}
@@ -288,15 +288,15 @@ def dispatch_table(receivers: list[Receiver], strangers: Strangers) -> dict[int,
                 "apart; give each device its own node or reply_id"
             )
         mask = masks.pop()
-        table[identifier] = _by_number(takers, mask, strangers) if mask else sharing[0].take
+        table[identifier] = _by_number(takers, mask, foreign) if mask else sharing[0].take
     return table
 
 
-def _by_number(takers: dict[int, Take], mask: int, strangers: Strangers) -> Take:
+def _by_number(takers: dict[int, Take], mask: int, foreign: ForeignFrames) -> Take:
     def take(data: bytes, now_s: float) -> int:
         taker = takers.get(data[0] & mask) if data else None
         if taker is None:
-            strangers.count += 1
+            foreign.count += 1
             return 0
         return taker(data, now_s)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.health import health_names
-from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.loop import Loop, RunStage
 
 END: Final = b"end"
 PER_SECOND: Final = 25.0
@@ -47,7 +47,7 @@ class Instrument:
         self._next_s = tick.now_s + self._period_s
         joint = loop.joints[0]
         view = joint.view
-        if view is None or loop.stage is not Stage.RUNNING:
+        if view is None or loop.stage is not RunStage.RUNNING:
             return
         e, s, t = view.estimate, view.sample, loop.accounts.times
         events = loop.events.last

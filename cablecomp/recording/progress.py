@@ -17,7 +17,7 @@ def progress_bar(
     delay_s: float = 2.0,
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[Callable[[float, int], None]]:
-    """Give a function to be told (share done, samples done); a bar appears once `delay_s` have passed. It never runs
+    """Give a function to call with (share done, samples done); a bar appears once `delay_s` have passed. It never runs
     backwards. Where there is no terminal, every tenth is a plain line.
 
     `console` is where to draw (standard error by default).
@@ -36,7 +36,7 @@ def progress_bar(
     started = clock()
     done, tenths = 0.0, 0
 
-    def told(fraction: float, samples: int) -> None:
+    def progress(fraction: float, samples: int) -> None:
         nonlocal done, tenths
         done = fraction = max(done, fraction)
         if not console.is_terminal:
@@ -49,7 +49,7 @@ def progress_bar(
             bar.start()
 
     try:
-        yield told
+        yield progress
     finally:
         if bar.live.is_started:
             bar.stop()

@@ -11,11 +11,11 @@ import numpy as np
 from cablecomp.recording.table import FloatArray
 
 START: Final = "start"
-GREATEST: Final = "greatest load"
+GREATEST_LOAD: Final = "greatest load"
 BACK: Final = "back through zero"
-LEAST: Final = "least load"
+LEAST_LOAD: Final = "least load"
 END: Final = "end"
-INSTANTS: Final = (START, GREATEST, BACK, LEAST, END)
+INSTANTS: Final = (START, GREATEST_LOAD, BACK, LEAST_LOAD, END)
 
 
 class WrapProfile(Protocol):
@@ -69,14 +69,14 @@ class Instants:
         if load[top] > self._greatest:
             self._greatest = float(load[top])
             self._falling, after = self._greatest > 0.0, top
-            yield top, GREATEST
+            yield top, GREATEST_LOAD
         below = load[after:] <= 0.0
         if self._falling and below.any():
             self._falling = False
             yield after + int(below.argmax()), BACK
         if load[bottom] < self._least:
             self._least = float(load[bottom])
-            yield bottom, LEAST
+            yield bottom, LEAST_LOAD
 
 
 def in_order(snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:

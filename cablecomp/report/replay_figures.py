@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from cablecomp.recording.replay_summary import ReplaySummary
-from cablecomp.recording.snapshots import BACK, END, GREATEST, LEAST, START, Snapshot, WrapProfile
+from cablecomp.recording.snapshots import BACK, END, GREATEST_LOAD, LEAST_LOAD, START, Snapshot, WrapProfile
 from cablecomp.recording.table import FloatArray
 from cablecomp.report import style
 from cablecomp.report.replay_display import Display
@@ -20,9 +20,9 @@ _MEASURED: Final = style.translucent(style.MEASURED, 0.5)  # broad and pale, so 
 _TIME: Final = style.label("time", "s")
 _INSTANT_COLOURS: Final = {
     START: style.FAINT,
-    GREATEST: style.RESIDUAL,
+    GREATEST_LOAD: style.RESIDUAL,
     BACK: style.LOAD,
-    LEAST: style.PREDICTED,
+    LEAST_LOAD: style.PREDICTED,
     END: style.CABLE_L,
 }
 

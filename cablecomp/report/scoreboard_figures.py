@@ -11,7 +11,7 @@ from cablecomp.report import style
 from cablecomp.trials.scoreboard import Scoreboard
 from cablecomp.trials.shares import Rate
 
-RIGHT, WRONG, NOTHING = style.CABLE_L, style.CABLE_H, style.BASELINE
+RIGHT, WRONG, NEITHER = style.CABLE_L, style.CABLE_H, style.BASELINE
 _DECIDABLE = style.PREDICTED
 
 
@@ -43,7 +43,7 @@ def reliability(board: Scoreboard) -> Any:
     """Share of names that are true against the confidence stated."""
     fig = style.figure(360)
     fig.add_scatter(
-        x=[0, 100], y=[0, 100], mode="lines", name="calibrated", line={"color": NOTHING, "dash": "dot"}
+        x=[0, 100], y=[0, 100], mode="lines", name="calibrated", line={"color": NEITHER, "dash": "dot"}
     )
     rates = [r for _, _, _, r in board.trust.bins]
     fig.add_scatter(
@@ -67,7 +67,7 @@ def risk(board: Scoreboard) -> Any:
     coverage = [100.0 * c for c in trust.coverage]
     for label, colour, values in (
         ("by confidence", _DECIDABLE, trust.risk),
-        ("by z alone", NOTHING, trust.risk_by_z),
+        ("by z alone", NEITHER, trust.risk_by_z),
     ):
         fig.add_scatter(
             x=coverage, y=[100.0 * v for v in values], mode="lines", name=label, line_color=colour
@@ -113,7 +113,7 @@ def ratios(board: Scoreboard) -> Any:
             marker={"color": colour, "size": 7, "opacity": 0.7},
             hovertext=[f"trial {r.number}: {', '.join(r.truth)}, said {r.outcome}" for r in rows],
         )
-    fig.add_hline(y=1.0, line={"color": NOTHING, "dash": "dot"})
+    fig.add_hline(y=1.0, line={"color": NEITHER, "dash": "dot"})
     fig.update_xaxes(type="log")
     fig.update_yaxes(type="log")
     return style.axes(fig, "contribution over loop width / %", "error left out / noise")

@@ -159,7 +159,7 @@ class JointLoop:
     def stand(self, now_s: float) -> None:
         """After the stop: observe and record what has come, command nothing."""
         if self.checked is not None and self.checked.ready and not self._refused:
-            self._observe(self._check(now_s, nan), now_s, None, told=False)
+            self._observe(self._check(now_s, nan), now_s, None, report=False)
             self._finish(None)
 
     def keep(self, now_s: float) -> None:
@@ -210,8 +210,8 @@ class JointLoop:
         self.checked = checked
         return checked
 
-    def _observe(self, checked: Checked, now_s: float, since_s: float | None, *, told: bool = True) -> None:
-        """Take in what has come, and find what the compensator asks for. `told`: what is wrong with it is an event,
+    def _observe(self, checked: Checked, now_s: float, since_s: float | None, *, report: bool = True) -> None:
+        """Take in what has come, and find what the compensator asks for. `report`: what is wrong with it is an event,
         which the silence of a drive that was stopped is not. A sample that the observer refuses
         ends the run: replay would refuse it as well. So does one that it takes where the next one, as expected, is
         beyond what the joint can take.
@@ -235,7 +235,7 @@ class JointLoop:
         estimate = compensator.estimate
         if estimate is not None:
             self._predicted = estimate.joint_position_rad
-        if told and checked.flags != self._flags:
+        if report and checked.flags != self._flags:
             self._note(checked.flags, now_s)
 
     def _finish(self, since_s: float | None) -> None:

@@ -27,7 +27,7 @@ LOOK_EVERY = 128  # ticks between two looks at the link's counters
 DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
 
 
-class Stage(IntEnum):
+class RunStage(IntEnum):
     """Where a run stands."""
 
     LISTENING = 0
@@ -55,7 +55,7 @@ class LoopOptions:
     begin_s: float = 0.0
 
 
-AfterTick = Callable[[Tick, Stage], None]
+AfterTick = Callable[[Tick, RunStage], None]
 """Called once a tick after the commands went out: steps a simulated bus, feeds the live view."""
 
 
@@ -79,7 +79,7 @@ class Loop:
         self.link = link
         self.options = options
         self.period_s = period_s
-        self.stage = Stage.LISTENING
+        self.stage = RunStage.LISTENING
         self.stop_reason = ""
         self.failures: list[str] = []
         self.accounts = Accounts(period_s)
@@ -99,7 +99,7 @@ class Loop:
     @property
     def since_s(self) -> float:
         """Time since control began (0 before), as of the last tick."""
-        return max(self.accounts.last_s - self._armed_s, 0.0) if self.stage is Stage.RUNNING else 0.0
+        return max(self.accounts.last_s - self._armed_s, 0.0) if self.stage is RunStage.RUNNING else 0.0
 
     def ask_to_stop(self, why: str) -> None:
         """End the run at the next tick, safely; may be called from another thread or a signal handler."""
@@ -162,11 +162,11 @@ class Loop:
     def _tick(self, tick: Tick) -> bool:
         """Do what the stage asks for at this tick; returns whether the run is over."""
         now = tick.now_s
-        if self.stage is Stage.LISTENING:
+        if self.stage is RunStage.LISTENING:
             self._listen(now)
-        elif self.stage is Stage.ENABLING:
+        elif self.stage is RunStage.ENABLING:
             self._enable(now)
-        elif self.stage is Stage.RUNNING:
+        elif self.stage is RunStage.RUNNING:
             self._run(tick)
         else:
             self.link.stop()
@@ -181,7 +181,7 @@ class Loop:
         if self._asked_to_stop:
             self._stop(self._asked_to_stop, now)
         elif all(j.taking_up.known_s(now) >= self.options.settle_s for j in self.joints):
-            self._go(Stage.ENABLING, now)
+            self._go(RunStage.ENABLING, now)
             for joint in self.joints:
                 joint.first()
         elif now - self._stage_s > self.options.listen_s:
@@ -218,7 +218,7 @@ class Loop:
             for joint in self.joints:
                 joint.begin()
             self._armed_s = now
-            self._go(Stage.RUNNING, now)
+            self._go(RunStage.RUNNING, now)
         elif waited > self.options.enable_s:
             states = ", ".join(f"{j.setup.name} is {j.drive_words}" for j in self.joints)
             raise DeviceError(
@@ -280,15 +280,15 @@ class Loop:
         self.link.stop()
         self.stop_reason = why
         self.events.add(now, "", f"stop: {why}")
-        self._go(Stage.STOPPING, now)
+        self._go(RunStage.STOPPING, now)
 
-    def _go(self, stage: Stage, now: float) -> None:
+    def _go(self, stage: RunStage, now: float) -> None:
         self.events.add(now, "", f"{self.stage.name.lower()} -> {stage.name.lower()}")
         self.stage, self._stage_s = stage, now
 
     def _account(self, tick: Tick, begin: float, polled: float, end: float) -> None:
         self.accounts.tick(tick)
-        if self.stage is not Stage.RUNNING:
+        if self.stage is not RunStage.RUNNING:
             return
         self.accounts.cycle(tick, begin, polled, end)
         for joint in self.joints:
@@ -299,7 +299,7 @@ class Loop:
     def _close(self) -> None:
         """Stop command, whatever happened; then the link and every log, each one tried."""
         try:
-            if self.stage is not Stage.STOPPING:
+            if self.stage is not RunStage.STOPPING:
                 self.link.stop()
                 self.stop_reason = self.stop_reason or "ended by an error"
                 self.events.add(self.accounts.last_s, "", f"stop: {self.stop_reason}")

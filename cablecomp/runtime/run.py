@@ -22,7 +22,7 @@ from cablecomp.links.schema import LinkConfig
 from cablecomp.runtime.clock import Clock, MonotonicClock, SteppedClock, Tick
 from cablecomp.runtime.folder import SNAPSHOT, START, RunFolder
 from cablecomp.runtime.joint_loop import JointSetup
-from cablecomp.runtime.loop import Loop, LoopOptions, Stage
+from cablecomp.runtime.loop import Loop, LoopOptions, RunStage
 from cablecomp.runtime.pace import Pace, check_pace
 from cablecomp.runtime.priority import QUIET, Policy
 from cablecomp.runtime.results import RunReport, TruthTally, result_of
@@ -119,7 +119,7 @@ def run_joints(
         check_pace([_pace(setup, options) for setup in setups], period)
     truths = TruthTally([c.name for c in contestants])
 
-    def after(tick: Tick, stage: Stage) -> None:
+    def after(tick: Tick, stage: RunStage) -> None:
         if simulation is not None:
             _simulate(loop, tick, simulation, protocol, mode, stage, truths)
         if watch is not None:
@@ -218,19 +218,19 @@ def _simulate(
     simulation: Simulation,
     protocol: Protocol,
     mode: ControlMode,
-    stage: Stage,
+    stage: RunStage,
     truths: TruthTally,
 ) -> None:
     """One period of the simulation after each cycle's commands, in step with the loop whether that is
     paced or not.
     """
     since = loop.since_s
-    load = protocol.reference(since).joint_torque_Nm if stage is Stage.RUNNING else protocol.start_load_Nm
+    load = protocol.reference(since).joint_torque_Nm if stage is RunStage.RUNNING else protocol.start_load_Nm
     for joint in loop.joints:
         if mode is not ControlMode.FORCE:
             simulation.set_load(joint.setup.place + 1, load)
     simulation.advance(1 + tick.skipped)
-    if stage is not Stage.RUNNING:
+    if stage is not RunStage.RUNNING:
         return
     # the truth is one period on, where the reference of the next instant applies
     wanted = protocol.reference(since + loop.period_s)

@@ -8,11 +8,11 @@ from math import isfinite, nan
 from statistics import median
 from typing import Any
 
-from cablecomp.trials.row import SURE
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.trials.run import Verdict
 from cablecomp.trials.shares import Rate, finite, rate
 
-MOVED = 3.0
+MOVED_SD = 3.0
 """Stated standard deviations by which a calibrated value has to leave its twin's to count as moved."""
 
 
@@ -103,7 +103,7 @@ def _moved(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterable[str]:
         if None in (a["value"], b["value"], a["sd"], b["sd"]):
             continue
         sd = max(float(a["sd"]), float(b["sd"]))
-        if sd > 0.0 and abs(float(a["value"]) - float(b["value"])) > MOVED * sd:
+        if sd > 0.0 and abs(float(a["value"]) - float(b["value"])) > MOVED_SD * sd:
             yield name
 
 
@@ -158,7 +158,7 @@ class Curves:
                 "twins": self.twins,
                 "names_in_twins": dict(self.names_in_twins),
                 "wrong_names": self.wrong.entry(),
-                "sure_from": SURE,
+                "sure_from": LIMITS.name,
                 "curves": [_curve(c) for c in self.curves],
                 "rows": [asdict(r) | {"found": r.found, "wrong": r.wrong} for r in self.rows],
             }

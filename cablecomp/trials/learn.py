@@ -30,7 +30,7 @@ from cablecomp.trials.shares import write_json
 
 Floats = NDArray[np.float64]
 SHIPPED = Path(confidence.__file__).with_name("confidence.json")
-FOLDS, LEAST, MISS = 5, 30, 0.1
+FOLDS, FEWEST, MISS = 5, 30, 0.1
 RIDGES = (0.3, 1.0, 3.0, 10.0, 30.0)
 """Standard deviations of a weight's prior to the minus two, of which one is taken (`_best`)."""
 
@@ -85,10 +85,10 @@ def fit_logistic(features: Floats, right: Floats, ridge: float, steps: int = 50)
 def learn(judged: Sequence[Judged], ridge: float, names: Sequence[str] = FEATURES) -> Logistic:
     """The logistic model of these effects; raises InputError for too few, or all right, or none."""
     right = np.array([float(j.right) for j in judged])
-    if len(judged) < LEAST or right.min() == right.max():
+    if len(judged) < FEWEST or right.min() == right.max():
         raise InputError(
             f"{len(judged)} weighed effects, {int(right.sum()) if len(right) else 0} "
-            f"right: at least {LEAST}, right and "
+            f"right: at least {FEWEST}, right and "
             "wrong ones, are needed; run more trials with `cablecomp prove`"
         )
     raw = np.array([[j.evidence[f] for f in names] for j in judged])

@@ -31,7 +31,7 @@ from cablecomp.trials.run import (
 from cablecomp.trials.sealed import SEALED, check_seal, read_sealed
 from cablecomp.trials.shares import write_json
 
-PIECES, ANSWER = "pieces", "concealed.json"
+PIECES, SCORED = "pieces", "concealed.json"
 Columns = Mapping[str, FloatArray]
 Conceal = Callable[[Path, int, Path, Callable[[int, int], None]], str]
 """Reads pieces of recordings, writes public trials and sealed truths into a folder; returns the SHA-256 of the
@@ -84,7 +84,7 @@ def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
     check_seal(out / SEALED, sha256)
     truths = [read_sealed(p.sealed)[0] for p in places]
     found = curves(_scored(places, truths), len(places), wanted | {"sha256": sha256})
-    write_json(out / ANSWER, found.as_json())
+    write_json(out / SCORED, found.as_json())
     return found
 
 
@@ -152,7 +152,7 @@ def _scored(places: Sequence[Place], truths: Sequence[Mapping[str, Any]]) -> lis
 
 def concealed_beside(folder: Path) -> dict[str, Any] | None:
     """What `concealed.json` in a folder says; None where there is none. Raises InputError for one that is none."""
-    path = folder / ANSWER
+    path = folder / SCORED
     if not path.exists():
         return None
     try:

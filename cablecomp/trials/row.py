@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from math import nan
 
 VISIBLE = 1.5  # mean square over the noise floor from which unknown physics can be seen at all
-SURE = 0.5  # confidence from which a name is given
 
 
 @dataclass(frozen=True)
 class Named:
     """An effect that was weighed: its confidence and evidence, and whether it is true. It is a name given from
-    `SURE` on."""
+    `LIMITS.name` on."""
 
     effect: str
     confidence: float

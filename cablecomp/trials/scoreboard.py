@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.trials.calibrated import brier, calibration_error, risk_area, risk_coverage
-from cablecomp.trials.row import SURE, Named, Row
+from cablecomp.trials.row import Named, Row
 from cablecomp.trials.shares import Rate, bootstrapped, finite, quantile, rate
 
 SIZE_EDGES = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.6001)
@@ -281,7 +282,7 @@ def as_json(board: Scoreboard) -> dict[str, Any]:
         "by_size": [_entry(p) for p in board.by_size],
         "confidence": {
             **{k: v for k, v in asdict(board.trust).items() if k != "bins"},
-            "sure_from": SURE,
+            "sure_from": LIMITS.name,
             "bins": [
                 {"from": low, "to": high, "confidence": mean, "true": r.entry()}
                 for low, high, mean, r in board.trust.bins

@@ -14,7 +14,7 @@ from cablecomp.config import load_joint
 from cablecomp.control.command import FULL, Feed, Reference
 from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
-from cablecomp.control.shaping import Ahead, Bump, Slope
+from cablecomp.control.shaping import BumplessTransfer, LeadFilter, Slope
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 from cablecomp.signals import NAN, Estimate, Sample
@@ -181,7 +181,7 @@ def test_on_the_observer_peek_and_step_agree() -> None:
 
 def test_a_ramp_is_foreseen_over_the_lead() -> None:
     lead = 0.012
-    ahead = Ahead(30.0, lead, T)
+    ahead = LeadFilter(30.0, lead, T)
     out = [ahead.step(3.0 * k * T) for k in range(2000)]
     assert out[-1] - 3.0 * 1999 * T == pytest.approx(3.0 * (lead - 2.0 * ahead.stage_lag_s), abs=1e-9)
     assert ahead.rate == pytest.approx(3.0, rel=1e-9)
@@ -189,7 +189,7 @@ def test_a_ramp_is_foreseen_over_the_lead() -> None:
 
 
 def test_bump_and_slope() -> None:
-    bump = Bump(0.1, T)
+    bump = BumplessTransfer(0.1, T)
     bump.start(2.0)
     values = [bump.step() for _ in range(120)]
     assert values[0] == 2.0

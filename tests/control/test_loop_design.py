@@ -17,16 +17,16 @@ from cablecomp.control.margins import grid_for, highest_gain, modulus_for
 from cablecomp.control.motors import DriveGains, control_for
 from cablecomp.control.options import ControlConfig, MotorModel, load_control
 from cablecomp.control.plant_model import (
-    ahead_filter,
     integrator,
     joint_model,
+    lead_filter,
     load_path,
     pick,
     response,
     stable_when_closed,
 )
 from cablecomp.control.plays import fit_plays
-from cablecomp.control.shaping import Ahead, Slope
+from cablecomp.control.shaping import LeadFilter, Slope
 from cablecomp.control.stiffness import stiffness_range
 from cablecomp.control.synthesis import DesignWork
 from cablecomp.errors import InputError
@@ -73,12 +73,12 @@ def test_filter_and_path_of_the_model_are_the_compensator_s_own() -> None:
     """The state space gives, step by step, what the running code gives."""
     rng = np.random.default_rng(1)
     readings = rng.standard_normal(60).cumsum()
-    ahead, slope = Ahead(25.0, 0.004, T), Slope(60.0, T)
+    ahead, slope = LeadFilter(25.0, 0.004, T), Slope(60.0, T)
     ahead.started = slope.started = True
     compliance, ratio = 1.0 / 180.0, 1.0 / 3.0
     motor = MotorModel(viscous_Nms_per_rad=2e-3)
     times = np.arange(60) * T
-    filtered = control.forced_response(ahead_filter(25.0, 0.004, T), times, readings).outputs
+    filtered = control.forced_response(lead_filter(25.0, 0.004, T), times, readings).outputs
     path = control.forced_response(
         load_path(motor, ratio, compliance, 25.0, 0.004, 60.0, T), times, readings
     ).outputs

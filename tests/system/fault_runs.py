@@ -20,7 +20,7 @@ from cablecomp.links.schema import LinkConfig
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
 from cablecomp.runtime.clock import Tick
-from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.loop import Loop, RunStage
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
@@ -135,7 +135,7 @@ def run_with(folder: Path, *faults: str, link: str = "wrist-virtual") -> Outcome
     outcome = Outcome(folder)
 
     def watch(loop: Loop, tick: Tick) -> None:
-        if loop.stage >= Stage.RUNNING:
+        if loop.stage >= RunStage.RUNNING:
             status = loop.link.status()
             outcome.time_s.append(tick.now_s)
             outcome.joint_rad.append(simulation.truth(1).joint_position_rad)

@@ -24,7 +24,7 @@ from cablecomp.recording.reader import open_recording
 from cablecomp.report.replay_page import write_replay
 from cablecomp.report.run_page import write_run_page
 from cablecomp.runtime.clock import Tick
-from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.loop import Loop, RunStage
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
@@ -207,7 +207,7 @@ def test_impedance_yields_by_its_stiffness() -> None:
     angles: list[float] = []
 
     def watch(loop: Loop, tick: Tick) -> None:
-        if loop.stage is Stage.RUNNING:
+        if loop.stage is RunStage.RUNNING:
             angles.append(simulation.truth(1).joint_position_rad)
 
     try:

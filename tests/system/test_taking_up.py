@@ -22,7 +22,7 @@ from cablecomp.control.protocol import Protocol
 from cablecomp.errors import DeviceError
 from cablecomp.links.load import load_link
 from cablecomp.runtime.clock import Tick
-from cablecomp.runtime.loop import Loop, Stage
+from cablecomp.runtime.loop import Loop, RunStage
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
@@ -46,7 +46,7 @@ class Rig:
         base = load_link(CONFIGS / "links/mit-virtual.toml").redirect("virtual", channel)
         control = CONTROL.model_copy(update={"compensator": CONTROL.compensator.model_copy(update=GAINS)})
         self.link, self.control = matched(base, control, own_link=True)
-        self.stages: list[Stage] = []
+        self.stages: list[RunStage] = []
 
     def run(
         self,
@@ -76,7 +76,7 @@ def test_a_drive_left_enabled_far_away_is_taken_up_without_a_pull(rig: Rig) -> N
     assert abs(first.torque) <= TORQUE_STEP
     assert abs(first.velocity) <= 100.0 / 4095
     taking_up = [
-        h for h, s in zip(joint.heard, joint.ticks, strict=True) if rig.stages[s - 1] < Stage.RUNNING
+        h for h, s in zip(joint.heard, joint.ticks, strict=True) if rig.stages[s - 1] < RunStage.RUNNING
     ]
     assert all(abs(h.position - 3.0) < 1e-3 for h in taking_up if not h.word)
     # nothing but the first steps of the motion, which begins at zero, is left to pull

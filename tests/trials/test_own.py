@@ -21,7 +21,7 @@ from cablecomp.config_text import joint_text
 from cablecomp.errors import InputError
 from cablecomp.report.concealed_page import concealed_page, concealed_section, concealed_table
 from cablecomp.trials.curves import Curves, curves, score_concealed
-from cablecomp.trials.own import ANSWER, Own, OwnWish, concealed_beside, piece, prove_in
+from cablecomp.trials.own import SCORED, Own, OwnWish, concealed_beside, piece, prove_in
 from cablecomp.trials.run import Verdict
 from cablecomp.trials.sealed import digest
 
@@ -154,7 +154,7 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
     assert answer["done"] == 3
     with pytest.raises(InputError, match="holds another run"):
         prove_in(own, replace(wish, seed=2), lambda what, done, of: None, log.append)
-    (tmp_path / ANSWER).write_text("[]")
+    (tmp_path / SCORED).write_text("[]")
     with pytest.raises(InputError, match="is no answer"):
         concealed_beside(tmp_path)
     assert concealed_beside(tmp_path / "trials") is None

@@ -20,7 +20,7 @@ from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.answer.verdict import warnings_of
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
-from cablecomp.diagnosis.outcome import Case, Left, Outcome
+from cablecomp.diagnosis.outcome import Case, Outcome, Remainder
 from cablecomp.diagnosis.result import Diagnosis, Law
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, rms_left
@@ -29,7 +29,7 @@ OUT_OF_TIME = "the {:g} s were over before all hypotheses were tried: what is na
 
 
 def diagnosis_of(
-    case: Case, before: Left, found: Search, outcome: Outcome, rng: np.random.Generator, budget_s: float
+    case: Case, before: Remainder, found: Search, outcome: Outcome, rng: np.random.Generator, budget_s: float
 ) -> Diagnosis:
     """Everything found; `before`: what the calibrated drive leaves."""
     drive, kept = case.drive, outcome.kept
@@ -57,7 +57,7 @@ def diagnosis_of(
         next_experiment=next_experiment(case, found.selection, outcome, hidden),
         could_be_unseen=tuple(unseen),
         remainder=remainder(case, outcome, rng),
-        remainder_location=outcome.left.location,
+        remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.names),
         notes=notes(case),
         augmented_joint=augmented_joint(case.config, kept, outcome.empirical, case.body.names),

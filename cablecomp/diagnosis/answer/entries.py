@@ -180,8 +180,8 @@ def remainder(case: Case, outcome: Outcome, rng: np.random.Generator) -> dict[st
     text, equation = "noise", None
     if outcome.structured:
         turns = 1.0 / fit.problem.config.drive.ratio
-        description = describe(outcome.left.series, rng, sensitivities(fit), turns)
-        first = outcome.left.location.significant(LIMITS.p_structured)
+        description = describe(outcome.remainder.series, rng, sensitivities(fit), turns)
+        first = outcome.remainder.location.significant(LIMITS.p_structured)
         text = (
             f"follows {first[0].covariate}: {first[0].how}; {description.text}" if first else description.text
         )

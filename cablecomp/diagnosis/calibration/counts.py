@@ -17,7 +17,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.simulate import load_of
 from cablecomp.estimation.view import INPUT
-from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.noise import channel_noise, reading_sigma
 from cablecomp.signal.smoothing import FloatArray
 
 WITHIN: Final = 1.5
@@ -46,7 +46,7 @@ def with_places(config: JointConfig, e: Evidence, count: float) -> Evidence:
         return e
     columns = np.zeros((len(e.rows), len(rests)))
     for k, rest in enumerate(rests):
-        columns[rest, k] = config.drive.ratio * count / np.sqrt(12.0)
+        columns[rest, k] = config.drive.ratio * reading_sigma(None, count)
     known = e.carryover.get(JOINT)
     both = columns if known is None else np.column_stack((known, columns))
     return replace(e, carryover={**e.carryover, JOINT: both})

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.config import JointConfig
+from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
@@ -18,8 +19,6 @@ from cablecomp.estimation.parameter import Parameter, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
-ZEROS = ("joint_position_offset_rad", "motor_torque_offset_Nm")
-"""Names in `[session] own` that are found inside of the fit, by session, always."""
 REPLICAS = 2
 """Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
 PASSES = 2
@@ -84,7 +83,7 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
 def _parameters(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[Parameter, ...]:
     """What `[tolerance]` frees; what `[session] own` names is each session's."""
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
-    own = [n for n in config.session_own if n not in ZEROS]
+    own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
     free = list(of_drive(config))
     if len(sessions) > 1:
         for name in own:

@@ -26,6 +26,7 @@ from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, gather
 from cablecomp.estimation.least_squares import Fit, approach, refit, rms_left, solve, weighed
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
+from cablecomp.signal.noise import reading_sigma
 from cablecomp.signal.smoothing import FloatArray, group_means
 
 MODEL: Final = 3e-3
@@ -35,7 +36,7 @@ MOST: Final = 120_000
 """Samples of all recordings together that are run one by one; of more, means of neighbours are."""
 WIDE: Final = 0.2
 """Share of a parameter's prior sd over which its derivative is taken."""
-SPIKE: Final = 8.0
+RAW_SPIKE: Final = 8.0
 """Sensor noises beyond which a raw reading is left cleaned."""
 
 
@@ -171,7 +172,7 @@ def _deflection(problem: Problem, e: Evidence, channel: str = JOINT) -> FloatArr
 def _with_places(problem: Problem, e: Evidence, columns: Columns) -> Evidence:
     """The recording with the motor's places inside its counts, where a count is more than the law is trusted to."""
     count = count_rad(columns)
-    moves = problem.config.drive.ratio * count / np.sqrt(12.0)
+    moves = problem.config.drive.ratio * reading_sigma(None, count)
     return with_places(problem.config, e, count) if moves > MODEL * np.std(_deflection(problem, e)) else e
 
 
@@ -211,7 +212,7 @@ def _with_raw_inputs(e: Evidence, columns: Columns, group: int) -> Evidence:
         values = np.asarray(columns[name], dtype=np.float64)
         good = np.isfinite(values) & np.isfinite(raw_time)
         smooth = np.interp(raw_time[good], e.columns["time_s"], clean)
-        near = np.abs(values[good] - smooth) <= SPIKE * max(e.noise.get(name, 0.0), 1e-300)
+        near = np.abs(values[good] - smooth) <= RAW_SPIKE * max(e.noise.get(name, 0.0), 1e-300)
         read = np.where(near, values[good], smooth)
         if group == 1:
             changed[name] = np.interp(e.columns["time_s"], raw_time[good], read)

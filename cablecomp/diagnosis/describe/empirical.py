@@ -22,7 +22,7 @@ TERMS = 10
 drum is."""
 RIDGE = 1e-3
 """Share of the terms' mean energy that holds their coefficients back."""
-CHANNELS = ("motor_position_rad", "joint_torque_Nm")
+CURVES_OVER = ("motor_position_rad", "joint_torque_Nm")
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
     rows = _joint_rows(model, groups)
     found: list[Found] = []
     while True:
-        others = [c for c in CHANNELS if all(f.law.of != c for f in found)]
+        others = [c for c in CURVES_OVER if all(f.law.of != c for f in found)]
         held = [h for c in others if (h := _held(c, rows)) is not None]
         if not held:
             return found

@@ -65,15 +65,15 @@ class Study:
 
     def as_dict(self) -> dict[str, object]:
         """What was switched on, its size, what came of it, how far from the thesis; without the traces."""
-        told = ("name", "sizes", "units", "plausible", "signature", "misfit")
+        fields = ("name", "sizes", "units", "plausible", "signature", "misfit")
         return {
             "plain_misfit": self.plain_misfit,
-            "findings": [{k: getattr(f, k) for k in told} for f in (*self.together, *self.findings)],
+            "findings": [{k: getattr(f, k) for k in fields} for f in (*self.together, *self.findings)],
         }
 
 
 def study(
-    rigs: Rigs, simulate: Simulate, told: Callable[[str, float], None] = lambda what, share: None
+    rigs: Rigs, simulate: Simulate, progress: Callable[[str, float], None] = lambda what, share: None
 ) -> Study:
     """Try every suspect by `simulate`, and what explains different questions together; the observer's own
     equations run the chosen cases as well.
@@ -82,12 +82,12 @@ def study(
     listed = suspects()
     findings = []
     for k, suspect in enumerate(listed):
-        told(suspect.id, k / (len(listed) + len(_TOGETHER)))
+        progress(suspect.id, k / (len(listed) + len(_TOGETHER)))
         findings.append(best_of(bench, own, [suspect], [(x,) for x in suspect.sizes]))
     named = {s.id: s for s in listed}
     together = []
     for k, sizes in enumerate(_TOGETHER):
-        told(" + ".join(sizes), (len(listed) + k) / (len(listed) + len(_TOGETHER)))
+        progress(" + ".join(sizes), (len(listed) + k) / (len(listed) + len(_TOGETHER)))
         group = [named[name] for name in sizes]
         together.append(best_of(bench, None, group, list(itertools.product(*sizes.values())), full=True))
     for found in (findings, together):
