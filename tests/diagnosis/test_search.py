@@ -9,11 +9,14 @@ from turning import JOINT, recorded
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.search import search, without_effects
 from cablecomp.diagnosis.folds import make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects import with_effects
+from cablecomp.estimation.least_squares import covariance, weighed
 
 FREE = JOINT.model_copy(update={"tolerance": {"EA_N": 0.1}})
 
@@ -38,6 +41,26 @@ def test_where_nothing_is_asked_the_calibrated_drive_is_the_model_of_all_recordi
     searched = found.selection.final.fit.problem.evidence
     assert len(searched) < len(drive.fit.problem.evidence)
     assert found.groups.folds == len(drive.fit.problem.evidence)
+
+
+def test_the_final_fit_is_about_all_recordings_and_weighs_them_by_what_it_leaves() -> None:
+    true = {"moment_Nm": 0.3, "phase_rad": 0.6}
+    heavy = with_effects(FREE, [("gravity_load", true)])
+    many = {f"all/{k}": recorded(heavy, seed=k, duration_s=5.0) for k in range(LIMITS.searched + 3)}
+    drive = calibrate_drive(FREE, gather_body(FREE, many).used, np.random.default_rng(0))
+    evidence = drive.fit.problem.evidence
+    pool = [h for h in hypotheses(FREE, evidence) if h.name == "gravity_load"]
+    found = search(drive, pool, np.random.default_rng(0), Pace(lambda what, share: None))
+    assert [t.name for t in found.final.terms] == ["gravity_load"]
+    fit = found.final.fit
+    assert [e.name for e in fit.problem.evidence] == [e.name for e in evidence]
+    assert len(found.selection.rounds[0].base.fit.problem.evidence) < len(evidence)
+    own = weighed(fit, drive.floor)
+    assert fit.problem.weighing.sigma == pytest.approx(own.sigma, rel=0.05)
+    spread = np.sqrt(np.diag(covariance(fit)))
+    for key, value in true.items():
+        k = next(k for k, p in enumerate(fit.problem.parameters) if p.name == f"effect.gravity_load.{key}")
+        assert abs(fit.x[k] - fit.problem.parameters[k].x(value)) < 4.0 * spread[k]
 
 
 def test_a_time_that_is_up_is_said(drive: Calibrated) -> None:
