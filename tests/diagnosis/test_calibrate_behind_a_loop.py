@@ -12,7 +12,7 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.diagnosis.calibration.counts import with_places
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
-from cablecomp.diagnosis.calibration.every_sample import by_wide_steps, on_every_sample
+from cablecomp.diagnosis.calibration.every_sample import by_wide_steps, in_common, on_every_sample
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
@@ -92,7 +92,27 @@ def test_a_drive_that_shakes_is_told_by_wide_steps() -> None:
     fit = by_wide_steps(shaking(), 0)
     fine = fit.problem.jacobian(fit.x, fit.residual)
     k = next(k for k, p in enumerate(fit.problem.parameters) if p.name == "mu_input")
-    step = 0.1 * fit.problem.parameters[k].sd
-    there = fit.problem.residual(fit.x + step * np.eye(len(fit.x))[k]) - fit.residual
-    wide_misses, fine_misses = (np.linalg.norm(there - step * J[:, k]) for J in (fit.J, fine))
-    assert wide_misses < 0.5 * fine_misses
+    for side in (-1.0, 1.0):
+        step = side * 0.4 * fit.problem.parameters[k].sd  # about as wide as its interval
+        there = fit.problem.residual(fit.x + step * np.eye(len(fit.x))[k]) - fit.residual
+        wide_misses, fine_misses = (np.linalg.norm(there - step * J[:, k]) for J in (fit.J, fine))
+        assert wide_misses < 0.5 * fine_misses
+
+
+def test_jumps_of_a_derivative_pass_for_no_knowledge() -> None:
+    """Two columns that the rows tell apart by little, jumps far larger than that: the width of what is not known is
+    that of the derivative without them (a square of one alone has it five times too narrow); where jumps
+    hide all, the priors' width is left."""
+    rng = np.random.default_rng(2)
+    base = np.sin(np.linspace(0.0, 60.0, 4000))
+    true = np.column_stack((base, base + 0.02 * np.cos(np.linspace(0.0, 60.0, 4000))))
+    one, other = (true + 0.1 * rng.standard_normal(true.shape) for _ in range(2))
+    J = in_common(np.vstack((one, np.eye(2))), np.vstack((other, np.eye(2))))
+    wide, told, jumps = (
+        np.sqrt(np.diag(np.linalg.inv(j.T @ j)))
+        for j in (np.vstack((true, np.eye(2))), J, np.vstack((one, np.eye(2))))
+    )
+    assert np.allclose(told, wide, rtol=0.25)
+    assert np.all(jumps < 0.25 * wide)
+    hidden = in_common(*(np.vstack((k * rng.standard_normal(true.shape), np.eye(2))) for k in (1.0, 1.0)))
+    assert np.all(np.diag(np.linalg.inv(hidden.T @ hidden)) <= 1.0 + 1e-9)

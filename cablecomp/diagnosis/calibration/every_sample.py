@@ -34,8 +34,8 @@ MODEL: Final = 3e-3
 `tests/golden/calibration_coverage.py`, whose true values it puts where a stated sd ought to; others judge it."""
 MOST: Final = 120_000
 """Samples of all recordings together that are run one by one; of more, means of neighbours are."""
-WIDE: Final = 0.2
-"""Share of a parameter's prior sd over which its derivative is taken."""
+WIDE: Final = (0.4, 0.8)
+"""Shares of a parameter's prior sd over which its derivative is taken, and taken once more."""
 RAW_SPIKE: Final = 8.0
 """Sensor noises beyond which a raw reading is left cleaned."""
 
@@ -72,22 +72,37 @@ def on_every_sample(drive: Calibrated, recordings: Mapping[str, Columns], pace: 
 def by_wide_steps(fit: Fit, rounds: int = 2) -> Fit:
     """The fit carried on by derivatives over `WIDE` of each prior, and with such a one: a drive that shakes jumps from
     sample to sample when a value moves a little, and a derivative over a thousandth is that of its jumps."""
-    for _ in range(rounds):
-        J = _wide_jacobian(fit)
-        better = approach(fit.problem, fit.x, dict(enumerate(J.T)), 6, 1e-4)
+    near, far = WIDE
+    for left in range(rounds, -1, -1):
+        J = _wide_jacobian(fit, near)
+        better = approach(fit.problem, fit.x, dict(enumerate(J.T)), 6, 1e-4) if left else fit
         if not better.cost < fit.cost:
-            return replace(fit, J=J)
+            break
         fit = better
-    return replace(fit, J=_wide_jacobian(fit))
+    return replace(fit, J=in_common(J, _wide_jacobian(fit, far)))
 
 
-def _wide_jacobian(fit: Fit) -> FloatArray:
-    """Central differences over `WIDE` prior sds either way; a side on which the drive cannot follow is left out."""
+def in_common(one: FloatArray, other: FloatArray) -> FloatArray:
+    """The mean of two derivatives K, turned so that its square is what both have in common, (K1'K2 + K2'K1)/2: jumps
+    are drawn anew for each, and in a square of one alone they pass for knowledge. The last rows, the priors', stay."""
+    data = len(one) - one.shape[1]
+    mean, half = 0.5 * (one + other), 0.5 * (one - other)[:data]
+    size, way = np.linalg.eigh(mean[:data].T @ mean[:data])
+    root = np.sqrt(np.maximum(size, 1e-12 * size.max(initial=1e-300)))
+    to, back = way * root @ way.T, way / root @ way.T
+    share, turned = np.linalg.eigh(np.eye(len(root)) - back @ (half.T @ half) @ back)
+    shrunk = turned * np.sqrt(np.maximum(share, 0.0)) @ turned.T
+    return np.concatenate((mean[:data] @ back @ shrunk @ to, mean[data:]))
+
+
+def _wide_jacobian(fit: Fit, share: float) -> FloatArray:
+    """Central differences over a share of the prior sds either way; a side on which the drive cannot follow is left
+    out."""
     problem = fit.problem
     low, high = problem.bounds()
     columns = []
     for k, p in enumerate(problem.parameters):
-        reach = WIDE * min(p.sd, float(high[k] - low[k]))
+        reach = share * min(p.sd, float(high[k] - low[k]))
         ends = []
         for side in (-reach, reach):
             x = fit.x.copy()
