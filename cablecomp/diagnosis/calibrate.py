@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import inf
+from math import hypot, inf
 from time import monotonic
 
 import numpy as np
@@ -28,7 +28,10 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel, noise_mean
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.limits import EXACT
+from cablecomp.estimation.parameter import Parameter
 
+LOAD_BY_MOTOR = 0.05
+"""Share to which a load read off the motor's torque is trusted: its gear and bearings take a few per cent."""
 OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure"
 
 
@@ -117,8 +120,29 @@ def _everything(body: Body) -> list[Evidence]:
 
 def _spread(fit: Fit) -> dict[str, float]:
     """1-sigma of every parameter's coordinate, all others free: what is not told later on widens the rest as well."""
-    sd = np.sqrt(np.diag(covariance(fit)))
-    return {p.name: float(s) for p, s in zip(fit.problem.parameters, sd, strict=True)}
+    sd = np.sqrt(np.diag(covariance(fit))).tolist()
+    found = {p.name: s for p, s in zip(fit.problem.parameters, sd, strict=True)}
+    if not _by_motor(fit):
+        return found
+    return {
+        p.name: _beside_the_motors(p, x, found[p.name])
+        for p, x in zip(fit.problem.parameters, fit.x.tolist(), strict=True)
+    }
+
+
+def _by_motor(fit: Fit) -> bool:
+    return any(load_channel(fit.problem.config, e.columns) == MOTOR for e in fit.problem.evidence)
+
+
+def _beside_the_motors(p: Parameter, x: float, sd: float) -> float:
+    """1-sigma with the load read off the motor's torque, in which its own friction stands and does what the cable's and
+    the pretension do: these are known no better than before, nor than by how much they moved."""
+    key = p.base.partition(".")[0]
+    if key.endswith("_radius_m"):
+        return sd
+    if key == "EA_N":
+        return hypot(sd, LOAD_BY_MOTOR)
+    return max(sd, p.sd, abs(x - p.centre_x))
 
 
 def _as_wide(value: Value, fit: Fit, spread: Mapping[str, float]) -> Value:
@@ -194,10 +218,11 @@ def _warnings(drive: Calibrated, fit: Fit, recordings: Mapping[str, Columns]) ->
             "a motor that hunts within a count shakes friction loose unseen; "
             "mu_input is what acts then, not the material's"
         )
-    if any(load_channel(fit.problem.config, c) == MOTOR for c in recordings.values()):
+    if _by_motor(fit):
         found.append(
-            "the load is read off the motor's torque, in which the motor's own friction and inertia stand: what is "
-            "found of friction is both, and surer than it is; calibrate with the joint's torque measured"
+            "the load is read off the motor's torque, in which the motor's own friction and inertia stand: friction "
+            "and pretension are what acts with both, and their intervals as wide as before; calibrate with the joint's "
+            "torque measured"
         )
     if rms_left(fit) > 2.0 * noise_mean(fit.problem.evidence, JOINT):
         found.append(

@@ -125,3 +125,23 @@ def test_a_load_read_off_the_motor_is_said_to_hold_its_friction() -> None:
     for config, said in ((by_motor, True), (NOMINAL, False)):
         found = calibrate(config, {"one": columns}, budget_s=0.0)
         assert any("motor's own friction" in line for line in found.warnings) == said
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_motors_own_friction_in_the_load_is_not_taken_for_the_cables(way: float) -> None:
+    """2 % of the greatest load, as a motor that yields to its load holds it: no value lies further from the truth than
+    its interval allows, and none of friction is said to be better known than before."""
+    columns = recording(with_values(NOMINAL, TRUE), 1)
+    load = columns["joint_torque_Nm"]
+    holds = way * 0.02 * float(np.max(np.abs(load))) * np.tanh(np.gradient(load) / 1e-3)
+    columns["motor_torque_Nm"] = NOMINAL.drive.ratio * (holds - load)
+    by_motor = NOMINAL.model_copy(
+        update={"observer": NOMINAL.observer.model_copy(update={"load": "motor_torque"})}
+    )
+    found = calibrate(by_motor, {"one": columns})
+    known = {v.name: v for v in found.values}
+    off = {n: (known[n].value - true) / known[n].sd for n, true in TRUE.items() if n in known}
+    assert "EA_N" in off
+    assert max(map(abs, off.values())) < 2.0, off
+    for name in ("mu_output", "mu_input"):
+        assert found.config.tolerance[name] >= NOMINAL.tolerance[name]
