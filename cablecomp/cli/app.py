@@ -134,7 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"{error} (a fault of this program: please report it)", 4)
     except CablecompError as error:
         return _fail(str(error), 4)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):  # the latter where a question is answered by Ctrl-C or Ctrl-D
         return _fail("stopped by the user", 130)
     except BrokenPipeError:  # whoever read our output has enough
         _drop_output()

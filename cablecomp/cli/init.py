@@ -18,7 +18,7 @@ from cablecomp.config.draft import Draft, draft_text
 from cablecomp.config.reference import CONVENTIONS, reference
 from cablecomp.config.schema import JointConfig
 from cablecomp.control.options import ControlConfig
-from cablecomp.errors import InputError
+from cablecomp.errors import ConfigError, InputError
 from cablecomp.examples import example, with_companions
 from cablecomp.links.schema import LinkConfig
 from cablecomp.recording.atomic import atomic_file
@@ -65,13 +65,17 @@ def init(
             raise InputError(
                 "init: nobody to ask; give --set KEY=VALUE or --from FILE (cablecomp init --keys lists the keys)"
             )
+<<<<<<< HEAD
         values = _asked()
     draft = validated(Draft, values, "init" if answers is None else str(answers))
+=======
+        _refuse_to_overwrite(out / "joint.toml")
+        told = _asked()
+    draft = validated(Draft, told, "init" if answers is None else str(answers))
+>>>>>>> f6a0ae2 (init asks again for what will not do, and a Ctrl-D is one line)
     files = {"joint.toml": draft_text(draft), **_link(draft)}
     for name, text in files.items():
-        place = out / name
-        if place.exists() and place.read_text(encoding="utf-8") != text:
-            raise InputError(f"{place}: is there already, and differs; remove it or give another --out")
+        _refuse_to_overwrite(out / name, text)
     out.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         with atomic_file(out / name) as spare:
@@ -83,6 +87,12 @@ def init(
     for name in files:
         console.print(f"written: {out / name}", soft_wrap=True)
     warn(f"{out / 'joint.toml'}: {words}" for words in asked)
+
+
+def _refuse_to_overwrite(place: Path, text: str | None = None) -> None:
+    """Raise InputError where another text stands (None: any)."""
+    if place.exists() and place.read_text(encoding="utf-8") != text:
+        raise InputError(f"{place}: is there already, and differs; remove it or give another --out")
 
 
 def _answer(word: str) -> tuple[str, Any]:
@@ -97,16 +107,38 @@ def _answer(word: str) -> tuple[str, Any]:
 
 
 def _asked() -> dict[str, Any]:
-    """Ask for every key; an empty answer takes the default, or leaves it out."""
+    """Ask for every key, again where an answer will not do; an empty one takes the default, or leaves it out."""
     values: dict[str, Any] = {}
-    for key, field in Draft.model_fields.items():
-        choices = get_args(field.annotation) if str(get_origin(field.annotation)) == "typing.Literal" else ()
-        words = f"{key}: {field.description}" + (f" ({', '.join(map(str, choices))})" if choices else "")
-        default = None if field.is_required() else ("" if field.default is None else str(field.default))
-        text = typer.prompt(words, default=default, show_default=bool(default))
-        if str(text) != "":
-            values |= dict([_answer(f"{key}={text}")])
+    left = list(Draft.model_fields)
+    while left:
+        key, answer = left[0], _prompted(left[0])
+        tried = values if answer == "" else values | dict([_answer(f"{key}={answer}")])
+        wrong = _wrong(tried, key, left[1:])
+        for line in wrong:
+            typer.echo(line)
+        if not wrong:
+            values = tried
+            del left[0]
     return values
+
+
+def _prompted(key: str) -> str:
+    field = Draft.model_fields[key]
+    choices = get_args(field.annotation) if str(get_origin(field.annotation)) == "typing.Literal" else ()
+    words = f"{key}: {field.description}" + (f" ({', '.join(map(str, choices))})" if choices else "")
+    if not field.is_required() and field.default is None:
+        return str(typer.prompt(f"{words} [Enter leaves it out]", default="", show_default=False))
+    default = None if field.is_required() else str(field.default)
+    return str(typer.prompt(words, default=default))
+
+
+def _wrong(values: dict[str, Any], key: str, later: list[str]) -> tuple[str, ...]:
+    """What is wrong with the answers that is of this key, and of none that is still to be asked for."""
+    try:
+        validated(Draft, values, "init")
+    except ConfigError as error:
+        return tuple(line for line in error.lines if key in line and not any(name in line for name in later))
+    return ()
 
 
 def _link(draft: Draft) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import tomllib
 from pathlib import Path
@@ -24,6 +25,13 @@ KNOWN = {
     "input_turns": 2.0,
     "joint_torque_max_Nm": 2.0,
 }
+
+
+class Terminal(io.StringIO):
+    """Somebody who answers."""
+
+    def isatty(self) -> bool:
+        return True
 
 
 def init(out: Path, **more: object) -> int:
@@ -91,3 +99,63 @@ def test_a_file_that_differs_is_not_overwritten(tmp_path: Path, capsys: pytest.C
 def test_a_metre_for_a_millimetre_is_asked_about(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert init(tmp_path, output_radius_mm=30_000.0) == 0
     assert "output_radius_m" in capsys.readouterr().err
+
+
+def asked(out: Path, answers: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setattr("sys.stdin", Terminal("".join(f"{a}\n" for a in answers)))
+    return main(["init", "--out", str(out)])
+
+
+DIALOGUE = ["", "", "30", "10", "", "steel-7x7", "0.5", "", "100", "1.5", "2", "", "", "2", *[""] * 8]
+
+
+def test_the_questions_lead_to_what_the_flags_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert init(tmp_path / "flags") == 0
+    assert asked(tmp_path / "asked", DIALOGUE, monkeypatch) == 0
+    flags, told = (tomllib.loads((tmp_path / d / "joint.toml").read_text()) for d in ("flags", "asked"))
+    assert told == flags
+
+
+def test_an_answer_that_will_not_do_is_asked_for_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = [
+        *DIALOGUE[:2],
+        "thirty",
+        "-3",
+        *DIALOGUE[2:5],
+        "rope",
+        *DIALOGUE[5:14],
+        "50",
+        "40",
+        "60",
+        *DIALOGUE[16:],
+    ]
+    assert asked(tmp_path, wrong, monkeypatch) == 0
+    limits = load_joint(tmp_path / "joint.toml").limits
+    assert (limits.joint_position_min_rad, limits.joint_position_max_rad) == pytest.approx(
+        (math.radians(50.0), math.radians(60.0)), rel=1e-5
+    )
+    said = capsys.readouterr().out
+    assert "a number is accepted" in said
+    assert "'tungsten'" in said
+
+
+@pytest.mark.parametrize("answered", [0, 5])
+def test_who_has_enough_of_questions_gets_one_line(
+    answered: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert asked(tmp_path, DIALOGUE[:answered], monkeypatch) == 130
+    assert capsys.readouterr().err.strip().splitlines()[-1] == "cablecomp: stopped by the user"
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_asked_where_a_joint_is_already(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert init(tmp_path) == 0
+    capsys.readouterr()
+    assert asked(tmp_path, DIALOGUE, monkeypatch) == 2
+    said = capsys.readouterr()
+    assert "is there already" in said.err
+    assert "output_radius_mm" not in said.out
