@@ -126,7 +126,7 @@ def announce_compilation(joint: JointConfig | None = None, bounds: bool = False)
     """Say so before the first use of this very version compiles its kernels, and do it where the joint is known."""
     from cablecomp.mechanics.jit import is_compiled
 
-    if is_compiled("walk") and (not bounds or is_compiled("bounds_step")):
+    if is_compiled("step_rows") and (not bounds or is_compiled("bounds_step")):
         return
     errors().print("compiling the kernels, once for this version (under a minute) ...", style="dim")
     if joint is not None:

@@ -39,6 +39,11 @@ class Stage(Frozen):
         """Output angle over input angle, r/R."""
         return self.input_radius_m / self.output_radius_m
 
+    @property
+    def pretension_moment_Nm(self) -> float:
+        """R T0, the natural unit of load."""
+        return self.output_radius_m * self.pretension_N
+
 
 def ratios_to_last(stages: Sequence[Stage]) -> list[float]:
     """Ratio from every stage's output axis to the last one's, N_ik = product over j = i+1..k of r_j/R_j (thesis

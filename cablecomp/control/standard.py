@@ -140,8 +140,7 @@ def force_protocol(config: JointConfig, seed: int, duration_s: float = 20.0, sha
     """
     m = span_of(config, share).load_Nm
     if config.drive.circuit == "open":  # beyond its pretension the cable would hang slack
-        last = config.drive.stage[-1]
-        m = min(m, 0.6 * last.pretension_N * last.output_radius_m)
+        m = min(m, 0.6 * config.drive.stage[-1].pretension_moment_Nm)
     rng = np.random.default_rng(seed)
     segments: list[Segment] = []
     total = 0.0

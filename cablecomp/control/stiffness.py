@@ -47,8 +47,7 @@ def greatest_load(config: JointConfig, load_max_Nm: float | None = None) -> floa
         return load_max_Nm
     if config.limits.joint_torque_max_Nm is not None:
         return config.limits.joint_torque_max_Nm
-    last = config.drive.stage[-1]
-    return last.output_radius_m * last.pretension_N
+    return config.drive.stage[-1].pretension_moment_Nm
 
 
 def plain(config: JointConfig) -> JointConfig:

@@ -1,6 +1,6 @@
 """Physics beyond the thesis's drive: one file per effect, found by name.
 
-Imports the kernel and the configuration. Start reading at `base.py`, the contract, then any effect.
+Imports the kernel and what lies below. Start reading at `base.py`, the contract, then any effect.
 """
 
 from cablecomp.effects.base import Change, Effect, Parameter, term

@@ -101,9 +101,13 @@ DURATION = Parameter(
 """How long an event takes."""
 
 
+LEAST_PRETENSION = 0.05
+"""Share of T0 below which no law of the pretension is followed further."""
+
+
 def pretension_moment(config: JointConfig) -> float:
     """R T0 of the output stage [N m]: the natural unit of load."""
-    return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
+    return config.drive.stage[-1].pretension_moment_Nm
 
 
 def input_moment(config: JointConfig) -> float:

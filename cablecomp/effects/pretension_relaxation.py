@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
-
-LEAST = 0.05  # share of T0 below which the law is not followed further
+from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, pretension_moment, term
 
 
 @term(parameters=("fraction", "time_constant", "began", "hanging"), state=("start",))
@@ -19,7 +17,7 @@ def _relax(c: Any, p: Any, s: Any) -> None:
     start = s.start
     if c.first:
         start = c.time if math.isnan(p.began) else p.began
-    factor = max(1.0 - p.fraction * math.log1p(max(c.time - start, 0.0) / p.time_constant), LEAST)
+    factor = max(1.0 - p.fraction * math.log1p(max(c.time - start, 0.0) / p.time_constant), LEAST_PRETENSION)
     if p.hanging > 0.0:
         c.moment += p.hanging * (1.0 - factor)
     else:

@@ -8,6 +8,7 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import (
+    LEAST_PRETENSION,
     Change,
     Effect,
     Parameter,
@@ -16,8 +17,6 @@ from cablecomp.effects.base import (
     pretension_moment,
     term,
 )
-
-LEAST = 0.05  # share of T0 below which the law is not followed further
 
 
 @term(parameters=("coefficient", "reference", "lag", "hanging"), state=("time", "warm"))
@@ -33,7 +32,7 @@ def _expand(c: Any, p: Any, s: Any) -> None:
             warm += (s.warm - warm) * math.exp(-(c.time - s.time) / p.lag)
         if c.commit:
             s.time, s.warm = c.time, warm
-        factor = max(1.0 + p.coefficient * (warm - p.reference), LEAST)
+        factor = max(1.0 + p.coefficient * (warm - p.reference), LEAST_PRETENSION)
         if p.hanging > 0.0:
             c.moment += p.hanging * (1.0 - factor)
         else:

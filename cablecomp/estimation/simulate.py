@@ -61,7 +61,9 @@ class Simulator:
         memory, heights = model.memory.copy(), model.heights.copy()
         joint_start(model.fixed, model.layout, memory, heights, model.laws, read.time[0], read.motor[0], 0.0)
         outs, answer = answers(len(read.rows))
-        done, status = st.walk(model.fixed, model.layout, memory, heights, model.laws, read.rows, outs, True)
+        done, status = st.step_rows(
+            model.fixed, model.layout, memory, heights, model.laws, read.rows, outs, True
+        )
         if status != STATUS_OK:
             at = read.time[min(done, len(outs) - 1)]
             raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")

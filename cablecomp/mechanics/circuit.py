@@ -74,10 +74,10 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
     unit = d.cables[first_l + count - 1].T0
     lowest = floor if pull >= 0.0 else floor - pull
     if closed:
-        guess = last_l.kept - last_l.reference * pull + last_l.miss
+        guess = last_l.unloaded - last_l.share * pull + last_l.miss
         tension = max(guess, lowest)
     else:
-        tension = last_l.reference * last_l.pretension
+        tension = unit * last_l.pretension
         if tension + pull <= floor:
             return Solved(x, 0.0, STATUS_SLACK)
     low, high = lowest, 1e300
@@ -151,13 +151,13 @@ def circuit_commit(d: Drive, laws: Floats, ic: int) -> None:
         share = a_h / (a_h + a_l)
         last_h, last_l = d.states[first_h + count - 1], d.states[first_l + count - 1]
         pull = last_h.tension - last_l.tension
-        miss = last_l.tension - (last_l.kept - last_l.reference * pull)
+        miss = last_l.tension - (last_l.unloaded - last_l.share * pull)
         before = last_l.miss_old
         last_l.miss_old = miss
         # what the last two guesses missed in one direction, the next will miss too
         last_l.miss = 0.0 if miss * before <= 0.0 else (miss if abs(miss) < abs(before) else before)
-        last_l.kept = last_l.tension + share * pull
-        last_l.reference = share
+        last_l.unloaded = last_l.tension + share * pull
+        last_l.share = share
     for chain in range(circuit.chains):
         for j in range(count):
             cable_commit(d, laws, circuit.first[chain] + j)

@@ -61,7 +61,7 @@ def drop_cut_short(folder: Path) -> int:
 drop_cut_short(CACHE)
 
 
-def is_compiled(function: str = "walk") -> bool:
+def is_compiled(function: str = "step_rows") -> bool:
     """True if an earlier run left a function of these very sources on disk as machine code."""
     return any(CACHE.rglob(f"*.{function}-*.nbi"))
 

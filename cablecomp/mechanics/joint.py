@@ -1,4 +1,8 @@
-"""The whole joint: circuits in series, terms of further physics, one step per sample."""
+"""The whole joint: circuits in series, terms of further physics, one step per sample.
+
+`joint_solve` finds the joint under a load, `joint_commit` makes the solution the state; `observer/stepper.py` calls
+both. `d` holds the joint's records by name (`records.py`); `laws` is None for a plain drive.
+"""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def _members(builder: Any, kind: Any, value: Any) -> Any:
         yield from _members(builder, member, part)
 
 
-call_walk = _caller(types.UniTuple(types.int64, 2))
+call_step_rows = _caller(types.UniTuple(types.int64, 2))
 call_bounds_step = _caller(types.UniTuple(types.float64, 2))
 
 

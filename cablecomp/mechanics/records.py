@@ -115,8 +115,8 @@ STATE = record(
         ("stiffness", "f8"),  # factor on EA
         ("offset", "f8"),  # length wound up between the drums
         ("error", "f8"),  # bound on the error of the stretch that merging made
-        ("kept", "f8"),  # warm start of the solver: T_l + share M/R,
-        ("reference", "f8"),  # the share; in an open circuit T0
+        ("unloaded", "f8"),  # warm start of a closed circuit: T_l + share M/R, its tension without load,
+        ("share", "f8"),  # and the share of a load that eases it
         ("side", "f8"),  # with a guide: stretch of the input side,
         ("guide_end", "f8"),  # end values of the guide,
         ("guide_far", "f8"),

@@ -57,8 +57,8 @@ def joint_start(
                 state.shaft_in = shaft
                 state.shaft = after
                 state.pretension = state.stiffness = 1.0
-                state.tension = state.tension_in = state.kept = cable.T0
-                state.reference = 0.5 if circuit.chains == 2 else cable.T0
+                state.tension = state.tension_in = state.unloaded = cable.T0
+                state.share = 0.5
                 shaft = after
         angle *= circuit.ratio
         rigid *= circuit.ratio

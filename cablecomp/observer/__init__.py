@@ -1,6 +1,7 @@
 """The online state of a joint: init, step, peek, snapshot, bounds, erasing history.
 
-Imports effects, the kernel and the configuration. Start reading at `observer.py`.
+Imports effects, the kernel and what lies below. Start reading at `observer.py`, the Python side; what each sample runs
+through is `stepper.py`.
 """
 
 from cablecomp.observer.erase import ErasePlan, plan_erase

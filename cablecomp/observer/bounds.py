@@ -54,13 +54,13 @@ class BoundPair:
         return float(low), float(high)
 
     def run(
-        self, walk_at: int, joint: Arrays, rows: Floats, outs: Floats, interval: Floats
+        self, step_rows_at: int, joint: Arrays, rows: Floats, outs: Floats, interval: Floats
     ) -> tuple[int, int]:
-        """Step the observer's own state (by `walk`, whose machine code lies at `walk_at`) and the bounds
+        """Step the observer's own state (by `step_rows`, whose machine code lies at `step_rows_at`) and the bounds
         through rows of readings; `interval` gets lowest and highest joint angle. Returns rows done and the
         status that stopped it."""
         return run_bounded(
-            walk_at, self.compile(joint), joint, rows, outs, self.numbers, self._low, self._up, interval
+            step_rows_at, self.compile(joint), joint, rows, outs, self.numbers, self._low, self._up, interval
         )
 
     def compile(self, joint: Arrays) -> int:

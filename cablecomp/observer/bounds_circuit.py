@@ -223,7 +223,7 @@ def circuit_interval(
             theta_low, theta_high = closed_interval(b, nominal, laws, ic, low, up, pull, x)
         else:
             last = first_h + count - 1
-            tension = nominal.states[last].reference * low.drive.states[last].pretension + pull
+            tension = nominal.cables[last].T0 * low.drive.states[last].pretension + pull
             highest = chain_bound(b, nominal, laws, up, first_h, count, tension, x.x_in, x.x_out, x.eps)
             theta_high = highest.value + highest.margin
             lowest = chain_bound(b, nominal, laws, low, first_h, count, tension, x.x_in, x.x_out, x.eps)

@@ -24,11 +24,12 @@ Done = tuple[int, int]
 
 
 class CompiledJoint:
-    """What `Observer` calls for every sample. `memory` and `heights` are the state.
+    """What `Observer` calls for every sample. The state is `memory`, all of its numbers, and `heights`, how many points
+    of each tension profile are in use.
 
     `put_sample(time, motor, load, joint, temperature)` writes what is read next, `put_asked` the first three of it;
-    then `walk(commit)` or `walk_inverse(commit)` steps it, and `said` is the answer. `walk_ahead()` commits that row,
-    and predicts a second, whose first three `put_ahead` wrote.
+    then `step(commit)` or `step_inverse(commit)` steps it, and `answer` is what comes of it, a row `ANSWER`.
+    `step_and_predict()` commits that row, and predicts a second, whose first three `put_ahead` wrote.
 
     Every array is written in place for good, so that each call is bound to its arguments once.
     """
@@ -42,13 +43,13 @@ class CompiledJoint:
         self._other = read.other[0, :channels]
         self._rows = read.rows
         self._outs, answer = answers(2)
-        self.said, self.joint, self.strength = self._outs[0], answer.joint, answer.strength
+        self.answer, self.joint, self.strength = self._outs[0], answer.joint, answer.strength
         self._one = (*self.arrays, self._rows[:1], self._outs[:1])
         cells = read.rows.data.cast("B")
         self.put_sample = partial(put_sample, cells, 0)
         self.put_asked = partial(put_asked, cells, 0)
         self.put_ahead = partial(put_asked, cells, read.rows.strides[0])
-        self.walk = partial(st.walk, *self._one)
+        self.step = partial(st.step_rows, *self._one)
         self._ahead: Callable[[], Done] | None = None
         self._address = 0
 
@@ -58,14 +59,14 @@ class CompiledJoint:
         for k, value in enumerate(values[: len(self._other)]):
             self._other[k] = value
 
-    def walk_inverse(self, commit: bool) -> Done:
-        """`walk` with the load found from both encoders."""
-        return st.walk_inverse(self.address(), *self._one, commit)
+    def step_inverse(self, commit: bool) -> Done:
+        """`step` with the load found from both encoders."""
+        return st.step_rows_inverse(self.address(), *self._one, commit)
 
-    def walk_ahead(self) -> Done:
+    def step_and_predict(self) -> Done:
         """Commit the first row and predict the second: the status of each."""
         if self._ahead is None:
-            self._ahead = partial(st.walk_ahead, self._located(), self.arrays.laws)
+            self._ahead = partial(st.step_and_predict, self._located(), self.arrays.laws)
         return self._ahead()
 
     def run(
@@ -78,13 +79,13 @@ class CompiledJoint:
         known = len(rows), STATUS_OK
         if inverse:
             before = self.memory.copy(), self.heights.copy()
-            known = st.walk_inverse(self.address(), *self.arrays, rows, outs, True)
+            known = st.step_rows_inverse(self.address(), *self.arrays, rows, outs, True)
             if bounds is None:
                 return known
             # every row's load is known by now: once more, with the bounds
             self.memory[:], self.heights[:] = before
         if bounds is None:
-            return st.walk(*self.arrays, rows, outs, True)
+            return st.step_rows(*self.arrays, rows, outs, True)
         ended = bounds.run(self.address(), self.arrays, rows[: known[0]], outs, interval)
         return ended if ended[1] != STATUS_OK else known
 
@@ -98,9 +99,9 @@ class CompiledJoint:
         self.memory[:], self.heights[:] = self.model.memory, self.model.heights
 
     def address(self) -> int:
-        """Where the machine code of `walk` lies for these arrays."""
+        """Where the machine code of `step_rows` lies for these arrays."""
         if self._address == 0:
-            self._address = kernel_address(st.walk, *self._one, True)
+            self._address = kernel_address(st.step_rows, *self._one, True)
         return self._address
 
     def compliance(self) -> float:
@@ -132,7 +133,7 @@ class CompiledJoint:
 
     def _located(self) -> Ints:
         at = np.zeros(1, PLACES)
-        at["walk"] = self.address()
+        at["step_rows"] = self.address()
         located = {**self.arrays._asdict(), "rows": self._rows, "outs": self._outs}
         for name in located.keys() & set(PLACES.names or ()):
             at[name] = located[name].ctypes.data, located[name].shape[-1]

@@ -24,7 +24,7 @@ from cablecomp.signals import Sample
 def compile_first(config: JointConfig, bounds: bool) -> None:
     """Have what a joint's replay calls compiled and kept on disk, unless it is; the process beside may fail, its part
     is compiled later then."""
-    if is_compiled("walk") and (not bounds or is_compiled("bounds_step")):
+    if is_compiled("step_rows") and (not bounds or is_compiled("bounds_step")):
         return
     with tempfile.TemporaryDirectory() as folder:
         beside = _beside(config, Path(folder)) if bounds and is_bounded(config) else None

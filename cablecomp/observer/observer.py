@@ -60,8 +60,8 @@ class Observer:
         """Commit one sample and say what the joint does."""
         fresh = self._read(sample)
         if self._inverts:
-            return self._taken(sample, self._joint.walk_inverse(True)[1], fresh)
-        return self._taken(sample, self._joint.walk(True)[1], fresh)
+            return self._taken(sample, self._joint.step_inverse(True)[1], fresh)
+        return self._taken(sample, self._joint.step(True)[1], fresh)
 
     def step_ahead(
         self, sample: Sample, time_s: float, motor_position_rad: float, joint_torque_Nm: float
@@ -72,7 +72,7 @@ class Observer:
             return self.step(sample), NAN
         fresh = self._read(sample)
         self._joint.put_ahead(time_s, motor_position_rad, joint_torque_Nm)
-        status, ahead = self._joint.walk_ahead()
+        status, ahead = self._joint.step_and_predict()
         estimate = self._taken(sample, status, fresh)
         if ahead != STATUS_OK:
             return estimate, NAN
@@ -81,13 +81,13 @@ class Observer:
     def peek(self, sample: Sample) -> Estimate:
         """Predict the joint for a sample (for instance the load expected next) and commit nothing."""
         fresh = self._read(sample)
-        return self._peeked(sample, self._joint.walk(False)[1], fresh)
+        return self._peeked(sample, self._joint.step(False)[1], fresh)
 
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the
         last sample."""
         self._joint.put_asked(time_s, motor_position_rad, joint_torque_Nm)
-        _, status = self._joint.walk(False)
+        _, status = self._joint.step(False)
         if status != STATUS_OK:
             self._refuse(status, time_s, False)
         return float(self._joint.joint[0]) - self._ratio * motor_position_rad
@@ -109,19 +109,19 @@ class Observer:
         if done:
             self._last_time = float(read.time[done - 1])
         if status != STATUS_OK:
-            self._joint.said[:] = outs[done]
+            self._joint.answer[:] = outs[done]
             self._refuse(status, read.time[done], fresh and done == 0, done)
         return estimates(answer, interval[:, 0], interval[:, 1], self._ratio * read.motor)
 
     def inverse(self, sample: Sample) -> Estimate:
         """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
         fresh = self._read(sample)
-        return self._peeked(sample, self._joint.walk_inverse(False)[1], fresh)
+        return self._peeked(sample, self._joint.step_inverse(False)[1], fresh)
 
     def step_inverse(self, sample: Sample) -> Estimate:
         """As `inverse`, and commits the sample with the torque found."""
         fresh = self._read(sample)
-        return self._taken(sample, self._joint.walk_inverse(True)[1], fresh)
+        return self._taken(sample, self._joint.step_inverse(True)[1], fresh)
 
     # --- state ----------------------------------------------------------------------------------------------------
 
@@ -301,7 +301,7 @@ class Observer:
 
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
         # in the order of `Answer`, which itself would cost 0.4 us of a step's 4
-        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque, _ = self._joint.said.tolist()
+        joint, drive, load, tension_h, tension_l, _, _, _, motor_torque, _ = self._joint.answer.tolist()
         rigid = self._ratio * sample.motor_position_rad
         shift = joint - drive - rigid
         # made without Python's own call of its class, which took a third longer

@@ -34,10 +34,10 @@ put_asked = Struct("=3d").pack_into
 """The first three of them."""
 
 # Where a joint's arrays lie, each by its address and its length (of `rows` and `outs`: of one of them), and the machine
-# code of `walk` for them: handed over as one array, as every one more costs a call from Python 0.13 us.
+# code of `step_rows` for them: handed over as one array, as every one more costs a call from Python 0.13 us.
 PLACES = record(
     [
-        ("walk", "i8"),
+        ("step_rows", "i8"),
         *((name, "i8", (2,)) for name in ("fixed", "layout", "memory", "heights", "rows", "outs")),
     ]
 )

@@ -17,7 +17,7 @@ from cablecomp.mechanics.joint import (
     strength_used,
     terms_sane,
 )
-from cablecomp.mechanics.pointer import call_walk, floats_at, ints_at
+from cablecomp.mechanics.pointer import call_step_rows, floats_at, ints_at
 from cablecomp.mechanics.profile import Floats, Ints, copy_floats
 from cablecomp.mechanics.records import IN, OTHERS
 from cablecomp.mechanics.status import (
@@ -139,7 +139,7 @@ def put_back(d: Drive, memory: Floats) -> None:
 
 
 @kernel
-def walk(
+def step_rows(
     fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats,
     rows: Floats, outs: Floats, commit: bool,
 ) -> tuple[int, int]:  # fmt: skip
@@ -166,11 +166,11 @@ def walk(
 
 
 @njit
-def walk_ahead(places: Ints, laws: Floats) -> tuple[int, int]:
+def step_and_predict(places: Ints, laws: Floats) -> tuple[int, int]:
     """Commit the first of a joint's two rows, then predict the second, whose time, motor and load are given and all
     else is the first's; returns both statuses.
 
-    One call for what a loop asks for in every cycle; `laws` as in `walk`.
+    One call for what a loop asks for in every cycle; `laws` as in `step_rows`.
     """
     at = places.view(PLACES)[0]
     joint = Arrays(
@@ -182,21 +182,21 @@ def walk_ahead(places: Ints, laws: Floats) -> tuple[int, int]:
     )
     rows = numba.carray(floats_at(at.rows[0]), (2, at.rows[1]))
     outs = numba.carray(floats_at(at.outs[0]), (2, at.outs[1]))
-    _, status = call_walk(at.walk, (joint, rows[:1], outs[:1], True))
+    _, status = call_step_rows(at.step_rows, (joint, rows[:1], outs[:1], True))
     if status != STATUS_OK:
         return status, status
     last, asked = readings_in(rows[0]), readings_in(rows[1])
     asked.joint, asked.temperature = last.joint, last.temperature
     for j in range(OTHERS):
         asked.other[j] = last.other[j]
-    _, ahead = call_walk(at.walk, (joint, rows[1:], outs[1:], False))
+    _, ahead = call_step_rows(at.step_rows, (joint, rows[1:], outs[1:], False))
     return status, ahead
 
 
 @inner_kernel
-def find_load(walk_at: int, joint: Arrays, rows: Floats, outs: Floats) -> int:
+def find_load(step_rows_at: int, joint: Arrays, rows: Floats, outs: Floats) -> int:
     """The load [N m] under which the joint encoder would read the only row's `joint`, by Newton's method;
-    written to its `load`. `walk_at`: where the machine code of `walk` lies.
+    written to its `load`. `step_rows_at`: where the machine code of `step_rows` lies.
 
     Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
     are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a load that the joint
@@ -213,7 +213,7 @@ def find_load(walk_at: int, joint: Arrays, rows: Floats, outs: Floats) -> int:
     taken = 0.0  # the last load that the joint could take
     for _ in range(200):
         read.load = load
-        _, status = call_walk(walk_at, (joint, rows, outs, False))
+        _, status = call_step_rows(step_rows_at, (joint, rows, outs, False))
         if status in (STATUS_SLACK, STATUS_UNWOUND, STATUS_DIVERGED):
             reach *= 2.0
             if status == STATUS_SLACK or load < taken:
@@ -245,17 +245,17 @@ def find_load(walk_at: int, joint: Arrays, rows: Floats, outs: Floats) -> int:
 
 
 @kernel
-def walk_inverse(
-    walk_at: int, fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats,
+def step_rows_inverse(
+    step_rows_at: int, fixed: Floats, layout: Ints, memory: Floats, heights: Ints, laws: Floats,
     rows: Floats, outs: Floats, commit: bool,
 ) -> tuple[int, int]:  # fmt: skip
-    """As `walk`, with every row's load found from both encoders."""
+    """As `step_rows`, with every row's load found from both encoders."""
     joint = Arrays(fixed, layout, memory, heights, laws)
     for k in range(rows.shape[0]):
         row, out = rows[k : k + 1], outs[k : k + 1]
-        status = find_load(walk_at, joint, row, out)
+        status = find_load(step_rows_at, joint, row, out)
         if status == STATUS_OK:
-            _, status = call_walk(walk_at, (joint, row, out, commit))
+            _, status = call_step_rows(step_rows_at, (joint, row, out, commit))
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK

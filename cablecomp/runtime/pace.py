@@ -44,8 +44,7 @@ Cost = Callable[[Sequence[Pace]], float]
 def motion(config: JointConfig, period_s: float) -> list[Sample]:
     """Both pulleys turn and the load reverses, within what the joint bears; all sources of the load agree."""
     drive = config.drive
-    last = drive.stage[-1]
-    load_Nm = 0.4 * last.pretension_N * last.output_radius_m
+    load_Nm = 0.4 * drive.stage[-1].pretension_moment_Nm
     turn_rad = min(0.2, 0.1 * min(min(s.wrap_input_rad, s.wrap_output_rad) for s in drive.stage))
     plain = config.model_copy(
         update={"observer": config.observer.model_copy(update={"load": "joint_torque"})}

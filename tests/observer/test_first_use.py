@@ -15,15 +15,15 @@ def test_only_what_the_cache_lacks_is_taken_over(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(first_use, "CACHE", cache)
     for place in (made, cache):
         (place / "observer").mkdir(parents=True)
-        for name in ("walk-1.py.nbi", "walk-1.py.1.nbc"):
+        for name in ("step_rows-1.py.nbi", "step_rows-1.py.1.nbc"):
             (place / "observer" / name).write_text(place.name)
     for name in ("bounds_step-2.py.nbi", "bounds_step-2.py.1.nbc", "bounds_step-2.py.2.nbc"):
         (made / "observer" / name).write_text("made")
     first_use._take_over(made)
     found = {p.name: p.read_text() for p in (cache / "observer").iterdir()}
     assert found == {
-        "walk-1.py.nbi": "cache",
-        "walk-1.py.1.nbc": "cache",
+        "step_rows-1.py.nbi": "cache",
+        "step_rows-1.py.1.nbc": "cache",
         "bounds_step-2.py.nbi": "made",
         "bounds_step-2.py.1.nbc": "made",
         "bounds_step-2.py.2.nbc": "made",
