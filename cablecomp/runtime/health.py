@@ -54,6 +54,7 @@ _WORDS: Final = (
 _FAR = 5.0  # times the joint residual's limit: no joint moves there in a few samples
 _FAR_S = 0.003
 _FAR_PERIODS = 2.5  # at least: of a slow loop two samples would be enough
+_SAME = 3  # readings that repeat the one before: fewer come from a drive that stood still itself
 _STILL_S = 0.008
 _STILL_PERIODS = 7.5
 
@@ -138,6 +139,7 @@ class Health:
         self._shake_square = inf if o.shake_Nm is None else o.shake_Nm**2
         self._motor_changed_s = nan
         self._motor_heard_s = inf
+        self._motor_same = 0
         self._target_then = nan
         self._stuck_since_s = nan
 
@@ -220,9 +222,12 @@ class Health:
         if (leads or self._lags.begun) and self._lags.step(leads, now_s):
             flags |= MOTOR_LAGS
         if motor.changed_s != self._motor_changed_s or self._target_then != self._target_then:
-            self._motor_changed_s, self._target_then = motor.changed_s, target_rad
-        elif abs(target_rad - self._target_then) > self._stuck_rad and motor.arrived_s > self._motor_heard_s:
-            flags |= MOTOR_STUCK  # heard since the target went there; a silent motor is stale, not stuck
+            self._motor_changed_s, self._target_then, self._motor_same = motor.changed_s, target_rad, 0
+        elif motor.arrived_s > self._motor_heard_s:
+            # a silent motor is stale, not stuck, and one that was held up may say the same again
+            self._motor_same += 1
+            if self._motor_same >= _SAME and abs(target_rad - self._target_then) > self._stuck_rad:
+                flags |= MOTOR_STUCK
         self._motor_heard_s = motor.arrived_s
         return flags
 

@@ -99,7 +99,18 @@ def test_a_motor_is_stuck_once_it_is_heard_to_stand_while_its_target_went_far() 
     assert fed.cycle(target=0.5 - 1.1 / 64, torque=0.0, joint=0.0).flags == 0  # not heard
     moved = {**ALL, "motor": 0.001}
     assert fed.cycle(target=0.9, **moved).flags == 0
-    assert fed.cycle(target=0.9 + 1.1 / 64, **moved).fatal
+    assert [fed.cycle(target=0.9 + 1.1 / 64, **moved).fatal for _ in range(3)] == [False, False, True]
+
+
+def test_a_motor_that_was_held_up_and_says_the_same_again_is_not_stuck() -> None:
+    """Silent while its target went far, it repeats itself twice and follows; the third time it is stuck."""
+    fed, moved = Fed(options(stuck_rad=1 / 64)), {**ALL, "motor": 0.001}
+    fed.cycle(target=0.5, **ALL)
+    for _ in range(10):
+        assert not fed.cycle(target=0.5 + 4 / 64, torque=0.0, joint=0.0).flags & h.MOTOR_STUCK
+    for told in (ALL, ALL, moved, moved, moved):
+        assert fed.cycle(target=0.5 + 4 / 64, **told).flags == 0
+    assert [fed.cycle(target=0.5 + 6 / 64, **moved).flags for _ in range(2)] == [h.MOTOR_STUCK] * 2
 
 
 def test_a_motor_that_follows_is_neither_stuck_nor_jumping_however_coarsely_its_drive_tells() -> None:
@@ -120,14 +131,14 @@ def test_a_motor_that_follows_is_neither_stuck_nor_jumping_however_coarsely_its_
 def test_a_target_that_is_none_yet_says_nothing_about_the_motor(asked: float) -> None:
     """Stuck counts from the first target on, be there cycles without one before it or not."""
     fed = Fed(options(stuck_rad=1 / 64))
-    for target in (nan, nan, asked, 0.5, 0.5):
+    for target in (nan, nan, asked, 0.5, 0.5, 0.5):
         assert fed.cycle(target=target, **ALL).flags == 0
     assert fed.cycle(target=0.5 + 1.1 / 64, **ALL).flags == h.MOTOR_STUCK
 
 
 def test_a_motor_may_trail_by_two_steps_of_its_drive_more_than_stated() -> None:
     fed = Fed(options(stuck_rad=1 / 64), motor_step_rad=1 / 64)
-    for target, flags in ((0.5, 0), (0.5 + 3.0 / 64, 0), (0.5 + 3.1 / 64, h.MOTOR_STUCK)):
+    for target, flags in (*[(0.5, 0)] * 3, (0.5 + 3.0 / 64, 0), (0.5 + 3.1 / 64, h.MOTOR_STUCK)):
         assert fed.cycle(target=target, **ALL).flags == flags
 
 
