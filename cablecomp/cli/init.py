@@ -65,14 +65,9 @@ def init(
             raise InputError(
                 "init: nobody to ask; give --set KEY=VALUE or --from FILE (cablecomp init --keys lists the keys)"
             )
-<<<<<<< HEAD
+        _refuse_to_overwrite(out / "joint.toml")
         values = _asked()
     draft = validated(Draft, values, "init" if answers is None else str(answers))
-=======
-        _refuse_to_overwrite(out / "joint.toml")
-        told = _asked()
-    draft = validated(Draft, told, "init" if answers is None else str(answers))
->>>>>>> f6a0ae2 (init asks again for what will not do, and a Ctrl-D is one line)
     files = {"joint.toml": draft_text(draft), **_link(draft)}
     for name, text in files.items():
         _refuse_to_overwrite(out / name, text)
