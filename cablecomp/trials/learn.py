@@ -3,8 +3,8 @@ was not learnt on.
 
 Each RUN is the folder of a `cablecomp prove` that has ended: its scoreboard holds the evidence of every effect
 that was weighed, and whether it was right. The model is logistic regression with a ridge (weights of
-standardised features; the bias is free). What is said of it comes from folds that leave out whole laws:
-`bearing_friction:dahl` is judged by what other laws taught.
+standardised features; the bias is free), fitted by own code: scikit-learn would be asked for ten lines alone. What is
+said of it comes from folds that leave out whole laws: `bearing_friction:dahl` is judged by what other laws taught.
 """
 
 from __future__ import annotations
@@ -63,8 +63,7 @@ class Checked:
 
 
 def fit_logistic(features: Floats, right: Floats, ridge: float, steps: int = 50) -> tuple[float, Floats]:
-    """Bias and weights that minimise -log likelihood + ridge/2 |w|^2, by iteratively reweighted least squares;
-    own code, for scikit-learn would be asked for these ten lines alone.
+    """Bias and weights that minimise -log likelihood + ridge/2 |w|^2, by iteratively reweighted least squares.
 
     `features` (n, k), standardised; `right` (n,) of 0 and 1; with p = 1/(1+exp(-(b+Xw))), each step solves
     (X'WX + R) d = X'(y-p) - R w, W = diag p(1-p) (P. McCullagh and J. Nelder, Generalized Linear Models, 1989).

@@ -1,4 +1,7 @@
-"""What a mismatch may depend on: covariates out of a recording's own channels."""
+"""What a mismatch may depend on: covariates out of a recording's own channels.
+
+Reversals are counted by own code: SciPy's peaks look at prominence, not at how far a channel has turned back so far.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Cut a bench recording into load ramps and holds, under noise (thesis, Appendix A.2: pump on, pump off)."""
+"""Cut a bench recording into load ramps and holds, under noise (thesis, Appendix A.2: pump on, pump off).
+
+Own line fit: one window for the whole recording, as wide as a ramp's slope needs, for the bench's errors are worked out
+from that window; `signal/smoothing.py` takes each place by itself.
+"""
 
 from __future__ import annotations
 
