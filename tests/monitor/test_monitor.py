@@ -28,6 +28,17 @@ WRAP = WrapProfile(
 )
 
 
+NARROWEST = """() => {
+  window.narrowest = 1e9;
+  const draws = CanvasRenderingContext2D.prototype, fillText = draws.fillText;
+  draws.fillText = function (text, x, y) {
+    if (this.textAlign === "right") narrowest = Math.min(narrowest, x - this.measureText(text).width);
+    fillText.call(this, text, x, y);
+  };
+}"""
+"""Keeps the least left end [px] of an upright axis' labels, beside which its title stands."""
+
+
 def made_up(k: int) -> Frame:
     """Frame number k of a joint under a swinging load."""
     load = float(np.sin(0.1 * k))
@@ -176,6 +187,9 @@ def test_a_recording_is_played(tmp_path: Path) -> None:
         page.wait_for_function("over && document.getElementById('play').textContent === 'play'")
         assert "a recording, 100 frames" in page.inner_text("#words")
         assert not page.is_visible("text=Timing")
+        page.evaluate(NARROWEST)
         page.click("#play")
         page.wait_for_function("at > 0 && at < 99")
+        page.wait_for_function("at === 99 && document.getElementById('play').textContent === 'play'")
+        assert page.evaluate("narrowest") > 15.0
     server.close()
