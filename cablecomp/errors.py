@@ -13,6 +13,10 @@ class InputError(CablecompError):
     """What the user gave is not acceptable: says what, where, what is accepted, what to do (exit code 2)."""
 
 
+class SlackError(InputError):
+    """A load beyond what an open circuit bears: the cable would hang slack."""
+
+
 class ConfigError(InputError):
     """Everything that is wrong with a configuration; `lines` holds one line for each error."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.effects import extend
 from cablecomp.effects.catalogue import other_channels
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.start import joint_start
@@ -66,7 +66,9 @@ class Simulator:
         )
         if status != STATUS_OK:
             at = read.time[min(done, len(outs) - 1)]
-            raise InputError(f"{recording.name}: at {at:g} s {REASONS[Refusal(status)]}")
+            why = Refusal(status)
+            refused = SlackError if why is Refusal.SLACK else InputError
+            raise refused(f"{recording.name}: at {at:g} s {REASONS[why]}")
         return Answer(*(column[before:] for column in answer))
 
     def _readings(self, recording: Evidence, kept: IntArray, before: int) -> Readings:

@@ -66,6 +66,20 @@ def test_a_stated_breaking_force_is_no_reason() -> None:
     assert bears(fitted(weak, 2.0))
 
 
+def test_a_cable_that_slackens_is_no_reason() -> None:
+    """An open circuit's cable hangs slack beyond R T0, whatever else the drive has: this one is loaded to 0.8 of that,
+    in the one direction and in the other."""
+    one = holding(None)
+    still = one.model_copy(update={"drive": one.drive.model_copy(update={"circuit": "open"})})
+    stage = still.drive.stage[0]
+    near_Nm = 0.8 * stage.output_radius_m * stage.pretension_N
+    fit = fitted(still, near_Nm)
+    torque = {k: 1.5 * v if k == "joint_torque_Nm" else v for k, v in fit.problem.evidence[0].columns.items()}
+    with pytest.raises(InputError, match="slacken"):
+        Observer(still).run(torque)
+    assert bears(fit)
+
+
 @pytest.mark.parametrize(
     ("effect", "amount", "told"),
     [

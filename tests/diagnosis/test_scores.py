@@ -126,8 +126,8 @@ def test_the_confidence_set_keeps_the_best_and_drops_what_is_clearly_worse() -> 
 
 def test_models_are_chosen_in_shares_that_add_up() -> None:
     rng = np.random.default_rng(7)
-    good = 1.0 + 0.2 * rng.standard_normal(BLOCKS)
-    shares = selected_in({"good": good, "poor": 0.2 * rng.standard_normal(BLOCKS)}, rng)
+    poor = 1.0 + 0.2 * rng.standard_normal(BLOCKS)
+    shares = selected_in({"good": 0.2 * rng.standard_normal(BLOCKS), "poor": poor}, rng)
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares["good"] > 0.99
     assert selected_in({}, rng) == {}

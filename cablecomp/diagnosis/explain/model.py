@@ -15,7 +15,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, le
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
 from cablecomp.estimation.parameter import Parameter as Free
@@ -171,7 +171,7 @@ def least(amount: Parameter, config: JointConfig) -> float:
 
 def bears(fit: Fit) -> bool:
     """Whether the fitted drive can be run at `LIMITS.beyond` times the loads that it was fitted to: what falls apart
-    just beyond its data predicts nothing there."""
+    just beyond its data predicts nothing there. An open circuit whose cable slackens says what no law can change."""
     problem = fit.problem
     stages = tuple(s.model_copy(update={"breaking_force_N": None}) for s in problem.config.drive.stage)
     drive = problem.config.drive.model_copy(update={"stage": stages})
@@ -180,6 +180,8 @@ def bears(fit: Fit) -> bool:
         for times in LIMITS.beyond:
             further = tuple(_loaded(problem.config, e, times) for e in problem.evidence)
             replace(unbroken, evidence=further).misfits(fit.x)
+    except SlackError:
+        return True
     except InputError:
         return False
     return True

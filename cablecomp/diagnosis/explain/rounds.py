@@ -18,6 +18,7 @@ from cablecomp.diagnosis.explain.model import (
     Round,
     Term,
     Tried,
+    common,
     finely,
     is_told,
     loss,
@@ -27,7 +28,14 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
-from cablecomp.diagnosis.explain.scores import demanded, left_out, scales, score_difference, selected_in
+from cablecomp.diagnosis.explain.scores import (
+    block_losses,
+    demanded,
+    left_out,
+    scales,
+    score_difference,
+    selected_in,
+)
 from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
@@ -219,7 +227,9 @@ def _compared(
         )
         for m in models
     }
-    shares = selected_in({n: v.by_block for n, v in differences.items()}, rng)
+    size = common(models, at.groups) if models else np.empty(0)
+    losses = {m.name: m.by_thinning * block_losses(m.left_out, size, at.groups) for m in models}
+    shares = selected_in(losses, rng)
     added = len(at.model.terms)
     tried = [Tried(m.terms[added], m, differences[m.name], shares[m.name]) for m in models]
     return sorted(tried, key=lambda t: -t.difference.gain)

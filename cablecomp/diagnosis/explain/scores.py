@@ -138,14 +138,12 @@ class ScoreDifference:
     """How much better one model predicts than another.
 
     `gain`: share of the worse one's loss that it takes off. `z`: the difference over what the better one's own
-    remainder makes of it by chance. `z_blocks`: over its scatter between blocks. `by_block`: the difference of
-    each block.
+    remainder makes of it by chance. `z_blocks`: over its scatter between blocks.
     """
 
     gain: float
     z: float
     z_blocks: float
-    by_block: FloatArray
 
 
 def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> ScoreDifference:
@@ -170,7 +168,6 @@ def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> S
         total / max(float(np.sum(lb)), 1e-300),
         total / max(noise, 1e-300),
         total / max(error, 1e-300),
-        difference,
     )
 
 
@@ -203,14 +200,14 @@ def demanded(step: ScoreDifference, first: bool = False) -> bool:
     return usual or large or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
 
 
-def selected_in(differences: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:
-    """Share of resampled bodies of blocks in which each model is the best."""
-    if not differences:
+def selected_in(losses: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:
+    """Share of resampled bodies of blocks in which each model is the best, by its losses per block."""
+    if not losses:
         return {}
-    names = list(differences)
-    table = np.stack([differences[n] for n in names])
+    names = list(losses)
+    table = np.stack([losses[n] for n in names])
     draws = rng.multinomial(table.shape[1], np.full(table.shape[1], 1.0 / table.shape[1]), LIMITS.resamples)
-    best = np.argmax(table @ draws.T, axis=0)
+    best = np.argmin(table @ draws.T, axis=0)
     return {n: float(np.mean(best == k)) for k, n in enumerate(names)}
 
 

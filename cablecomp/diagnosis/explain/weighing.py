@@ -21,9 +21,9 @@ from cablecomp.effects import Parameter
 from cablecomp.effects.catalogue import parameter_of
 from cablecomp.signal.smoothing import FloatArray
 
-ALONE = ScoreDifference(1.0, 99.0, 10.0, np.zeros(1))
+ALONE = ScoreDifference(1.0, 99.0, 10.0)
 """Of an effect without which the drive cannot follow the recordings."""
-NO_RIVAL = ScoreDifference(1.0, 10.0, 10.0, np.zeros(1))
+NO_RIVAL = ScoreDifference(1.0, 10.0, 10.0)
 """Of an effect in whose place nothing could be tried."""
 
 
