@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from turning import JOINT, recorded
@@ -10,15 +13,19 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.unseen import could_be_unseen
+from cablecomp.diagnosis.explain.screening import anchor, contribution
+from cablecomp.diagnosis.explain.unseen import _bound_of_phase, could_be_unseen
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT as ANGLE
-from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
 
-def bounds(moment_Nm: float) -> dict[str, float | None]:
-    """What is said of two recordings of a joint that lifts a weight."""
-    entry = EffectEntry(id="gravity_load", moment_Nm=moment_Nm, phase_rad=0.4)
+def bounds(entry: EffectEntry) -> dict[str, float | None]:
+    """What is said of two recordings of a joint with this effect."""
     lifting = JOINT.model_copy(update={"effect": (entry,)})
     loose = JOINT.model_copy(update={"tolerance": {"EA_N": 0.2, "pretension_N": 0.1, "mu_output": 0.3}})
     body = gather_body(loose, {f"a/{k}": recorded(lifting, seed=k) for k in (1, 2)})
@@ -28,11 +35,45 @@ def bounds(moment_Nm: float) -> dict[str, float | None]:
 
 
 @pytest.mark.parametrize("moment_Nm", [0.0, 0.01, 0.2])
-def test_what_is_there_lies_below_its_bound(moment_Nm: float) -> None:
-    """Whether or not it shows: 0.01 N m are three standard deviations, 0.2 N m are sixty."""
-    below = bounds(moment_Nm)["gravity_load"]
+@pytest.mark.parametrize("phase_rad", [0.4, 2.0, 3.6])
+def test_a_weight_lies_below_its_bound(moment_Nm: float, phase_rad: float) -> None:
+    """Whether or not it shows, and wherever it hangs: 0.01 N m are three standard deviations, 0.2 N m are sixty."""
+    below = bounds(EffectEntry(id="gravity_load", moment_Nm=moment_Nm, phase_rad=phase_rad))["gravity_load"]
     assert below is not None
-    assert moment_Nm < below < 2.0 * moment_Nm + 0.02
+    assert moment_Nm < below < 2.0 * moment_Nm + 0.04
+
+
+def test_no_phase_hides_below_the_bound() -> None:
+    """A weight at its bound shows by three deviations at least, wherever it hangs, and by no more at the worst place:
+    seen along a short way its two phases do nearly the same (seed 4)."""
+    rng = np.random.default_rng(4)
+    along, across = rng.standard_normal((2, 300))
+    made = [(0.2 * along, 0.1), (0.2 * (along + 0.2 * across), 0.1)]
+    nothing: Any = SimpleNamespace(fit=SimpleNamespace(residual=np.zeros(300)), beyond=lambda v: v)
+    below = _bound_of_phase(nothing, made)
+    assert below is not None
+    phase = np.linspace(0.0, np.pi, 2001)
+    shape = np.outer(made[0][0], np.cos(phase)) + np.outer(made[1][0], np.sin(phase))
+    seen = np.linalg.norm(below / 0.1 * shape, axis=0)
+    assert float(seen.min()) == pytest.approx(LIMITS.unseen, rel=1e-4)
+
+
+def test_what_an_inertia_does_is_asked_on_every_sample() -> None:
+    """The observer itself, with an inertia and without, on all samples of a quick motion: rows thinned by travel, of
+    which there are forty, know nothing of the swing between them."""
+    columns = recorded(seed=1)
+    e = gather(JOINT, "one", columns, "all", fine_rows=len(columns["time_s"]), judged_rows=40)
+    problem = Problem(JOINT, (), (e,), Weighing({ANGLE: 1e-4}, {}))
+    here = anchor(Fit(problem, np.empty(0), problem.residual(np.empty(0)), np.empty((len(e.rows), 0))))
+    (h,) = [h for h in hypotheses(JOINT, [e]) if h.name == "inertial_load"]
+    found = contribution(here, h, h.starts[0])
+    assert found is not None
+    d, size = found
+    heavy = JOINT.model_copy(update={"effect": (EffectEntry(id="inertial_load", inertia_kgm2=size),)})
+    swung = [Observer(c).run(e.columns)[ANGLE][e.rows] for c in (heavy, JOINT)]
+    wanted = (swung[0] - swung[1]) * e.weight / 1e-4
+    wanted -= wanted.mean()
+    assert float(np.std(d[: len(wanted)] - wanted)) < 0.1 * float(np.std(wanted))
 
 
 def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() -> None:

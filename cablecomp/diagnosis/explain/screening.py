@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -34,6 +35,11 @@ class Anchor:
     Q: FloatArray
     J: FloatArray
 
+    @cached_property
+    def rated(self) -> FloatArray | None:
+        """The residual with the drive run on every sample; None where it cannot be followed so."""
+        return self.fit.problem.finely().followed(self.fit.x)
+
     def step(self, v: FloatArray) -> FloatArray:
         """Where the anchor's parameters go, by a linear step, to make up for a residual v."""
         scale = np.sqrt(np.maximum(np.sum(self.J**2, axis=0), 1e-300))
@@ -48,10 +54,11 @@ class Anchor:
         return np.concatenate([v, np.zeros(self.J.shape[1])])
 
 
-def anchor(fit: Fit) -> Anchor:
-    """An anchor at a fit (or any evaluated point)."""
+def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
+    """An anchor at a fit (or any evaluated point); `reach`: share of the cost that a step by one in a parameter
+    costs."""
     count = fit.J.shape[1]
-    cost = np.sqrt(LIMITS.reach * 2.0 * fit.cost) * np.eye(count)
+    cost = np.sqrt(reach * 2.0 * fit.cost) * np.eye(count)
     J = np.concatenate([fit.J, cost])
     if not count:
         return Anchor(fit, np.empty((len(J), 0)), J)
@@ -202,13 +209,19 @@ def contribution(
 
 
 def _difference(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> FloatArray | None:
-    problem = here.fit.problem
+    """What the effect adds at these values. A law with rates is run on every sample, with it and without: rows thinned
+    by travel know no acceleration."""
+    problem, before = here.fit.problem, here.fit.residual
+    if h.effect.rates and not problem.fine:
+        if here.rated is None:
+            return None
+        problem, before = problem.finely(), here.rated
     joint = problem.config.model_copy(update={"effect": (*problem.config.effect, h.entry(values))})
     try:
         found = replace(problem, config=joint).followed(here.fit.x)
     except InputError:
         return None
-    return None if found is None else here.fit.residual - found
+    return None if found is None else before - found
 
 
 def _answer(

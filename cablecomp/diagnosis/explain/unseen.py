@@ -41,7 +41,7 @@ def could_be_unseen(
 ) -> tuple[list[dict[str, Any]], list[Hidden]]:
     """One row per effect: its amount is below `below` unless it hides in the least visible of its shapes; None
     = any size. Beside them the effects that calibration within its tolerances conceals."""
-    here = anchor(fit)
+    here = anchor(fit, reach=0.0)  # what a calibration within its tolerances may do, it may
     found, hidden = [], []
     held = {entry.id for entry in fit.problem.config.effect}
     for h in pool:
@@ -49,7 +49,7 @@ def could_be_unseen(
             continue
         shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
         made = [contribution(here, h, h.starts[k]) for k in shapes]
-        sizes = [None if m is None else _bound(here, *m, h.two_sided) for m in made]
+        sizes = _bounds(here, h, made)
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
         below = max(seen) if seen and len(seen) == len(sizes) else None
@@ -67,6 +67,28 @@ def could_be_unseen(
             behind = [_hidden(here, h, k, *m) for k, m in zip(shapes, made, strict=True) if m is not None]
             hidden += sorted((b for b in behind if b is not None), key=lambda b: -b.visible)[:1]
     return found, sorted(hidden, key=lambda b: -b.visible)[: LIMITS.hidden_most]
+
+
+def _bounds(
+    here: Anchor, h: Hypothesis, made: Sequence[tuple[FloatArray, float] | None]
+) -> list[float | None]:
+    """The bound of each shape whose contribution (what it does, of which size) is given; of a phase the one that shows
+    least."""
+    if not h.has_phase:
+        return [None if m is None else _bound(here, *m, h.two_sided) for m in made]
+    given = [m for m in made if m is not None]
+    return [_bound_of_phase(here, given) if len(given) == len(made) else None]
+
+
+def _bound_of_phase(here: Anchor, made: Sequence[tuple[FloatArray, float]]) -> float | None:
+    """As `_bound`, amount and phase being a pair (a cos, a sin): the pair's own length, and its standard deviation
+    along the phase that shows least."""
+    own = np.column_stack([here.beyond(d) / size for d, size in made])
+    u, s, vt = np.linalg.svd(own, full_matrices=False)
+    if s[-1] <= 1e-9 * max(abs(1.0 / size) for _, size in made):
+        return None
+    shown = vt.T @ ((u.T @ here.beyond(here.fit.residual)) / s)
+    return float(np.linalg.norm(shown) + LIMITS.unseen / s[-1])
 
 
 def _bound(here: Anchor, d: FloatArray, size: float, two_sided: bool) -> float | None:
