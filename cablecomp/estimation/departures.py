@@ -66,7 +66,7 @@ def _lines(recordings: Sequence[Evidence], loads: Sequence[FloatArray | float]) 
 
 def _least_absolute(A: FloatArray, b: FloatArray) -> FloatArray:
     """x of least sum |b - A x| (by least squares with weights 1/sqrt(|b - A x|)): what one value far off does not
-    move."""
+    move. Own code: `statsmodels`' quantile regression would bring pandas for these lines."""
     x = np.linalg.lstsq(A, b, rcond=None)[0]
     for _ in range(ROUNDS):
         w = 1.0 / np.sqrt(np.maximum(np.abs(b - A @ x), 1e-6 * float(np.abs(b).max()) + 1e-300))

@@ -1,4 +1,4 @@
-"""Bounded least squares from one or several starts, and what of a fit is kept.
+"""Bounded least squares from one start, and what of a fit is kept; several starts: `multi_start.py`.
 
 The derivative is our own, as SciPy's `jac="2-point"` would simulate every recording once for every parameter after each
 step: secants simulate none, known columns are kept, and a session's own parameter asks for its recordings alone.

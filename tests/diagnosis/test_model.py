@@ -8,7 +8,7 @@ from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
-from cablecomp.diagnosis.explain.model import bears, is_told, runs_away
+from cablecomp.diagnosis.explain.model import amount_resolved, bears, runs_away
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
@@ -96,7 +96,7 @@ def test_an_amount_is_told_from_none_by_what_is_plausible(
     effect: str, amount: dict[str, float], told: bool
 ) -> None:
     fit, h = beside(effect, amount)
-    assert is_told(fit, h) is told
+    assert amount_resolved(fit, h) is told
 
 
 @pytest.mark.parametrize(

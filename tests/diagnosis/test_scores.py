@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cablecomp.diagnosis.explain.scores import confidence_set, huber, left_out, score_difference, selected_in
+from cablecomp.diagnosis.explain.scores import (
+    huber,
+    left_out,
+    model_confidence_set,
+    score_difference,
+    selected_in,
+)
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.signal.smoothing import FloatArray
 
@@ -117,11 +123,11 @@ def test_the_confidence_set_keeps_the_best_and_drops_what_is_clearly_worse() -> 
         "as good": base + 0.05 * rng.standard_normal(BLOCKS),
         "worse": base + 3.0 + rng.standard_normal(BLOCKS),
     }
-    kept = confidence_set(losses, rng)
+    kept = model_confidence_set(losses, rng)
     assert "best" in kept
     assert "as good" in kept
     assert "worse" not in kept
-    assert confidence_set({"alone": base}, rng) == ("alone",)
+    assert model_confidence_set({"alone": base}, rng) == ("alone",)
 
 
 def test_models_are_chosen_in_shares_that_add_up() -> None:

@@ -116,7 +116,7 @@ def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
-def most_told(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hypothesis:
+def best_resolved(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hypothesis:
     """The same effect by that of its amounts of which the fit found most: all of them are free in it."""
     same = [h for h in pool if (h.effect.id, h.channel) == (term.effect.id, term.channel)]
     values = fit.values
@@ -128,7 +128,7 @@ def most_told(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hypothe
     return max(same, key=share) if len(same) > 1 else term
 
 
-def is_told(fit: Fit, term: Term) -> bool:
+def amount_resolved(fit: Fit, term: Term) -> bool:
     """Whether an effect's own amount is more than none: a guide without friction is free cable, and yields as such.
     What depends on a condition may be none where that is none."""
     found = _amount(fit, term)

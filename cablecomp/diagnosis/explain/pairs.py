@@ -14,11 +14,12 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, solve
+from cablecomp.estimation.multi_start import lowest_by_session
 from cablecomp.estimation.parameter import own_of
 from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.standing import PRETENSION
 from cablecomp.signal.smoothing import FloatArray
 
-PRETENSION: Final = "pretension_N"
 FACTORS: Final = np.geomspace(0.1, 4.0, 9)
 """A session's pretension over the common one, at first."""
 AMOUNTS: Final = (0.3, 1.0)
@@ -62,35 +63,13 @@ def _scanned(
     problem: Problem, values: Mapping[str, float], pretension_N: float
 ) -> tuple[float, FloatArray] | None:
     """(cost, x) with the best of `FACTORS` for each session: what the pretension of one does, its own rows tell."""
-    at = [p.session for p in problem.parameters]
-    found = []
-    for factor in FACTORS:
-        x = np.array(
+    starts = [
+        np.array(
             [
                 p.x(factor * pretension_N if p.session else values.get(p.name, p.start))
                 for p in problem.parameters
             ]
         )
-        r = problem.followed(x)
-        if r is not None:
-            found.append((x, _by_session(problem, r)))
-    if not found:
-        return None
-    costs = np.stack([c for _, c in found])
-    best = np.argmin(costs, axis=0)
-    x = found[0][0].copy()
-    for k, s in enumerate(problem.sessions):
-        for j in [j for j, owner in enumerate(at) if owner == s]:
-            x[j] = found[int(best[k])][0][j]
-    return float(np.sum(costs[best, np.arange(costs.shape[1])])), x
-
-
-def _by_session(problem: Problem, residual: FloatArray) -> FloatArray:
-    """Half the sum of squares of each session's rows."""
-    place = {s: k for k, s in enumerate(problem.sessions)}
-    total = np.zeros(len(place))
-    for c, span in problem.spans().items():
-        owners = problem.owners(c)
-        mine = np.array([place[e.session] for e in problem.evidence])[owners]
-        total += 0.5 * np.bincount(mine, residual[span] ** 2, minlength=len(place))
-    return total
+        for factor in FACTORS
+    ]
+    return lowest_by_session(problem, starts)

@@ -15,9 +15,9 @@ from cablecomp.diagnosis.explain.model import Model, placed
 from cablecomp.diagnosis.explain.scores import (
     ScoreDifference,
     block_losses,
-    confidence_set,
     left_out,
     left_out_linearly,
+    model_confidence_set,
     scales,
     score_difference,
 )
@@ -78,7 +78,7 @@ def rivals(
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         differences[a.hypothesis.name] = score_difference(model.left_out, other.left_out, groups)
         losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
-    kept = confidence_set(losses, rng)
+    kept = model_confidence_set(losses, rng)
     plain = _plain(model, base, term, groups)
     effects = tuple(n for n in kept if n != term.name)
     return Rivals(effects, tuple(plain), {**differences, **plain})

@@ -18,11 +18,11 @@ from cablecomp.diagnosis.explain.model import (
     Round,
     Term,
     Tried,
+    amount_resolved,
+    best_resolved,
     common,
     finely,
-    is_told,
     loss,
-    most_told,
     placed,
     runs_away,
 )
@@ -205,8 +205,8 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
         fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
     except InputError:
         return None
-    terms = tuple(most_told(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    if not is_told(fit, terms[0]) or runs_away(fit, terms[0]):
+    terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
+    if not amount_resolved(fit, terms[0]) or runs_away(fit, terms[0]):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:

@@ -211,7 +211,7 @@ def selected_in(losses: Mapping[str, FloatArray], rng: np.random.Generator) -> d
     return {n: float(np.mean(best == k)) for k, n in enumerate(names)}
 
 
-def confidence_set(losses: Mapping[str, FloatArray], rng: np.random.Generator) -> tuple[str, ...]:
+def model_confidence_set(losses: Mapping[str, FloatArray], rng: np.random.Generator) -> tuple[str, ...]:
     """Models that cannot be told from the best by their losses per block (T_max elimination, bootstrap over blocks).
 
     Written out here because the libraries that have it bring pandas and statsmodels with them.

@@ -18,7 +18,8 @@ from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, approach, inside, solve
+from cablecomp.estimation.least_squares import Fit, approach, inside
+from cablecomp.estimation.multi_start import lowest, multi_start
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
@@ -277,7 +278,8 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     """A short fit from where an answer begins; without the shape that it may do without, where that is as good."""
     # of the effect's further parameters the answer tells no derivative
     known = {int(k): a.J[:, k] for k in np.flatnonzero(np.any(a.J != 0.0, axis=0))}
-    x, residual = _lowest(a)
+    # what the effect does together with a step of all else may, put beside them as they are, be far off
+    x, residual = lowest(a.problem, a.starts[:2] if a.problem.fine else a.starts)
     try:
         fit = approach(a.problem, x, known, 3 if a.problem.fine else evaluations, LIMITS.tolerance, residual)
     except InputError:
@@ -286,14 +288,6 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     if plain is not None and (fit is None or fit.cost > LIMITS.shaped * plain.cost):
         return plain
     return fit
-
-
-def _lowest(a: Answer) -> tuple[FloatArray, FloatArray | None]:
-    """The point to begin from that leaves least, with its residual: what the effect does together with a step of all
-    else may, where it is put beside them as they are, be far off. The first without one if none can be followed."""
-    starts = a.starts[:2] if a.problem.fine else a.starts
-    found = [(x, r) for x in starts if (r := a.problem.followed(x)) is not None]
-    return min(found, key=lambda f: float(f[1] @ f[1]), default=(starts[0], None))
 
 
 def rough(
@@ -305,10 +299,6 @@ def rough(
     """
     fits = [f for f in (_begun(a, evaluations) for a in answers) if f is not None]
     problem = fits[0].problem if fits else answers[0].problem
-    for values in further:
-        x = np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters])
-        try:
-            fits.append(solve(problem, x, 3 if problem.fine else evaluations + 3, LIMITS.tolerance))
-        except InputError:
-            continue
+    starts = [np.array([p.x(values.get(p.name, p.start)) for p in problem.parameters]) for values in further]
+    fits += multi_start(problem, starts, 3 if problem.fine else evaluations + 3, LIMITS.tolerance)
     return sorted(fits, key=lambda f: f.cost)

@@ -13,9 +13,9 @@ from cablecomp.diagnosis.explain.model import (
     Round,
     Selection,
     Tried,
+    amount_resolved,
     bears,
     common,
-    is_told,
     loss,
     ranked,
     reweighed,
@@ -88,7 +88,7 @@ def _carried(tried: Sequence[Tried], groups: Groups, first: bool) -> tuple[list[
     kept = [m for m in fresh[: LIMITS.beam + 1] if loss(m, size, groups) < most]
     sharper = searching(fresh[0].fit)
     again = [reweighed(m, sharper, groups) for m in kept]
-    carried = ranked([m for m in again if all(is_told(m.fit, t) for t in m.terms)], groups)
+    carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
     return (simplest_first(carried, groups), sharper) if carried else None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Selection, is_told, without
+from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
@@ -93,7 +93,7 @@ def _weighed(
     )
     depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
     confidence, why_not = 0.0, "its amount is not told from none"
-    if is_told(final.fit, term):
+    if amount_resolved(final.fit, term):
         confidence = learnt().probability(evidence)
         why_not = _against((*instead.effects, *instead.plain), own, evidence)
     removes = max(evidence["share_total"], _alone(selection, term))
