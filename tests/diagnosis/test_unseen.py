@@ -37,10 +37,11 @@ def bounds(entry: EffectEntry) -> dict[str, float | None]:
 @pytest.mark.parametrize("moment_Nm", [0.0, 0.01, 0.2])
 @pytest.mark.parametrize("phase_rad", [0.4, 2.0, 3.6])
 def test_a_weight_lies_below_its_bound(moment_Nm: float, phase_rad: float) -> None:
-    """Whether or not it shows, and wherever it hangs: 0.01 N m are three standard deviations, 0.2 N m are sixty."""
+    """Whether or not it shows, and wherever it hangs: 0.01 N m hardly do, 0.2 N m are all that is left over, which
+    leaves their sixth uncertain and the bound at three times as much."""
     below = bounds(EffectEntry(id="gravity_load", moment_Nm=moment_Nm, phase_rad=phase_rad))["gravity_load"]
     assert below is not None
-    assert moment_Nm < below < 2.0 * moment_Nm + 0.04
+    assert moment_Nm < below < 3.5 * moment_Nm + 0.08
 
 
 def test_no_phase_hides_below_the_bound() -> None:
