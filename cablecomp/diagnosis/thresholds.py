@@ -214,8 +214,8 @@ class Thresholds:
     # --- what could be there unseen
     unseen: float = 6.0
     """Standard deviations of its amount, beyond what the data show of it, up to which an effect could have stayed
-    unseen: laws are no straight lines, and what calibration did for an effect is not told from it (trials seed 618, most
-    of them hidden behind calibration: three held 28 of 39, six 34)."""
+    unseen: laws are no straight lines, and what calibration did for an effect is not told from it (trials seed 618,
+    most of them hidden behind calibration: three held 28 of 39, six 34)."""
     unseen_shapes: int = 6
     """Shapes of an effect, and instants of an event, among which the least visible one is looked for."""
     hidden: float = 0.1
