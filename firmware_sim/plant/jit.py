@@ -35,12 +35,6 @@ def _root() -> Path:
 CODE_FOLDER = _root() / "firmware_sim" / _digest()
 
 
-def is_compiled() -> bool:
-    """Whether machine code of these very sources lies on disk; if not, the first run compiles for some
-    seconds."""
-    return any(CODE_FOLDER.rglob("*.nbi"))
-
-
 def njit(function: F) -> F:
     """Compile to machine code on first call and keep it; IEEE arithmetic, no reordering; for what makes no arrays,
     so that no references need to be counted."""

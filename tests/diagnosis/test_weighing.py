@@ -8,7 +8,8 @@ from typing import Any, cast
 import pytest
 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.weighing import _at_bound
+from cablecomp.diagnosis.explain.scores import ScoreDifference
+from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows
 
 
 @pytest.mark.parametrize(
@@ -29,3 +30,39 @@ def test_that_all_of_a_cable_lies_on_its_guides_is_held_against_no_name(
     model: Any = SimpleNamespace(fit=SimpleNamespace(at_bound=lambda: bounds))
     term = cast(Hypothesis, SimpleNamespace(effect=SimpleNamespace(id=effect)))
     assert _at_bound(model, term) is held
+
+
+STRONG = {"follows": 0.0, "selected_in": 1.0, "share_left": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("instead", "z", "weak", "said"),
+    [
+        (("clamp_slip",), 9.0, {}, "clamp_slip in its place"),
+        ((), 1.2, {}, "z = 1.2"),
+        ((), 9.0, {"follows": 0.6}, "60% of what is left still follows"),
+        ((), 9.0, {"selected_in": 0.2}, "the best of its round in 20%"),
+        ((), 9.0, {"share_left": 0.7}, "70% of the mismatch is left over"),
+        ((), 9.0, {}, "weak in every respect"),
+    ],
+)
+def test_what_speaks_against_a_name_is_said_and_nothing_else(
+    instead: tuple[str, ...], z: float, weak: dict[str, float], said: str
+) -> None:
+    reason = _against(instead, ScoreDifference(0.5, z, z), {**STRONG, **weak})
+    assert said in reason
+    assert ";" not in reason
+
+
+def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:
+    """Of three covariates one is another effect's, one follows by chance."""
+    left: Any = SimpleNamespace(
+        mismatch=[
+            SimpleNamespace(covariate="temperature", share=0.9, p_value=0.001),
+            SimpleNamespace(covariate="load", share=0.5, p_value=0.4),
+            SimpleNamespace(covariate="reversal", share=0.2, p_value=0.001),
+        ]
+    )
+    term = cast(Hypothesis, SimpleNamespace(acts_through=("load", "reversal")))
+    assert _follows(term, left) == 0.2
+    assert _follows(cast(Hypothesis, SimpleNamespace(acts_through=("velocity",))), left) == 0.0

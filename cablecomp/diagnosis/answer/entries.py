@@ -118,7 +118,7 @@ def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple
     rows = []
     for w in found:
         if w.rivals:
-            why = f"they predict data left out alike: the lead over the nearest is {w.difference.z:.1f} standard errors"
+            why = f"data left out tell them apart by {w.difference.z:.1f} standard errors alone"
             rows.append(((w.term.name, *w.rivals), why))
     level, first = learnt_level(), (selection.rounds[0].tried if selection.rounds else ())
     if level is not None and found:

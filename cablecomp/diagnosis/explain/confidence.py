@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 FEATURES: Final = (
-    "log_gain", "log_z", "z_blocks", "selected_in", "lead_gain", "lead_z", "share_left", "rivals", "follows",
+    "log_gain", "log_z", "z_blocks", "selected_in", "margin_gain", "margin_z", "share_left", "rivals", "follows",
     "unsteady", "at_bound", "tries",
 )  # fmt: skip
 """What is learnt from. How many effects there are, and how large each is beside the others, stands in the evidence
@@ -93,8 +93,8 @@ def features(
     z: float,
     z_blocks: float,
     selected_in: float,
-    lead_gain: float,
-    lead_z: float,
+    margin_gain: float,
+    margin_z: float,
     share_left: float,
     share_total: float,
     rivals: int,
@@ -107,7 +107,7 @@ def features(
     """The evidence of one name.
 
     `gain`, `z`, `z_blocks`: of the model over the one without the effect, on data left out. `selected_in`: share of
-    resampled data in which it is the best of its round. `lead_gain`, `lead_z`: over the nearest rival in its place.
+    resampled data in which it is the best of its round. `margin_gain`, `margin_z`: over the nearest rival in its place.
     `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
     the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`:
     share of the remainder that still follows what the effect acts through. `unsteady`: difference of its amount
@@ -120,8 +120,8 @@ def features(
         "log_z": _log_z(z),
         "z_blocks": min(max(z_blocks, -3.0), 10.0),
         "selected_in": selected_in,
-        "lead_gain": min(max(lead_gain, -1.0), 1.0),
-        "lead_z": min(max(lead_z, -3.0), 10.0),
+        "margin_gain": min(max(margin_gain, -1.0), 1.0),
+        "margin_z": min(max(margin_z, -3.0), 10.0),
         "share_left": min(max(share_left, 0.0), 1.0),
         "share_total": min(max(share_total, 0.0), 1.0),
         "rivals": float(min(rivals, 4)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,17 @@ class Experiment:
     separation: float
 
 
-def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
-    """Protocols inside the configuration's limits; where it states none, inside those of the recordings."""
+class Reach(NamedTuple):
+    """What a protocol may use: largest load [N m], joint angles [rad], least time [s] of a motion over most of them."""
+
+    load: float
+    low: float
+    high: float
+    quick: float
+
+
+def _reach(config: JointConfig, seen: Covariates) -> Reach:
+    """The configuration's limits; where it states none, those of the recordings."""
     load = float(np.max(np.abs(seen.values["load"])))
     if config.limits.joint_torque_max_Nm is not None:
         load = config.limits.joint_torque_max_Nm
@@ -47,12 +57,18 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
         low = config.limits.joint_position_min_rad
     if config.limits.joint_position_max_rad is not None:
         high = config.limits.joint_position_max_rad
-    load = max(load, 1e-6)
+    travel = max(high - low, 0.02)
+    # motion of least jerk peaks at 15/8 of its mean speed
+    quick = max(15.0 / 8.0 * 0.8 * travel / _top_speed(config, seen), 0.4)
+    return Reach(max(load, 1e-6), low, high, quick)
+
+
+def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
+    """Protocols inside the configuration's limits; where it states none, inside those of the recordings."""
+    load, low, high, quick = _reach(config, seen)
     travel = max(high - low, 0.02)
     middle, rate = 0.5 * (low + high), load / 4.0
     start = {"start_position_rad": middle}
-    # motion of least jerk peaks at 15/8 of its mean speed
-    quick = max(15.0 / 8.0 * 0.8 * travel / _top_speed(config, seen), 0.4)
     # every swing comes several times: what is judged on held-out blocks must stand in many of them
     swings = (load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load)
     nested = NestedReversals(peaks=(*swings * 3, load), rate=rate)
@@ -64,17 +80,7 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
         Ramp(duration_s=8.0, load_Nm=-load),
         Hold(duration_s=8.0),
     )
-    sweeps = tuple(
-        AngleSweep(
-            from_rad=low + 0.05 * travel,
-            to_rad=high - 0.05 * travel,
-            speed_rad_s=travel / 3.0,
-            load_Nm=v,
-            load_rate_Nm_s=rate,
-            cycles=2,
-        )
-        for v in (0.0, 0.8 * load, -0.8 * load)
-    )
+    sweeps = _sweeps(load, low, high)
     return [
         Protocol(name="ramp and hold", segment=(*step, *step, Unload(rate_Nm_s=rate)), **start),
         Protocol(name="rate pair", segment=(
@@ -101,6 +107,22 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
             NestedReversals(peaks=(load, -load) * 3, rate=rate),
         ), **start),
     ]  # fmt: skip
+
+
+def _sweeps(load: float, low: float, high: float) -> tuple[AngleSweep, ...]:
+    """Motions to and fro over most of the travel, under no load and most of either sign."""
+    travel = max(high - low, 0.02)
+    return tuple(
+        AngleSweep(
+            from_rad=low + 0.05 * travel,
+            to_rad=high - 0.05 * travel,
+            speed_rad_s=travel / 3.0,
+            load_Nm=v,
+            load_rate_Nm_s=load / 4.0,
+            cycles=2,
+        )
+        for v in (0.0, 0.8 * load, -0.8 * load)
+    )
 
 
 def _top_speed(config: JointConfig, seen: Covariates) -> float:
