@@ -38,12 +38,32 @@ class Experiment:
 
 
 class Reach(NamedTuple):
-    """What a protocol may use: largest load [N m], joint angles [rad], least time [s] of a motion over most of them."""
+    """What a protocol may use: largest load [N m], joint angles [rad], top speed of the joint [rad/s]."""
 
     load: float
     low: float
     high: float
-    quick: float
+    speed: float
+
+    @property
+    def travel(self) -> float:
+        """How far the joint may go, rad."""
+        return max(self.high - self.low, 0.02)
+
+    @property
+    def middle(self) -> float:
+        """Joint angle in the middle of that, rad."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def rate(self) -> float:
+        """Rate of the load at which nothing is quick, N m/s."""
+        return self.load / 4.0
+
+    @property
+    def quick(self) -> float:
+        """Least time of a motion over most of the travel, s: motion of least jerk peaks at 15/8 of its mean speed."""
+        return max(15.0 / 8.0 * 0.8 * self.travel / self.speed, 0.4)
 
 
 def _reach(config: JointConfig, seen: Covariates) -> Reach:
@@ -57,17 +77,14 @@ def _reach(config: JointConfig, seen: Covariates) -> Reach:
         low = config.limits.joint_position_min_rad
     if config.limits.joint_position_max_rad is not None:
         high = config.limits.joint_position_max_rad
-    travel = max(high - low, 0.02)
-    # motion of least jerk peaks at 15/8 of its mean speed
-    quick = max(15.0 / 8.0 * 0.8 * travel / _top_speed(config, seen), 0.4)
-    return Reach(max(load, 1e-6), low, high, quick)
+    return Reach(max(load, 1e-6), low, high, _top_speed(config, seen))
 
 
 def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
     """Protocols inside the configuration's limits; where it states none, inside those of the recordings."""
-    load, low, high, quick = _reach(config, seen)
-    travel = max(high - low, 0.02)
-    middle, rate = 0.5 * (low + high), load / 4.0
+    reach = _reach(config, seen)
+    load, low, high, _ = reach
+    travel, middle, rate, quick = reach.travel, reach.middle, reach.rate, reach.quick
     start = {"start_position_rad": middle}
     # every swing comes several times: what is judged on held-out blocks must stand in many of them
     swings = (load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load)
@@ -80,7 +97,7 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
         Ramp(duration_s=8.0, load_Nm=-load),
         Hold(duration_s=8.0),
     )
-    sweeps = _sweeps(load, low, high)
+    sweeps = _sweeps(reach)
     return [
         Protocol(name="ramp and hold", segment=(*step, *step, Unload(rate_Nm_s=rate)), **start),
         Protocol(name="rate pair", segment=(
@@ -109,19 +126,18 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
     ]  # fmt: skip
 
 
-def _sweeps(load: float, low: float, high: float) -> tuple[AngleSweep, ...]:
+def _sweeps(reach: Reach) -> tuple[AngleSweep, ...]:
     """Motions to and fro over most of the travel, under no load and most of either sign."""
-    travel = max(high - low, 0.02)
     return tuple(
         AngleSweep(
-            from_rad=low + 0.05 * travel,
-            to_rad=high - 0.05 * travel,
-            speed_rad_s=travel / 3.0,
-            load_Nm=v,
-            load_rate_Nm_s=load / 4.0,
+            from_rad=reach.low + 0.05 * reach.travel,
+            to_rad=reach.high - 0.05 * reach.travel,
+            speed_rad_s=reach.travel / 3.0,
+            load_Nm=share * reach.load,
+            load_rate_Nm_s=reach.rate,
             cycles=2,
         )
-        for v in (0.0, 0.8 * load, -0.8 * load)
+        for share in (0.0, 0.8, -0.8)
     )
 
 
