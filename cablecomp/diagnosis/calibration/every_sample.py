@@ -73,12 +73,12 @@ def by_wide_steps(fit: Fit, rounds: int = 2) -> Fit:
     """The fit carried on by derivatives over `WIDE` of each prior, and with such a one: a drive that shakes jumps from
     sample to sample when a value moves a little, and a derivative over a thousandth is that of its jumps."""
     near, far = WIDE
-    for left in range(rounds, -1, -1):
-        J = _wide_jacobian(fit, near)
-        better = approach(fit.problem, fit.x, dict(enumerate(J.T)), 6, 1e-4) if left else fit
+    J = _wide_jacobian(fit, near)
+    for _ in range(rounds):
+        better = approach(fit.problem, fit.x, dict(enumerate(J.T)), 6, 1e-4)
         if not better.cost < fit.cost:
             break
-        fit = better
+        fit, J = better, _wide_jacobian(better, near)
     return replace(fit, J=in_common(J, _wide_jacobian(fit, far)))
 
 

@@ -219,6 +219,8 @@ def _compared(
     models: Sequence[Model], at: Beginning, fine: Model | None, rng: np.random.Generator
 ) -> list[Tried]:
     """Each model's score against the one before, run as finely as it is itself; best first."""
+    if not models:
+        return []
     differences = {
         m.name: score_difference(
             m.left_out,
@@ -227,7 +229,7 @@ def _compared(
         )
         for m in models
     }
-    size = common(models, at.groups) if models else np.empty(0)
+    size = common(models, at.groups)
     losses = {m.name: m.by_thinning * block_losses(m.left_out, size, at.groups) for m in models}
     shares = selected_in(losses, rng)
     added = len(at.model.terms)
