@@ -111,8 +111,8 @@ class CanSimpleDrive:
             identifier = cansimple.identifier(self._node, self._firmware.data[name])
             out.append(Receiver(identifier, self._pair(name, maps[name])))
         if self._joint is not None:
-            told = cansimple.identifier(self._node, Cmd06.TX_SDO)
-            out.append(Receiver(told, self._joint_encoder(self._joint)))
+            reply = cansimple.identifier(self._node, Cmd06.TX_SDO)
+            out.append(Receiver(reply, self._joint_encoder(self._joint)))
         return tuple(out)
 
     def _stats(self, name: str) -> MessageStats:

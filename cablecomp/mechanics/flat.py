@@ -36,6 +36,7 @@ def _typed(context: Any) -> Any:
     return typer
 
 
+# numba is not typed here either
 @lower_builtin(records, types.Array, types.Integer, types.UniTuple, types.DType)  # type: ignore[untyped-decorator]
 def _lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     source_type, at_type, shape_type, _ = signature.args

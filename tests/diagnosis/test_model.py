@@ -71,8 +71,7 @@ def test_a_cable_that_slackens_is_no_reason() -> None:
     in the one direction and in the other."""
     one = holding(None)
     still = one.model_copy(update={"drive": one.drive.model_copy(update={"circuit": "open"})})
-    stage = still.drive.stage[0]
-    near_Nm = 0.8 * stage.output_radius_m * stage.pretension_N
+    near_Nm = 0.8 * still.drive.stage[0].pretension_moment_Nm
     fit = fitted(still, near_Nm)
     torque = {k: 1.5 * v if k == "joint_torque_Nm" else v for k, v in fit.problem.evidence[0].columns.items()}
     with pytest.raises(InputError, match="slacken"):

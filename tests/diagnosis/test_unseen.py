@@ -37,15 +37,15 @@ def bounds(entry: EffectEntry) -> dict[str, float | None]:
 @pytest.mark.parametrize("moment_Nm", [0.0, 0.01, 0.2])
 @pytest.mark.parametrize("phase_rad", [0.4, 2.0, 3.6])
 def test_a_weight_lies_below_its_bound(moment_Nm: float, phase_rad: float) -> None:
-    """Whether or not it shows, and wherever it hangs: 0.01 N m hardly do, 0.2 N m are all that is left over, which
-    leaves their sixth uncertain and the bound at three times as much."""
+    """Whether or not it shows, and wherever it hangs: 0.01 N m hardly do, 0.2 N m are all that is left over, a
+    third of which is one deviation: the bound lies at three times as much."""
     below = bounds(EffectEntry(id="gravity_load", moment_Nm=moment_Nm, phase_rad=phase_rad))["gravity_load"]
     assert below is not None
     assert moment_Nm < below < 3.5 * moment_Nm + 0.08
 
 
 def test_no_phase_hides_below_the_bound() -> None:
-    """A weight at its bound shows by three deviations at least, wherever it hangs, and by no more at the worst place:
+    """A weight at its bound shows by so many deviations at least, wherever it hangs, and by no more at the worst place:
     seen along a short way its two phases do nearly the same (seed 4)."""
     rng = np.random.default_rng(4)
     along, across = rng.standard_normal((2, 300))

@@ -14,9 +14,8 @@ from firmware_sim.errors import SimError
 
 
 class SimProcess:
-    """`python -m firmware_sim ARGUMENTS` as a context manager; `where` says how to reach it (its first
-    line). On a
-    machine where the plant was never run, compiling it takes the better part of a minute.
+    """`python -m firmware_sim ARGUMENTS` as a context manager; `where` says how to reach it (its first line).
+    On a machine where the plant was never run, compiling it takes the better part of a minute.
 
     The child ends when its standard input closes, hence also when this process dies.
     """
