@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import JsonOption, console, echo_json
-from cablecomp.cli.sources import Reading, reads_recordings
+from cablecomp.cli.sources import RatioOption, Reading, reads_recordings
+from cablecomp.config import load_joint
 from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
 from cablecomp.recording.progress import progress_bar
@@ -20,6 +21,7 @@ def convert_recording(
     *,
     recording: Annotated[Path, typer.Argument(help="recording of any accepted kind")],
     to: Annotated[Path, typer.Argument(help="file to write: .csv, .csv.gz, .parquet, .mcap or .npz")],
+    config: RatioOption = None,
     reading: Reading,
     begin: Annotated[float, typer.Option("--from", help="leave out rows before this time, s")] = -inf,
     end: Annotated[float, typer.Option("--to", help="leave out rows after this time, s")] = inf,
@@ -33,7 +35,7 @@ def convert_recording(
     as_json: JsonOption = False,
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
-    source = reading().open(recording)
+    source = reading(None if config is None else load_joint(config)).open(recording)
     with progress_bar(f"convert {recording.name}") as progress:
         rows = convert(source, to, (begin, end), progress, dict(map(_late, late or ())), ros)
     if as_json:

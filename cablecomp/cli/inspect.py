@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import JsonOption, console, errors
-from cablecomp.cli.sources import Reading, Sources, reads_recordings
+from cablecomp.cli.sources import RatioOption, Reading, Sources, reads_recordings
 from cablecomp.config import load_joint
 from cablecomp.errors import InputError, path_text
 from cablecomp.recording.inspection import Inspection, inspect
@@ -32,9 +32,7 @@ from cablecomp.report.inspection import Looked, inspection_json, show
 def inspect_recording(
     *,
     recording: Annotated[Path, typer.Argument(help="recording of any accepted kind")],
-    config: Annotated[
-        Path | None, typer.Option("--config", help="joint configuration: its ratio helps to tell units")
-    ] = None,
+    config: RatioOption = None,
     reading: Reading,
     save: Annotated[
         bool,
@@ -53,17 +51,18 @@ def inspect_recording(
     found = suggest(raw.columns, ratio, raw.units)
     mapping = as_mapping(found) if known is None else joined_maps(as_mapping(found), known)
     looked = Looked(recording, raw, found, mapping, *_looked_at(recording, mapping, given))
-    if as_json:
-        typer.echo(json.dumps(inspection_json(looked), indent=2))
-    else:
-        show(looked, console)
-    if save:
-        place = recording.parent / FOLDER_MAP
+    place = recording.parent / FOLDER_MAP
+    if save:  # before it is shown: a pager may be left early
         save_mapping(
             place,
             mapping,
             (f"what the columns of {path_text(recording.name)} mean; check it before you trust it",),
         )
+    if as_json:
+        typer.echo(json.dumps(inspection_json(looked), indent=2))
+    else:
+        show(looked, console)
+    if save:
         (errors() if as_json else console).print(f"saved: {place}", soft_wrap=True)
 
 

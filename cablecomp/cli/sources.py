@@ -32,6 +32,9 @@ MapOption = Annotated[
         help="what foreign columns mean: a TOML file, CHANNEL=COLUMN[,unit=deg][,sign=-1].., or auto (shown first)",
     ),
 ]
+RatioOption = Annotated[
+    Path | None, typer.Option("--config", help="joint configuration: its ratio helps to tell units")
+]
 LinkOption = Annotated[
     Path | None, typer.Option("--link", help="for a CAN log: the link file of its devices")
 ]

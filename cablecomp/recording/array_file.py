@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any, Final, NamedTuple
+from typing import IO, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
@@ -29,6 +29,8 @@ def open_npz(path: Path) -> RawTable:
     """Open .npz; an array of n x k is k columns `name[0]`... InputError if damaged or of unequal lengths."""
     try:
         with zipfile.ZipFile(path) as archive:
+            if "[Content_Types].xml" in archive.namelist():
+                raise InputError(f"{path}: is an Excel workbook; save its sheet as CSV")
             heads = {info.filename: _npy_head(archive, info) for info in archive.infolist()}
     except (
         OSError,
@@ -146,6 +148,8 @@ def open_mat(path: Path) -> RawTable:
         }
     except Exception as error:  # whatever scipy's parser makes of a damaged file
         raise InputError(f"{path}: is a damaged MATLAB file ({first_line(error)}); save it anew") from None
+    if _is_cut(path):
+        raise InputError(f"{path}: MATLAB file without its end, it was cut short; copy or save it anew")
     structures = [name for name, _, kind in listed if kind == "struct"]
     if structures and not any(max(shape, default=0) > 1 for shape in held.values()):
         raise InputError(
@@ -175,6 +179,18 @@ def open_mat(path: Path) -> RawTable:
         yield NumberRows(1, arrays, 1.0)
 
     return RawTable(tuple(columns), read, notes=notes)
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether the last of the file's elements (MAT-file level 5: type and size of 32 bits each, then the data) ends
+    beyond the file."""
+    size, place = path.stat().st_size, 128
+    with path.open("rb") as file:
+        order: Literal["little", "big"] = "little" if file.read(128).endswith(b"IM") else "big"
+        while place + 8 <= size:
+            file.seek(place + 4)
+            place += 8 + int.from_bytes(file.read(4), order)
+    return place != size
 
 
 def _upright(shape: tuple[int, ...]) -> tuple[int, ...]:

@@ -19,6 +19,9 @@ def open_bag(path: Path) -> MessageLog:
 
     Bags of format 2 that carry no definitions are read by those of ROS 2 Humble.
     """
+    ending, reindex = _habits(path)
+    if path.is_file() and path.suffix != ending:
+        raise InputError(f"{path}: is a ROS bag; rename it to {path.stem}{ending}")
     highlevel = package("rosbags.highlevel", path, "ros", "a ROS bag")
     typesys = package("rosbags.typesys", path, "ros", "a ROS bag")
 
@@ -31,7 +34,7 @@ def open_bag(path: Path) -> MessageLog:
         return found
 
     skipped: dict[str, str] = {}
-    bag = _guarded(path, reader)
+    bag = _guarded(path, reader, f"; try `{reindex}`")
     try:
         for connection in bag.connections:
             if connection.msgtype not in bag.typestore.fielddefs:
@@ -61,12 +64,19 @@ def open_bag(path: Path) -> MessageLog:
     return MessageLog("bag", read, skipped)
 
 
-def _guarded(path: Path, action: Any) -> Any:
+def _habits(path: Path) -> tuple[str, str]:
+    """How a bag's file is named, and the command that mends its index."""
+    if path.is_file():
+        with path.open("rb") as file:
+            if file.read(7) == b"#ROSBAG":
+                return ".bag", "rosbag reindex"
+    return ".db3", "ros2 bag reindex"
+
+
+def _guarded(path: Path, action: Any, advice: str = "; record it anew") -> Any:
     try:
         return action()
     except InputError:
         raise
     except Exception as error:  # whatever the package makes of a damaged bag
-        raise InputError(
-            f"{path}: cannot be read as a ROS bag ({first_line(error)}); record it anew"
-        ) from None
+        raise InputError(f"{path}: cannot be read as a ROS bag ({first_line(error)}){advice}") from None

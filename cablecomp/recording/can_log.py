@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, TextIO
+from typing import Any, Final, Literal, NamedTuple
 
 from cablecomp.errors import InputError
 from cablecomp.recording.array_file import first_line
@@ -73,7 +73,21 @@ def open_can_log(path: Path, kind: CanKind, decode: Callable[[], DecodeFrame] | 
                 logged = round((frame.time_s - first) * 1e9)
                 yield Message(found[0], logged, None, found[1]), 0.0
 
-    return MessageLog("can", read)
+    return MessageLog("can", read, notes=tuple(_ends_early(path, kind)))
+
+
+def _ends_early(path: Path, kind: CanKind) -> Iterator[str]:
+    """What is missing of a log that was cut short: a text's last line, which is not read, or objects of BLF."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if kind == "blf":
+            stated = int.from_bytes(file.read(24)[16:], "little")
+            if size < stated:
+                yield f"the log was cut short ({size:,} of {stated:,} bytes): what is there is read"
+        elif kind != "mf4":
+            file.seek(-1, 2)
+            if file.read() != b"\n":
+                yield "the last line is not whole and was left out: was the log cut short?"
 
 
 def frames(path: Path, kind: CanKind) -> Iterator[Frame]:
@@ -98,9 +112,11 @@ def _reader(path: Path, kind: CanKind, stack: ExitStack) -> Any:
     import can  # slow to import, and only such logs need it
 
     if kind == "mf4":
-        package("asammdf", path, "mf4", "an MF4 log")
+        version_4 = package("asammdf.blocks.mdf_v4", path, "mf4", "an MF4 log")
         from can.io.mf4 import MF4Reader
 
+        # of a damaged file its own end is a traceback; `stop` closes what is open
+        version_4.MDF4.__del__ = lambda self: None
         reader = MF4Reader(path)
         stack.callback(reader.stop)
         return reader
@@ -108,33 +124,17 @@ def _reader(path: Path, kind: CanKind, stack: ExitStack) -> Any:
         _check_containers(path)
         return can.BLFReader(stack.enter_context(path.open("rb")))
     text = stack.enter_context(path.open(encoding="latin-1"))
+    lines = (line for line in text if line.endswith("\n"))
     if kind == "asc":
-        return can.ASCReader(_AbsoluteAsc(text))
-    return can.CanutilsLogReader(text) if kind == "candump" else can.TRCReader(text)
+        return can.ASCReader(_Lines(_absolute(lines)))
+    return can.CanutilsLogReader(_Lines(lines)) if kind == "candump" else can.TRCReader(_Lines(lines))
 
 
-class _AbsoluteAsc:
-    """Lines of an ASC file with stamps from the start of the measurement.
+class _Lines:
+    """Lines of text as python-can's readers take them from a file."""
 
-    Where the head says `timestamps relative`, each line's stamp counts from the line before (Vector's ASC
-    format); python-can takes them as they are, so they are summed up here.
-    """
-
-    def __init__(self, file: TextIO) -> None:
-        self._file = file
-        self._lines = self._absolute()
-
-    def _absolute(self) -> Iterator[str]:
-        relative, total = False, 0.0
-        for line in self._file:
-            if re.match(r"\s*base\s", line, re.IGNORECASE):
-                relative = "relative" in line.lower()
-            match = _STAMP.fullmatch(line) if relative else None
-            if match is None:
-                yield line
-                continue
-            total += float(match[2])
-            yield f"{match[1]}{total:.9f}{match[3]}"
+    def __init__(self, lines: Iterator[str]) -> None:
+        self._lines = lines
 
     def __iter__(self) -> Iterator[str]:
         return self._lines
@@ -147,8 +147,25 @@ class _AbsoluteAsc:
         return "".join(self._lines)
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """The file is closed by who opened it."""
+
+
+def _absolute(lines: Iterator[str]) -> Iterator[str]:
+    """Lines of an ASC file with stamps from the start of the measurement.
+
+    Where the head says `timestamps relative`, each line's stamp counts from the line before (Vector's ASC
+    format); python-can takes them as they are, so they are summed up here.
+    """
+    relative, total = False, 0.0
+    for line in lines:
+        if re.match(r"\s*base\s", line, re.IGNORECASE):
+            relative = "relative" in line.lower()
+        match = _STAMP.fullmatch(line) if relative else None
+        if match is None:
+            yield line
+            continue
+        total += float(match[2])
+        yield f"{match[1]}{total:.9f}{match[3]}"
 
 
 def _check_containers(path: Path) -> None:

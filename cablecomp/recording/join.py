@@ -164,6 +164,6 @@ def _words(rule: Settled, topics: Mapping[str, TopicFacts], clock: _OneClock) ->
     if rule.by_stamp:
         for name, line in clock.lines.items():
             yield (
-                f"time of {name}: its sender's stamps, brought to the logger's clock (rate {line.rate - 1.0:+.2e}, "
-                f"median delay {1e3 * line.delay_s:.3g} ms)"
+                f"time of {name}: its sender's stamps, brought to the logger's clock (drift "
+                f"{1e6 * (line.rate - 1.0):.0f} ppm, median delay {1e3 * line.delay_s:.3f} ms)"
             )

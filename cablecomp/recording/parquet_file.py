@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 import polars as pl
+import polars.selectors as cs
 
 from cablecomp.errors import InputError
 from cablecomp.recording.array_file import first_line
@@ -23,7 +24,7 @@ _FAILURES: Final = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSE
 
 
 def open_parquet(path: Path) -> RawTable:
-    """Open Parquet; InputError if damaged or a column is not of numbers.
+    """Open Parquet; InputError if damaged or a column is not of numbers. Dates (from 1970) and durations are in s.
 
     Damage that changes values shows only in a file that states checksums; a note says if it does not.
     """
@@ -36,9 +37,11 @@ def open_parquet(path: Path) -> RawTable:
     except (*_FAILURES, ValueError, AttributeError) as error:
         raise InputError(f"{path}: is damaged or cut Parquet ({first_line(error)}); export it anew") from None
 
+    dated = [name for name, kind in schema.items() if isinstance(kind, pl.Datetime | pl.Duration)]
+
     def read(names: Sequence[str]) -> Iterator[NumberRows]:
         for name in names:
-            if not (schema[name].is_numeric() or schema[name] == pl.Boolean):
+            if not (schema[name].is_numeric() or schema[name] == pl.Boolean or name in dated):
                 raise InputError(f"{path}: column {name!r} holds {schema[name]}; numbers are expected")
         found = dict.fromkeys(names, 0)
         for done in range(0, total, _ROWS):
@@ -54,7 +57,7 @@ def open_parquet(path: Path) -> RawTable:
     notes = (
         () if sums else ("Parquet that states no checksums: a value that was damaged would not be noticed",)
     )
-    return RawTable(tuple(schema), read, notes=notes)
+    return RawTable(tuple(schema), read, units=dict.fromkeys(dated, "s"), notes=notes)
 
 
 def write_parquet(path: Path, columns: Mapping[str, FloatArray]) -> None:
@@ -67,10 +70,11 @@ def write_parquet(path: Path, columns: Mapping[str, FloatArray]) -> None:
 
 
 def _slice(path: Path, first: int, names: Sequence[str]) -> dict[str, FloatArray]:
-    wanted = [pl.col(name).cast(pl.Float64) for name in names]
+    times = [cs.datetime().dt.timestamp("ns") / 1e9, cs.duration().dt.total_nanoseconds() / 1e9]
     try:
         with held_errors():
-            frame = pl.scan_parquet(path).slice(first, _ROWS).select(wanted).collect()
+            rows = pl.scan_parquet(path).slice(first, _ROWS).select(names)
+            frame = rows.with_columns(times).cast(pl.Float64).collect()
     except _FAILURES as error:
         where = f"{path}: row {first + 1} or after"
         raise InputError(f"{where}: damaged Parquet ({first_line(error)}); export it anew") from None

@@ -37,6 +37,9 @@ _FOREIGN: Final[dict[bytes, str]] = {
     b"\xff\xfe": "UTF-16 text",
     b"\xfe\xff": "UTF-16 text",
     b"\xd0\xcf\x11\xe0": "an old Excel file",
+    b"# Created by Octave": "Octave's text format (its `save -v7` writes a .mat that is read)",
+    b"{": "JSON text",
+    b"[{": "JSON text",
 }
 _ACCEPTED: Final = (
     "accepted are CSV text (plain or gzip), Parquet, .npz, .mat, HDF5, MCAP, ROS bags, "
@@ -76,7 +79,7 @@ def identify(path: Path) -> Opened:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the permissions") from None
     if not head:
-        raise InputError(f"{path}: is empty; expected a header line and rows of numbers")
+        raise InputError(f"{path}: is empty; record or export it anew")
     if not head.startswith(_GZIP):
         return Opened(_kind(path, head, ""), False)
     try:
@@ -84,7 +87,7 @@ def identify(path: Path) -> Opened:
     except Truncated as error:
         raise InputError(f"{path}: {error}; copy or record the file anew") from None
     if not inner:
-        raise InputError(f"{path}: is gzip of an empty file; expected a header line and rows of numbers")
+        raise InputError(f"{path}: is gzip of an empty file; record or export it anew")
     kind = _kind(path, inner[:_SNIFF], "gzip of ")
     if kind != "text":
         raise InputError(f"{path}: is gzip of {kind}; unpack it first, gzip is accepted around CSV only")
@@ -151,6 +154,8 @@ def _kind(path: Path, head: bytes, wrapper: str) -> Kind:
         return log
     if b"\0" in head:
         ending = f" although it is named {path.suffix}" if path.suffix else ""
+        if path.suffix == ".mat":
+            ending += " (one of MATLAB 4? its `save -v7` writes one that is read)"
         raise InputError(f"{path}: is {wrapper}binary data of an unknown kind{ending}; {_ACCEPTED}")
     return "text"
 

@@ -62,7 +62,8 @@ def open_file(path: Path, decode: Callable[[], DecodeFrame] | None = None) -> tu
     fields = {f"{t.name}.{key}": (t.name, key) for t in topics.values() for key in t.fields}
     if not fields:
         why = "; ".join(f"{topic}: {reason}" for topic, reason in list(log.skipped.items())[:5])
-        raise InputError(f"{path}: holds no message with numbers in it{f' ({why})' if why else ''}")
+        hint = "; MF4 of signals is not read: export it as CSV" if kind == "mf4" else ""
+        raise InputError(f"{path}: holds no message with numbers in it{f' ({why})' if why else ''}{hint}")
     return kind, Messages(log, topics, fields)
 
 

@@ -157,6 +157,11 @@ def _angles(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rati
     motor, joint = found.get("motor_position_rad"), found.get("joint_position_rad")
     if motor is None or joint is None:
         return
+    for here, other in ((motor, joint), (joint, motor)):
+        bare = here.source.unit is None and here.source.counts_per_rev is None
+        far = float(np.max(np.abs(values[here.source.column]), initial=0.0)) > 2.0 * np.pi
+        if ratio is None and bare and far and other.source.unit == "deg":
+            _change(here, "over a turn in radians, and the other angle is in degrees", unit="deg")
     slope, strength = _slope(
         _in_si(motor, values[motor.source.column]), _in_si(joint, values[joint.source.column])
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -15,6 +15,9 @@ from cablecomp.recording.inspection import ChannelQuality, Inspection
 from cablecomp.recording.mapping import ColumnMap, mapping_text
 from cablecomp.recording.raw_columns import RawColumns
 from cablecomp.recording.suggest import Suggestion
+
+_NEEDED: Final = ("motor_position_rad", "joint_torque_Nm", "joint_position_rad")
+"""Channels without which nothing can be compared."""
 
 
 class Looked(NamedTuple):
@@ -47,6 +50,9 @@ def show(looked: Looked, console: Console) -> None:
         console.print(f"not yet a recording: {looked.why}", style="yellow")
     else:
         _show_quality(seen, console)
+        missing = [name for name in _NEEDED if name not in {c.name for c in seen.channels}]
+        if missing:
+            console.print(f"missing: {', '.join(missing)}; which columns are they?", style="yellow")
     for note in looked.notes:
         console.print(f"note: {note}")
     console.print("\nmapping:\n" + mapping_text(mapping))
@@ -81,7 +87,7 @@ def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap)
 def _show_quality(seen: Inspection, console: Console) -> None:
     console.print(
         f"{seen.rows:,} rows over {seen.duration_s:.6g} s, {seen.rate_Hz:.6g} Hz, steps even within "
-        f"{100 * seen.jitter:.2g} %, {len(seen.gaps)} gaps, {seen.duplicates} repeated stamps"
+        f"{max(100 * seen.jitter, 0.01):.2g} %, {len(seen.gaps)} gaps, {seen.duplicates} repeated stamps"
     )
     table = Table(box=None)
     for name in ("channel", "least", "greatest", "noise", "step", "odd"):

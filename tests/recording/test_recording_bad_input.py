@@ -38,7 +38,7 @@ PACKED = gzip.compress(LONG)
 
 CASES: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     # name: (file name, content, what the one line must say)
-    "empty file": ("a.csv", b"", ("is empty", "header")),
+    "empty file": ("a.csv", b"", ("is empty", "record or export it")),
     "empty gzip": ("a.csv.gz", gzip.compress(b""), ("gzip of an empty file",)),
     "only line breaks": ("a.csv", b"\n\n\n", ("no header line",)),
     "only comments": ("a.csv", b"# one\n# two\n", ("no header line",)),

@@ -1,0 +1,116 @@
+"""Files as other programs leave them, cut short or not what they seem: read, or refused in a line that says what to
+do."""
+
+from __future__ import annotations
+
+import zipfile
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import can
+import numpy as np
+import polars as pl
+import pytest
+import scipy.io
+
+from cablecomp.errors import InputError
+from cablecomp.recording.can_log import Frame
+from cablecomp.recording.mapping import mapping_from
+from cablecomp.recording.reader import open_recording, read_all
+from cablecomp.recording.suggest import suggest
+
+ROWS = 200
+TIME = 0.01 * np.arange(ROWS)
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read_all(path)
+    return str(caught.value)
+
+
+def test_dates_of_a_data_frame_are_the_clock(tmp_path: Path) -> None:
+    begin = datetime(2026, 3, 1, 9)
+    stamps = [begin + timedelta(milliseconds=10 * k) for k in range(ROWS)]
+    pl.DataFrame({"when": stamps, "q": TIME, "M": -TIME}).write_parquet(tmp_path / "log.parquet")
+    words = ["time_s=when", "motor_position_rad=q", "joint_torque_Nm=M"]
+    time = read_all(tmp_path / "log.parquet", mapping_from(words)).columns["time_s"]
+    np.testing.assert_allclose(time - time[0], TIME, atol=1e-6)
+    assert time[0] == (begin - datetime(1970, 1, 1)).total_seconds()
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_matlab_file_that_was_cut_is_refused(packed: bool, tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    columns = {"time_s": TIME, "motor_position_rad": np.sin(TIME), "joint_torque_Nm": np.cos(TIME)}
+    scipy.io.savemat(path, columns, do_compression=packed)
+    assert set(read_all(path).columns) == set(columns)
+    whole = path.read_bytes()
+    for size in (len(whole) - 1, len(whole) // 2):
+        path.write_bytes(whole[:size])
+        assert "cut short" in refusal(path) or "damaged" in refusal(path)
+
+
+@pytest.mark.parametrize("kind", ["log", "asc", "trc"])
+def test_a_log_that_ends_inside_of_a_line_loses_that_line_and_says_so(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{kind}"
+    with can.Logger(str(path)) as writer:
+        for k in range(20):
+            writer(
+                can.Message(
+                    timestamp=1.7e9 + 0.01 * k, arbitration_id=5, is_extended_id=False, data=bytes([k] * 8)
+                )
+            )
+
+    def decode(frame: Frame) -> tuple[str, dict[str, float]]:
+        return "drive", {"motor_position_rad": float(frame.data[0])}
+
+    assert open_recording(path, decode=lambda: decode).notes == ()
+    whole = path.read_text()
+    last = whole.index("13 13 13" if kind != "log" else "131313")
+    path.write_text(whole[:last])
+    found = read_all(path, decode=lambda: decode)
+    assert found.columns["motor_position_rad"].tolist() == list(range(19))
+    assert "last line is not whole" in " ".join(found.notes)
+
+
+def test_a_blf_that_was_cut_says_how_much_of_it_is_there(tmp_path: Path) -> None:
+    path = tmp_path / "log.blf"
+    with can.Logger(str(path), max_container_size=400) as writer:
+        for k in range(200):
+            writer(can.Message(timestamp=1.7e9 + 0.01 * k, arbitration_id=5, data=bytes([k] * 8)))
+    decode = lambda frame: ("drive", {"motor_position_rad": float(frame.data[0])})  # noqa: E731
+    whole = path.read_bytes()
+    assert read_all(path, decode=lambda: decode).notes == ()
+    path.write_bytes(whole[: len(whole) * 2 // 3])
+    found = read_all(path, decode=lambda: decode)
+    assert 50 < len(found.columns["time_s"]) < 200
+    assert f"of {len(whole):,} bytes" in " ".join(found.notes)
+
+
+def test_what_is_no_recording_is_called_by_its_name(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "book.xlsx", "w") as book:
+        book.writestr("[Content_Types].xml", "<Types/>")
+    (tmp_path / "octave.mat").write_text("# Created by Octave 8.4.0\n# name: t\n# type: matrix\n 1\n")
+    (tmp_path / "rows.json").write_text('{"time_s": [0, 1], "motor_position_rad": [0, 1]}')
+    scipy.io.savemat(tmp_path / "old.mat", {"t": TIME, "q": TIME}, format="4")
+    (tmp_path / "bag.csv").write_bytes(b"#ROSBAG V2.0\n" + bytes(100))
+    (tmp_path / "nothing.mat").write_bytes(b"")
+    assert refusal(tmp_path / "book.xlsx").endswith("is an Excel workbook; save its sheet as CSV")
+    assert "Octave" in refusal(tmp_path / "octave.mat")
+    assert "is JSON text" in refusal(tmp_path / "rows.json")
+    assert "save -v7" in refusal(tmp_path / "old.mat")
+    assert refusal(tmp_path / "bag.csv").endswith("is a ROS bag; rename it to bag.bag")
+    assert refusal(tmp_path / "nothing.mat").endswith("is empty; record or export it anew")
+
+
+def test_an_angle_without_a_unit_is_in_degrees_where_the_other_is_and_it_goes_beyond_a_turn() -> None:
+    swing = np.sin(TIME)
+    far = {
+        s.channel: s.source.unit for s in suggest({"t": TIME, "theta_m": 120 * swing, "theta_j": 40 * swing})
+    }
+    near = {
+        s.channel: s.source.unit for s in suggest({"t": TIME, "theta_m": 120 * swing, "theta_j": 0.7 * swing})
+    }
+    assert (far["motor_position_rad"], far["joint_position_rad"]) == ("deg", "deg")
+    assert (near["motor_position_rad"], near["joint_position_rad"]) == ("deg", None)
