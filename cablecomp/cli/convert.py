@@ -11,6 +11,7 @@ import typer
 from cablecomp.cli.shared import JsonOption, console, echo_json
 from cablecomp.cli.sources import RatioOption, Reading, reads_recordings
 from cablecomp.config import load_joint
+from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
 from cablecomp.recording.progress import progress_bar
@@ -43,7 +44,7 @@ def convert_recording(
         return
     for note in source.notes:
         console.print(f"note: {note}")
-    console.print(f"written: {to} ({rows:,} rows: {', '.join(source.channels)})", soft_wrap=True)
+    console.print(f"written: {to} ({counted(rows, 'row')}: {', '.join(source.channels)})", soft_wrap=True)
 
 
 def _late(word: str) -> tuple[str, float]:

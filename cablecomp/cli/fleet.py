@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedCo
 
 from cablecomp.cli.shared import announce_compilation, console, echo_json, plain_counts
 from cablecomp.cluster import Workers
+from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.fleet.fleet import Work, run_fleet
 from cablecomp.fleet.places import nights
@@ -73,7 +74,7 @@ def work_fleet(
         if len(failed) > _MOST:
             console.print(f"failed: {len(failed) - _MOST} more, which the report names")
         if found.reused:
-            console.print(f"{found.reused} nights were there already")
+            console.print(f"there already: {counted(found.reused, 'night')}")
         console.print(f"report: {out / 'fleet.html'}", soft_wrap=True)
     if all(row["failed"] for row in found.rows):
         raise InputError(f"every night failed; the first: {found.rows[0]['failed']}")

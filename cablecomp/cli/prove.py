@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -35,9 +36,13 @@ def prove_blindly(
     config: Annotated[
         Path | None, typer.Option(help="with --in: their joint's configuration (TOML), or an example's name")
     ] = None,
-    minutes: Annotated[
-        float, typer.Option(min=0.0, help="with --in: begin no trial after this; the same folder again goes on")
-    ] = 1.0,
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="seconds after which no trial is begun (60 with --in, else no end); the same folder again goes on",
+        ),
+    ] = None,
     rounds: Annotated[int, typer.Option(min=1, help="with --in: pieces; 4 hold every size once")] = 4,
     seconds: Annotated[float, typer.Option(min=1.0, help="with --in: of recordings, in each piece")] = 20.0,
     trials: Annotated[int, typer.Option(min=1, help="how many simulated joints")] = 200,
@@ -62,7 +67,8 @@ def prove_blindly(
             raise InputError(
                 "--config goes with --in: give recordings too, or leave it out for simulated joints"
             )
-        _on_joints(Wish(trials, seed, kinds, laws, imperfections), out, by, as_json)
+        wish = Wish(trials, seed, kinds, laws, imperfections)
+        _on_joints(wish, inf if budget is None else budget, out, by, as_json)
         return
     if config is None:
         raise InputError("--in needs --config: the joint's configuration, as `cablecomp diagnose` takes it")
@@ -70,20 +76,21 @@ def prove_blindly(
     source = reading(joint)
     data = {path_text(p): source.read(p, gaps=True).columns for p in find_recordings(recordings)}
     own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
-    _in_recordings(own, OwnWish(seed, rounds, seconds, minutes), out, as_json)
+    _in_recordings(own, OwnWish(seed, rounds, seconds, 60.0 if budget is None else budget), out, as_json)
 
 
-def _on_joints(wish: Wish, out: Path, by: Workers, as_json: bool) -> None:
+def _on_joints(wish: Wish, budget_s: float, out: Path, by: Workers, as_json: bool) -> None:
     def conceal(where: Path, wanted: Wish, progress: OnProgress) -> str:
         return conceal_joints(where, wanted, by.processes, progress)
 
     with trial_bar() as tell:
-        board = prove(Blind(out.absolute(), conceal, experiment, by), wish, tell, _announce)
+        board = prove(Blind(out.absolute(), conceal, experiment, by), wish, tell, _announce, budget_s)
     write_scoreboard_page(board, out / "scoreboard.html")
     if as_json:
         echo_json(scoreboard_json(board))
         return
     console.print(scoreboard_table(board))
+    _say_left(len(board.rows), wish.trials)
     console.print(f"report: {out / 'scoreboard.html'}")
 
 
@@ -96,9 +103,13 @@ def _in_recordings(own: Own, wish: OwnWish, out: Path, as_json: bool) -> None:
         echo_json(answer)
         return
     console.print(concealed_table(answer))
-    if found.done < found.of:
-        console.print(f"{found.done} of {found.of} trials are done; the same with more --minutes goes on")
+    _say_left(found.done, found.of)
     console.print(f"report: {out / 'concealed.html'}")
+
+
+def _say_left(done: int, of: int) -> None:
+    if done < of:
+        console.print(f"{done} of {of} trials are done; the same command again goes on")
 
 
 def _announce(sha256: str) -> None:

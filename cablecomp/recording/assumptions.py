@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 from typing import Final
 
 from cablecomp.config import JointConfig, Stage
+from cablecomp.counting import counted
 
 _LOAD: Final = {
     "joint_torque": "The load is the measured joint torque",
@@ -24,7 +25,7 @@ def assumptions(config: JointConfig, channels: Collection[str] = ()) -> tuple[st
 def _all(config: JointConfig, channels: Collection[str]) -> Iterator[str]:
     drive, stages = config.drive, len(config.drive.stage)
     order = f", stages in {drive.arrangement}" if stages > 1 else ""
-    yield f"Drive: {drive.circuit} circuit, {stages} stage(s){order}; radii reach to the cable's centre."
+    yield f"Drive: {drive.circuit} circuit, {counted(stages, 'stage')}{order}; radii reach to the cable's centre."
     yield (
         "Before the first row the cable was at rest at its pretension, without load. Where that is not so, "
         "the band of low and high holds the truth for every admissible history until the two have met."

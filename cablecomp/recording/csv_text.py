@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 import polars as pl
 
+from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.recording.csv_head import Head, number, plain_breaks, read_head, seconds_since
 from cablecomp.recording.raw import RawTable
@@ -161,8 +162,8 @@ class _Parser:
         cells = row.split(self.head.separator)
         if len(cells) != len(self.head.columns):
             raise InputError(
-                f"{where}: has {len(cells)} cell(s) where the header names {len(self.head.columns)} columns"
-                f"{ending or '; mend or remove that line'}"
+                f"{where}: has {counted(len(cells), 'cell')} where the header names "
+                f"{counted(len(self.head.columns), 'column')}{ending or '; mend or remove that line'}"
             )
         values = []
         for name in self.names:

@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cablecomp.counting import counted
+
 FloatArray = NDArray[np.float64]
 
 
@@ -111,17 +113,17 @@ class RemarkLog:
             shown = ", ".join(f"{self._word} {gap.line} ({gap.size:.4g} s)" for gap in self._gaps[:5])
             more = f" and {self._gap_count - 5} more" if self._gap_count > 5 else ""
             yield (
-                f"{self._gap_count} gap(s) in time, at {shown}{more}; longest {widest.size:.4g} s; "
+                f"{counted(self._gap_count, 'gap')} in time, at {shown}{more}; longest {widest.size:.4g} s; "
                 "nothing was filled in, the drive is taken as moving monotonically across a gap"
             )
         for remark in self._sums.values():
             count, where = int(remark.size), f"first at {self._word} {remark.line}"
             if remark.kind == "repeat":
-                yield f"{count} row(s) repeat the time stamp of the row before, {where}"
+                yield f"{counted(count, 'row')} with the time stamp of the row before, {where}"
             elif remark.kind == "empty":
-                yield f"{remark.channel} is empty in {count} row(s), {where}; left empty"
+                yield f"{remark.channel} is empty in {counted(count, 'row')}, {where}; left empty"
             elif remark.kind == "stale":
-                yield f"{count} row(s) left out for want of a fresh value from another topic, {where}"
+                yield f"{counted(count, 'row')} left out for want of a fresh value from another topic, {where}"
             else:
                 yield (
                     f"{self._word} {remark.line} does not end with a line break; "

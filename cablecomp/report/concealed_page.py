@@ -11,6 +11,7 @@ from plotly.subplots import make_subplots
 from rich.table import Table
 from rich.text import Text
 
+from cablecomp.counting import counted
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.report import page, style
 from cablecomp.report.diagnosis_words import plain
@@ -28,9 +29,8 @@ _EXPLAINED = (
 
 def concealed_table(answer: Mapping[str, Any]) -> Table:
     """What size of each physics was found, for the terminal."""
-    table = Table(
-        title=f"{answer['done']} of {answer['of']} trials, {answer['twins']} twins", title_justify="left"
-    )
+    trials, twins = counted(answer["of"], "trial"), counted(answer["twins"], "twin")
+    table = Table(title=f"{answer['done']} of {trials}, {twins}", title_justify="left")
     for name in ("concealed", "sizes: found of put", "found from"):
         table.add_column(name)
     table.add_column("named in twins", justify="right")
@@ -84,8 +84,8 @@ def concealed_page(answer: Mapping[str, Any]) -> str:
     ]
     lead = (
         f"Physics of known size, concealed in stretches of {answer['seconds']:g} s "
-        f"of {len(answer['recordings'])} recordings; the "
-        "truth was sealed before any diagnosis and opened after all verdicts were written."
+        f"of {counted(len(answer['recordings']), 'recording')}; the "
+        "truth was sealed before any diagnosis and opened after their verdicts were written."
     )
     return page.page("What would have been found", lead, sections)
 

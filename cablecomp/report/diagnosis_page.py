@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, Final
 
+from cablecomp.counting import counted
 from cablecomp.diagnosis.result import Diagnosis, Traces, report_json
 from cablecomp.effects import Effect, catalogue
 from cablecomp.report import diagnosis_figures as figures
@@ -48,7 +49,7 @@ def diagnosis_page(d: Diagnosis, augmented_toml: str = "", concealed: Mapping[st
     """Return the page of one diagnosis as HTML that opens offline; `augmented_toml` is shown folded,
     `concealed` is what `cablecomp prove --in` found of physics concealed in the same recordings."""
     many = len(d.sessions) > 1
-    count = f"{len(d.recordings)} recording{'s' if len(d.recordings) > 1 else ''}"
+    count = counted(len(d.recordings), "recording")
     lead = f"{count}{f' in {len(d.sessions)} sessions' if many else ''}; diagnosed in {d.runtime_s:.0f} s."
     return page.page(f"Diagnosis: {d.config.name}", lead, _sections(d, augmented_toml, concealed))
 
@@ -226,7 +227,7 @@ def _overlays(d: Diagnosis, unit: Scale) -> Section:
         body += page.fold(
             short(t.name), page.figure(figures.overlay(t, (), unit)) + page.figure(figures.loops(t, unit))
         )
-    left = f" {len(others) - _DRAWN + 1} recordings are not drawn." if len(others) >= _DRAWN else ""
+    left = f" Not drawn: {counted(len(others) - _DRAWN + 1, 'recording')}." if len(others) >= _DRAWN else ""
     return Section(
         "Before and after",
         body,

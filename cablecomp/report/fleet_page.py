@@ -11,6 +11,7 @@ import numpy as np
 from plotly.subplots import make_subplots
 from rich.table import Table
 
+from cablecomp.counting import counted
 from cablecomp.fleet.fleet import Fleet, JointStory
 from cablecomp.fleet.rows import Row
 from cablecomp.report import page, style
@@ -85,7 +86,7 @@ def _sections(fleet: Fleet, command: str) -> Iterator[Section]:
             "What failed", page.bullets(failures(fleet)), "Tried again when the command is given again."
         )
     yield Section(
-        "Every night", page.fold(f"{len(fleet.rows)} rows", _all_rows(fleet.rows)) + page.code(command)
+        "Every night", page.fold(counted(len(fleet.rows), "row"), _all_rows(fleet.rows)) + page.code(command)
     )
 
 

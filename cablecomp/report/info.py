@@ -9,6 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cablecomp.counting import counted
 from cablecomp.thesis.bench.types import BenchResult, Branch, Measured
 from cablecomp.thesis.design_types import DesignSheet, StageSheet, WrapUse
 
@@ -59,7 +60,9 @@ def bench_table(result: BenchResult) -> RenderableType:
 
 def _joint_table(sheet: DesignSheet) -> Table:
     circuit = sheet.circuit if sheet.arrangement == "single" else f"{sheet.circuit}, {sheet.arrangement}"
-    table = _table(f"{sheet.name}: {circuit} circuit, {len(sheet.stages)} stage(s)", "quantity", "value", "")
+    table = _table(
+        f"{sheet.name}: {circuit} circuit, {counted(len(sheet.stages), 'stage')}", "quantity", "value", ""
+    )
     few = "of the output stage" if sheet.equivalent is None else ""
     ease = "of the load that eases the cable" if sheet.circuit == "open" else ""
     rows = [

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from cablecomp.counting import counted
 from cablecomp.errors import path_text
 from cablecomp.recording.channels import CANONICAL
 from cablecomp.recording.inspection import ChannelQuality, Inspection
@@ -38,12 +39,13 @@ def show(looked: Looked, console: Console) -> None:
     raw, mapping, seen = looked.raw, looked.mapping, looked.seen
     rows = len(next(iter(raw.columns.values())))
     console.print(
-        f"{looked.recording}: {raw.kind}, {len(raw.columns)} columns of numbers, {rows:,} rows looked at"
+        f"{looked.recording}: {raw.kind}, {counted(len(raw.columns), 'column')} of numbers, "
+        f"{counted(rows, 'row')} looked at"
     )
     for topic in raw.topics.values():
         stamped = ", stamped by its sender" if topic.stamped else ""
         console.print(
-            f"  {topic.name}: {topic.count:,} messages, every {1e3 * topic.period_s:.4g} ms{stamped}"
+            f"  {topic.name}: {counted(topic.count, 'message')}, every {1e3 * topic.period_s:.4g} ms{stamped}"
         )
     console.print(_columns_table(raw, looked.suggested, mapping))
     if seen is None:
@@ -86,8 +88,9 @@ def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap)
 
 def _show_quality(seen: Inspection, console: Console) -> None:
     console.print(
-        f"{seen.rows:,} rows over {seen.duration_s:.6g} s, {seen.rate_Hz:.6g} Hz, steps even within "
-        f"{max(100 * seen.jitter, 0.01):.2g} %, {len(seen.gaps)} gaps, {seen.duplicates} repeated stamps"
+        f"{counted(seen.rows, 'row')} over {seen.duration_s:.6g} s, {seen.rate_Hz:.6g} Hz, steps even within "
+        f"{max(100 * seen.jitter, 0.01):.2g} %, {counted(len(seen.gaps), 'gap')}, "
+        f"{counted(seen.duplicates, 'repeated stamp')}"
     )
     table = Table(box=None)
     for name in ("channel", "least", "greatest", "noise", "step", "odd"):

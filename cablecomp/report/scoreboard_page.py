@@ -21,7 +21,7 @@ from cablecomp.trials.shares import Rate
 
 def scoreboard_table(board: Scoreboard) -> Table:
     """What was reached against what is to be reached, for the terminal."""
-    table = Table(title=f"{len(board.rows)} blind trials, seed {board.wish['seed']}", title_justify="left")
+    table = Table(title=f"{board.counted} blind trials, seed {board.wish['seed']}", title_justify="left")
     table.add_column("what")
     for name in ("reached", "95 % interval", "to reach", "of"):
         table.add_column(name, justify="right")
@@ -42,10 +42,10 @@ def scoreboard_page(board: Scoreboard) -> str:
     wish = board.wish
     command = "cablecomp prove " + " ".join(f"--{k} {v}" for k, v in wish.items())
     lead = (
-        f"{len(board.rows)} simulated joints with concealed physics, seed "
+        f"{board.counted} simulated joints with concealed physics, seed "
         f"{wish['seed']}, laws: {wish['laws']}, imperfections: "
         f"{wish['imperfections']}. The truth was sealed before any diagnosis "
-        f"and opened after all verdicts were written."
+        f"and opened after their verdicts were written."
     )
     sections = [
         Section("What was reached", _facts(board) + _targets(board) + page.code(command)),

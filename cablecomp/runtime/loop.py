@@ -11,6 +11,7 @@ from enum import IntEnum
 from pathlib import Path
 from time import perf_counter
 
+from cablecomp.counting import counted
 from cablecomp.errors import DeviceError
 from cablecomp.links.link import Link
 from cablecomp.links.records import BusState, DriveState, Mode
@@ -244,7 +245,7 @@ class Loop:
         if tick.number % LOOK_EVERY == 0:
             self._unread = (self._unread[1], self.link.unread)
         if tick.skipped:
-            self.events.add(now, "", f"{tick.skipped} ticks skipped")
+            self.events.add(now, "", f"{counted(tick.skipped, 'tick')} skipped")
         why = self._asked_to_stop or self._joint_trouble() or self._bus_trouble()
         if not why and since >= self.options.duration_s:
             why = TIME_IS_OVER

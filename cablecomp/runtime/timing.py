@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from math import inf
 from typing import Any
 
+from cablecomp.counting import counted
 from cablecomp.runtime.histogram import Spread
 from cablecomp.runtime.minutes import Minute, shown
 
@@ -70,7 +71,7 @@ class TimingReport:
                     f"simulated, {self.ticks} ticks of 1/{self.asked_Hz:g} s: neither rate nor lateness was measured",
                 ),
                 *work,
-                ("longer than a tick", f"{self.misses} cycles: in real time they would have been late"),
+                ("longer than a tick", f"{counted(self.misses, 'cycle')}: late, had it been real time"),
             ]
         else:
             measured = [

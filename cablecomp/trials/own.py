@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -41,12 +42,12 @@ seals."""
 @dataclass(frozen=True)
 class OwnWish:
     """How much: `rounds` pieces of at most `seconds` of recordings each (one twin and one trial of every
-    physics in each), begun for at most `minutes` (None: until all are done)."""
+    physics in each), begun for at most `budget_s`."""
 
     seed: int
     rounds: int
     seconds: float
-    minutes: float | None
+    budget_s: float = inf
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Own:
 def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
     """Conceal, diagnose each trial blindly, open the truth, and say what size of each physics would have been found.
 
-    Writes `concealed.json`. With the same folder again (and more minutes), it goes on where it stopped. Raises
+    Writes `concealed.json`. With the same folder again, it goes on where it stopped. Raises
     InputError for recordings that cannot be used, or a folder that holds another run.
     """
     out = own.out
@@ -78,7 +79,7 @@ def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
     announce(sha256)
     numbers = [int(p.stem) for p in sorted((out / SEALED).glob("*.zip"))]
     places = [Place(out, k) for k in numbers]
-    until = None if wish.minutes is None else time.monotonic() + 60.0 * wish.minutes
+    until = time.monotonic() + wish.budget_s
     jobs: list[Job] = [(own.diagnose, p.public, (), p.verdict) for p in places]
     diagnose_all(jobs, own.workers, "diagnosing", tell, until, least=2)
     check_seal(out / SEALED, sha256)

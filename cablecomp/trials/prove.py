@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from math import inf
 from pathlib import Path
 
 from cablecomp.cluster import Workers, spread
@@ -61,12 +63,13 @@ class Blind:
     diagnose: Diagnose = diagnose_folder
 
 
-def prove(blind: Blind, wish: Wish, tell: Tell, announce: Announce) -> Scoreboard:
+def prove(blind: Blind, wish: Wish, tell: Tell, announce: Announce, budget_s: float = inf) -> Scoreboard:
     """Run blind trials and score them; writes `scoreboard.json`.
 
     Order: trials and the sealed truths are written, the seals' SHA-256 is announced; every trial is diagnosed
     in a process of its own; proposed experiments are played on the sealed joints and diagnosed again; the
-    seals are checked and opened; verdicts are scored. A run that was interrupted goes on where it stopped.
+    seals are checked and opened; verdicts are scored. A run that was interrupted, or whose `budget_s` was spent (no
+    diagnosis is begun after it, but one there is), goes on where it stopped.
     Raises InputError if the folder holds another run or a seal was broken.
     """
     out = blind.out
@@ -74,24 +77,26 @@ def prove(blind: Blind, wish: Wish, tell: Tell, announce: Announce) -> Scoreboar
         out, asdict(wish), lambda: blind.conceal(out, wish, lambda done, of: tell("concealing", done, of))
     )
     announce(sha256)
+    until = time.monotonic() + budget_s
     places = [Place(out, k) for k in range(wish.trials)]
     jobs: list[Job] = [(blind.diagnose, p.public, (), p.verdict) for p in places]
-    diagnose_all(jobs, blind.workers, "diagnosing", tell)
+    diagnose_all(jobs, blind.workers, "diagnosing", tell, until, least=1)
+    places = [p for p in places if p.is_diagnosed]
     if CONFOUNDED in wish.kinds.split(","):  # experiments are played on these alone
-        _experiment_all(blind, places, tell)
+        _experiment_all(blind, places, tell, until)
     check_seal(out / SEALED, sha256)
     board = scoreboard(_score_all(blind, places, tell), sha256, asdict(wish))
     write_json(out / "scoreboard.json", as_json(board))
     return board
 
 
-def _experiment_all(blind: Blind, places: Sequence[Place], tell: Tell) -> None:
+def _experiment_all(blind: Blind, places: Sequence[Place], tell: Tell, until: float) -> None:
     """Play the experiments that verdicts propose, and diagnose again with them; the concealing side knows which
     joints are there to be experimented on."""
     jobs: list[Job] = []
     for p in places:
         protocol, second = p.verdict / PROTOCOL, p.verdict / SECOND
-        if not protocol.exists():
+        if not protocol.exists() or time.monotonic() >= until:
             continue
         further = second / "experiment.csv.gz"
         if not (second / "timing.json").exists():
@@ -101,7 +106,7 @@ def _experiment_all(blind: Blind, places: Sequence[Place], tell: Tell) -> None:
             except CablecompError as error:
                 write_json(second / "timing.json", {"seconds": None, "failed": str(error)})
         jobs.append((blind.diagnose, p.public, (further,), second))
-    diagnose_all(jobs, blind.workers, "diagnosing after the experiment", tell)
+    diagnose_all(jobs, blind.workers, "diagnosing after the experiment", tell, until)
 
 
 def _score_all(blind: Blind, places: Sequence[Place], tell: Tell) -> list[Row]:

@@ -52,6 +52,11 @@ class Place:
         return self.out / VERDICTS / f"{self.number:05d}"
 
     @property
+    def is_diagnosed(self) -> bool:
+        """Whether its diagnosis was made, or failed."""
+        return (self.verdict / "timing.json").exists()
+
+    @property
     def sealed(self) -> Path:
         """The truth."""
         return self.out / SEALED / f"{self.number:05d}.zip"

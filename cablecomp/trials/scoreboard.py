@@ -87,6 +87,12 @@ class Scoreboard:
     by_size: tuple[Part, ...]
     trust: Trust
 
+    @property
+    def counted(self) -> str:
+        """How many trials are scored, and of how many where some are still to be diagnosed."""
+        asked = int(self.wish["trials"])
+        return str(asked) if len(self.rows) == asked else f"{len(self.rows)} of {asked}"
+
     def of_kind(self, *kinds: str) -> list[Row]:
         """Rows of some kinds."""
         return [r for r in self.rows if r.kind in kinds]

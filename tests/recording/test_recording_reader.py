@@ -119,9 +119,9 @@ def test_gaps_repeats_and_empty_optional_cells_are_remarked_with_their_line(tmp_
             log.add(block.remarks)
         notes = "; ".join(log.notes())
         assert [(gap.line, round(gap.size, 6)) for gap in log.gaps] == [(102, 3.01)]
-        assert "1 gap(s) in time, at line 102 (3.01 s)" in notes
-        assert "1 row(s) repeat the time stamp of the row before, first at line 153" in notes
-        assert "other_x is empty in 2 row(s), first at line 22" in notes
+        assert "1 gap in time, at line 102 (3.01 s)" in notes
+        assert "1 row with the time stamp of the row before, first at line 153" in notes
+        assert "other_x is empty in 2 rows, first at line 22" in notes
         assert "line 201 does not end with a line break" in notes
 
 

@@ -202,7 +202,7 @@ def test_progress_and_gaps_are_told(tmp_path: Path) -> None:
     )
     assert told[-1] == (1.0, 1500)
     assert [gap["line"] for gap in summary.gaps] == [702]
-    assert any("1 gap(s)" in note for note in summary.notes)
+    assert any("1 gap" in note for note in summary.notes)
 
 
 def test_the_bar_shows_only_when_it_takes_long() -> None:

@@ -7,7 +7,7 @@ import json
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import isnan
+from math import inf, isnan
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +146,7 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
     seal = digest(tmp_path / "sealed")
     assert log == [seal, "00000", "00001"]  # the least: a twin and one beside it
     assert (first.done, first.of) == (2, 3)
-    second = prove_in(own, replace(wish, minutes=None), lambda what, done, of: None, log.append)
+    second = prove_in(own, replace(wish, budget_s=inf), lambda what, done, of: None, log.append)
     assert log[3:] == [seal, "00002"]
     assert (second.done, second.of, second.curves[0].in_twins.hits) == (3, 3, 0)
     answer = concealed_beside(tmp_path)

@@ -104,6 +104,18 @@ def test_the_whole_way_in_order_and_again_without_work(tmp_path: Path) -> None:
         prove(blind, replace(wish, trials=3), lambda what, done, of: None, log.append)
 
 
+def test_a_budget_that_is_spent_leaves_the_rest_for_the_next_time(tmp_path: Path) -> None:
+    log: list[str] = []
+    blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), Workers(0), _fake_diagnosis(log))
+    wish = Wish(2, 5, "none,confounded", "catalogue", "none")
+    first = prove(blind, wish, lambda what, done, of: None, log.append, budget_s=0.0)
+    assert ([r.number for r in first.rows], first.counted) == ([0], "1 of 2")
+    assert log[2:] == ["diagnosed 00000 with 0"]
+    whole = prove(blind, wish, lambda what, done, of: None, log.append)
+    assert ([r.number for r in whole.rows], whole.counted) == ([0, 1], "2")
+    assert log[4:] == ["diagnosed 00001 with 0", "experiment 00000", "diagnosed 00000 with 1"]
+
+
 def test_a_broken_seal_is_not_opened(tmp_path: Path) -> None:
     seal(tmp_path, 0, _plain_truth(0))
     sha256 = digest(tmp_path / SEALED)
