@@ -71,7 +71,7 @@ def facts(cards: Iterable[Fact]) -> str:
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> str:
     """Return a table of plain cells; numbers (int, float) are set right-aligned with `number`."""
-    head = "".join(f"<th>{escape(header)}</th>" for header in headers)
+    head = "".join(f"<th>{_breakable(escape(header))}</th>" for header in headers)
     body = "".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>" for row in rows)
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
     return (
@@ -182,7 +182,12 @@ def _cell(cell: object) -> str:
         return f'<td class="number">{escape(number(cell, digits=5))}</td>'
     text = str(cell)
     kind = ' class="long"' if len(text) > LONG_TEXT else ""
-    return f"<td{kind}>{_words(text)}</td>"
+    return f"<td{kind}>{_breakable(_words(text))}</td>"
+
+
+def _breakable(text: str) -> str:
+    """HTML whose long names may be broken, so that a table is no wider than its card."""
+    return _IN_NAMES.sub(r"\1<wbr>", text)
 
 
 def _words(text: str) -> str:
@@ -197,6 +202,8 @@ def _superscript(exponent: int) -> str:
 LONG_TEXT: Final = 60
 """Characters from which on a cell is a sentence, and keeps a width that it can be read at."""
 _CODE: Final = re.compile("`([^`]+)`")
+_IN_NAMES: Final = re.compile(r"(?<=\w)([_/])(?=[^\W\d])")
+"""Where a long name may be broken."""
 _LONG: Final = (64, 16_384)
 """Lengths between which an array is worth packing, and 65 534 steps are finer than its points."""
 _CONFIG: Final = json.dumps({

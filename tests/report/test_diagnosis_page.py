@@ -31,7 +31,7 @@ def found() -> Diagnosis:
 
 def text_of(html: str) -> str:
     """The page without scripts and tags."""
-    html = re.sub(r"<(script|style).*?</\1>", " ", html, flags=re.DOTALL)
+    html = re.sub(r"<(script|style).*?</\1>", " ", html, flags=re.DOTALL).replace("<wbr>", "")
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html)).replace("&#x27;", "'")
 
 

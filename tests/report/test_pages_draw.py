@@ -135,6 +135,16 @@ def test_the_name_of_an_axis_stays_out_of_the_column_before_it(chromium: Any, tm
     assert begins >= ends
 
 
+def test_a_table_of_long_names_is_no_wider_than_its_card(chromium: Any, tmp_path: Path) -> None:
+    heads = ["switched on", *(f"true, loading/unloading, M_pk {k}" for k in range(10))]
+    table = page.table(heads, [["pressure_dependent_friction", *["1.093"] * 10]])
+    table_of = "[document.querySelector('table').scrollWidth, document.querySelector('.scroll').clientWidth]"
+    with drawn(chromium, page.page("A page", "", [Section("Numbers", table)]), tmp_path) as seen:
+        wide, card = seen.evaluate(table_of)
+        assert wide <= card
+        assert seen.evaluate("document.querySelector('td').textContent") == "pressure_dependent_friction"
+
+
 def test_a_sentence_in_a_table_keeps_a_width_that_it_can_be_read_at(chromium: Any, tmp_path: Path) -> None:
     fig = style.figure(300)
     style.curve(fig, np.arange(3.0), np.arange(3.0), "line", style.PREDICTED, 1.0)
