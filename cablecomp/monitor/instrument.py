@@ -70,7 +70,7 @@ class Instrument:
             "late_p99_s": t.jitter.quantile(0.99),
             "misses": t.misses,
             "alarms": list(health_names(view.flags)),
-            "event": " ".join(events[-1][1:]) if events else "",
+            "event": " ".join(events[-1][1:]).strip() if events else "",
             "dropped": self.dropped,
         }
         self.send(packed(scalars, None if vector is None else vector()))

@@ -14,6 +14,14 @@ from cablecomp.monitor.frames import Frame
 PLOTJUGGLER: Final = ("127.0.0.1", 9870)
 FOXGLOVE_PORT: Final = 8765
 _TOPIC: Final = "/live"
+_SCHEMA: Final = "cablecomp.Live"
+
+
+def schema_of(found: Frame) -> bytes:
+    """JSON schema of frames like this one: by it onlookers offer the curves that can be drawn."""
+    kinds: dict[type, str] = {str: "string", list: "array"}
+    fields = {name: {"type": kinds.get(type(value), "number")} for name, value in found.items()}
+    return json.dumps({"title": _SCHEMA, "type": "object", "properties": fields}).encode()
 
 
 class Sink(Protocol):
@@ -52,12 +60,16 @@ class Foxglove:
             import foxglove
         except ImportError:
             raise InputError("--foxglove needs a package: pip install 'cablecomp[live]'") from None
+        self._foxglove = foxglove
         self._server = foxglove.start_server(name="cablecomp", host="127.0.0.1", port=port)
-        self._channel = foxglove.Channel(_TOPIC, message_encoding="json")
+        self._channel: Any = None
         self.port: int = self._server.port
 
     def take(self, found: Frame) -> None:
         """See `Sink.take`."""
+        if self._channel is None:
+            schema = self._foxglove.Schema(name=_SCHEMA, encoding="jsonschema", data=schema_of(found))
+            self._channel = self._foxglove.Channel(_TOPIC, schema=schema, message_encoding="json")
         self._channel.log(found, log_time=round(found["time_s"] * 1e9))
 
     def close(self) -> None:
@@ -76,12 +88,14 @@ class Mcap:
         self._stream = path.open("wb")
         self._writer: Any = Writer(self._stream, enable_data_crcs=True, use_chunking=False)
         self._writer.start(profile="", library="cablecomp")
-        schema = self._writer.register_schema("cablecomp.Live", "jsonschema", b'{"type": "object"}')
-        self._channel = self._writer.register_channel(_TOPIC, "json", schema)
+        self._channel: int | None = None
         self._every_s, self._saved_s = every_s, float("-inf")
 
     def take(self, found: Frame) -> None:
         """See `Sink.take`."""
+        if self._channel is None:
+            schema = self._writer.register_schema(_SCHEMA, "jsonschema", schema_of(found))
+            self._channel = self._writer.register_channel(_TOPIC, "json", schema)
         stamp = round(max(found["time_s"], 0.0) * 1e9)
         self._writer.add_message(
             self._channel, log_time=stamp, publish_time=stamp, data=json.dumps(found).encode()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -133,13 +134,47 @@ def _until_the_end(reader: Any) -> Iterator[Any]:
         return
 
 
-def test_foxglove_is_served_on_loopback() -> None:
+LISTEN = """(port) => new Promise((done, fail) => {
+  const socket = new WebSocket(`ws://127.0.0.1:${port}`, ["foxglove.sdk.v1"]);
+  socket.binaryType = "arraybuffer";
+  setTimeout(() => fail("nothing came"), 20000);
+  let channel;
+  socket.onmessage = ({ data }) => {
+    if (typeof data !== "string") { socket.close(); done([channel, new TextDecoder().decode(data.slice(13))]); return; }
+    const said = JSON.parse(data);
+    if (said.op !== "advertise") return;
+    channel = said.channels[0];
+    socket.send(JSON.stringify({ op: "subscribe", subscriptions: [{ id: 1, channelId: channel.id }] }));
+  };
+})"""
+
+
+@needs_browser
+def test_a_foxglove_client_gets_the_channel_its_schema_and_frames() -> None:
     pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
-    sink = Foxglove(port=0)
-    sink.take(made_up(1))
-    with socket.create_connection(("127.0.0.1", sink.port), timeout=5.0):
-        pass
-    sink.close()
+    sink, over = Foxglove(port=0), threading.Event()
+
+    def send() -> None:
+        while not over.wait(0.02):
+            sink.take(made_up(10))
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        with browser() as chromium:
+            channel, frame = chromium.new_page().evaluate(LISTEN, sink.port)
+    finally:
+        over.set()
+        sender.join()
+        sink.close()
+    assert (channel["topic"], channel["schemaName"]) == ("/live", "cablecomp.Live")
+    fields = json.loads(channel["schema"])["properties"]
+    assert (fields["load_Nm"]["type"], fields["joint"]["type"], fields["wraps"]["type"]) == (
+        "number",
+        "string",
+        "array",
+    )
+    assert json.loads(frame) == made_up(10)
 
 
 @needs_browser
