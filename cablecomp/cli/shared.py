@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from cablecomp.config import JointConfig, doubts, load_joint
+from cablecomp.errors import InputError
 from cablecomp.examples import resolve
 
 if TYPE_CHECKING:
@@ -66,6 +67,13 @@ def read_joint(path: Path, effects: Sequence[Path] | None = None) -> JointConfig
         for file in effects:
             load_effects(file)
     joint = load_joint(path)
+    if joint.effect or joint.empirical:
+        from cablecomp.effects import extend
+
+        try:
+            extend(joint)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
     warn(f"{path}: {words}" for words in doubts(joint))
     return joint
 

@@ -64,7 +64,11 @@ def _check_line(config: LinkConfig, where: str) -> None:
 def _check_identifiers(config: LinkConfig, where: str) -> None:
     """Raise InputError where two devices would send or take frames of the same identifier."""
     seen: dict[int, list[tuple[str, Claim]]] = {}
-    for owner, claim in claims_of(config):
+    try:
+        claims = tuple(claims_of(config))
+    except InputError as error:  # a model or a message table that is not there
+        raise InputError(f"{where}: {error}") from None
+    for owner, claim in claims:
         for other, before in seen.setdefault(claim.identifier, []):
             if other != owner and not _may_share(claim, before):
                 raise InputError(

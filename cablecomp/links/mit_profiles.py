@@ -13,6 +13,7 @@ drive: it is asked for them, and a drive that has others than the link is not en
 
 from __future__ import annotations
 
+import difflib
 from typing import Final, Literal, NamedTuple
 
 from cablecomp.errors import InputError
@@ -130,9 +131,9 @@ def profile(model: str) -> MitProfile:
     """Profile of a model; raises InputError with the models there are."""
     found = PROFILES.get(model)
     if found is None:
-        raise InputError(
-            f"unknown MIT model `{model}`; known: {', '.join(PROFILES)}; or give `range` for another drive"
-        )
+        close = difflib.get_close_matches(model, PROFILES, 1)
+        hint = f"did you mean `{close[0]}`?" if close else f"known: {', '.join(PROFILES)};"
+        raise InputError(f"unknown MIT model `{model}`; {hint} or give `range` for another drive")
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import queue
 import socket
@@ -50,7 +51,9 @@ def _open_bus(
 ) -> Any:
     known = sorted(can.VALID_INTERFACES)
     if interface not in known:
-        raise InputError(f"unknown CAN interface `{interface}`; python-can has {', '.join(known)}")
+        close = difflib.get_close_matches(interface, known, 1, 0.75)
+        hint = f"did you mean `{close[0]}`?" if close else f"python-can has {', '.join(known)}"
+        raise InputError(f"unknown CAN interface `{interface}`; {hint}")
     chosen = {"channel": channel, "bitrate": None if "timing" in options else bitrate}
     wanted = {k: v for k, v in chosen.items() if v is not None}
     try:

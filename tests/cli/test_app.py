@@ -142,3 +142,15 @@ def test_a_packed_recording_with_an_unpacked_name_is_taken_and_said(
     out = str(tmp_path / "out")
     assert main(["replay", str(packed), "--config", "wrist-capstan", "--no-bounds", "--out", out]) == 0
     assert "note: is gzip although it is named .csv; read unpacked" in capsys.readouterr().out
+
+
+def test_an_effect_that_there_is_not_is_told_with_the_file_and_the_nearest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["example", "joints/wrist-capstan", "--out", str(tmp_path)]) == 0
+    path = tmp_path / "wrist-capstan.toml"
+    path.write_text(path.read_text() + '\n[[effect]]\nid = "viscous_slipp"\n')
+    assert main(["info", "--config", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"cablecomp: {path}: key `effect.id`")
+    assert "did you mean `viscous_slip`?" in said

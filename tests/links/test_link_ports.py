@@ -221,6 +221,8 @@ def test_multicast_with_a_stock_client(group: dict[str, object]) -> None:
 def test_what_cannot_be_opened_is_said_in_one_line(tmp_path) -> None:
     with pytest.raises(InputError, match="unknown CAN interface `cannon`; python-can has"):
         can_port("cannon", "x", None, {}).open()
+    with pytest.raises(InputError, match=r"did you mean `udp_multicast`\?"):
+        can_port("udp_multicst", "x", None, {}).open()
     with pytest.raises(DeviceError, match="cannot be opened") as caught:
         serial_port(str(tmp_path / "none"), 9600).open()
     assert "\n" not in str(caught.value)

@@ -43,6 +43,7 @@ def test_there_is_one_for_every_kind_of_wire() -> None:
         ('model = "AK80-9"', 'modle = "AK80-9"', "modle"),
         ('model = "AK80-9"', "", "`range` and `family`"),
         ('model = "AK80-9"', 'model = "AK81"', "unknown MIT model `AK81`"),
+        ('model = "AK80-9"', 'model = "AK809"', "x.toml: unknown MIT model `AK809`; did you mean `AK80-9`?"),
         ("node = 1\nreply_id = 0", 'node = "1"\nreply_id = 0', "node"),
         ("hold_s = 0.01", "hold_s = 0.3", "hold_s < fade_s <= stop_s"),
         ("rate_Hz = 1000.0", "rate_Hz = 50.0", "0.02 s or more are accepted"),
