@@ -4,6 +4,9 @@ A row stands for each message of the *leading* topic. Every other topic gives th
 among its last message at or before the row and any up to `within_s` after it (messages of one cycle are often
 stamped microseconds apart); how old that value is stands beside it as `other_age_<topic>_s`. A value older than
 `hold_s` is not used: where a channel needs one, the row is left out, and counted.
+
+A topic of another rate is interpolated between its messages before and after the row: held, 200 Hz would lag 2.5 ms
+behind on average, in which a joint moves farther than its cable gives way.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from cablecomp.recording.raw import NumberRows
 from cablecomp.recording.topics import TopicFacts
 
 _SAME_CLOCK_S: Final = 2e-3
+_SAME_RATE: Final = 1.5
 
 Clock = Literal["auto", "stamp", "log"]
 
@@ -62,21 +66,27 @@ def join(
     wanted: Mapping[str, tuple[str, str]],
     needed: Collection[str],
     rule: JoinRule,
+    steady: Collection[str] = (),
 ) -> Joined:
     """Join the `wanted` columns, name -> (topic, field), into rows with `time_s` from the leader's first message.
 
     A row in which a `needed` column has no fresh value is left out. A row stands for each message of the leader
-    that holds the first of its wanted fields. Raises InputError if the rule names a leader that is not there.
+    that holds the first of its wanted fields. `steady`: columns that change steadily and may be interpolated. Raises
+    InputError if the rule names a leader that is not there.
     """
     used = {topic: topics[topic] for topic, _ in wanted.values()}
     chosen = settled(rule, used)
     clock = _OneClock(used, chosen)
     ages = _age_names([topic for topic in used if topic != chosen.leader])
     after = frozenset(wanted[name][0] for name in needed) - {chosen.leader}
-    plan = JoinPlan(wanted, after, ages, chosen.leader, chosen.within_s, chosen.hold_s)
+    between = _between(used, chosen.leader, {n: place for n, place in wanted.items() if n in steady})
+    plan = JoinPlan(wanted, after, ages, chosen.leader, chosen.within_s, chosen.hold_s, between)
     names = ("time_s", *wanted, *ages.values())
     return Joined(
-        lambda: JoinedRows(log, plan, clock).blocks(), names, chosen, tuple(_words(chosen, used, clock))
+        lambda: JoinedRows(log, plan, clock).blocks(),
+        names,
+        chosen,
+        tuple(_words(chosen, used, clock, between)),
     )
 
 
@@ -155,12 +165,29 @@ class _OneClock:
         return self.logged(message)
 
 
-def _words(rule: Settled, topics: Mapping[str, TopicFacts], clock: _OneClock) -> Iterator[str]:
+def _between(
+    topics: Mapping[str, TopicFacts], leader: str, steady: Mapping[str, tuple[str, str]]
+) -> dict[str, frozenset[str]]:
+    """Topic -> fields to interpolate, of the topics that are slower or faster than the leader."""
+    period = topics[leader].period_s
+    found: dict[str, frozenset[str]] = {}
+    for topic, name in steady.values():
+        other = topics[topic].period_s
+        if topic != leader and not period / _SAME_RATE < other < period * _SAME_RATE:
+            found[topic] = found.get(topic, frozenset()) | {name}
+    return found
+
+
+def _words(
+    rule: Settled, topics: Mapping[str, TopicFacts], clock: _OneClock, between: Collection[str]
+) -> Iterator[str]:
     if len(topics) > 1:
         yield (
             f"a row for each message of {rule.leader}; other topics by their nearest message up to "
             f"{1e3 * rule.within_s:.3g} ms after it, none older than {1e3 * max(rule.hold_s.values()):.3g} ms"
         )
+    if between:
+        yield f"between the messages before and after a row, as it comes at another rate: {', '.join(between)}"
     if rule.by_stamp:
         for name, line in clock.lines.items():
             yield (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right, insort
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
@@ -34,7 +34,8 @@ class Clock(Protocol):
 @dataclass(frozen=True)
 class JoinPlan:
     """What is joined: `wanted` column -> (topic, field); `needed` topics without a fresh value of which a row is
-    left out; `ages` topic -> name of its column of ages; `hold_s` by topic, how old a value may be.
+    left out; `ages` topic -> name of its column of ages; `hold_s` by topic, how old a value may be; `between` topic ->
+    fields that are interpolated between the messages before and after a row.
     """
 
     wanted: Mapping[str, tuple[str, str]]
@@ -43,10 +44,11 @@ class JoinPlan:
     leader: str
     within_s: float
     hold_s: Mapping[str, float]
+    between: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     def fields_of(self, topic: str) -> frozenset[str]:
         """The fields of a topic that are wanted."""
-        return frozenset(field for t, field in self.wanted.values() if t == topic)
+        return frozenset(name for t, name in self.wanted.values() if t == topic)
 
 
 class _Row(NamedTuple):
@@ -90,13 +92,22 @@ class _History:
             return self._times[k], self._held[k]
         return (self._times[k - 1], self._held[k - 1]) if k else None
 
+    def around(
+        self, time: float
+    ) -> tuple[tuple[float, dict[str, float]], tuple[float, dict[str, float]]] | None:
+        """The last message at or before `time` and the first after it; None where one is not there."""
+        k = bisect_right(self._times, time)
+        if not 0 < k < len(self._times):
+            return None
+        return (self._times[k - 1], self._held[k - 1]), (self._times[k], self._held[k])
+
 
 class JoinedRows:
     """The running state of a join."""
 
     def __init__(self, log: MessageLog, plan: JoinPlan, clock: Clock) -> None:
         self._log, self._plan, self._clock = log, plan, clock
-        self._key = next(field for topic, field in plan.wanted.values() if topic == plan.leader)
+        self._key = next(name for topic, name in plan.wanted.values() if topic == plan.leader)
         topics = {topic for topic, _ in plan.wanted.values()}
         self._history = {topic: _History(plan.fields_of(topic)) for topic in topics}
         self._waiting: list[_Row] = []
@@ -108,7 +119,7 @@ class JoinedRows:
         parts: list[tuple[_Row, dict[str, tuple[float, dict[str, float]]]]] = []
         first = 1
         for row in self._complete():
-            near = {t: h.nearest(row.time, self._plan.within_s) for t, h in self._history.items()}
+            near = {t: self._at(row.time, t) for t in self._history}
             fresh = {
                 t: found
                 for t, found in near.items()
@@ -127,9 +138,25 @@ class JoinedRows:
         if parts:
             yield self._block(first, parts)
 
+    def _at(self, time: float, topic: str) -> tuple[float, dict[str, float]] | None:
+        """What a topic says at a row, and since when."""
+        history, plan = self._history[topic], self._plan
+        near = history.nearest(time, plan.within_s)
+        pair = history.around(time) if topic in plan.between else None
+        if near is None or pair is None or pair[1][0] - pair[0][0] > plan.hold_s[topic]:
+            return near
+        (before, old), (after, new) = pair
+        share = (time - before) / (after - before)
+        mixed = {
+            name: (1.0 - share) * old[name] + share * new[name]
+            for name in plan.between[topic] & old.keys() & new.keys()
+        }
+        return before, {**near[1], **mixed}
+
     def _complete(self) -> Iterator[_Row]:
         """Rows in the order of time, each once nothing that belongs to it is still to come."""
-        patience = self._plan.within_s + self._clock.late_s
+        wait = max((self._plan.hold_s[t] for t in self._plan.between), default=0.0)
+        patience = max(self._plan.within_s, wait) + self._clock.late_s
         for message, share in self._log.read(frozenset(self._history)):
             now = self._clock.logged(message)
             while self._waiting and self._waiting[0].time + patience < now:

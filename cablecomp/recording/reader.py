@@ -11,7 +11,7 @@ import numpy as np
 
 from cablecomp.errors import ConfigError, InputError
 from cablecomp.recording.can_log import DecodeFrame
-from cablecomp.recording.channels import Column, may_be_empty, order, parse_header
+from cablecomp.recording.channels import CANONICAL, Column, may_be_empty, order, parse_header
 from cablecomp.recording.checks import Checks, regrouped, some
 from cablecomp.recording.join import JoinRule, join
 from cablecomp.recording.mapping import (
@@ -177,10 +177,12 @@ def _joined_rows(
     wanted = {c.column: source.fields[c.column] for c in ordered}
     needed = [c.column for c in by_channel.values() if not may_be_empty(c.name)]
     rule = JoinRule() if mapping is None else mapping.rule
-    motor = by_channel.get("motor_position_rad")
-    if rule.leader is None and motor is not None:
-        rule = replace(rule, leader=source.fields[motor.column][0])
-    joined = join(source.log, source.topics, wanted, needed, rule)
+    ends = [by_channel[n].column for n in ("motor_position_rad", "joint_position_rad") if n in by_channel]
+    if rule.leader is None and ends:  # the slower one: readings that were not made are none
+        slower = max((source.fields[c][0] for c in ends), key=lambda topic: source.topics[topic].period_s)
+        rule = replace(rule, leader=slower)
+    steady = [c.column for c in by_channel.values() if c.name in CANONICAL]
+    joined = join(source.log, source.topics, wanted, needed, rule, steady)
     columns = [by_channel[name] for name in order(by_channel)]
     if "time_s" not in by_channel:
         columns.insert(0, Column("time_s", "time_s", 1.0, 0.0))

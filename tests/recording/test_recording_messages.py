@@ -162,6 +162,42 @@ def test_the_nearest_message_within_the_rule_is_taken_and_its_age_kept(tmp_path:
     assert [r.size for r in remarks] == [1]
 
 
+def test_topics_of_other_rates_are_interpolated_at_the_slower_one_of_motor_and_joint(tmp_path: Path) -> None:
+    """Motor at 1 kHz, joint at 200 Hz, load at 50 Hz, each linear in time: every row is exact, and none is made up. A
+    state word is held, and so is the last load before a gap."""
+    every_us = {"/motor": (1_000, 0), "/joint": (5_000, 130), "/load": (20_000, 70)}
+    slope = {
+        "/motor": ("motor_position_rad", 3.0),
+        "/joint": ("joint_position_rad", 1.0),
+        "/load": ("joint_torque_Nm", -2.0),
+    }
+
+    def content(topic: str, at_s: float) -> dict[str, float]:
+        name, per_s = slope[topic]
+        word = {"other_state": float(at_s > 0.5)} if topic == "/load" else {}
+        return {name: per_s * at_s, **word}
+
+    stream = sorted(
+        (k * step + after, topic)
+        for topic, (step, after) in every_us.items()
+        for k in range(1_000_000 // step)
+        if not (topic == "/load" and 0.6 < 1e-6 * k * step < 0.79)
+    )
+    messages = [(topic, T0 + 1_000 * at, content(topic, 1e-6 * at)) for at, topic in stream]
+    write_messages(tmp_path / "a.mcap", dict.fromkeys(every_us, JSON), messages)
+    table = read_all(tmp_path / "a.mcap")
+    time, inner = table.columns["time_s"] + 130e-6, slice(4, -4)
+    quiet = (time > 0.6001) & (time < 0.8)
+    np.testing.assert_allclose(np.diff(time[~quiet][:100]), 5e-3, atol=1e-9)
+    for name, per_s in slope.values():
+        known = ~quiet if name == "joint_torque_Nm" else np.ones(len(time), dtype=bool)
+        np.testing.assert_allclose(table.columns[name][known][inner], per_s * time[known][inner], atol=1e-9)
+    assert time[quiet].max() < 0.75  # then the last load is too old: five of its periods
+    np.testing.assert_allclose(table.columns["joint_torque_Nm"][quiet], -2.0 * 0.60007, atol=1e-9)
+    assert set(table.columns["other_state"]) == {0.0, 1.0}
+    assert any("at another rate: /motor, /load" in note for note in table.notes)
+
+
 def test_messages_out_of_order_in_the_file_are_sorted(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     times = np.arange(4000) * 10**6 + rng.integers(0, 5_000_000, 4000)
