@@ -103,5 +103,6 @@ def _say(result: Mapping[str, Any]) -> None:
         console.print(
             f"error on the loops that it was fitted to: {1e3 * result['code_rms_rad']:.3g} mrad RMS"
         )
-    for line in (*result.get("simulators_leave_out", ()), *result.get("code_leaves_out", ())):
-        console.print(f"left out: {line}", style="dim", soft_wrap=True)
+    for formats, key in (("MJCF and URDF", "simulators_leave_out"), ("C and FMU", "code_leaves_out")):
+        for line in result.get(key, ()):
+            console.print(f"{formats} leave out: {line}", style="dim", soft_wrap=True)

@@ -169,3 +169,12 @@ def test_the_result_is_had_as_json(tmp_path: Path, capsys: pytest.CaptureFixture
     told = json.loads(capsys.readouterr().out)
     assert (told["name"], Path(told["urdf"]).read_text()[:7]) == ("wrist-capstan", "<?xml v")
     assert told["equivalent"]["friction_Nm"] == pytest.approx(equivalent(JOINT).friction_Nm)
+
+
+def test_what_is_lost_is_said_with_the_formats_that_lose_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "--config", "wrist-capstan", "--urdf", "--c", "--out", str(tmp_path)]) == 0
+    lost = [line for line in capsys.readouterr().out.splitlines() if "leave out" in line]
+    assert {line.partition(" leave out: ")[0] for line in lost} == {"MJCF and URDF", "C and FMU"}
+    assert len(lost) == len(set(lost))
