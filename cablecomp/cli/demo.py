@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.folders import out_option
-from cablecomp.cli.shared import DEMO_LINK, JsonOption, console, echo_json, errors
+from cablecomp.cli.shared import DEMO_LINK, JsonOption, announce_compilation, console, echo_json, errors
 from cablecomp.cli.simulation import start_simulation, true_values
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.config_text import joint_text
@@ -54,6 +54,7 @@ def compare_controllers(
     as_json: bool,
 ) -> None:
     """Run motor-side control, linear stiffness and observer side by side on simulated joints; show and write it."""
+    announce_compilation(joint)
     with LiveView(errors() if as_json else console) as view:
         found = compare(
             joint,

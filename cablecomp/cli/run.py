@@ -22,6 +22,7 @@ from cablecomp.cli.shared import (
     Control,
     EffectsOption,
     JsonOption,
+    announce_compilation,
     console,
     control_of,
     echo_json,
@@ -135,6 +136,7 @@ def run(
         duration, fast, out, bounds, resume=resume, without_drive_timeout=without_drive_timeout
     )
     said = errors() if as_json else console
+    announce_compilation(joint, bounds)
     with WaysOut() as ways_out:
         with ExitStack() as last:
             simulation = _simulation(config, wish) if sim else None

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cablecomp.cli.folders import out_option
-from cablecomp.cli.shared import JsonOption, console, echo_json, share_bar
+from cablecomp.cli.shared import JsonOption, announce_compilation, console, echo_json, share_bar
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.errors import InputError
 from cablecomp.report.study_page import study_table, write_study
@@ -20,6 +20,7 @@ def study_bench(
 ) -> None:
     """Which physics gives what the thesis saw on its bench and left open: simulated cycles, its own evaluation."""
     rigs = Rigs(load_joint("snow-open-rig"), load_joint("snow-closed-rig"))
+    announce_compilation()
     with share_bar() as progress:
         found = study(rigs, by_plant, progress)
     page = write_study(found, out, f"cablecomp study --out {out}")

@@ -14,6 +14,7 @@ import pytest
 
 from cablecomp import __version__
 from cablecomp.cli import app, main
+from cablecomp.errors import InputError
 
 HEAVY = {"numba", "scipy", "polars", "plotly", "control", "can", "pydantic"}
 
@@ -154,3 +155,18 @@ def test_an_effect_that_there_is_not_is_told_with_the_file_and_the_nearest(
     said = capsys.readouterr().err
     assert said.startswith(f"cablecomp: {path}: key `effect.id`")
     assert "did you mean `viscous_slip`?" in said
+
+
+@pytest.mark.parametrize("words", [["run", "--config", "wrist-capstan", "--sim", "--fast"], ["demo"]])
+def test_who_waits_for_a_compiler_is_told_so_first(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def compiler(*_: object) -> None:
+        raise InputError("the compiler would begin here")
+
+    monkeypatch.setattr("cablecomp.mechanics.jit.is_compiled", lambda name: False)
+    monkeypatch.setattr("cablecomp.observer.first_use.compile_first", compiler)
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    first, last = capsys.readouterr().err.splitlines()
+    assert first.startswith("compiling the kernels, once for this version")
+    assert last == "cablecomp: the compiler would begin here"
