@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import islice
 from multiprocessing import get_context
 from typing import Any, Final, Generic, TypeVar
 
@@ -68,20 +69,22 @@ def _told(work: Callable[..., R], job: tuple[Any, ...]) -> tuple[R | None, str]:
 def _in_processes(
     work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], processes: int
 ) -> Iterator[Done[R]]:
-    """A process that dies takes its pool along: what is left is then done one by one, to find whose fault it was."""
+    """A process that dies takes its pool along: what is left is then done one by one, to find whose fault it was. A
+    pool is handed no more than it works on: what it has it does, also after its user has gone."""
     left = dict(enumerate(jobs))
     while left:
-        with _pool(min(processes, len(left))) as pool:
-            running: dict[Future[tuple[R | None, str]], int] = {
-                pool.submit(_told, work, job): k for k, job in left.items()
-            }
-            for finished in as_completed(running):
-                try:
-                    result, failed = finished.result()
-                except BrokenProcessPool:
-                    break
-                del left[running[finished]]
-                yield Done(running[finished], result, failed)
+        with _pool(min(processes, len(left))) as pool, suppress(BrokenProcessPool):
+            waiting = iter(list(left.items()))
+            running: dict[Future[tuple[R | None, str]], int] = {}
+            for k, job in islice(waiting, processes):
+                running[pool.submit(_told, work, job)] = k
+            while running:
+                finished = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
+                number, (result, failed) = running.pop(finished), finished.result()
+                del left[number]
+                yield Done(number, result, failed)
+                for k, job in islice(waiting, 1):
+                    running[pool.submit(_told, work, job)] = k
         if left and processes == 1:  # one process takes jobs in their order: the first that is left killed it
             guilty = min(left)
             del left[guilty]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -56,6 +57,18 @@ def test_a_process_that_dies_fails_alone() -> None:
     assert {x: d.result for x, d in done.items() if not d.failed} == {1: 1, 2: 4, 6: 36}
     assert "died" in done[5].failed
     assert done[3].failed == "ZeroDivisionError: three"
+
+
+def mark(folder: str, number: int) -> None:
+    """Leaves a file behind."""
+    Path(folder, str(number)).touch()
+
+
+def test_who_goes_after_the_first_outcome_leaves_the_rest_undone(tmp_path: Path) -> None:
+    outcomes = spread(mark, [(str(tmp_path), k) for k in range(6)], Workers(1))
+    assert next(outcomes).job == 0
+    outcomes.close()
+    assert [p.name for p in tmp_path.iterdir()] == ["0"]
 
 
 def test_a_cluster_does_the_same(scheduler: str) -> None:
