@@ -104,13 +104,17 @@ def concealed_section(answer: Mapping[str, Any], before: str = "") -> Section:
 def found_by_size(answer: Mapping[str, Any]) -> Any:
     """Share found, and share given a wrong name, against the size concealed: one small figure for each physics."""
     shown = answer["curves"]
-    rows = max(-(-len(shown) // _COLUMNS), 1)
+    across = max(min(_COLUMNS, len(shown)), 1)
+    rows = max(-(-len(shown) // across), 1)
+    drawn_px = 250 * rows - 20
     fig = make_subplots(
         rows,
-        _COLUMNS,
+        across,
         subplot_titles=[c["words"] for c in shown],
-        figure=style.figure(90 + 210 * rows, margin={"l": 56, "r": 20, "t": 60, "b": 50}),
-        vertical_spacing=0.3 / rows,
+        figure=style.figure(
+            drawn_px + 154, margin={"l": 56, "r": 20, "t": 104, "b": 50}, legend={"y": 1.0 + 52 / drawn_px}
+        ),  # between legend and figure, as between rows, lie two lines of a title
+        vertical_spacing=100 / drawn_px,
     )
     for k, c in enumerate(shown):
         series = (("found", style.PREDICTED, "found"), ("wrong name", style.CABLE_H, "wrong_name"))
@@ -125,10 +129,10 @@ def found_by_size(answer: Mapping[str, Any]) -> Any:
                 line_color=colour,
                 hovertext=[f"{r['hits']} of {r['of']}" for r in rates],
                 showlegend=k == 0,
-                row=k // _COLUMNS + 1,
-                col=k % _COLUMNS + 1,
+                row=k // across + 1,
+                col=k % across + 1,
             )
-        fig.update_xaxes(title_text=c["unit"], type="log", row=k // _COLUMNS + 1, col=k % _COLUMNS + 1)
+        fig.update_xaxes(title_text=c["unit"], type="log", row=k // across + 1, col=k % across + 1)
     fig.update_yaxes(range=[-6, 106], ticksuffix=" %")
     return fig
 

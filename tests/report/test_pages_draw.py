@@ -39,6 +39,7 @@ from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
 from cablecomp.recording.writer import write_canonical
 from cablecomp.report import page, style
+from cablecomp.report.concealed_page import found_by_size
 from cablecomp.report.design_page import design_page
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.page import Section
@@ -133,6 +134,20 @@ def test_the_name_of_an_axis_stays_out_of_the_column_before_it(chromium: Any, tm
     with drawn(chromium, text, tmp_path, PHONE) as seen:
         ends, begins = seen.evaluate(edges)
     assert begins >= ends
+
+
+@pytest.mark.parametrize("width", [DESKTOP, PHONE])
+@pytest.mark.parametrize("physics", [1, 2, 8])
+def test_curves_of_what_was_concealed_leave_room_for_their_words(
+    chromium: Any, physics: int, width: int, tmp_path: Path
+) -> None:
+    rate = {"share": 0.5, "interval_95": [0.2, 0.8], "hits": 1, "of": 2}
+    points = [{"size": size, "found": rate, "wrong_name": rate} for size in (0.1, 1.0)]
+    curve = {"words": "joint channel late", "unit": "ms", "points": points}
+    figure = page.figure(found_by_size({"curves": [curve] * physics}))
+    with drawn(chromium, page.page("A page", "", [Section("Found", figure)]), tmp_path, width) as seen:
+        for what in (BLANK, CUT, OVERLAPPING):
+            assert seen.evaluate(what) == [], what
 
 
 def test_a_table_of_long_names_is_no_wider_than_its_card(chromium: Any, tmp_path: Path) -> None:
