@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cablecomp import examples
 from cablecomp.cli.folders import out_option
+from cablecomp.cli.shared import JsonOption, echo_json
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_file
 
@@ -21,14 +22,22 @@ def copy_example(
         str | None, typer.Argument(help="such as capstan-arm or links/mit-udp; lists them if absent")
     ] = None,
     out: Annotated[Path, out_option("folder to copy into")] = Path(),
+    as_json: JsonOption = False,
 ) -> None:
     """Copy out a configuration that comes with the project: a joint, a link, a controller; or list them."""
     console = Console(markup=False, emoji=False)
     if name is None:
+        listed = {
+            f"{kind}/{each}": _about(examples.example(kind, each))
+            for kind in examples.KINDS
+            for each in examples.names(kind)
+        }
+        if as_json:
+            echo_json(listed)
+            return
         table = Table(show_header=False, box=None)
-        for kind in examples.KINDS:
-            for each in examples.names(kind):
-                table.add_row(f"{kind}/{each}", _about(examples.example(kind, each)))
+        for each, about in listed.items():
+            table.add_row(each, about)
         console.print(table)
         return
     files = examples.with_companions(examples.find(name))
@@ -40,7 +49,12 @@ def copy_example(
     for path in files:
         with atomic_file(out / path.name) as spare:
             spare.write_bytes(path.read_bytes())
-        console.print(f"written: {out / path.name}", soft_wrap=True)
+    written = [out / path.name for path in files]
+    if as_json:
+        echo_json({"written": written})
+        return
+    for place in written:
+        console.print(f"written: {place}", soft_wrap=True)
 
 
 def _about(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,13 @@ def test_every_example_is_listed_with_what_it_is(capsys: pytest.CaptureFixture[s
     for kind in examples.KINDS:
         for name in examples.names(kind):
             assert f"{kind}/{name} " in said
+
+
+def test_the_list_and_what_was_written_are_had_as_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["example", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert set(listed) == {f"{kind}/{name}" for kind in examples.KINDS for name in examples.names(kind)}
+    assert main(["example", "capstan-arm", "--out", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"written": [str(tmp_path / "capstan-arm.toml")]}
