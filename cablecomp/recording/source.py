@@ -73,6 +73,11 @@ def identify(path: Path) -> Opened:
         with path.open("rb") as file:
             head = file.read(_SNIFF)
     except IsADirectoryError:
+        inside = next((p for p in sorted(path.iterdir()) if p.suffix in (".db3", ".mcap")), None)
+        if inside is not None:
+            raise InputError(
+                f"{path}: is a bag without its metadata.yaml; give {inside}, or run `ros2 bag reindex` on it"
+            ) from None
         raise InputError(f"{path}: is a directory; give the path of one recording") from None
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist; give the path of a recording") from None

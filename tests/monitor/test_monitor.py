@@ -189,6 +189,7 @@ def test_the_page_draws_plays_and_scrubs(width: int) -> None:
         page.wait_for_function("Object.values(canvases).every((c) => c.canvas.dataset.marks > 1)")
         assert page.evaluate(SIDEWAYS) <= 0
         assert page.inner_text("h1") == "wrist <1>"
+        assert "bounds (wider than this)" in page.inner_text("body")
         server.take(made_up(60))
         page.wait_for_function("document.getElementById('alarms').textContent.includes('stale')")
         page.click("#play")

@@ -104,6 +104,13 @@ def test_what_is_no_recording_is_called_by_its_name(tmp_path: Path) -> None:
     assert refusal(tmp_path / "nothing.mat").endswith("is empty; record or export it anew")
 
 
+def test_a_bag_without_its_index_is_told_what_to_give_instead(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    assert "is a directory" in refusal(tmp_path / "bag")
+    (tmp_path / "bag/bag_0.db3").write_bytes(b"SQLite format 3\0")
+    assert f"give {tmp_path / 'bag/bag_0.db3'}, or run `ros2 bag reindex`" in refusal(tmp_path / "bag")
+
+
 def test_an_angle_without_a_unit_is_in_degrees_where_the_other_is_and_it_goes_beyond_a_turn() -> None:
     swing = np.sin(TIME)
     far = {
