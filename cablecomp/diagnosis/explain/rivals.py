@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import ask_dependences
+from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, placed
 from cablecomp.diagnosis.explain.scores import (
@@ -67,8 +68,9 @@ def rivals(
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )
-    size = scales(model.left_out, groups)
-    losses = {term.name: block_losses(model.left_out, size, groups)}
+    mine = left_out_with_discrepancy(model, ids, groups)
+    size = scales(mine, groups)
+    losses = {term.name: block_losses(mine, size, groups)}
     differences: dict[str, ScoreDifference] = {}
     chosen = roughs[: LIMITS.promising // 2]
     fits = side_by_side(lambda p: _tried(p[0]), chosen)
@@ -76,8 +78,9 @@ def rivals(
         if fit is None:
             continue
         other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
-        differences[a.hypothesis.name] = score_difference(model.left_out, other.left_out, groups)
-        losses[a.hypothesis.name] = block_losses(other.left_out, size, groups)
+        theirs = left_out_with_discrepancy(other, ids, groups)
+        differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
+        losses[a.hypothesis.name] = block_losses(theirs, size, groups)
     kept = model_confidence_set(losses, rng)
     plain = _plain(model, base, term, groups)
     effects = tuple(n for n in kept if n != term.name)

@@ -33,7 +33,7 @@ def left_out(fit: Fit, groups: Groups) -> FloatArray:
     fits done again where the drive is known by order of magnitude only."""
     if any(p.sd >= DECADE for p in fit.problem.parameters if np.isfinite(p.sd)):
         return left_out_exactly(fit, groups)
-    return left_out_linearly(fit.residual, fit.J[:, _free(fit)], groups)
+    return left_out_linearly(fit.residual, fit.J[:, movable(fit)], groups)
 
 
 def left_out_linearly(residual: FloatArray, J: FloatArray, groups: Groups) -> FloatArray:
@@ -99,9 +99,9 @@ def _kept(problem: Problem, out: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> 
     return [e for e in kept if any(m.any() for m in e.counted.values())]
 
 
-def _free(fit: Fit) -> IntArray:
-    """Parameters that are not on a bound; when an event happens is read from all rows, a block left out cannot
-    place it."""
+def movable(fit: Fit) -> IntArray:
+    """Parameters that a fold left out may move: those that are not on a bound; when an event happens is read from all
+    rows, a block left out cannot place it."""
     low, high = fit.problem.bounds()
     margin = 1e-4 * (high - low)
     when = ("instant", "duration")

@@ -9,6 +9,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
@@ -72,7 +73,9 @@ def _weighed(
     bare = without(final, term, groups)
     own, instead = ALONE, Rivals()
     if bare is not None:
-        own = score_difference(final.left_out, bare.left_out, groups)
+        laws = {t.effect.id for t in bare.terms if isinstance(t, Hypothesis)}
+        having, lacking = (left_out_with_discrepancy(m, laws, groups) for m in (final, bare))
+        own = score_difference(having, lacking, groups)
         instead = rivals(final, term, bare, pool, groups, rng)
     nearest = min(instead.differences.values(), key=lambda v: v.z, default=NO_RIVAL)
     evidence = features(

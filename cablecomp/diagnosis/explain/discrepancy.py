@@ -1,0 +1,80 @@
+"""Laws have other forms in reality than in the catalogue: what one law of a model leaves for its form alone is no
+reason for another name beside it.
+
+The laws that a name stands beside may each do a little more or less with load, motor angle, time, direction and speed:
+r(x, c) = r(x) + sum_kj c_kj phi_j dr/dx_k, x_k their parameters, phi_j functions of those, c_kj normal with sd
+`LIMITS.form`. It is in the model with the name and in the one without it, and so the name has to explain what no other
+form of the others can (M. Kennedy and A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63, 2001;
+M. Plumlee, Bayesian calibration of inexact computer models, J. Am. Stat. Assoc. 112, 2017).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
+from cablecomp.diagnosis.folds import Groups
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.catalogue import role_of
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.simulate import load_of
+from cablecomp.signal.smoothing import FloatArray
+
+
+def left_out_with_discrepancy(model: Model, laws: Collection[str], groups: Groups) -> FloatArray:
+    """Weighted residual of every data row with its fold left out, where these laws of the model (effects' ids) may have
+    other forms; as `left_out` where there are none."""
+    fit, n = model.fit, len(groups.fold)
+    columns = [
+        fit.J[:n, k]
+        for k, p in enumerate(fit.problem.parameters)
+        if _law_of(p.name) in laws and role_of(p.base) not in ("instant", "duration")
+    ]
+    if not columns:
+        return model.left_out
+    forms = _forms(fit.problem)
+    D = np.stack([c * f for c in columns for f in forms], axis=1)
+    J = fit.J[:, movable(fit)]
+    A = np.zeros((len(J) + D.shape[1], J.shape[1] + D.shape[1]))
+    A[: len(J), : J.shape[1]], A[:n, J.shape[1] :] = J, D
+    A[len(J) :, J.shape[1] :] = np.eye(D.shape[1]) / LIMITS.form
+    r = np.concatenate([fit.residual, np.zeros(D.shape[1])])
+    return left_out_linearly(r + A @ np.linalg.lstsq(A, -r, rcond=None)[0], A, groups)
+
+
+def _law_of(parameter: str) -> str:
+    """The id of the effect that a parameter belongs to; none for the drive's own."""
+    head, _, rest = parameter.partition(".")
+    return rest.partition(".")[0] if head == "effect" else ""
+
+
+def _forms(problem: Problem) -> list[FloatArray]:
+    """phi_j on the rows of a residual, none on penalty rows: Legendre's first two polynomials of load, motor angle and
+    time over their ranges, tanh of the rates of load and motor, and of the motor's amount, over their medians."""
+    parts = []
+    for c in problem.channels:
+        parts += [_course(problem, e)[:, e.counted[c]] for e in problem.evidence if c in e.counted]
+        parts.append(np.full((5, problem.bases[c].penalty_rows), np.nan))
+    load, angle, time, loading, speed = np.concatenate(parts, axis=1)
+    forms: list[FloatArray] = []
+    for course in (load, angle, time):
+        low, high = np.nanmin(course), np.nanmax(course)
+        if high > low:
+            u = 2.0 * (course - low) / (high - low) - 1.0
+            forms += [u, 1.5 * u**2 - 0.5]
+    for rate in (loading, speed, np.abs(speed)):
+        moving = np.abs(rate[np.isfinite(rate) & (rate != 0.0)])
+        if len(moving):
+            forms.append(np.tanh(rate / np.median(moving)))
+    return [np.nan_to_num(f) for f in forms]
+
+
+def _course(problem: Problem, e: Evidence) -> FloatArray:
+    """Load, motor angle, time, their rates on a recording's judged rows (5 x rows)."""
+    time, angle = e.at_rows("time_s"), e.at_rows("motor_position_rad")
+    load = np.broadcast_to(load_of(problem.config, e.columns), e.columns["time_s"].shape)[e.rows]
+    return np.stack((load, angle, time, np.gradient(load, time), np.gradient(angle, time)))
