@@ -113,14 +113,7 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
     hidden = _conceal(rng, wanted, asked, how, scene, plain_run)
     if hidden is None:
         return None
-    course = courses[0].seen
-    torque_rate = float(np.std(np.gradient(course.load_Nm, course.time_s)))
-    rates = {
-        "joint_position": scene.plain.speed_rms,
-        "motor_position": scene.plain.speed_rms,
-        "joint_torque": scene.plain.compliance * torque_rate,
-    }
-    how = settled(how, rates, floor)
+    how = settled(how, _channel_rates(scene.plain, usable(joint).motor_per_joint, courses), floor)
     if "configuration" in how:
         joint = _off(joint, how, scene.plain)
     needed = any(s.neighbour for s in asked.suspects)
@@ -129,6 +122,15 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
         other = f"other_{asked.case.condition}"
     legs = _legs(rng, joint, scene.plain, hidden, courses, sessions, how, other)
     return None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other)
+
+
+def _channel_rates(plain: PlainDrive, motor_per_joint: float, courses: Sequence[Course]) -> dict[str, float]:
+    """RMS speed with which each channel moves, in rad/s of the joint angle, in the quickest of the recordings."""
+    seen = [c.seen for c in courses]
+    loads = max(float(np.std(np.gradient(c.load_Nm, c.time_s))) for c in seen)
+    turns = max(float(np.std(np.gradient(c.motor_rad, c.time_s))) for c in seen) / motor_per_joint
+    speed = max(plain.speed_rms, turns)
+    return {"joint_position": speed, "motor_position": speed, "joint_torque": plain.compliance * loads}
 
 
 def _draw_confounded(rng: np.random.Generator, asked: Order, case: Tie) -> World | None:

@@ -114,6 +114,25 @@ def test_imperfections_are_there_and_as_large_as_the_truth_says(tmp_path: Path) 
         assert spread == pytest.approx(np.hypot(expected, _lagged(how, truth)), rel=0.3)
 
 
+def test_a_lag_is_no_larger_in_any_recording_than_the_truth_says(tmp_path: Path) -> None:
+    """Joints that rest in one recording and move in another: what is late shows where they move."""
+    make(Wanted(11, ("none",), "catalogue", "all"), 10, tmp_path)
+    quickest = []
+    for folder in sorted(tmp_path.iterdir()):
+        truth, angles = _truth(folder)
+        for late in (truth["imperfections"]["late"], truth["imperfections"]["low_pass"]):
+            if late["channel"] == "joint_torque":
+                continue
+            moved = []
+            for k, entry in enumerate(truth["recordings"], start=1):
+                time = _read(folder / entry["file"])["time_s"]
+                moved.append(float(np.std(np.gradient(angles[f"joint_rad_{k}"], time))) * late["lag_s"])
+            quickest.append(max(moved) / (late["size_of_floor"] * truth["noise_floor_rad"]))
+    assert len(quickest) >= 4
+    assert max(quickest) < 1.5
+    assert min(quickest) > 0.5
+
+
 def _lagged(how: dict[str, Any], truth: dict[str, Any]) -> float:
     """What lag leaves between joint encoder and joint, RMS, about."""
     shares = [how[n]["size_of_floor"] for n in ("late", "low_pass") if how[n]["channel"] == "joint_position"]
