@@ -106,8 +106,9 @@ def features(
 ) -> dict[str, float]:
     """The evidence of one name.
 
-    `gain`, `z`, `z_blocks`: of the model over the one without the effect, on data left out. `selected_in`: share of
-    resampled data in which it is the best of its round. `margin_gain`, `margin_z`: over the nearest rival in its place.
+    `gain`, `z`, `z_blocks`: of the model over the one without the effect, on data left out, where the other laws of
+    either may have other forms (`discrepancy`). `selected_in`: share of resampled data in which it is the best of its
+    round. `margin_gain`, `margin_z`: as these, over the nearest rival in its place.
     `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
     the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`:
     share of the remainder that still follows what the effect acts through. `unsteady`: difference of its amount
