@@ -11,6 +11,8 @@ import recordings as files
 from baselines import BASELINES
 from recordings import JOINT, MOTOR
 
+from cablecomp.config import JointConfig
+from cablecomp.config.sessions import ZEROS, Session
 from cablecomp.signal.smoothing import FloatArray
 
 PITCHES: Final = ("Pitch_1", "Pitch_3", "Pitch_5")
@@ -40,6 +42,11 @@ def pitch_split(session: str) -> tuple[list[Path], list[Path]]:
     is judged."""
     mine = of_session(session)
     return [*(n for p in PITCHES if p != session for n in of_session(p)), mine[0]], mine[1:]
+
+
+def turned(config: JointConfig) -> JointConfig:
+    """The joint whose pretension is each session's own: the wrist's turn changes the cables' way."""
+    return config.model_copy(update={"session": (Session(own=(*ZEROS, "pretension_N")),)})
 
 
 def baseline(

@@ -31,11 +31,16 @@ def jaw_by_diagnosis() -> None:
     )
     for pitch in jaw.PITCHES:
         train, judged = jaw.pitch_split(pitch)
-        joint = files.diagnosed(config, train).augmented_joint
-        left = {str(p): files.replayed(joint, p, jaw.GROUP) for p in judged}
-        mean = float(np.mean(np.concatenate(list(left.values()))))
-        session = {name: m - mean for name, m in left.items()}
-        print(f"{pitch} left out {degrees(left):.3f} deg, the session's own zero {degrees(session):.3f} deg")
+        for how, joint in (("one pretension", config), ("each session's own pretension", jaw.turned(config))):
+            found = files.diagnosed(joint, train).augmented_joint
+            left = {str(p): files.replayed(found, p, jaw.GROUP) for p in judged}
+            mean = float(np.mean(np.concatenate(list(left.values()))))
+            session = {name: m - mean for name, m in left.items()}
+            print(
+                f"{pitch} left out, {how}: {degrees(left):.3f} deg, with the session's own zero "
+                f"{degrees(session):.3f} deg",
+                flush=True,
+            )
 
 
 def jaw_laws_given() -> None:
