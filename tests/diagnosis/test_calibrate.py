@@ -145,3 +145,28 @@ def test_a_motors_own_friction_in_the_load_is_not_taken_for_the_cables(way: floa
     assert max(map(abs, off.values())) < 2.0, off
     for name in ("mu_output", "mu_input"):
         assert found.config.tolerance[name] >= NOMINAL.tolerance[name]
+
+
+def loosely_stated(tolerance: float) -> JointConfig:
+    """An open circuit at 60 N, stated as 50 N: at 1.5 N m its cable would hang slack."""
+    opened = NOMINAL.model_copy(update={"drive": NOMINAL.drive.model_copy(update={"circuit": "open"})})
+    stated = with_values(opened, {"pretension_N": 50.0})
+    return stated.model_copy(update={"tolerance": {**NOMINAL.tolerance, "pretension_N": tolerance}})
+
+
+def test_a_pretension_stated_too_low_for_the_load_is_calibrated() -> None:
+    """Within its tolerance (0.18 in the logarithm are 2.3 deviations) it is raised to what carries the load."""
+    stated = loosely_stated(0.08)
+    columns = recording(with_values(stated, {"pretension_N": 60.0}), 1)
+    assert columns["joint_torque_Nm"].min() < -1.5
+    found = calibrate(stated, {"one": columns})
+    T0 = found["pretension_N"]
+    assert T0.nominal == 50.0
+    assert abs(T0.value - 60.0) < 4.0 * T0.sd + 0.12
+
+
+def test_a_pretension_stated_surely_too_low_is_refused() -> None:
+    stated = loosely_stated(0.002)
+    columns = recording(with_values(stated, {"pretension_N": 60.0}), 1)
+    with pytest.raises(InputError, match="slacken"):
+        calibrate(stated, {"one": columns})

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import pytest
 
+from cablecomp.diagnosis.answer import entries
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows
@@ -66,3 +67,19 @@ def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> N
     term = cast(Hypothesis, SimpleNamespace(acts_through=("load", "reversal")))
     assert _follows(term, left) == 0.2
     assert _follows(cast(Hypothesis, SimpleNamespace(acts_through=("velocity",))), left) == 0.0
+
+
+@pytest.mark.parametrize(("confidence", "said"), [(0.3, True), (0.9, False)])
+def test_what_trials_say_not_to_exclude_is_told_where_nothing_has_a_name(
+    monkeypatch: pytest.MonkeyPatch, confidence: float, said: bool
+) -> None:
+    """Three explanations asked alone, one of them far behind the two others."""
+    monkeypatch.setattr(entries, "learnt_level", lambda: 2.0)
+    tried = [
+        SimpleNamespace(term=SimpleNamespace(name=name), difference=ScoreDifference(0.5, z, z))
+        for name, z in (("gravity_load", 9.0), ("pulley_runout", 8.0), ("clock_skew", 1.0))
+    ]
+    selection: Any = SimpleNamespace(rounds=[SimpleNamespace(tried=tried)])
+    found: Any = [SimpleNamespace(confidence=confidence, rivals=())]
+    told = [names for names, _ in entries.tied_of(found, selection)]
+    assert told == ([("gravity_load", "pulley_runout")] if said else [])

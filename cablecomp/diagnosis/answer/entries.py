@@ -114,14 +114,15 @@ def _of_tried(evidence: Mapping[str, float]) -> float:
 
 
 def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple[str, ...], str], ...]:
-    """Effects that data left out cannot tell apart, and the first explanations that trials say not to exclude."""
+    """Effects that data left out cannot tell apart; and where none has a name, the first explanations that trials say
+    not to exclude."""
     rows = []
     for w in found:
         if w.rivals:
             why = f"data left out tell them apart by {w.difference.z:.1f} standard errors alone"
             rows.append(((w.term.name, *w.rivals), why))
     level, first = learnt_level(), (selection.rounds[0].tried if selection.rounds else ())
-    if level is not None and found:
+    if level is not None and found and all(w.confidence < LIMITS.name for w in found):
         names = conformal_set(deficits({t.term.name: t.difference.z for t in first}), level)
         if len(names) > 1 and all(set(names) != set(effects) for effects, _ in rows):
             why = (

@@ -11,7 +11,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
 from cablecomp.estimation.history import forgotten, full_swing
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
@@ -43,8 +43,7 @@ def calibrate_drive(
 ) -> Calibrated:
     """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one."""
     parameters = _parameters(config, evidence)
-    problem = Problem(config, parameters, tuple(evidence), first_weights(config, evidence))
-    problem.misfits(problem.start)  # a recording that the nominal drive cannot follow is said, not fitted
+    problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
     fit = solve(problem, evaluations=15)
     fit = refit(fit, weighed(fit, floor), 10)
@@ -65,6 +64,26 @@ def calibrate_drive(
     nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))
     lost = before - sum(int(e.counted[JOINT].sum()) for e in cut)
     return Calibrated(fit, nominal, floor, floor_rad, lost)
+
+
+def _followed(problem: Problem) -> Problem:
+    """The problem, begun where the drive can follow every recording: at the nominal values, or where an open circuit's
+    cable slackens at these, at the least pretension within some tolerances at which it does not.
+
+    Raises InputError where there is none: what the drive cannot follow is said, not fitted."""
+    sds = {p.name: p.sd for p in problem.parameters if p.base == "pretension_N" and np.isfinite(p.sd)}
+    for by in (0.0, *LIMITS.tighter):
+        tight = tuple(
+            replace(p, start=p.value(p.x(p.start) + by * sds.get(p.name, 0.0))) for p in problem.parameters
+        )
+        begun = replace(problem, parameters=tight)
+        try:
+            begun.misfits(begun.start)
+        except SlackError as error:
+            slack = error
+            continue
+        return begun
+    raise slack
 
 
 def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Evidence], float]:
