@@ -102,7 +102,7 @@ def _angles(view: View) -> list[Suspicion]:
     off = abs(factor)
     if abs(log(off)) > RATIO_OFF and not _loose(view.config, "radius"):
         unit = next((words for f, words in _ANGLES.items() if abs(log(off / f)) < 0.1), None)
-        words = unit or "a gear between encoder and pulley, or a radius that is off?"
+        words = unit or "a gear between encoder and pulley, or a radius that is off"
         kind = "unit" if unit else "ratio"
         left = rms(view.y - view.slope * view.q)
         said = (
