@@ -34,6 +34,7 @@ _USUAL: Final = {
     "wrap_input_rad": _Usual(0.1, 80.0, "turns instead of radians?", "degrees instead of radians?"),
 }
 _STRAIN: Final = 0.03
+_BREAKS: Final = 0.1  # steel breaks at two or three per cent, polymer fibres at four or five
 _RATIO: Final = 30.0
 _NOISE: Final = {"rad": 0.02, "Nm": 50.0, "N": 500.0}
 
@@ -49,6 +50,7 @@ def _all(config: JointConfig) -> Iterator[str]:
         where = f"stage {number}: " if several else ""
         yield from (where + words for words in _of_stage(stage, config.tolerance))
     yield from _reach(config)
+    yield from _pull(config)
     for key, value in config.sensors.model_dump(exclude_none=True).items():
         most = _NOISE.get(key.rpartition("_")[2], 0.0)
         if key.endswith(("noise_rad", "noise_Nm", "noise_N", "resolution_rad")) and value > most:
@@ -90,3 +92,18 @@ def _reach(config: JointConfig) -> Iterator[str]:
     for value in (limits.joint_position_min_rad, limits.joint_position_max_rad):
         if value is not None and abs(value) >= last.wrap_output_rad:
             yield f"[limits] joint position {value:g} rad unwinds wrap_output_rad = {last.wrap_output_rad:g}; degrees?"
+
+
+def _pull(config: JointConfig) -> Iterator[str]:
+    """Whether the largest torques would strain a cable by what none bears."""
+    first, last, limits = config.drive.stage[0], config.drive.stage[-1], config.limits
+    torques = (
+        ("joint_torque_max_Nm", limits.joint_torque_max_Nm, last.output_radius_m, last.EA_N),
+        ("motor_torque_max_Nm", limits.motor_torque_max_Nm, first.input_radius_m, first.EA_N),
+    )
+    for key, torque_Nm, radius_m, EA_N in torques:
+        if torque_Nm is None or config.tolerance.get("EA_N", 0.0) >= 1.0:
+            continue
+        strain = torque_Nm / radius_m / EA_N
+        if strain > _BREAKS:
+            yield f"[limits] {key} = {torque_Nm:g} would strain the cable by {100 * strain:.3g} %; N·mm?"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from cablecomp.config import TomlTable, read_toml, validated
-from cablecomp.errors import InputError
+from cablecomp.errors import ConfigError, InputError
 from cablecomp.examples import resolve
 from cablecomp.links.devices import Claim
 from cablecomp.links.protocols import claims_of
@@ -30,51 +31,52 @@ def load_link(path: Path | str) -> LinkConfig:
 
 def parse_link(data: dict[str, Any], where: str, folder: Path = Path()) -> LinkConfig:
     """Validate a link already read; `where` names it in errors, relative paths start at `folder`. Raises
-    InputError with one line, also where two devices would share an identifier."""
+    InputError with a line for each fault, also where two devices would share an identifier."""
     if "folder" in data:
         raise InputError(f"{where}: unknown key `folder`; remove it or check its spelling")
     lines = data.lines() if isinstance(data, TomlTable) else None
     config = validated(LinkConfig, {**_tuples(data), "folder": folder}, where, lines)
-    _check_fd(config, where)
-    _check_line(config, where)
-    _check_identifiers(config, where)
+    faults = [*_without_fd(config), *_off_their_line(config), *_not_told_apart(config)]
+    if faults:
+        raise ConfigError(f"{where}: {fault}" for fault in faults)
     return config
 
 
-def _check_fd(config: LinkConfig, where: str) -> None:
-    """Raise InputError where a device needs CAN FD on a bus without it."""
-    wanting = next((d for d in config.device if isinstance(d, MoteusDevice)), None)
-    if wanting is not None and isinstance(config.bus, CanBus) and not config.bus.fd:
-        raise InputError(
-            f"{where}: device `{wanting.id}` speaks `{wanting.protocol}`, which needs CAN FD; set bus.fd = true, "
-            "on an interface that can"
-        )
+def _without_fd(config: LinkConfig) -> Iterator[str]:
+    """Devices that need CAN FD, on a bus without it."""
+    if isinstance(config.bus, CanBus) and not config.bus.fd:
+        for device in config.device:
+            if isinstance(device, MoteusDevice):
+                yield (
+                    f"device `{device.id}` speaks `{device.protocol}`, which needs CAN FD; set bus.fd = true, on an "
+                    "interface that can"
+                )
 
 
-def _check_line(config: LinkConfig, where: str) -> None:
-    """Raise InputError where Dynamixel packets would go over a CAN bus, or share a line with something else."""
+def _off_their_line(config: LinkConfig) -> Iterator[str]:
+    """Dynamixel packets that would go over a CAN bus, or share a line with something else."""
     packets = [isinstance(device, DynamixelDevice) for device in config.device]
     if any(packets) and not (all(packets) and isinstance(config.bus, SerialBus)):
-        raise InputError(
-            f'{where}: a `dynamixel` needs a line of its own: bus.kind = "serial", and no other protocol on it, is '
-            "accepted"
+        yield (
+            'a `dynamixel` needs a line of its own: bus.kind = "serial", and no other protocol on it, is accepted'
         )
 
 
-def _check_identifiers(config: LinkConfig, where: str) -> None:
-    """Raise InputError where two devices would send or take frames of the same identifier."""
+def _not_told_apart(config: LinkConfig) -> Iterator[str]:
+    """Devices that would send or take frames of the same identifier."""
     seen: dict[int, list[tuple[str, Claim]]] = {}
     try:
         claims = tuple(claims_of(config))
     except InputError as error:  # a model or a message table that is not there
-        raise InputError(f"{where}: {error}") from None
+        yield str(error)
+        return
     for owner, claim in claims:
         for other, before in seen.setdefault(claim.identifier, []):
             if other != owner and not _may_share(claim, before):
-                raise InputError(
-                    f"{where}: identifier 0x{claim.identifier & 0x1FFF_FFFF:X} would be used by {other} "
-                    f"({before.what}) and by {owner} ({claim.what}), which cannot be told apart; give one of "
-                    "them another node, reply_id or message table"
+                yield (
+                    f"identifier 0x{claim.identifier & 0x1FFF_FFFF:X} would be used by {other} ({before.what}) and by "
+                    f"{owner} ({claim.what}), which cannot be told apart; give one of them another node, reply_id or "
+                    "message table"
                 )
         seen[claim.identifier].append((owner, claim))
 

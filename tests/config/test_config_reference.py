@@ -71,6 +71,16 @@ def test_a_plausible_joint_raises_no_doubt(path: Path) -> None:
         ("pretension_N = 35.0", "pretension_N = 350.0", "strains the cable"),
         ("joint_position_noise_rad = 2e-4", "joint_position_noise_rad = 0.2", "poor sensor"),
         ("mu_output = 0.30", "mu_output = 30.0", "per cent?"),
+        (
+            "joint_torque_max_Nm = 0.30",
+            "joint_torque_max_Nm = 300.0",
+            "joint_torque_max_Nm = 300 would strain",
+        ),
+        (
+            "motor_torque_max_Nm = 0.40",
+            "motor_torque_max_Nm = 400.0",
+            "motor_torque_max_Nm = 400 would strain",
+        ),
         ("joint_position_max_rad = 0.8", "joint_position_max_rad = 45.0", "unwinds"),
         ("[tolerance]", '[observer]\nload = "motor_torque"\n\n[tolerance]', "may swing"),
     ],

@@ -119,6 +119,18 @@ def test_two_joints_that_cannot_be_told_apart() -> None:
         build(text + joint)
 
 
+def test_everything_that_is_wrong_with_the_wires_is_told_at_once() -> None:
+    """A bus without CAN FD for a drive that needs it, and two joints with the same drive."""
+    text = text_of("moteus-socketcan.toml").replace("fd = true", "fd = false")
+    joint = text[text.index("[[joint]]") :].replace('name = "', 'name = "other-', 1)
+    with pytest.raises(InputError) as caught:
+        build(text + joint)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith("x.toml: ") for line in lines)
+    assert any("needs CAN FD" in line for line in lines)
+    assert any("cannot be told apart" in line for line in lines)
+
+
 def test_a_name_given_twice() -> None:
     text = text_of("mit-virtual.toml")
     with pytest.raises(InputError, match=r"joint\.name `joint-1` is there twice"):
