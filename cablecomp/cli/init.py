@@ -123,8 +123,9 @@ def _prompted(key: str) -> str:
     words = f"{key}: {field.description}" + (f" ({', '.join(map(str, choices))})" if choices else "")
     if not field.is_required() and field.default is None:
         return str(typer.prompt(f"{words} [Enter leaves it out]", default="", show_default=False))
-    default = None if field.is_required() else str(field.default)
-    return str(typer.prompt(words, default=default))
+    if field.is_required():
+        return str(typer.prompt(f"{words} [needed]"))
+    return str(typer.prompt(words, default=str(field.default)))
 
 
 def _wrong(values: dict[str, Any], key: str, later: list[str]) -> tuple[str, ...]:
