@@ -14,13 +14,15 @@ SUFFIXES: Final = (
 )  # fmt: skip
 """Endings by which a file in a folder is taken for a recording; a file that is given itself may have any."""
 _BAG: Final = "metadata.yaml"
+_WRITTEN: Final = ("prediction.csv", "cycles.csv")
+"""What `run` and `replay` write beside a recording; in a folder these are none."""
 
 
 def find_recordings(places: Iterable[Path]) -> list[Path]:
     """All recordings of these places, each once, a folder's in the order of their paths.
 
-    A folder is searched to its last subfolder; what is hidden (`.name`) is left alone. Raises InputError for a
-    folder that holds no recording.
+    A folder is searched to its last subfolder; what is hidden (`.name`), and what `run` or `replay` wrote beside a
+    recording, is left alone. Raises InputError for a folder that holds no recording.
     """
     found: dict[Path, None] = {}
     for place in places:
@@ -38,7 +40,7 @@ def _in(folder: Path) -> Iterator[Path]:
         yield folder
         return
     for path in sorted(folder.iterdir()):
-        if path.name.startswith("."):
+        if path.name.startswith(".") or path.name in _WRITTEN:
             continue
         if path.is_dir():
             yield from _in(path)

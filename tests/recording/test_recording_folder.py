@@ -1,0 +1,34 @@
+"""What in a folder is a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cablecomp.errors import InputError
+from cablecomp.recording.folder import find_recordings
+
+
+def test_what_a_run_wrote_beside_its_recording_is_none(tmp_path: Path) -> None:
+    """A run's folder may be given whole, also inside of another one; a file that is named is taken as it is."""
+    night = tmp_path / "night"
+    night.mkdir()
+    for name in (
+        "recording.csv",
+        "prediction.csv",
+        "cycles.csv",
+        "run.json",
+        "joint.toml",
+        ".recording.csv.part",
+    ):
+        (night / name).touch()
+    (tmp_path / "own.parquet").touch()
+    assert find_recordings([tmp_path]) == [night / "recording.csv", tmp_path / "own.parquet"]
+    assert find_recordings([night / "cycles.csv"]) == [night / "cycles.csv"]
+
+
+def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "prediction.csv").touch()
+    with pytest.raises(InputError, match="holds no recording"):
+        find_recordings([tmp_path])
