@@ -15,7 +15,8 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
 from cablecomp.estimation.history import forgotten, full_swing
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
-from cablecomp.estimation.parameter import Parameter, of_drive, own_of
+from cablecomp.estimation.multi_start import multi_start
+from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
@@ -60,6 +61,7 @@ def calibrate_drive(
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
     for _ in range(2):
         fit = refit(fit, weighed(fit, floor), 8)
+    fit = _drums_exchanged(fit)
     here = fit.problem.start
     nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))
     lost = before - sum(int(e.counted[JOINT].sum()) for e in cut)
@@ -84,6 +86,23 @@ def _followed(problem: Problem) -> Problem:
             continue
         return begun
     raise slack
+
+
+def _drums_exchanged(fit: Fit) -> Fit:
+    """The fit, or that begun where the coefficients of a stage's two drums have changed places, if it leaves less.
+
+    Which drum is the rough one is told by little, and a ridge lies between the two answers. Of what is known by orders
+    of magnitude the search has starts of its own."""
+    place = {p.name: k for k, p in enumerate(fit.problem.parameters) if p.sd < DECADE}
+    for name, out in place.items():
+        into = place.get(name.replace("mu_output", "mu_input"))
+        if into is None or into == out:
+            continue
+        x = fit.x.copy()
+        first, second = fit.problem.parameters[out], fit.problem.parameters[into]
+        x[out], x[into] = first.x(second.value(fit.x[into])), second.x(first.value(fit.x[out]))
+        fit = min(fit, *multi_start(fit.problem, [x], 15, LIMITS.tolerance), key=lambda f: f.cost)
+    return fit
 
 
 def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Evidence], float]:
