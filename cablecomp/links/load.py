@@ -63,8 +63,9 @@ def _off_their_line(config: LinkConfig) -> Iterator[str]:
 
 
 def _not_told_apart(config: LinkConfig) -> Iterator[str]:
-    """Devices that would send or take frames of the same identifier."""
+    """Devices that would send or take frames of the same identifier: the first one of each two."""
     seen: dict[int, list[tuple[str, Claim]]] = {}
+    told: set[frozenset[str]] = set()
     try:
         claims = tuple(claims_of(config))
     except InputError as error:  # a model or a message table that is not there
@@ -72,7 +73,9 @@ def _not_told_apart(config: LinkConfig) -> Iterator[str]:
         return
     for owner, claim in claims:
         for other, before in seen.setdefault(claim.identifier, []):
-            if other != owner and not _may_share(claim, before):
+            pair = frozenset((owner, other))
+            if other != owner and pair not in told and not _may_share(claim, before):
+                told.add(pair)
                 yield (
                     f"identifier 0x{claim.identifier & 0x1FFF_FFFF:X} would be used by {other} ({before.what}) and by "
                     f"{owner} ({claim.what}), which cannot be told apart; give one of them another node, reply_id or "
