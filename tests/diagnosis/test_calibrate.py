@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from cablecomp.diagnosis.calibrate import Calibration, calibrate
 from cablecomp.diagnosis.calibration.drive import _drums_exchanged
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
-from cablecomp.estimation.least_squares import solve
+from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
@@ -200,3 +202,11 @@ def test_the_rough_drum_is_told_from_the_smooth_one() -> None:
     assert right.values["mu_output"] > 2.0 * right.values["mu_input"]
     assert right.cost < 0.5 * wrong.cost
     assert _drums_exchanged(right).values["mu_output"] > _drums_exchanged(right).values["mu_input"]
+
+
+def test_drums_that_cannot_change_places_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no drive can follow the other answer (a cable that would slacken)."""
+    monkeypatch.setattr("cablecomp.diagnosis.calibration.drive.multi_start", lambda *_: [])
+    problem: Any = SimpleNamespace(parameters=of_drive(NOMINAL))
+    fit = Fit(problem, np.array([p.x(p.start) for p in problem.parameters]), np.ones(3), np.empty((3, 0)))
+    assert _drums_exchanged(fit) is fit

@@ -101,7 +101,7 @@ def _drums_exchanged(fit: Fit) -> Fit:
         x = fit.x.copy()
         first, second = fit.problem.parameters[out], fit.problem.parameters[into]
         x[out], x[into] = first.x(second.value(fit.x[into])), second.x(first.value(fit.x[out]))
-        fit = min(fit, *multi_start(fit.problem, [x], 15, LIMITS.tolerance), key=lambda f: f.cost)
+        fit = min([fit, *multi_start(fit.problem, [x], 15, LIMITS.tolerance)], key=lambda f: f.cost)
     return fit
 
 
