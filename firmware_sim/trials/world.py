@@ -8,20 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantError, PlantRun, StageConfig
-from firmware_sim.plant.records import Floats
+from firmware_sim.plant import EffectSpec, PlantError, PlantRun, StageConfig
 from firmware_sim.trials.confounded import Case as Tie
 from firmware_sim.trials.confounded import draw_truth
 from firmware_sim.trials.courses import KINDS, RATES_HZ, Course, draw_course
 from firmware_sim.trials.history import uneven, with_history
 from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
 from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
+from firmware_sim.trials.legs import Leg, legs_of
 from firmware_sim.trials.measures import PlainDrive
 from firmware_sim.trials.order import LAWS, Order, Wanted, order
-from firmware_sim.trials.scene import PAUSE_S, is_slack, plain_scene, usable
+from firmware_sim.trials.scene import PAUSE_S, plain_scene, usable
 from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
-from firmware_sim.trials.spoil import Recorded, record
 from firmware_sim.trials.suspects import Scene, Shape, Suspect
 from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
 
@@ -39,24 +38,6 @@ class Hidden:
 
     sized: Sized
     role: str
-
-
-@dataclass(frozen=True)
-class Leg:
-    """One recording: what was done, the drive as it was then, the zeros of its sensors, and what was recorded.
-
-    Angles are those of the joint without noise, as its encoder would show them: `true_rad` of the drive as it is,
-    `plain_rad` without any effect, `without` each by its id where there are several; one value per row.
-    """
-
-    course: Course
-    drive: PlantConfig
-    session: int
-    zeros: dict[str, float]
-    recorded: Recorded
-    true_rad: Floats
-    plain_rad: Floats
-    without: dict[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -120,7 +101,8 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
     other = NEIGHBOUR if needed or rng.uniform() < 0.6 else ""
     if asked.case is not None:
         other = f"other_{asked.case.condition}"
-    legs = _legs(rng, joint, scene.plain, hidden, courses, sessions, how, other)
+    specs = [h.sized.spec for h in hidden]
+    legs = legs_of(rng, joint, scene.plain, specs, courses, sessions, how, other)
     return None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other)
 
 
@@ -161,7 +143,8 @@ def _draw_confounded(rng: np.random.Generator, asked: Order, case: Tie) -> World
     floor, how = noise_floor_rad(joint, scene.plain), Imperfections()
     other = NEIGHBOUR if "crosstalk" in case.pair or rng.uniform() < 0.6 else ""
     hidden = (Hidden(sized, "main"),)
-    legs = _legs(rng, joint, scene.plain, hidden, courses, (0,) * len(courses), how, other)
+    specs = [h.sized.spec for h in hidden]
+    legs = legs_of(rng, joint, scene.plain, specs, courses, (0,) * len(courses), how, other)
     return (
         None if legs is None else World(asked, joint, scene.plain, floor, hidden, legs, how, other, partner)
     )
@@ -284,68 +267,3 @@ def _off(joint: DrawnJoint, how: Imperfections, plain: PlainDrive) -> DrawnJoint
     values[key] = true * math.exp(numbers["sigmas"] * joint.tolerance[key])
     stated = {name: float(f"{value:.4e}") for name, value in values.items()}
     return replace(joint, nominal=replace(joint.nominal, stages=(StageConfig(**stated),)))
-
-
-def _legs(
-    rng: np.random.Generator,
-    joint: DrawnJoint,
-    plain: PlainDrive,
-    hidden: Sequence[Hidden],
-    courses: Sequence[Course],
-    sessions: Sequence[int],
-    how: Imperfections,
-    other: str,
-) -> tuple[Leg, ...] | None:
-    found = []
-    zeros, drive = {"joint_position": joint.offset_rad}, joint.true
-    for course, k in zip(courses, sessions, strict=True):
-        if "sessions" in how:
-            zeros, drive = session(joint, how, k)
-        leg = _leg(rng, replace(joint, true=drive), plain, hidden, course, how, other, zeros)
-        if leg is None:
-            return None
-        found.append(replace(leg, session=k))
-    return tuple(found)
-
-
-def session(joint: DrawnJoint, how: Imperfections, k: int) -> tuple[dict[str, float], PlantConfig]:
-    """Zeros and drive of session k."""
-    numbers = how["sessions"]
-    zeros = {
-        "joint_position": joint.offset_rad + numbers["joint_zero_rad"][k],
-        "joint_torque": numbers["torque_zero_of_load"][k] * joint.load_Nm,
-    }
-    factor = numbers["pretension_factor"][k] if joint.true.circuit == "closed" else 1.0
-    stage = replace(joint.stage, pretension_N=joint.stage.pretension_N * factor)
-    return zeros, replace(joint.true, stages=(stage,))
-
-
-def _leg(
-    rng: np.random.Generator,
-    joint: DrawnJoint,
-    plain: PlainDrive,
-    hidden: Sequence[Hidden],
-    course: Course,
-    how: Imperfections,
-    other: str,
-    zeros: dict[str, float],
-) -> Leg | None:
-    specs = [h.sized.spec for h in hidden]
-    scene = Scene(joint, course, plain)
-
-    def played(effects: Sequence[EffectSpec]) -> PlantRun:
-        return run_course(scene, effects, NORMAL)
-
-    run = played(specs)
-    if is_slack(run, joint):
-        return None
-    recorded = record(rng, run, joint.sensors, how, zeros, other)
-    rows = recorded.rows
-    without = {
-        s.id: played([o for o in specs if o is not s]).joint_position_rad[rows]
-        for s in specs
-        if len(specs) > 1
-    }
-    bare = run if not specs else played([])
-    true = run.joint_position_rad[rows]
-    return Leg(course, joint.true, 0, zeros, recorded, true, bare.joint_position_rad[rows], without)

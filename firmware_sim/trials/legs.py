@@ -1,0 +1,102 @@
+"""The recordings of a trial: each played by the drive as it was then, through sensors as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from firmware_sim.plant import NORMAL, EffectSpec, PlantConfig, PlantRun
+from firmware_sim.plant.records import Floats
+from firmware_sim.trials.courses import Course
+from firmware_sim.trials.imperfections import Imperfections
+from firmware_sim.trials.joints import DrawnJoint
+from firmware_sim.trials.measures import PlainDrive
+from firmware_sim.trials.scene import is_slack
+from firmware_sim.trials.sizes import run_course
+from firmware_sim.trials.spoil import Recorded, record
+from firmware_sim.trials.suspects import Scene
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One recording: what was done, the drive as it was then, the zeros of its sensors, and what was recorded.
+
+    Angles are those of the joint without noise, as its encoder would show them: `true_rad` of the drive as it is,
+    `plain_rad` without any effect, `without` each by its id where there are several; one value per row.
+    """
+
+    course: Course
+    drive: PlantConfig
+    session: int
+    zeros: dict[str, float]
+    recorded: Recorded
+    true_rad: Floats
+    plain_rad: Floats
+    without: dict[str, Floats]
+
+
+def legs_of(
+    rng: np.random.Generator,
+    joint: DrawnJoint,
+    plain: PlainDrive,
+    specs: Sequence[EffectSpec],
+    courses: Sequence[Course],
+    sessions: Sequence[int],
+    how: Imperfections,
+    other: str,
+) -> tuple[Leg, ...] | None:
+    """One leg for each course; None where a cable goes slack in one."""
+    found = []
+    zeros, drive = {"joint_position": joint.offset_rad}, joint.true
+    for course, k in zip(courses, sessions, strict=True):
+        if "sessions" in how:
+            zeros, drive = _session(joint, how, k)
+        leg = _leg(rng, replace(joint, true=drive), plain, specs, course, how, other, zeros)
+        if leg is None:
+            return None
+        found.append(replace(leg, session=k))
+    return tuple(found)
+
+
+def _session(joint: DrawnJoint, how: Imperfections, k: int) -> tuple[dict[str, float], PlantConfig]:
+    """Zeros and drive of session k."""
+    numbers = how["sessions"]
+    zeros = {
+        "joint_position": joint.offset_rad + numbers["joint_zero_rad"][k],
+        "joint_torque": numbers["torque_zero_of_load"][k] * joint.load_Nm,
+    }
+    factor = numbers["pretension_factor"][k] if joint.true.circuit == "closed" else 1.0
+    stage = replace(joint.stage, pretension_N=joint.stage.pretension_N * factor)
+    return zeros, replace(joint.true, stages=(stage,))
+
+
+def _leg(
+    rng: np.random.Generator,
+    joint: DrawnJoint,
+    plain: PlainDrive,
+    specs: Sequence[EffectSpec],
+    course: Course,
+    how: Imperfections,
+    other: str,
+    zeros: dict[str, float],
+) -> Leg | None:
+    scene = Scene(joint, course, plain)
+
+    def played(effects: Sequence[EffectSpec]) -> PlantRun:
+        return run_course(scene, effects, NORMAL)
+
+    run = played(specs)
+    if is_slack(run, joint):
+        return None
+    recorded = record(rng, run, joint.sensors, how, zeros, other)
+    rows = recorded.rows
+    without = {
+        s.id: played([o for o in specs if o is not s]).joint_position_rad[rows]
+        for s in specs
+        if len(specs) > 1
+    }
+    bare = run if not specs else played([])
+    true = run.joint_position_rad[rows]
+    return Leg(course, joint.true, 0, zeros, recorded, true, bare.joint_position_rad[rows], without)
