@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from linear_fit import Linear
 from turning import JOINT as CONFIG
 
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
@@ -29,16 +30,6 @@ LOAD = 2.0 * np.sin(0.7 * TIME) * np.cos(0.11 * TIME)
 MOTOR = 0.8 * np.sin(0.23 * TIME + 0.4)
 LAW = 5.0 * np.sign(np.gradient(MOTOR))
 """What the law of a model does to its rows at its amount: friction that turns with the motor."""
-
-
-@dataclass(frozen=True)
-class Linear:
-    """A fit of a linear model, with what is asked of it."""
-
-    problem: Any
-    x: FloatArray
-    residual: FloatArray
-    J: FloatArray
 
 
 def model(y: FloatArray, columns: Mapping[str, FloatArray]) -> Model:

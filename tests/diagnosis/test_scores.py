@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
+from linear_fit import Linear
 
 from cablecomp.diagnosis.explain.scores import (
     huber,
@@ -20,16 +19,6 @@ from cablecomp.diagnosis.folds import Groups
 from cablecomp.signal.smoothing import FloatArray
 
 BLOCKS, ROWS = 30, 20
-
-
-@dataclass(frozen=True)
-class Linear:
-    """A fit of a linear model, with what `left_out` asks of it."""
-
-    problem: Any
-    x: FloatArray
-    residual: FloatArray
-    J: FloatArray
 
 
 def groups(folds: int = 6) -> Groups:

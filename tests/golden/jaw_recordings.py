@@ -68,8 +68,7 @@ def baseline(
     found = {str(p): given(p)[JOINT] - model.predict(given(p)) for p in test}
     pitched = {n: m for n, m in found.items() if "Pitch" in n}
     if pitched:
-        mean = float(np.mean(np.concatenate(list(pitched.values()))))
-        found |= {n: m - mean for n, m in pitched.items()}
+        found |= files.session_zero(pitched)
     return found
 
 

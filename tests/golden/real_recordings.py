@@ -12,7 +12,7 @@ import jaw_recordings as jaw
 import numpy as np
 import recordings as files
 import sheath_recordings as sheath
-from recordings import KINDS, degrees, own_zero
+from recordings import KINDS, degrees, own_zero, session_zero
 
 from cablecomp.diagnosis.result import Diagnosis
 
@@ -34,11 +34,9 @@ def jaw_by_diagnosis() -> None:
         for how, joint in (("one pretension", config), ("each session's own pretension", jaw.turned(config))):
             found = files.diagnosed(joint, train).augmented_joint
             left = {str(p): files.replayed(found, p, jaw.GROUP) for p in judged}
-            mean = float(np.mean(np.concatenate(list(left.values()))))
-            session = {name: m - mean for name, m in left.items()}
             print(
                 f"{pitch} left out, {how}: {degrees(left):.3f} deg, with the session's own zero "
-                f"{degrees(session):.3f} deg",
+                f"{degrees(session_zero(left)):.3f} deg",
                 flush=True,
             )
 
@@ -47,11 +45,9 @@ def jaw_laws_given() -> None:
     """Every wrist pitch left out once, the laws given and not searched for."""
     for pitch in jaw.PITCHES:
         left = jaw_given.pitch_left_out(pitch)
-        mean = float(np.mean(np.concatenate(list(left.values()))))
-        session = {name: m - mean for name, m in left.items()}
         print(
             f"{pitch} left out, laws given: {degrees(left):.3f} deg, the session's own zero "
-            f"{degrees(session):.3f}, one zero per recording {degrees(own_zero(left)):.3f}",
+            f"{degrees(session_zero(left)):.3f}, one zero per recording {degrees(own_zero(left)):.3f}",
             flush=True,
         )
 

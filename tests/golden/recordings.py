@@ -71,6 +71,12 @@ def degrees(misfits: Mapping[str, FloatArray]) -> float:
     return float(np.degrees(np.sqrt(np.mean(np.concatenate(list(misfits.values())) ** 2))))
 
 
+def session_zero(misfits: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The same with the mean misfit of all these recordings for zero."""
+    mean = float(np.mean(np.concatenate(list(misfits.values()))))
+    return {name: m - mean for name, m in misfits.items()}
+
+
 def own_zero(misfits: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """The same with one encoder zero per recording in place of one per session."""
     return {name: m - m.mean() for name, m in misfits.items()}
