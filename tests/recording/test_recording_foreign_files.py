@@ -79,7 +79,10 @@ def test_a_blf_that_was_cut_says_how_much_of_it_is_there(tmp_path: Path) -> None
     with can.Logger(str(path), max_container_size=400) as writer:
         for k in range(200):
             writer(can.Message(timestamp=1.7e9 + 0.01 * k, arbitration_id=5, data=bytes([k] * 8)))
-    decode = lambda frame: ("drive", {"motor_position_rad": float(frame.data[0])})  # noqa: E731
+
+    def decode(frame: can.Message) -> tuple[str, dict[str, float]]:
+        return "drive", {"motor_position_rad": float(frame.data[0])}
+
     whole = path.read_bytes()
     assert read_all(path, decode=lambda: decode).notes == ()
     path.write_bytes(whole[: len(whole) * 2 // 3])
