@@ -21,6 +21,7 @@ from rich.progress import (
 
 from cablecomp.cli.shared import plain_counts, warn
 from cablecomp.errors import InputError
+from cablecomp.trials.own import OwnWish
 from cablecomp.trials.prove import Wish
 
 OnProgress = Callable[[int, int], None]
@@ -43,9 +44,10 @@ def conceal_joints(out: Path, wish: Wish, workers: int, progress: OnProgress) ->
     return _concealed("firmware_sim.trials", options, progress)
 
 
-def conceal_in(pieces: Path, seed: int, out: Path, progress: OnProgress) -> str:
+def conceal_in(pieces: Path, wish: OwnWish, out: Path, progress: OnProgress) -> str:
     """Conceal physics in pieces of recordings; returns the seals' SHA-256. Raises InputError where that fails."""
-    return _concealed("firmware_sim.conceal", {"--in": pieces, "--seed": seed, "--out": out}, progress)
+    options = {"--in": pieces, "--seed": wish.seed, "--physics": wish.physics, "--out": out}
+    return _concealed("firmware_sim.conceal", options, progress)
 
 
 def experiment(sealed: Path, protocol: Path, out: Path) -> None:

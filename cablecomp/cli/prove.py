@@ -45,6 +45,9 @@ def prove_blindly(
     ] = None,
     rounds: Annotated[int, typer.Option(min=1, help="with --in: pieces; 4 hold every size once")] = 4,
     seconds: Annotated[float, typer.Option(min=1.0, help="with --in: of recordings, in each piece")] = 20.0,
+    physics: Annotated[
+        str, typer.Option(help="with --in: what is concealed, by ids with commas between (late,slip,…); else all")
+    ] = "",
     trials: Annotated[int, typer.Option(min=1, help="how many simulated joints")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="of everything that is drawn")] = 1,
     out: Annotated[Path, out_option("folder for trials, verdicts, answer and page")] = Path("prove"),
@@ -76,7 +79,8 @@ def prove_blindly(
     source = reading(joint)
     data = {path_text(p): source.read(p, gaps=True).columns for p in find_recordings(recordings)}
     own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
-    _in_recordings(own, OwnWish(seed, rounds, seconds, 60.0 if budget is None else budget), out, as_json)
+    wish_own = OwnWish(seed, rounds, seconds, 60.0 if budget is None else budget, physics)
+    _in_recordings(own, wish_own, out, as_json)
 
 
 def _on_joints(wish: Wish, budget_s: float, out: Path, by: Workers, as_json: bool) -> None:

@@ -34,7 +34,7 @@ from cablecomp.trials.shares import write_json
 
 PIECES, SCORED = "pieces", "concealed.json"
 Columns = Mapping[str, FloatArray]
-Conceal = Callable[[Path, int, Path, Callable[[int, int], None]], str]
+Conceal = Callable[[Path, "OwnWish", Path, Callable[[int, int], None]], str]
 """Reads pieces of recordings, writes public trials and sealed truths into a folder; returns the SHA-256 of the
 seals."""
 
@@ -42,12 +42,13 @@ seals."""
 @dataclass(frozen=True)
 class OwnWish:
     """How much: `rounds` pieces of at most `seconds` of recordings each (one twin and one trial of every
-    physics in each), begun for at most `budget_s`."""
+    physics in each), begun for at most `budget_s`; `physics`: ids with commas between, empty for all."""
 
     seed: int
     rounds: int
     seconds: float
     budget_s: float = inf
+    physics: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,7 @@ def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
         "seed": wish.seed,
         "rounds": wish.rounds,
         "seconds": wish.seconds,
+        "physics": wish.physics,
     }
     sha256 = committed(out, wanted, lambda: _conceal(own, wish, tell))
     announce(sha256)
@@ -98,7 +100,7 @@ def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
             # numpy's stub takes `**` for `allow_pickle`, a bool
             np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]
     (pieces / JOINT_FILE).write_text(own.joint, encoding="utf-8")
-    return own.conceal(pieces, wish.seed, own.out, lambda done, of: tell("concealing", done, of))
+    return own.conceal(pieces, wish, own.out, lambda done, of: tell("concealing", done, of))
 
 
 def piece(

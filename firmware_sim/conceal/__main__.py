@@ -1,5 +1,5 @@
-"""`python -m firmware_sim.conceal --in PIECES --seed S --out DIR`: conceal physics in pieces of recordings,
-seal the truth.
+"""`python -m firmware_sim.conceal --in PIECES --seed S [--physics A,B…] --out DIR`: conceal physics in pieces of
+recordings, seal the truth.
 
 PIECES/00000 holds `recording-1.npz`, … (canonical channels) of the first round, and so on; `PIECES/joint.toml`
 goes along into every trial's folder DIR/trials/00000; its truth is sealed in DIR/sealed/00000.zip. Prints
@@ -23,14 +23,15 @@ from firmware_sim.trials.seal import SEALED, TRUTH, digest, truth_text, write_se
 JOINT_FILE = "joint.toml"
 
 
-def conceal(pieces: Path, seed: int, out: Path) -> str:
-    """Write all trials and the seal; returns the seal's SHA-256. Raises SimError for a folder without pieces."""
+def conceal(pieces: Path, seed: int, out: Path, only: Sequence[str] = ()) -> str:
+    """Write all trials and the seal; returns the seal's SHA-256. Raises SimError for a folder without pieces, or an
+    unknown physics."""
     folders = sorted(p for p in pieces.iterdir() if p.is_dir())
     tables = [_read(f) for f in folders]
     if not tables or not all(usable(t) for t in tables):
         raise SimError(f"{pieces}: holds no piece with a joint_position_rad in every recording")
     joint = (pieces / JOINT_FILE).read_text(encoding="utf-8")
-    trials, missing = trials_of(tables, seed)
+    trials, missing = trials_of(tables, seed, only)
     for k, trial in enumerate(trials, start=1):
         name = f"{trial.number:05d}"
         _write(out / "trials" / name, trial, joint)
@@ -63,10 +64,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m firmware_sim.conceal", description=__doc__)
     parser.add_argument("--in", dest="pieces", type=Path, required=True)
     parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--physics", default="", help="these alone, by their ids, with commas between")
     parser.add_argument("--out", type=Path, required=True)
     a = parser.parse_args(arguments)
+    only = [name.strip() for name in a.physics.split(",") if name.strip()]
     try:
-        print(f"sha256 {conceal(a.pieces, a.seed, a.out)}", flush=True)
+        print(f"sha256 {conceal(a.pieces, a.seed, a.out, only)}", flush=True)
     except (SimError, OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

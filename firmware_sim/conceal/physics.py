@@ -33,8 +33,8 @@ class Physics:
 
     `named`: ids under which the effects catalogue of a diagnosis may rightly name it; `shows_in`: covariates in
     which it shows; `calibrates`: it is no missing physics but a constant that is off. `shares`: sizes, of the
-    span that `of` says (the joint's travel, the torque's scatter), or seconds. `unit`, `per_unit`: the unit in
-    which a size is shown, and how many of it a unit of `Change.numbers["size"]` is.
+    joint's travel or of the torque's RMS about zero (a steady load is a load too), or seconds. `unit`, `per_unit`:
+    the unit in which a size is shown, and how many of it a unit of `Change.numbers["size"]` is.
     """
 
     id: str
@@ -55,6 +55,10 @@ def _spans(tables: Sequence[Table], channel: str) -> float:
 
 def _scatter(parts: Sequence[Floats]) -> float:
     return float(np.nanstd(np.concatenate(parts)))
+
+
+def _rms(parts: Sequence[Floats]) -> float:
+    return float(np.sqrt(np.nanmean(np.square(np.concatenate(parts)))))
 
 
 def _has(tables: Sequence[Table], channel: str) -> bool:
@@ -86,11 +90,11 @@ def _slip(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
 
 
 def _unseen_torque(tables: Sequence[Table], parts: Sequence[Floats], share: float) -> Change | None:
-    """A torque on the joint, as `share` of the torque channel's scatter, that this channel does not show."""
+    """A torque on the joint that its channel does not show; its scatter is `share` of the channel's RMS."""
     scatter = _scatter(parts)
     if not scatter > 0.0:
         return None
-    size = share * _scatter([t[TORQUE] for t in tables])
+    size = share * _rms([t[TORQUE] for t in tables])
     return Change(TORQUE, tuple(size / scatter * p for p in parts), {"size": size})
 
 
@@ -102,10 +106,14 @@ def _neighbour(rng: Rng, tables: Sequence[Table], share: float) -> Change | None
 
 
 def _weight(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
+    """A weight that hangs, or stands, upright at an angle that the joint passes: one far from there would pull with a
+    torque many times what it changes by."""
     if not _has(tables, TORQUE):
         return None
-    phase = float(rng.uniform(-np.pi, np.pi))
-    return _unseen_torque(tables, [np.sin(t[JOINT] + phase) for t in tables], share)
+    angles = np.concatenate([t[JOINT] for t in tables])
+    upright = float(rng.uniform(np.nanmin(angles), np.nanmax(angles)))
+    way = float(rng.choice((-1.0, 1.0)))
+    return _unseen_torque(tables, [way * np.sin(t[JOINT] - upright) for t in tables], share)
 
 
 def _inertia(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:

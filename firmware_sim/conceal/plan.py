@@ -20,6 +20,7 @@ from firmware_sim.conceal.physics import (
     Physics,
     Table,
 )
+from firmware_sim.errors import SimError
 
 TWIN = "twin"
 
@@ -53,18 +54,27 @@ class Trial:
         }
 
 
-def trials_of(pieces: Sequence[Sequence[Table]], seed: int) -> tuple[list[Trial], dict[str, str]]:
+def trials_of(
+    pieces: Sequence[Sequence[Table]], seed: int, only: Sequence[str] = ()
+) -> tuple[list[Trial], dict[str, str]]:
     """All trials of these pieces (one round each), and why a physics cannot be concealed in them, by its id.
 
-    A trial depends on seed, round and piece, not on the others. In every round each physics has another of its
-    sizes, so that as many rounds as there are sizes hold every one once; first comes the third.
+    `only`: ids of the physics that are concealed, where not all are. What is concealed depends on seed, round and
+    piece, not on the other trials. In every round each physics has another of its sizes, so that as many rounds as
+    there are sizes hold every one once; first comes the third. Raises SimError for an unknown physics.
     """
+    known = [p.id for p in PHYSICS]
+    for name in only:
+        if name not in known:
+            raise SimError(f"physics is {name!r}; {', '.join(known)} are accepted")
     found: list[Trial] = []
     missing: dict[str, str] = {}
     for r, piece in enumerate(pieces):
         tables = _with_companions(np.random.default_rng([seed, 31, r]), piece)
         found.append(Trial(len(found), r, None, 0.0, None, tables))
         for k, physics in enumerate(PHYSICS):
+            if only and physics.id not in only:
+                continue
             share = physics.shares[_turn(r, k)]
             change = physics.make(np.random.default_rng([seed, 32, r, k]), tables, share)
             if change is None:

@@ -11,6 +11,7 @@ import pytest
 from firmware_sim.conceal.__main__ import main
 from firmware_sim.conceal.physics import JOINT, MOTOR, NEIGHBOUR, PHYSICS, TIME, TORQUE, acceleration, dahl
 from firmware_sim.conceal.plan import Trial, trials_of
+from firmware_sim.errors import SimError
 from firmware_sim.trials import digest, open_truth
 
 Table = dict[str, np.ndarray]
@@ -50,7 +51,7 @@ def test_every_size_once_in_as_many_rounds_beside_a_twin_that_differs_by_nothing
 
 def test_sizes_are_what_the_truth_says() -> None:
     found, _ = trials()
-    travel, torque = 1.0, float(np.std(table()[TORQUE]))
+    travel, torque = 1.0, float(np.sqrt(np.mean(table()[TORQUE] ** 2)))
     for t in found:
         if t.physics is None or t.change is None:
             continue
@@ -71,6 +72,33 @@ def test_sizes_are_what_the_truth_says() -> None:
             if size >= 0.004:  # by whole samples: the same readings, later
                 np.testing.assert_allclose(late[lag:], own[:-lag], atol=1e-12)
         assert t.truth()["size"] == pytest.approx(size * t.physics.per_unit)
+
+
+def test_under_a_steady_load_torques_are_shares_of_it_and_a_weight_pulls_about_as_much_as_it_changes() -> (
+    None
+):
+    steady = [[{**table(r), TORQUE: 0.3 + 0.01 * np.sin(0.7 * table(r)[TIME])}] for r in range(8)]
+    found, missing = trials_of(steady, 5)
+    assert set(missing) == {"play"}
+    twins = {t.round: t for t in found if t.physics is None}
+    for t in found:
+        if t.physics is None or t.physics.id not in ("neighbour", "weight", "inertia", "friction"):
+            continue
+        delta = added(t, twins[t.round], TORQUE)
+        assert np.std(delta) == pytest.approx(0.3 * t.share, rel=0.01)
+        assert abs(np.mean(delta)) < 2.0 * np.std(delta)
+
+
+def test_a_few_physics_alone_are_the_same_as_among_all() -> None:
+    pieces = [[table(r)] for r in range(2)]
+    whole, few = trials_of(pieces, 5)[0], trials_of(pieces, 5, ("weight", "late"))[0]
+    assert [t.physics.id if t.physics else "twin" for t in few] == ["twin", "late", "weight"] * 2
+    for t in few:
+        same = next(o for o in whole if o.round == t.round and o.physics is t.physics)
+        for name, values in t.recordings[0].items():
+            np.testing.assert_array_equal(values, same.recordings[0][name])
+    with pytest.raises(SimError, match=r"physics is 'wait'; late, slip, .* are accepted"):
+        trials_of(pieces, 5, ("late", "wait"))
 
 
 def test_a_slip_goes_on_into_the_recordings_after_it() -> None:
@@ -120,6 +148,8 @@ def test_command_line_writes_public_folders_and_seals(
         "joint.toml",
         "recordings/recording-1.npz",
     ]
+    assert main([*arguments, "--physics", "late, weight"]) == 0
+    assert "written 3 of 3" in capsys.readouterr().out
     (piece / "recording-1.npz").unlink()
     assert main(arguments) == 2
     assert capsys.readouterr().err.startswith("error: ")

@@ -120,7 +120,7 @@ def test_pieces_are_stretches_of_one_session_and_the_same_again() -> None:
         piece({"a": {"time_s": np.arange(5.0)}}, 20.0, 0, 0)
 
 
-def _conceal(pieces: Path, seed: int, out: Path, told: Callable[[int, int], None]) -> str:
+def _conceal(pieces: Path, wish: OwnWish, out: Path, told: Callable[[int, int], None]) -> str:
     (out / "sealed").mkdir()
     assert (pieces / "joint.toml").exists()
     for k, physics in enumerate(("twin", "late", "late")):
@@ -154,6 +154,8 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
     assert answer["done"] == 3
     with pytest.raises(InputError, match="holds another run"):
         prove_in(own, replace(wish, seed=2), lambda what, done, of: None, log.append)
+    with pytest.raises(InputError, match="holds another run"):
+        prove_in(own, replace(wish, physics="late"), lambda what, done, of: None, log.append)
     (tmp_path / SCORED).write_text("[]")
     with pytest.raises(InputError, match="is no answer"):
         concealed_beside(tmp_path)
