@@ -140,7 +140,7 @@ def _fine(row: Row) -> bool:
     if row.failed or row.wrong:
         return False
     if row.kind in ("single", "pair"):
-        return row.all_right and bool(row.located) if row.decidable else True
+        return row.all_right and row.located is not False if row.decidable else True
     if row.kind == "confounded":
         return bool(row.said_tied and row.settled)
     return not (row.kind == "none" and row.empirical)

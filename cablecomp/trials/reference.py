@@ -1,7 +1,8 @@
 """The yardstick of a blind trial: what the true law itself, whatever its form, takes off the recalibrated drive.
 
-The plant's own noise-free contribution of an effect is taken off the recorded angle and the drive is calibrated
-again: that is what a catalogue that held the very law could reach.
+The plant's own noise-free contribution of an effect is taken off the recorded angle, and off the recorded motor torque
+where that alone shows it, and the drive is calibrated again: that is what a catalogue that held the very law could
+reach.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, left_out, score_
 from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -57,7 +58,8 @@ def measure_truth(
     """Compare the drive with and without its true effects, on data left out.
 
     `angles`: `time_s_k`, `joint_rad_k` (as it is), `plain_rad_k` (without any effect), `without_<id>_rad_k` of
-    recordings k = 1, 2, … in order. Raises InputError if the joint cannot follow the recordings.
+    recordings k = 1, 2, … in order, and `joint_motor_Nm_k`, … where the motor's torque alone shows it. Raises
+    InputError if the joint cannot follow the recordings.
     """
     rng = np.random.default_rng(seed)
     body = gather_body(config, recordings)
@@ -70,7 +72,8 @@ def measure_truth(
     if not truth.main:
         return Yardstick(rmse, baseline)
     # companions stay: both sides have them
-    parts = {k.partition("without_")[2].rpartition("_rad_")[0] for k in angles if k.startswith("without_")}
+    lacking = [k for k in angles if k.startswith("without_") and "_rad_" in k]
+    parts = {k.partition("without_")[2].rpartition("_rad_")[0] for k in lacking}
     mine = [p for p in parts if any(p.partition(".")[0] == e.id for e in truth.main)]
     single = "plain" if len(mine) != 1 else f"without_{mine[0]}"
     whole = _told(drive, places, angles, single)
@@ -109,12 +112,15 @@ def _without(
     lack: str,
     own: str = "joint",
 ) -> list[Evidence]:
-    """The recordings with what `own` has and `lack` has not taken off the joint's angle."""
+    """The recordings with what `own` has and `lack` has not taken off the channels that show it."""
     found = []
     for e in evidence:
-        k = places[e.name]
-        added = _at(e, angles[f"time_s_{k}"], angles[f"{own}_rad_{k}"] - angles[f"{lack}_rad_{k}"])
-        found.append(replace(e, columns={**e.columns, JOINT: e.columns[JOINT] - added}))
+        k, columns = places[e.name], dict(e.columns)
+        for channel, unit in ((JOINT, "rad"), (MOTOR, "motor_Nm")):
+            mine, theirs = angles.get(f"{own}_{unit}_{k}"), angles.get(f"{lack}_{unit}_{k}")
+            if mine is not None and theirs is not None and channel in columns:
+                columns[channel] = columns[channel] - _at(e, angles[f"time_s_{k}"], mine - theirs)
+        found.append(replace(e, columns=columns))
     return found
 
 

@@ -58,8 +58,9 @@ class Row:
     `named`: names given, `weighed`: all effects of the final model, named or not, with their evidence;
     `decidable`: the true laws beat the recalibrated drive beyond what an effect has to bring; `located`: the
     first covariate of the calibrated drive's residual, before any name, or an interval, is what the concealed
-    effect acts through (None if nothing is concealed); `bounds`: of what was concealed and not named;
-    `depends`: true dependences found, of all (None: there are none to be found), `depends_wrongly`: those
+    effect acts through (None if nothing is concealed that shows in the joint's angle); `bounds`: of what was
+    concealed and not named; `depends`: true dependences found, of all (None: there are none to be found),
+    `depends_wrongly`: those
     stated that are not true; `final_rad`: RMSE after modelling on data kept for the end; `empirical`: laws
     without a name; `said_tied`, `proposed`, `settled`: of confounded trials (None otherwise); `heldout_rad`,
     `baseline_rad`, `true_rad`, `floor_rad`: RMSE after modelling, of the recalibrated drive, of the true angle

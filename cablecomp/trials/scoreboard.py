@@ -137,8 +137,8 @@ def _of_names(rows: Sequence[Row]) -> Iterable[Target]:
     yield _share("nothing missing: a wrong name", rate(clean, lambda r: r.wrong), None, 0.01)
     yield _share("pairs: both named, decidable", rate(pairs, lambda r: r.all_right), 0.80)
     yield _share("strangers: no wrong name", rate(strange, lambda r: not r.wrong and not r.failed), 0.90)
-    yield _share("strangers: located by the residual itself, decidable", rate(unlike, _located), 0.80)
-    yield _share("single effect: located by the residual itself, decidable", rate(decidable, _located), 0.90)
+    yield _share("strangers: located by the residual itself, decidable", _raw_location(unlike), 0.80)
+    yield _share("single effect: located by the residual itself, decidable", _raw_location(decidable), 0.90)
 
 
 def _of_confidence(rows: Sequence[Row], trust: Trust) -> Iterable[Target]:
@@ -202,8 +202,9 @@ def _first(row: Row) -> bool:
     return row.first_right
 
 
-def _located(row: Row) -> bool:
-    return bool(row.located)
+def _raw_location(rows: Sequence[Row]) -> Rate:
+    """Of those that have a place in the joint's angle."""
+    return rate([r for r in rows if r.located is not None], lambda r: bool(r.located))
 
 
 def _sum(pairs: Iterable[tuple[int, int] | None]) -> tuple[int, int]:
@@ -214,7 +215,7 @@ def _sum(pairs: Iterable[tuple[int, int] | None]) -> tuple[int, int]:
 def _part(name: str, rows: Sequence[Row], low: float = nan, high: float = nan) -> Part:
     decidable = [r for r in rows if r.decidable]
     return Part(
-        name, len(rows), rate(decidable, _first), rate(decidable, _located), rate(rows, lambda r: r.wrong), low, high
+        name, len(rows), rate(decidable, _first), _raw_location(decidable), rate(rows, lambda r: r.wrong), low, high
     )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ def score_trial(
             if "selected_in" in m["evidence"]
         ),
         tied=tuple(tuple(g["effects"]) for g in verdict["not_excluded"]),
-        located=_located(truth, mismatch) if truth.main else None,
+        located=_located(truth, mismatch) if truth.in_joint else None,
         covariate=mismatch[0]["covariate"] if mismatch else "",
         said_tied=_said_tied(truth, verdict) if confounded else None,
         proposed=verdict["next_experiment"] is not None if confounded else None,
@@ -61,7 +61,7 @@ def failed_trial(truth: Truth, yardstick: Yardstick, why: str, seconds: float = 
     confounded = False if truth.kind == "confounded" else None
     return Row(
         **_known(truth, yardstick),
-        located=False if truth.main else None,
+        located=False if truth.in_joint else None,
         said_tied=confounded,
         proposed=confounded,
         settled=confounded,

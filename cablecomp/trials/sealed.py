@@ -15,6 +15,7 @@ import numpy as np
 
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT
 from cablecomp.signal.smoothing import FloatArray
 
 SEALED: str = "sealed"
@@ -58,7 +59,8 @@ class TrueEffect:
 
     `id`: of the catalogue, or a stranger's; `form`: "catalogue", another law's name, or "stranger"; `role`: "main" or
     "companion" (far smaller); `parameters` as a joint configuration states them; `size`: RMS contribution over
-    the plain loop's width; `covariates` in which it shows, best first; `nearest`: names that are right for it.
+    the plain loop's width; `covariates` in which it shows, best first; `nearest`: names that are right for it;
+    `channel`: the output in which it shows.
     """
 
     id: str
@@ -68,6 +70,7 @@ class TrueEffect:
     form: str = "catalogue"
     role: str = "main"
     nearest: tuple[str, ...] = ()
+    channel: str = JOINT
 
     @property
     def known(self) -> bool:
@@ -112,6 +115,11 @@ class Truth:
         return tuple(e.id for e in self.main)
 
     @property
+    def in_joint(self) -> bool:
+        """Whether something that the trial is about shows in the joint's angle."""
+        return any(e.channel == JOINT for e in self.main)
+
+    @property
     def right(self) -> frozenset[str]:
         """Every name that is right: what is there, what an imperfection is in small, what a stranger is nearest to."""
         here = {n for e in self.effects for n in (e.id, *(e.nearest if not e.known else ()))}
@@ -149,7 +157,7 @@ def truth_from(t: Mapping[str, Any]) -> Truth:
         effects = tuple(
             TrueEffect(
                 e["effect"], e["parameters"], float(e["size"]), tuple(e["covariates"]), e["form"], e["role"],
-                tuple(e["nearest"]),
+                tuple(e["nearest"]), e.get("channel", JOINT),
             )
             for e in t["effects"]
         )  # fmt: skip

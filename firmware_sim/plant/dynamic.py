@@ -185,8 +185,8 @@ class Plant:
         """Put motor and link at the ends of the drive."""
         rotor, pulley = build.shafts[0], build.shafts[build.output]
         rotor["inertia"], rotor["viscous"] = self.motor.rotor_inertia_kgm2, self.motor.viscous_Nms_per_rad
-        rotor["coulomb_Nm"] = self.motor.coulomb_Nm
-        rotor["presliding"] = max(self.motor.presliding_rad, 1e-7)
+        rotor["coulomb_Nm"] += self.motor.coulomb_Nm
+        rotor["presliding"] = max(self.motor.presliding_rad, rotor["presliding"])
         pulley["inertia"] += 0.02 * self.link.inertia_kgm2
         for shaft in build.shafts[1 : build.output]:
             shaft["inertia"] = (

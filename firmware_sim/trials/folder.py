@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from firmware_sim.plant import EFFECTS, FORMS
-from firmware_sim.trials.order import Wanted
+from firmware_sim.trials.order import LAWS, Wanted
 from firmware_sim.trials.seal import ANGLES, TRUTH, truth_text
 from firmware_sim.trials.spoil import UNITS, coarser
+from firmware_sim.trials.strangers import STRANGERS
 from firmware_sim.trials.world import Hidden, World
 from firmware_sim.trials.writing import JOINT_FILE, joint_toml, observer_parameters, write_recording
 
-RECORDINGS = "recordings"
+RECORDINGS, MOTOR_TORQUE = "recordings", "motor_torque_Nm"
+IN_MOTOR_TORQUE = frozenset(s.id for s in (*LAWS["mixed"], *STRANGERS) if s.motor_torque)
+"""What shows in the motor's torque alone."""
 
 
 def write_world(folder: Path, world: World, wanted: Wanted) -> None:
@@ -151,17 +154,22 @@ def _effect(hidden: Hidden, other: str) -> dict[str, Any]:
         "parameters": observer_parameters(spec),
         "covariates": [c.replace("other:1", other.replace("other_", "other:")) for c in kind.covariates],
         "nearest": [kind.effect] if kind.listed else list(kind.nearest),
+        **({"channel": MOTOR_TORQUE} if spec.id in IN_MOTOR_TORQUE else {}),
     }
 
 
 def true_angles(world: World) -> dict[str, Any]:
     """Noise-free joint angles on the rows of recording k = 1, 2, …, rad, as an encoder without a zero of its own
     shows them: `joint_rad_k` of the drive as it is, `plain_rad_k` without any effect, and of several
-    `without_<id>_rad_k` without each."""
+    `without_<id>_rad_k` without each. Where something shows in the motor's torque alone, that torque as well (N·m):
+    `joint_motor_Nm_k`, …"""
     found: dict[str, Any] = {}
     for k, leg in enumerate(world.legs, start=1):
         found[f"time_s_{k}"] = leg.recorded.channels["time_s"]
         found[f"joint_rad_{k}"], found[f"plain_rad_{k}"] = leg.true_rad, leg.plain_rad
         for name, angle in leg.without.items():
             found[f"without_{name.replace(':', '.')}_rad_{k}"] = angle
+        if any(h.sized.spec.id in IN_MOTOR_TORQUE for h in world.hidden):
+            for name, torque in leg.motor_Nm.items():
+                found[f"{name.replace(':', '.')}_motor_Nm_{k}"] = torque
     return found

@@ -24,7 +24,8 @@ class Leg:
     """One recording: what was done, the drive as it was then, the zeros of its sensors, and what was recorded.
 
     Angles are those of the joint without noise, as its encoder would show them: `true_rad` of the drive as it is,
-    `plain_rad` without any effect, `without` each by its id where there are several; one value per row.
+    `plain_rad` without any effect, `without` each by its id where there are several; one value per row. `motor_Nm`
+    holds the motor's torque without noise by the same names: `joint`, `plain`, `without_<id>`.
     """
 
     course: Course
@@ -35,6 +36,7 @@ class Leg:
     true_rad: Floats
     plain_rad: Floats
     without: dict[str, Floats]
+    motor_Nm: dict[str, Floats]
 
 
 def legs_of(
@@ -92,11 +94,10 @@ def _leg(
         return None
     recorded = record(rng, run, joint.sensors, how, zeros, other)
     rows = recorded.rows
-    without = {
-        s.id: played([o for o in specs if o is not s]).joint_position_rad[rows]
-        for s in specs
-        if len(specs) > 1
-    }
+    without = {s.id: played([o for o in specs if o is not s]) for s in specs if len(specs) > 1}
     bare = run if not specs else played([])
-    true = run.joint_position_rad[rows]
-    return Leg(course, joint.true, 0, zeros, recorded, true, bare.joint_position_rad[rows], without)
+    angles = {name: r.joint_position_rad[rows] for name, r in without.items()}
+    torques = {"joint": run, "plain": bare, **{f"without_{name}": r for name, r in without.items()}}
+    motor = {name: r.motor_torque_Nm[rows] for name, r in torques.items()}
+    true, plain_rad = run.joint_position_rad[rows], bare.joint_position_rad[rows]
+    return Leg(course, joint.true, 0, zeros, recorded, true, plain_rad, angles, motor)

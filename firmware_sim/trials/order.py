@@ -16,13 +16,15 @@ from firmware_sim.trials import confounded
 from firmware_sim.trials.forms_cable import CABLE
 from firmware_sim.trials.forms_friction import FRICTION
 from firmware_sim.trials.forms_joint import JOINT
+from firmware_sim.trials.forms_motor import MOTOR, MOTOR_FORMS
 from firmware_sim.trials.strangers import STRANGERS
 from firmware_sim.trials.suspects import CATALOGUE, Suspect
 from firmware_sim.trials.tabletop import Case, case_in_turn
 
 T = TypeVar("T")
 
-KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded")
+KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor")
+"""What a trial holds; `motor`: a single effect that shows in the motor's torque alone."""
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:other_cable", "strand_break:fraying", "strand_break:other_cable",
@@ -31,9 +33,9 @@ ALIKE = frozenset({
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
 FORMS = (*FRICTION, *CABLE, *JOINT)
-OTHER_FORMS = tuple(s for s in FORMS if s.id not in ALIKE)
+OTHER_FORMS = (*(s for s in FORMS if s.id not in ALIKE), *MOTOR_FORMS)
 """What can be concealed of laws that the catalogue does not hold."""
-CATALOGUE_FORMS = (*CATALOGUE, *(s for s in FORMS if s.id in ALIKE))
+CATALOGUE_FORMS = (*CATALOGUE, *(s for s in FORMS if s.id in ALIKE), *MOTOR)
 """What can be concealed of laws that it holds."""
 LAWS = {"catalogue": CATALOGUE_FORMS, "other": OTHER_FORMS, "mixed": (*CATALOGUE_FORMS, *OTHER_FORMS)}
 """What can be concealed, by whose laws are asked for."""
@@ -90,6 +92,8 @@ def order(wanted: Wanted, number: int) -> Order:
     if kind == "single":
         effect = _in_turn(wanted.seed, place, CATALOGUE, 4)
         return Order(number, kind, (form_of(wanted, effect, place),))
+    if kind == "motor":
+        return Order(number, "single", (form_of(wanted, MOTOR[0], place),))
     return Order(number, kind, _pair(wanted, place))
 
 

@@ -246,7 +246,7 @@ def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: se
         for s in LAWS[wanted.laws]
         if scene.course.kind in s.courses
         and s.id.partition(":")[0] not in taken
-        and not (s.warm or s.neighbour or s.two_sided or (s.closed and not closed))
+        and not (s.warm or s.neighbour or s.two_sided or s.motor_torque or (s.closed and not closed))
     ]
     return fit[int(rng.integers(len(fit)))]
 

@@ -70,26 +70,15 @@ def recording(effect: str, case: Case) -> dict[str, FloatArray]:
         "temperature_degC": 20.0 + 4.0 * np.sin(0.9 * time),
         "other_1": np.sin(1.3 * time),
     }
-    specs = [] if effect == "motor_friction" else [EffectSpec(effect + case.form, case.values)]
+    specs = [EffectSpec(effect + case.form, case.values)]
     found = simulate(
         PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=specs, **given
     ).channels()
-    if effect == "motor_friction":
-        found["motor_torque_Nm"] = found["motor_torque_Nm"] + dragged(motor, **case.values)
     noise = {**SMALL_NOISE, "motor_torque_Nm": 1e-3, "temperature_degC": 0.02, "other_1": 1e-3}
     columns = {"time_s": time}
     for name in (*SMALL_NOISE, *case.channels):
         columns[name] = found[name] + noise[name] * rng.standard_normal(len(time))
     return columns
-
-
-def dragged(angle: FloatArray, torque_Nm: float, presliding_rad: float) -> FloatArray:
-    """Torque [N m] of a friction that yields elastically over `presliding_rad` before it slips."""
-    z, found = 0.0, np.zeros(len(angle))
-    for k in range(1, len(angle)):
-        z = float(np.clip(z + (angle[k] - angle[k - 1]) / presliding_rad, -1.0, 1.0))
-        found[k] = torque_Nm * z
-    return found
 
 
 def test_every_effect_of_the_catalogue_has_its_case() -> None:

@@ -30,6 +30,7 @@ CATALOGUE = {
     "clamp_slip",
     "strand_break",
     "crosstalk",
+    "motor_friction",
 }
 
 # Values that switch an effect off, and values that switch it on; both for the joint and motion below.
@@ -68,6 +69,7 @@ NEUTRAL: dict[str, Mapping[str, float]] = {
     "torque_sensor_hysteresis": {"fraction": 0.0, "width_Nm": 0.1},
     "torque_sensor_drift": {"coefficient_Nm_per_K": 0.0},
     "motor_torque_cogging": {"amplitude_Nm": 0.0},
+    "motor_friction": {"torque_Nm": 0.0},
     "flange_climb": {"radius_m_per_rad": 0.0},
     "input_play": {"gap_rad": 0.0},
     "self_heating": {"fraction": 0.0},

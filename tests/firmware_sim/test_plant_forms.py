@@ -73,6 +73,9 @@ SIZES = {
     "crosstalk:lagged": {"load_coefficient": 0.3},
     "crosstalk:quadratic": {"load_coefficient": 0.3, "bend_per_unit": 0.5},
     "crosstalk:posed": {"load_coefficient": 0.3},
+    "motor_friction:lugre": {"torque_Nm": 0.02, "viscous_Nms_per_rad": 0.01},
+    "motor_friction:gear": {"torque_Nm": 0.02, "share": 0.1},
+    "motor_friction:uneven": {"torque_Nm": 0.02, "order": 2.0},
 }
 
 
@@ -102,6 +105,9 @@ def test_a_form_shows_without_breaking_the_solution_and_can_be_switched_off(
             run.motor_position_rad - MOTOR,
         ]
     )
+    if name.startswith("motor_friction"):  # beside the path: the joint does not feel it
+        assert np.max(np.abs(change)) < 1e-12
+        change = run.motor_torque_Nm - plain.motor_torque_Nm
     assert np.all(np.isfinite(change))
     assert np.max(np.abs(change)) > 1e-3 * np.ptp(plain.deflection_rad)
     neutral = {p.name: p.neutral for p in FORMS[name].parameters if p.neutral is not None}
@@ -113,6 +119,8 @@ def test_a_form_shows_without_breaking_the_solution_and_can_be_switched_off(
     limit = 3e-4 if name.startswith(("routing", "nonlinear")) else 1e-9
     assert np.max(np.abs(off.deflection_rad - plain.deflection_rad)) < limit * np.ptp(plain.deflection_rad)
     assert np.max(np.abs(off.joint_torque_Nm - plain.joint_torque_Nm)) < 1e-9
+    if name.startswith("motor_friction"):
+        assert np.max(np.abs(off.motor_torque_Nm - plain.motor_torque_Nm)) < 1e-12
 
 
 def _vanishing(name: str) -> dict[str, float]:

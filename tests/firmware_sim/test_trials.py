@@ -13,6 +13,7 @@ from firmware_sim.trials.__main__ import main
 from firmware_sim.trials.confounded import CASES
 from firmware_sim.trials.courses import KINDS as COURSES
 from firmware_sim.trials.courses import Range, draw_course
+from firmware_sim.trials.forms_motor import MOTOR
 from firmware_sim.trials.joints import OFF_NOMINAL, draw_joint
 from firmware_sim.trials.measures import loop_width
 from firmware_sim.trials.order import order
@@ -22,7 +23,7 @@ from firmware_sim.trials.suspects import CATALOGUE
 
 
 def test_suspects_are_the_plants_listed_effects_and_strangers_are_not() -> None:
-    assert {s.id for s in CATALOGUE} == set(LISTED)
+    assert {s.id for s in (*CATALOGUE, *MOTOR)} == set(LISTED)
     assert {s.id for s in STRANGERS} <= set(UNLISTED)
 
 

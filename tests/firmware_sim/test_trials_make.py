@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from firmware_sim.plant import FORMS, PlantError
+from firmware_sim.trials.forms_motor import MOTOR
 from firmware_sim.trials.make import main, make
 from firmware_sim.trials.order import ALIKE, CATALOGUE_FORMS, KINDS, OTHER_FORMS, Wanted, order
 from firmware_sim.trials.suspects import CATALOGUE
@@ -33,12 +34,12 @@ def _truth(folder: Path) -> tuple[dict[str, Any], Any]:
 
 def test_everything_that_the_plant_can_do_otherwise_can_be_concealed() -> None:
     assert {s.id for s in OTHER_FORMS} == set(FORMS) - PRIVATE - ALIKE
-    assert {s.id for s in CATALOGUE_FORMS} == {s.id for s in CATALOGUE} | ALIKE
+    assert {s.id for s in CATALOGUE_FORMS} == {s.id for s in (*CATALOGUE, *MOTOR)} | ALIKE
 
 
 def test_every_effect_has_two_laws_at_least_that_the_catalogue_has_not() -> None:
     count = Counter(s.id.partition(":")[0] for s in OTHER_FORMS)
-    assert min(count[s.id] for s in CATALOGUE) >= 2
+    assert min(count[s.id] for s in (*CATALOGUE, *MOTOR)) >= 2
 
 
 def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
@@ -51,7 +52,8 @@ def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
         others = sum(name not in known for name in drawn)
         assert {"catalogue": others == 0, "other": others == len(drawn)}.get(laws, 20 < others < 52)
     every = Wanted(3, KINDS, "mixed", "none")
-    assert [order(every, k).kind for k in range(len(KINDS))] == list(KINDS)
+    drawn_kinds = [order(every, k).kind for k in range(len(KINDS))]
+    assert drawn_kinds == ["single" if kind == "motor" else kind for kind in KINDS]
     first, second = order(Wanted(3, ("pair",), "mixed", "none"), 7).suspects
     assert first.id.partition(":")[0] != second.id.partition(":")[0]
 
@@ -81,6 +83,31 @@ def test_the_truth_stands_beside_the_recordings_it_belongs_to(tmp_path: Path) ->
         assert 0.01 * truth["loop_rad"] < np.std(added) < 2.0 * truth["loop_rad"]
         assert all(e["effect"] not in (folder / "joint.toml").read_text() for e in truth["effects"])
         assert 9000 < sum(entry["rows"] for entry in truth["recordings"]) < 13000
+
+
+@pytest.mark.parametrize("laws", ["catalogue", "other"])
+def test_friction_of_the_motor_is_in_its_torque_alone(laws: str, tmp_path: Path) -> None:
+    make(Wanted(5, ("motor",), laws, "none"), 3, tmp_path)
+    forms = set()
+    for folder in sorted(tmp_path.iterdir()):
+        truth, true = _truth(folder)
+        (hidden,) = truth["effects"]
+        assert (truth["kind"], hidden["effect"], hidden["channel"]) == (
+            "single",
+            "motor_friction",
+            "motor_torque_Nm",
+        )
+        forms.add(hidden["form"])
+        np.testing.assert_array_equal(true["joint_rad_1"], true["plain_rad_1"])
+        added = true["joint_motor_Nm_1"] - true["plain_motor_Nm_1"]
+        # as large as the truth says: in loops of the joint's angle, by the drive's ratio and its compliance
+        ratio = truth["true"]["input_radius_m"] / truth["true"]["output_radius_m"]
+        apparent = truth["plain"]["compliance"] / ratio * np.std(added) / truth["loop_rad"]
+        assert apparent == pytest.approx(hidden["size"], rel=0.15)
+        seen = _read(folder / truth["recordings"][0]["file"])["motor_torque_Nm"]
+        noise = np.std(seen - true["joint_motor_Nm_1"]) / np.ptp(true["joint_motor_Nm_1"])
+        assert 0.0018 < noise < 0.011
+    assert (forms == {"catalogue"}) == (laws == "catalogue")
 
 
 def test_imperfections_are_there_and_as_large_as_the_truth_says(tmp_path: Path) -> None:

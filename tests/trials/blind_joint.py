@@ -48,3 +48,18 @@ def recording(joint: JointConfig, seed: int, noise: bool = True) -> dict[str, ND
     sigma = NOISE_RAD if noise else 0.0
     columns["joint_position_rad"] = columns["joint_position_rad"] + sigma * rng.standard_normal(len(time))
     return columns
+
+
+def turning(seed: int) -> dict[str, NDArray[np.float64]]:
+    """Both pulleys turn under a load of two frequencies; the motor's torque is recorded, without noise of its own."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 40.0, 0.02)
+    columns = {
+        "time_s": time,
+        "motor_position_rad": 0.8 * np.sin(1.1 * time),
+        "joint_torque_Nm": 0.4 * np.sin(1.7 * time) + 0.3 * np.sin(2.9 * time),
+    }
+    ran = Observer(JOINT).run(columns)
+    columns["joint_position_rad"] = ran["joint_position_rad"] + NOISE_RAD * rng.standard_normal(len(time))
+    columns["motor_torque_Nm"] = ran["predicted_motor_torque_Nm"]
+    return columns

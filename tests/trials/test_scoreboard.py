@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blind_joint import JOINT, recording
+from blind_joint import JOINT, recording, turning
 from blind_verdict import verdict
 
 from cablecomp.effects import with_effects
@@ -118,6 +118,10 @@ def test_location_counts_by_the_effect_and_by_the_event() -> None:
     named = verdict(mismatch=[{"covariate": "other:neighbour", "intervals_s": []}])
     assert row(channel, named).located
     assert row(truth("none"), verdict()).located is None
+    beside = row(truth("single", replace(effect("motor_friction"), channel="motor_torque_Nm")), verdict())
+    assert beside.located is None
+    found = row(series, verdict())
+    assert target([beside, found], "single effect: located") == 1.0
 
 
 def test_a_stranger_may_be_called_what_it_is_nearest_to_and_nothing_else() -> None:
@@ -249,6 +253,29 @@ def test_the_true_law_is_the_yardstick() -> None:
     assert found.gain > 0.5
     assert found.true_rmse_rad < 0.8 * found.baseline_rmse_rad
     nothing = {**angles, "joint_rad_1": plain["joint_position_rad"]}
+    assert not measure_truth(JOINT, {"a": columns}, truth("single", effect("clock_skew")), nothing).decidable
     none = measure_truth(JOINT, {"a": recording(JOINT, 1)}, truth("none"), nothing)
     assert not none.decidable
     assert none.baseline_rmse_rad == pytest.approx(none.true_rmse_rad, rel=0.15)
+
+
+def test_what_the_motors_torque_alone_shows_is_measured_there() -> None:
+    """The same joint angle, and a drag in the motor's torque: decidable by its true course, not by another one."""
+    columns = turning(1)
+    rng, motor = np.random.default_rng(2), columns["motor_position_rad"]
+    drag = 0.004 * np.sign(np.gradient(motor))
+    alone = columns["motor_torque_Nm"]
+    columns["motor_torque_Nm"] = alone + drag + 1e-3 * rng.standard_normal(len(motor))
+    angles = {
+        "time_s_1": columns["time_s"],
+        "joint_rad_1": columns["joint_position_rad"],
+        "plain_rad_1": columns["joint_position_rad"],
+        "joint_motor_Nm_1": alone + drag,
+        "plain_motor_Nm_1": alone,
+    }
+    concealed = truth("single", replace(effect("motor_friction"), channel="motor_torque_Nm"))
+    found = measure_truth(JOINT, {"a": columns}, concealed, angles)
+    assert found.decidable
+    assert found.gain > 0.5
+    off = {**angles, "joint_motor_Nm_1": alone + np.roll(drag, len(drag) // 3)}
+    assert not measure_truth(JOINT, {"a": columns}, concealed, off).decidable

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.config import EffectSpec
-from firmware_sim.plant.effects import cable, friction, load, sensing, strangers
+from firmware_sim.plant.effects import cable, friction, load, motor, sensing, strangers
 from firmware_sim.plant.effects.base import EffectKind, Parameter
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.forms import FORMS
 
 EFFECTS: dict[str, EffectKind] = {
-    kind.id: kind for group in (friction, cable, load, sensing, strangers) for kind in group.KINDS
+    kind.id: kind for group in (friction, cable, load, motor, sensing, strangers) for kind in group.KINDS
 }
 LISTED = tuple(name for name, kind in EFFECTS.items() if kind.listed)
 UNLISTED = tuple(name for name, kind in EFFECTS.items() if not kind.listed)

@@ -15,6 +15,7 @@ from firmware_sim.plant.forms import (
     crosstalk,
     gravity_load,
     inertial_load,
+    motor_friction,
     nonlinear_cable,
     position_dependent_friction,
     pressure_dependent_friction,
@@ -48,6 +49,7 @@ _ROOMS = (
     clamp_slip,
     strand_break,
     crosstalk,
+    motor_friction,
 )
 FORMS: dict[str, EffectKind] = {kind.id: kind for room in _ROOMS for kind in room.KINDS}
 
