@@ -23,7 +23,7 @@ from cablecomp.trials.own import Own, OwnWish, prove_in
 from cablecomp.trials.prove import Blind, Wish, prove
 from cablecomp.trials.scoreboard import as_json as scoreboard_json
 
-KINDS = "single,single,single,pair,none,stranger,sessions,confounded"
+KINDS = "single,single,single,pair,none,stranger,sessions,confounded,motor"
 
 
 @reads_recordings

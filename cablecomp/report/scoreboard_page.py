@@ -139,7 +139,7 @@ def _wrong(board: Scoreboard) -> str:
 def _fine(row: Row) -> bool:
     if row.failed or row.wrong:
         return False
-    if row.kind in ("single", "pair"):
+    if row.kind in ("single", "pair", "motor"):
         return row.all_right and row.located is not False if row.decidable else True
     if row.kind == "confounded":
         return bool(row.said_tied and row.settled)

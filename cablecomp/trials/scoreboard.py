@@ -131,6 +131,7 @@ def _of_names(rows: Sequence[Row]) -> Iterable[Target]:
     clean = [r for r in rows if r.kind == "none"]
     strange = [r for r in rows if r.kind == "stranger"]
     unlike = [r for r in strange if r.decidable]
+    motor = [r for r in rows if r.kind == "motor"]
     yield _share("single effect named first, catalogue's law, decidable", rate(known, _first), 0.97)
     yield _share("single effect named first, another law, decidable", rate(other, _first), 0.90)
     yield _share("single effect: a wrong name", rate(single, lambda r: r.wrong), None, 0.02)
@@ -139,6 +140,9 @@ def _of_names(rows: Sequence[Row]) -> Iterable[Target]:
     yield _share("strangers: no wrong name", rate(strange, lambda r: not r.wrong and not r.failed), 0.90)
     yield _share("strangers: located by the residual itself, decidable", _raw_location(unlike), 0.80)
     yield _share("single effect: located by the residual itself, decidable", _raw_location(decidable), 0.90)
+    beside = rate([r for r in motor if r.decidable], _first)
+    yield _share("friction of the motor, in its torque alone: named first, decidable", beside)
+    yield _share("friction of the motor: a wrong name", rate(motor, lambda r: r.wrong))
 
 
 def _of_confidence(rows: Sequence[Row], trust: Trust) -> Iterable[Target]:
@@ -220,7 +224,7 @@ def _part(name: str, rows: Sequence[Row], low: float = nan, high: float = nan) -
 
 
 def _by_law(rows: Sequence[Row]) -> Iterable[Part]:
-    one = [r for r in rows if r.kind in ("single", "stranger")]
+    one = [r for r in rows if r.kind in ("single", "stranger", "motor")]
     for name in sorted({f for r in one for f in r.forms}):
         yield _part(name, [r for r in one if name in r.forms])
 

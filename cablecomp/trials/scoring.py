@@ -45,7 +45,7 @@ def score_trial(
         settled=_settled(truth, second) if confounded else None,
         depends=(len(stated & set(truth.depends_on)), len(truth.depends_on)) if truth.depends_on else None,
         depends_wrongly=len(stated - set(truth.depends_on)),
-        short_by=_short_by(truth, verdict) if truth.kind == "single" else None,
+        short_by=_short_by(truth, verdict) if truth.kind in ("single", "motor") else None,
         estimates=tuple(_estimates(truth, verdict)),
         bounds=tuple(_bounds(truth, verdict)),
         empirical=tuple(law["law"] for law in verdict["empirical"]),

@@ -87,7 +87,7 @@ class TrueEffect:
 class Truth:
     """What is true of one trial.
 
-    `kind`: single, pair, none, stranger, sessions or confounded; `partner`: the other explanation of a
+    `kind`: single, pair, none, stranger, sessions, confounded or motor; `partner`: the other explanation of a
     confounded trial; `depends_on`: (parameter, on) pairs; `imperfections`: by name, with what each was drawn to
     be; `true` drive values by name.
     """
@@ -148,7 +148,7 @@ class Truth:
             "none": "nothing",
             "sessions": self.case or "sessions",
         }
-        return self.names[0] if self.kind == "single" else words.get(self.kind, self.kind)
+        return self.names[0] if self.kind in ("single", "motor") else words.get(self.kind, self.kind)
 
 
 def truth_from(t: Mapping[str, Any]) -> Truth:

@@ -80,7 +80,7 @@ def draw_imperfections(rng: np.random.Generator, amount: str, kind: str) -> Impe
     for name, probability in PROBABILITIES.items():
         chosen = bool(rng.uniform() < probability)
         numbers = _NUMBERS[name](rng)
-        if name == "companions" and kind not in ("single", "stranger"):
+        if name == "companions" and kind not in ("single", "stranger", "motor"):
             continue
         if amount == "all" or (amount == "some" and chosen):
             found[name] = numbers

@@ -24,7 +24,7 @@ from firmware_sim.trials.tabletop import Case, case_in_turn
 T = TypeVar("T")
 
 KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor")
-"""What a trial holds; `motor`: a single effect that shows in the motor's torque alone."""
+"""What a trial holds; `motor`: an effect that shows in the motor's torque alone."""
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:other_cable", "strand_break:fraying", "strand_break:other_cable",
@@ -93,7 +93,7 @@ def order(wanted: Wanted, number: int) -> Order:
         effect = _in_turn(wanted.seed, place, CATALOGUE, 4)
         return Order(number, kind, (form_of(wanted, effect, place),))
     if kind == "motor":
-        return Order(number, "single", (form_of(wanted, MOTOR[0], place),))
+        return Order(number, kind, (form_of(wanted, MOTOR[0], place),))
     return Order(number, kind, _pair(wanted, place))
 
 

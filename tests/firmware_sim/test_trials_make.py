@@ -52,8 +52,7 @@ def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
         others = sum(name not in known for name in drawn)
         assert {"catalogue": others == 0, "other": others == len(drawn)}.get(laws, 20 < others < 52)
     every = Wanted(3, KINDS, "mixed", "none")
-    drawn_kinds = [order(every, k).kind for k in range(len(KINDS))]
-    assert drawn_kinds == ["single" if kind == "motor" else kind for kind in KINDS]
+    assert [order(every, k).kind for k in range(len(KINDS))] == list(KINDS)
     first, second = order(Wanted(3, ("pair",), "mixed", "none"), 7).suspects
     assert first.id.partition(":")[0] != second.id.partition(":")[0]
 
@@ -93,7 +92,7 @@ def test_friction_of_the_motor_is_in_its_torque_alone(laws: str, tmp_path: Path)
         truth, true = _truth(folder)
         (hidden,) = truth["effects"]
         assert (truth["kind"], hidden["effect"], hidden["channel"]) == (
-            "single",
+            "motor",
             "motor_friction",
             "motor_torque_Nm",
         )

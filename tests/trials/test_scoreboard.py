@@ -118,10 +118,19 @@ def test_location_counts_by_the_effect_and_by_the_event() -> None:
     named = verdict(mismatch=[{"covariate": "other:neighbour", "intervals_s": []}])
     assert row(channel, named).located
     assert row(truth("none"), verdict()).located is None
-    beside = row(truth("single", replace(effect("motor_friction"), channel="motor_torque_Nm")), verdict())
-    assert beside.located is None
-    found = row(series, verdict())
-    assert target([beside, found], "single effect: located") == 1.0
+    beside = truth("motor", replace(effect("motor_friction"), channel="motor_torque_Nm"))
+    assert row(beside, verdict()).located is None
+    rows = [row(beside, verdict("motor_friction")), row(beside, verdict("crosstalk"))]
+    assert target(rows, "friction of the motor, in its torque alone: named first") == 0.5
+    assert target(rows, "friction of the motor: a wrong name") == 0.5
+    assert isnan(target(rows, "single effect named first, catalogue"))
+    cogging = replace(effect("motor_torque_cogging"), form="stranger", channel="motor_torque_Nm")
+    unlike = [
+        row(truth("stranger", cogging), verdict()),
+        row(truth("stranger", replace(effect("tip_link"), form="stranger")), verdict()),
+    ]
+    assert scoreboard(unlike, "", WISH).by_law[0].located.of == 0
+    assert target(unlike, "strangers: located") == 0.0
 
 
 def test_a_stranger_may_be_called_what_it_is_nearest_to_and_nothing_else() -> None:
@@ -273,7 +282,7 @@ def test_what_the_motors_torque_alone_shows_is_measured_there() -> None:
         "joint_motor_Nm_1": alone + drag,
         "plain_motor_Nm_1": alone,
     }
-    concealed = truth("single", replace(effect("motor_friction"), channel="motor_torque_Nm"))
+    concealed = truth("motor", replace(effect("motor_friction"), channel="motor_torque_Nm"))
     found = measure_truth(JOINT, {"a": columns}, concealed, angles)
     assert found.decidable
     assert found.gain > 0.5
