@@ -50,13 +50,14 @@ def diagnose(
     pace = Pace(progress, begin_s + budget_s)
     rng = np.random.default_rng(seed)
     case = _calibrated(config, recordings, sessions, rng, pace)
+    location = case.located(rng.spawn(1)[0])
     before = case.remainder_of(case.drive.fit, rng)
     found = search(case.drive, hypotheses(config, case.body.used), rng, pace)
     after = case.remainder_of(found.final.fit, rng)
     pace.tell("holding each name against its rivals", 0.92)
     weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
     outcome = _judged(case, before, found, after, weighed, rng, pace)
-    answer = diagnosis_of(case, before, found, outcome, rng, budget_s)
+    answer = diagnosis_of(case, location, found, outcome, rng, budget_s)
     return replace(answer, runtime_s=time.monotonic() - begin_s)
 
 

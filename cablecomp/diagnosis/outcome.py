@@ -14,7 +14,8 @@ from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.weighing import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.diagnosis.locate.location import Location, locate
-from cablecomp.diagnosis.locate.remainders import sensitivities, series_of
+from cablecomp.diagnosis.locate.remainders import covariates_of, sensitivities, series_of
+from cablecomp.diagnosis.locate.responses import every_row, responses
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.result import Errors
 from cablecomp.estimation.least_squares import Fit
@@ -37,6 +38,14 @@ class Case:
     body: Body
     drive: Calibrated
     covariates: tuple[Covariates, ...]
+
+    def located(self, rng: np.random.Generator) -> Location:
+        """Where the calibrated drive's misfit lies, before any name: on every fine row, and by what the drive itself
+        makes of laws that change."""
+        fit = every_row(self.drive.fit)
+        seen = [covariates_of(self.config, e) for e in fit.problem.evidence]
+        series = series_of(fit, seen, self.drive.floor_rad)
+        return locate(series, rng, sensitivities(fit), drive=responses(fit))
 
     def remainder_of(self, fit: Fit, rng: np.random.Generator) -> Remainder:
         """What a fit to these recordings leaves."""

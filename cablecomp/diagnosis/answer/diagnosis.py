@@ -20,7 +20,8 @@ from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.answer.verdict import warnings_of
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
-from cablecomp.diagnosis.outcome import Case, Outcome, Remainder
+from cablecomp.diagnosis.locate.location import Location
+from cablecomp.diagnosis.outcome import Case, Outcome
 from cablecomp.diagnosis.result import Diagnosis, Law
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, rms_left
@@ -29,9 +30,9 @@ OUT_OF_TIME = "the {:g} s were over before all hypotheses were tried: what is na
 
 
 def diagnosis_of(
-    case: Case, before: Remainder, found: Search, outcome: Outcome, rng: np.random.Generator, budget_s: float
+    case: Case, location: Location, found: Search, outcome: Outcome, rng: np.random.Generator, budget_s: float
 ) -> Diagnosis:
-    """Everything found; `before`: what the calibrated drive leaves."""
+    """Everything found; `location`: where the calibrated drive's misfit lies."""
     drive, kept = case.drive, outcome.kept
     unseen, hidden = could_be_unseen(kept.fit, found.pool, outcome.names)
     return Diagnosis(
@@ -49,7 +50,7 @@ def diagnosis_of(
         final=tuple(e.name for e in case.body.final),
         channels=_channels(drive.fit, kept.fit),
         calibration=drive_values(kept.fit, case.config),
-        location=before.location,
+        location=location,
         named=tuple(named_of(w, found.final) for w in outcome.named),
         candidates=candidates(outcome.weighed, found.selection, found.final),
         not_excluded=(*tied_of(outcome.weighed, found.selection), *(((h.effect,), h.why) for h in hidden)),

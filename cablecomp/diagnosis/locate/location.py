@@ -10,7 +10,7 @@ import numpy as np
 from cablecomp.diagnosis.locate.crossfit import BlockSums, block_sums, coefficients, gains, surrogate_gains
 from cablecomp.diagnosis.locate.segments import Segments, segment
 from cablecomp.diagnosis.locate.series import Series, thin
-from cablecomp.diagnosis.locate.views import View, load_path, views
+from cablecomp.diagnosis.locate.views import Response, Responses, View, load_path, views
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 _ENERGY_SHARE: Final = 0.8
@@ -85,6 +85,7 @@ class _Ground:
     weight: FloatArray
     nuisance: FloatArray
     excess: float
+    drive: Responses | None
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ def locate(
     rng: np.random.Generator,
     nuisance: FloatArray | None = None,
     surrogates: int = 999,
+    drive: Responses | None = None,
 ) -> Location:
     """Rank the covariates by the share of the mismatch that they account for.
 
@@ -105,10 +107,11 @@ def locate(
     blocks removes from a block, over the energy beyond noise. Surrogates flip the sign of whole blocks,
     longer than the residual remembers: noise cannot tell, a dependence is destroyed. p-values compare with
     the largest score over all views of each surrogate. `nuisance` (n x p): sensitivities of the prediction
-    to the calibration parameters; what they can explain is not counted, for the covariate or against it.
+    to the calibration parameters; what they can explain is not counted, for the covariate or against it. `drive`:
+    what the drive itself makes of laws that change along a covariate.
     Near ties go to the covariate that leaves less to the other.
     """
-    ground = _ground(series, nuisance)
+    ground = _ground(series, nuisance, drive)
     answers, highest = _asked(ground, rng, surrogates)
     regressors = np.column_stack((np.ones(ground.series.samples), load_path(ground.series)))
     pieces = segment(ground.series.residual / ground.series.sigma, regressors)
@@ -132,7 +135,7 @@ def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[
     energy = float(plain.energy.sum())
     answers: list[_Answer] = []
     highest = np.full(surrogates, -np.inf)
-    for view in views(ground.series):
+    for view in views(ground.series, ground.drive):
         sums = _sums(ground, np.column_stack((_beneath(view, ground), view.basis)))
         base = bases[view.beyond_loop]
         per_block = gains(sums) - base.gain
@@ -162,17 +165,36 @@ def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float
     )
 
 
-def _ground(series: Series, nuisance: FloatArray | None) -> _Ground:
+def _ground(series: Series, nuisance: FloatArray | None, drive: Responses | None) -> _Ground:
     columns = np.ones((series.samples, 1))
     if nuisance is not None:
         columns = np.column_stack((columns, np.asarray(nuisance, dtype=np.float64)))
+    own = columns.shape[1]
+    if drive is not None:
+        columns = np.column_stack(
+            (columns, *(r.columns for r in drive.of_laws), *(c for _, c in drive.sensitivities))
+        )
     thinned = thin(series, columns)
     small = thinned.series
     weight = 1.0 / small.sigma**2
     energy = float(np.sum(weight * small.residual**2))
     # below a tenth of the energy the part beyond noise is not known well enough to divide by
     excess = max(energy - small.samples, 0.1 * energy, 1e-300)
-    return _Ground(small, small.blocks(), weight, _orthonormal(thinned.extra, weight), excess)
+    nuisances, said = thinned.extra[:, :own], thinned.extra[:, own:]
+    beneath = _orthonormal(nuisances, weight)
+    return _Ground(
+        small, small.blocks(), weight, beneath, excess, None if drive is None else _parted(drive, said)
+    )
+
+
+def _parted(drive: Responses, columns: FloatArray) -> Responses:
+    """The same with these columns, thinned."""
+    laws, first = [], 0
+    for law in drive.of_laws:
+        laws.append(Response(law.covariate, law.how, columns[:, first : first + law.columns.shape[1]]))
+        first += law.columns.shape[1]
+    slow = tuple((name, columns[:, first + k]) for k, (name, _) in enumerate(drive.sensitivities))
+    return Responses(tuple(laws), slow)
 
 
 def _orthonormal(columns: FloatArray, weight: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,28 @@ from cablecomp.signal.smoothing import FloatArray
 
 _INSTANTS: Final = 15
 """Instants of a single jump that are looked at, even over the recordings."""
+_COURSE: Final = 5
+"""Hat functions along a covariate by which a parameter of the drive changes."""
+_NO_COURSE: Final = ("load_direction", "dwell", "reversal")
+"""Covariates that are no course: they begin anew with every turn or rest."""
+_RATES: Final = ("load_rate", "velocity", "acceleration")
+"""Covariates whose rare extremes are drawn in."""
+_ANGLE_CURVE: Final = "a curve over the angle"
+
+
+class Response(NamedTuple):
+    """What a change of the drive along a covariate makes of the joint's angle [rad], n x k."""
+
+    covariate: str
+    how: str
+    columns: FloatArray
+
+
+class Responses(NamedTuple):
+    """What the drive itself can say: `of_laws`, and its sensitivities by parameter (n), for slow changes."""
+
+    of_laws: tuple[Response, ...]
+    sensitivities: tuple[tuple[str, FloatArray], ...]
 
 
 @dataclass(frozen=True)
@@ -60,16 +82,45 @@ def contrasts(basis: FloatArray) -> FloatArray:
     return np.asarray((basis - basis.mean(axis=0))[:, 1:], dtype=np.float64)
 
 
-def views(series: Series) -> Iterator[View]:
-    """Yield every view of every covariate that varies in the series."""
+def views(series: Series, drive: Responses | None = None) -> Iterator[View]:
+    """Yield every view of every covariate that varies in the series.
+
+    `drive`: what the drive itself says, in place of how the plain loop changes; a curve over an angle is not asked
+    beside it, for in a loop the angle goes with the load, and whatever has a curve has that one too.
+    """
     values = series.covariates.values
     path = load_path(series)
     for name in values:
         if float(np.ptp(values[name])) <= 0.0 and name not in ("dwell",):
             continue
         for view in _views_of(name, series, path):
+            if drive is not None and (view.beyond_loop or view.how == _ANGLE_CURVE):
+                continue
             if view.width and float(np.max(np.abs(view.basis))) > 0.0:
                 yield view
+    if drive is not None:
+        yield from _drive_views(series, drive)
+
+
+def _drive_views(series: Series, drive: Responses) -> Iterator[View]:
+    for response in drive.of_laws:
+        if float(np.max(np.abs(response.columns))) > 0.0:
+            yield View(response.covariate, response.how, _of_one_size(response.columns))
+    for name, values in series.covariates.values.items():
+        if name in _NO_COURSE or float(np.ptp(values)) <= 0.0:
+            continue
+        course = elapsed(series) if name == "time" else _compressed(values) if name in _RATES else values
+        along = contrasts(hats(course, _COURSE))
+        for parameter, column in drive.sensitivities:
+            if float(np.max(np.abs(column))) > 0.0:
+                yield View(
+                    name, f"{parameter} changes along it", products(along, _of_one_size(column[:, None]))
+                )
+
+
+def _of_one_size(columns: FloatArray) -> FloatArray:
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    return np.asarray(columns / np.where(size > 0.0, size, 1.0), dtype=np.float64)
 
 
 def load_path(series: Series) -> FloatArray:
@@ -122,7 +173,7 @@ def _views_of(name: str, series: Series, path: FloatArray) -> Iterator[View]:
         yield View(name, "in proportion to the acceleration", x[:, None])
         yield View(name, "a curve over the acceleration", contrasts(hats(_compressed(x), 7)))
     elif name in ("motor_angle", "joint_angle"):
-        yield View(name, "a curve over the angle", contrasts(hats(x, 12, even=True)))
+        yield View(name, _ANGLE_CURVE, contrasts(hats(x, 12, even=True)))
         yield View(name, "a fine pattern over the angle", contrasts(hats(x, 36, even=True)))
         yield View(name, "the loop changes along the angle", products(contrasts(hats(x, 6)), path), True)
     else:
