@@ -34,26 +34,29 @@ OPEN: Final = 100.0
 """Root of the deviance of a value at which the drive cannot follow the recordings: far outside."""
 
 
-def profile_interval(fit: Fit, name: str) -> tuple[float, float] | None:
+def profile_interval(fit: Fit, name: str, wider: float = 1.0) -> tuple[float, float] | None:
     """The 95 % interval of a parameter, in its own unit; an end that lies beyond a bound is the bound. None for what is
-    a session's own or a gain by a condition, which a configuration cannot hold."""
+    a session's own or a gain by a condition, which a configuration cannot hold.
+
+    `wider`: by which the root of the deviance at an end is larger than the likelihood alone asks."""
     place = {p.name: k for k, p in enumerate(fit.problem.parameters) if p.name == p.base}
     k = place.get(name)
     if k is None:
         return None
     p = fit.problem.parameters[k]
-    return p.value(_end(fit, k, p.x(p.low))), p.value(_end(fit, k, p.x(p.high)))
+    level = wider * LEVEL
+    return p.value(_end(fit, k, p.x(p.low), level)), p.value(_end(fit, k, p.x(p.high), level))
 
 
-def _end(fit: Fit, k: int, bound: float) -> float:
+def _end(fit: Fit, k: int, bound: float, level: float) -> float:
     """Coordinate of the end towards a bound."""
     here = float(fit.x[k])
     way = bound - here
-    step = LEVEL * sqrt(max(float(covariance(fit)[k, k]), 0.0)) / max(abs(way), 1e-300)
+    step = level * sqrt(max(float(covariance(fit)[k, k]), 0.0)) / max(abs(way), 1e-300)
 
     @cache
     def beyond(share: float) -> float:
-        return _root_of_deviance(fit, k, here + share * way) - LEVEL
+        return _root_of_deviance(fit, k, here + share * way) - level
 
     outside = min(step, 1.0)
     for _ in range(TIMES):  # outward until it is outside, ...

@@ -16,7 +16,7 @@ from cablecomp.diagnosis.answer.entries import (
     tied_of,
     traces,
 )
-from cablecomp.diagnosis.answer.values import drive_values
+from cablecomp.diagnosis.answer.values import as_trials_say, drive_values
 from cablecomp.diagnosis.answer.verdict import warnings_of
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
@@ -49,7 +49,7 @@ def diagnosis_of(
         folds=found.groups.folds,
         final=tuple(e.name for e in case.body.final),
         channels=_channels(drive.fit, kept.fit),
-        calibration=drive_values(kept.fit, case.config),
+        calibration=as_trials_say(drive_values(kept.fit, case.config)),
         location=location,
         named=tuple(named_of(w, found.final) for w in outcome.named),
         candidates=candidates(outcome.weighed, found.selection, found.final),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cablecomp.diagnosis.answer.values import effect_values
+from cablecomp.diagnosis.answer.values import as_trials_say, effect_values
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
@@ -32,9 +32,9 @@ def named_of(w: Weighed, final: Model) -> Named:
     """One effect with its parameters, evidence and confidence; profile intervals where it is named."""
     effect = w.term.effect
     mine = f"effect.{effect.id}."
-    values = [v for v in effect_values(final.fit) if v.name.startswith(mine)]
+    values = list(as_trials_say([v for v in effect_values(final.fit) if v.name.startswith(mine)]))
     if w.confidence >= LIMITS.name:
-        found = side_by_side(lambda v: profile_interval(final.fit, v.name), values)
+        found = side_by_side(lambda v: profile_interval(final.fit, v.name, LIMITS.wider), values)
         values = [replace(v, interval_95=i) for v, i in zip(values, found, strict=True)]
     parameters: dict[str, Value | str] = {v.name.removeprefix(mine): v for v in values}
     if w.term.channel:

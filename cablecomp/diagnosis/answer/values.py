@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.result import Value
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, covariance
 from cablecomp.estimation.standing import value_of
@@ -19,6 +23,11 @@ def drive_values(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
 def effect_values(fit: Fit) -> tuple[Value, ...]:
     """The effects' parameters, named `effect.ID.KEY`."""
     return _parameters(fit, fit.problem.config, effects=True)
+
+
+def as_trials_say(values: Sequence[Value]) -> tuple[Value, ...]:
+    """The values with deviations as wide as blind trials ask for (`LIMITS.wider`)."""
+    return tuple(replace(v, sd=LIMITS.wider * v.sd) for v in values)
 
 
 def _parameters(fit: Fit, config: JointConfig, *, effects: bool) -> tuple[Value, ...]:
