@@ -92,8 +92,8 @@ def concealed_page(answer: Mapping[str, Any]) -> str:
 
 def concealed_section(answer: Mapping[str, Any], before: str = "") -> Section:
     """The curves and their table as a section of a page."""
-    rows = [(c["words"], _names(c), _from(c), _twins(c), c["already_named"] or "") for c in answer["curves"]]
-    heads = ("concealed", "right name", "found from", "named in twins", "trials left out: named already")
+    rows = [(c["words"], _names(c), _from(c), _twins(c)) for c in answer["curves"]]
+    heads = ("concealed", "right name", "found from", "named in twins")
     body = page.figure(found_by_size(answer), _EXPLAINED) + page.table(heads, rows)
     lead = (
         f"What size of known physics the diagnosis found in these recordings ({answer['done']} blind trials)."
@@ -161,7 +161,7 @@ def _trials(answer: Mapping[str, Any]) -> str:
             ", ".join(r["named"]),
             r["confidence"],
             float("nan") if r["seconds"] is None else r["seconds"],
-            r["failed"] or ("named in the twin already" if r["already"] and r["physics"] != "twin" else ""),
+            r["failed"] or ("named in the twin too, with another value" if r.get("grown") else ""),
         )
         for r in answer["rows"]
     ]

@@ -13,7 +13,7 @@ from cablecomp.trials.run import Verdict
 from cablecomp.trials.shares import Rate, finite, rate
 
 MOVED_SD = 3.0
-"""Stated standard deviations by which a calibrated value has to leave its twin's to count as moved."""
+"""Stated standard deviations by which a value has to leave its twin's to count as moved."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Concealed:
     """One trial beside its twin, which differs by nothing but what is concealed.
 
     `physics`: its id ("twin" for the twin itself); `accepted`: names that are right; `size` in `unit`; `share`:
-    the same as it was drawn; `new`: names that its twin was not given; `already`: a right name that its twin
-    was given; `located`: the residual's first covariate is the right one, and not the twin's; `moved`:
+    the same as it was drawn; `new`: names that its twin was not given; `grown`: right names that its twin was given
+    too, with other values; `located`: the residual's first covariate is the right one, and not the twin's; `moved`:
     calibrated values that left the twin's.
     """
 
@@ -37,7 +37,7 @@ class Concealed:
     unit: str
     named: tuple[str, ...]
     new: tuple[str, ...]
-    already: bool
+    grown: tuple[str, ...]
     located: bool
     moved: tuple[str, ...]
     confidence: float
@@ -46,10 +46,10 @@ class Concealed:
 
     @property
     def found(self) -> bool:
-        """Whether what was put was found: a right name is new; where there is none, it is located, or
-        calibrated away."""
+        """Whether what was put was found: a right name is new, or its values have left the twin's; where there is
+        none, it is located, or calibrated away."""
         if self.accepted:
-            return any(n in self.accepted for n in self.new)
+            return bool(self.grown) or any(n in self.accepted for n in self.new)
         return bool(self.moved) if self.calibrates else self.located
 
     @property
@@ -63,7 +63,8 @@ def score_concealed(truth: Mapping[str, Any], verdict: Verdict, twin: Mapping[st
     said = verdict.said or {"missing_physics": [], "candidates": [], "mismatch": [], "calibration": {}}
     accepted = tuple(truth["named"])
     names = tuple(m["effect"] for m in said["missing_physics"])
-    before = {m["effect"] for m in twin["missing_physics"]}
+    before = {m["effect"]: m["parameters"] for m in twin["missing_physics"]}
+    both = {m["effect"]: m["parameters"] for m in said["missing_physics"] if m["effect"] in before}
     weighed = [
         m["confidence"] or 0.0
         for m in (*said["missing_physics"], *said["candidates"])
@@ -82,7 +83,7 @@ def score_concealed(truth: Mapping[str, Any], verdict: Verdict, twin: Mapping[st
         truth["unit"],
         names,
         tuple(n for n in names if n not in before) if truth["physics"] != "twin" else (),
-        any(n in before for n in accepted),
+        tuple(n for n in accepted if n in both and any(_moved(both[n], before[n]))),
         first in truth["shows_in"] and first != theirs,
         tuple(_moved(said["calibration"], twin["calibration"])),
         max(weighed, default=0.0),
@@ -98,8 +99,10 @@ def _first(said: Mapping[str, Any]) -> str:
 
 
 def _moved(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterable[str]:
-    for name in mine.keys() & theirs.keys():
+    for name in sorted(mine.keys() & theirs.keys()):
         a, b = mine[name], theirs[name]
+        if not isinstance(a, Mapping) or not isinstance(b, Mapping):
+            continue  # a channel's name
         if None in (a["value"], b["value"], a["sd"], b["sd"]):
             continue
         sd = max(float(a["sd"]), float(b["sd"]))
@@ -121,8 +124,8 @@ class Point:
 @dataclass(frozen=True)
 class Curve:
     """All sizes of one physics, smallest first. `in_twins`: twins that were given its name although nothing was
-    put, and what is named without being put cannot be found anew (`already` counts such trials; they are in no
-    point). `from_size`: smallest size from which on all were found; NaN where not even the largest."""
+    put: hardware has physics of its own. `from_size`: smallest size from which on all were found; NaN where not even
+    the largest."""
 
     physics: str
     words: str
@@ -130,7 +133,6 @@ class Curve:
     unit: str
     points: tuple[Point, ...]
     in_twins: Rate
-    already: int
     from_size: float
 
 
@@ -189,10 +191,9 @@ def curves(rows: Sequence[Concealed], of: int, wish: Mapping[str, Any]) -> Curve
 
 def _of(physics: str, rows: Sequence[Concealed], twins: Sequence[Concealed]) -> Curve:
     first = rows[0]
-    fresh = [r for r in rows if not r.already]
     points = []
-    for share in sorted({r.share for r in fresh}):
-        here = [r for r in fresh if r.share == share]
+    for share in sorted({r.share for r in rows}):
+        here = [r for r in rows if r.share == share]
         points.append(
             Point(
                 share,
@@ -215,7 +216,6 @@ def _of(physics: str, rows: Sequence[Concealed], twins: Sequence[Concealed]) -> 
         first.unit,
         tuple(points),
         named,
-        len(rows) - len(fresh),
         size,
     )
 
@@ -227,7 +227,6 @@ def _curve(c: Curve) -> dict[str, Any]:
         "names": list(c.names),
         "unit": c.unit,
         "found_from": c.from_size if isfinite(c.from_size) else None,
-        "already_named": c.already,
         "named_in_twins": c.in_twins.entry(),
         "points": [
             {

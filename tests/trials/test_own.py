@@ -28,9 +28,16 @@ from cablecomp.trials.sealed import digest
 Said = dict[str, Any]
 
 
-def said(*names: str, covariate: str = "load", EA: float = 1.0) -> Said:
+def said(*names: str, covariate: str = "load", EA: float = 1.0, size: float = 1.0) -> Said:
     return {
-        "missing_physics": [{"effect": n, "confidence": 0.9} for n in names],
+        "missing_physics": [
+            {
+                "effect": n,
+                "confidence": 0.9,
+                "parameters": {"channel": "other_1", "of": {"value": size, "sd": 0.1}},
+            }
+            for n in names
+        ],
         "candidates": [],
         "mismatch": [{"covariate": covariate, "p_value": 0.001}],
         "calibration": {"EA_N": {"value": EA, "sd": 0.01}},
@@ -49,11 +56,15 @@ def put(physics: str, share: float = 0.1, **changes: Any) -> dict[str, Any]:
 def test_what_counts_is_new_beside_the_twin() -> None:
     twin = said("bearing_friction")
     late = score_concealed(put("late"), Verdict(said("bearing_friction", "clock_skew"), 1.0, ""), twin)
-    assert (late.found, late.wrong, late.already, late.new) == (True, False, False, ("clock_skew",))
+    assert (late.found, late.wrong, late.grown, late.new) == (True, False, (), ("clock_skew",))
     other = score_concealed(put("late"), Verdict(said("bearing_friction", "crosstalk"), 1.0, ""), twin)
     assert (other.found, other.wrong) == (False, True)
     same = score_concealed(put("friction"), Verdict(twin, 1.0, ""), twin)
-    assert (same.found, same.wrong, same.already) == (False, False, True)
+    assert (same.found, same.wrong, same.new) == (False, False, ())
+    for size, found in ((1.29, False), (1.31, True), (0.69, True)):  # three deviations off the twin's, or not
+        more = Verdict(said("bearing_friction", size=size), 1.0, "")
+        assert score_concealed(put("friction"), more, twin).found is found
+        assert not score_concealed(put("late"), more, twin).found
     none = score_concealed(put("late"), Verdict(None, 2.0, "no luck"), twin)
     assert (none.found, none.wrong, none.failed) == (False, False, "no luck")
 
