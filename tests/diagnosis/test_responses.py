@@ -77,7 +77,7 @@ def test_responses_stand_on_counted_rows() -> None:
     fit = calibrated("nonlinear_cable", {"stiffening": 0.6}, 1.0).drive.fit
     said = responses(fit)
     counted = len(fit.problem.owners(JOINT))
-    assert {name for name, _ in said.sensitivities} == {"pretension_N", "mu_output"}
+    assert {name for name, _ in said.sensitivities} == {"pretension", "friction on the joint's drum"}
     for columns in (*(r.columns for r in said.of_laws), *(c[:, None] for _, c in said.sensitivities)):
         assert columns.shape[0] == counted
         assert np.isfinite(columns).all()

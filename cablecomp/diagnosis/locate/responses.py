@@ -43,8 +43,13 @@ _PLAYS: Final = (0.05, 0.15, 0.4)
 """Half widths of the play, over T0."""
 _PLAY_SHARE: Final = 0.2
 """Share of the free cable's compliance that follows through the play."""
-_DRIVE: Final = ("EA_N", "pretension_N", "mu_output", "mu_input")
-"""Parameters of the drive whose sensitivities say what a slow change of it does."""
+_DRIVE: Final = {
+    "EA_N": "stiffness",
+    "pretension_N": "pretension",
+    "mu_output": "friction on the joint's drum",
+    "mu_input": "friction on the motor's drum",
+}
+"""Parameters of the drive whose sensitivities say what a slow change of it does, in words."""
 
 
 class Place(NamedTuple):
@@ -79,12 +84,14 @@ def responses(fit: Fit) -> Responses:
 
 
 def _slow(fit: Fit) -> tuple[tuple[str, FloatArray], ...]:
-    """Sensitivities of the joint's rows to each parameter of the drive, the sessions' own ones together."""
+    """Sensitivities of the joint's rows to each parameter of the drive, in words, the sessions' own ones together."""
     problem = fit.problem
     count = len(problem.owners(JOINT))
     bases = [p.name.partition("@")[0] for p in problem.parameters]
     return tuple(
-        (name, fit.J[:count, [b == name for b in bases]].sum(axis=1)) for name in _DRIVE if name in bases
+        (words, fit.J[:count, [b == name for b in bases]].sum(axis=1))
+        for name, words in _DRIVE.items()
+        if name in bases
     )
 
 

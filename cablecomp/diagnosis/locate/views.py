@@ -31,7 +31,7 @@ class Response(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """What the drive itself can say: `of_laws`, and its sensitivities by parameter (n), for slow changes."""
+    """What the drive itself can say: `of_laws`, and its sensitivities by what changes (n), for slow changes."""
 
     of_laws: tuple[Response, ...]
     sensitivities: tuple[tuple[str, FloatArray], ...]
@@ -114,7 +114,7 @@ def _drive_views(series: Series, drive: Responses) -> Iterator[View]:
         for parameter, column in drive.sensitivities:
             if float(np.max(np.abs(column))) > 0.0:
                 yield View(
-                    name, f"{parameter} changes along it", products(along, _of_one_size(column[:, None]))
+                    name, f"{parameter} changes with it", products(along, _of_one_size(column[:, None]))
                 )
 
 
