@@ -32,18 +32,20 @@ LOCATED = {
 """What the plant has, how large its loads are, and the covariates along which its law changes."""
 
 
-def calibrated(effect: str, values: dict[str, float], loads: float) -> Case:
+def calibrated(effect: str, values: dict[str, float], loads: float, *, locked: bool = False) -> Case:
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 90.0, 0.04)
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
+    motor = 0.0 * motor if locked else motor
     load = loads * soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
     found = simulate(
         PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=[EffectSpec(effect, values)]
     ).channels()
     columns: dict[str, FloatArray] = {"time_s": time}
     for name, noise in SMALL_NOISE.items():
-        columns[name] = found[name] + noise * rng.standard_normal(len(time))
+        turned = 0.0 if locked and name == "motor_position_rad" else noise
+        columns[name] = found[name] + turned * rng.standard_normal(len(time))
     joint = parse_joint(
         {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
     )
@@ -97,3 +99,8 @@ def test_a_change_that_the_drive_cannot_follow_is_left_out(monkeypatch: pytest.M
     )
     (only,) = responses(fit).of_laws
     assert only.columns.shape[1] == 1
+
+
+def test_what_does_not_change_is_not_asked_about() -> None:
+    case = calibrated("nonlinear_cable", {"stiffening": 0.6}, 1.0, locked=True)
+    assert "motor_angle" not in {m.covariate for m in case.located(np.random.default_rng(0)).mismatch}

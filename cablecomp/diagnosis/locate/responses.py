@@ -144,11 +144,12 @@ class Reach(NamedTuple):
 
 
 def _reach(problem: Problem, x: FloatArray, answers: Sequence[Any]) -> Reach:
-    low, high = np.inf, -np.inf
+    low, high = 1.0, 1.0
     for e, a in zip(problem.evidence, answers, strict=True):
-        tensions = np.concatenate([a.tension_h, a.tension_l])
-        over = tensions[tensions > 0.0] / problem.joint(x, e).drive.stage[-1].pretension_N
-        low, high = min(low, float(over.min())), max(high, float(over.max()))
+        pretension = problem.joint(x, e).drive.stage[-1].pretension_N
+        for tension in (a.tension_h, a.tension_l):
+            over = tension[tension > 0.0] / pretension
+            low, high = min(low, float(over.min(initial=1.0))), max(high, float(over.max(initial=1.0)))
     joint, motor = (np.concatenate([e.columns[k] for e in problem.evidence]) for k in (JOINT, MOTOR_ANGLE))
     return Reach(
         (float(np.log(max(low, 0.05))), float(np.log(high))),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -13,6 +13,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 _INSTANTS: Final = 15
 """Instants of a single jump that are looked at, even over the recordings."""
+_ROUNDING: Final = 1e-12
+"""Range, over the largest value or 1, up to which values are one and the same."""
 _COURSE: Final = 5
 """Hat functions along a covariate by which a parameter of the drive changes."""
 _NO_COURSE: Final = ("load_direction", "dwell", "reversal")
@@ -63,7 +65,7 @@ def hats(values: FloatArray, count: int, even: bool = False) -> FloatArray:
     column.
     """
     low, high = float(np.min(values)), float(np.max(values))
-    if high - low <= 1e-12 * max(1.0, abs(low), abs(high)):
+    if not _changes(values):
         return np.ones((len(values), 1))
     spaced = np.linspace(low, high, count)
     knots = spaced if even else 0.5 * (spaced + np.quantile(values, np.linspace(0.0, 1.0, count)))
@@ -88,10 +90,10 @@ def views(series: Series, drive: Responses | None = None) -> Iterator[View]:
     `drive`: what the drive itself says, in place of how the plain loop changes; a curve over an angle is not asked
     beside it, for in a loop the angle goes with the load, and whatever has a curve has that one too.
     """
-    values = series.covariates.values
     path = load_path(series)
-    for name in values:
-        if float(np.ptp(values[name])) <= 0.0 and name not in ("dwell",):
+    changing = {k: v for k, v in series.covariates.values.items() if _changes(v)}
+    for name in series.covariates.values:
+        if name not in changing and name != "dwell":
             continue
         for view in _views_of(name, series, path):
             if drive is not None and (view.beyond_loop or view.how == _ANGLE_CURVE):
@@ -99,23 +101,26 @@ def views(series: Series, drive: Responses | None = None) -> Iterator[View]:
             if view.width and float(np.max(np.abs(view.basis))) > 0.0:
                 yield view
     if drive is not None:
-        yield from _drive_views(series, drive)
+        yield from _drive_views(series, drive, changing)
 
 
-def _drive_views(series: Series, drive: Responses) -> Iterator[View]:
+def _drive_views(series: Series, drive: Responses, changing: Mapping[str, FloatArray]) -> Iterator[View]:
     for response in drive.of_laws:
-        if float(np.max(np.abs(response.columns))) > 0.0:
+        if response.covariate in changing and float(np.max(np.abs(response.columns))) > 0.0:
             yield View(response.covariate, response.how, _of_one_size(response.columns))
-    for name, values in series.covariates.values.items():
-        if name in _NO_COURSE or float(np.ptp(values)) <= 0.0:
+    for name, values in changing.items():
+        if name in _NO_COURSE:
             continue
         course = elapsed(series) if name == "time" else _compressed(values) if name in _RATES else values
         along = contrasts(hats(course, _COURSE))
-        for parameter, column in drive.sensitivities:
+        for what, column in drive.sensitivities:
             if float(np.max(np.abs(column))) > 0.0:
-                yield View(
-                    name, f"{parameter} changes with it", products(along, _of_one_size(column[:, None]))
-                )
+                yield View(name, f"{what} changes with it", products(along, _of_one_size(column[:, None])))
+
+
+def _changes(values: FloatArray) -> bool:
+    """Whether the values differ by more than rounding."""
+    return float(np.ptp(values)) > _ROUNDING * max(1.0, float(np.max(np.abs(values))))
 
 
 def _of_one_size(columns: FloatArray) -> FloatArray:
