@@ -13,7 +13,7 @@ from cablecomp.diagnosis.locate.crossfit import block_sums, gains, surrogate_gai
 from cablecomp.diagnosis.locate.location import locate
 from cablecomp.diagnosis.locate.segments import segment
 from cablecomp.diagnosis.locate.series import make_series, thin
-from cablecomp.diagnosis.locate.views import load_path
+from cablecomp.diagnosis.locate.views import hats, load_path
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.signal.smoothing import FloatArray
@@ -51,6 +51,26 @@ def test_noise_gives_uniform_p_values_however_long_it_remembers(memory: float) -
     for trial in range(24):
         residual = autoregressive(np.random.default_rng(trial), found.samples, memory, SIGMA)
         location = locate(make_series(residual, SIGMA, found), np.random.default_rng(trial), surrogates=99)
+        lowest.append(min(entry.p_value for entry in location.mismatch))
+    # binomial bounds at three standard deviations
+    for level in (0.05, 0.2, 0.5):
+        share = float(np.mean(np.array(lowest) <= level))
+        assert abs(share - level) < 3.0 * np.sqrt(level * (1.0 - level) / 24.0) + 0.02
+
+
+def test_what_a_fit_leaves_of_noise_has_uniform_p_values_too() -> None:
+    channels = columns("sweep", 1_000, 0.036)
+    found = covariates(channels)
+    steps = hats(found.values["time"], 10)
+    fitted = np.column_stack((load_path(make_series(np.zeros(1_000), SIGMA, found)), steps))
+    fitted, _ = np.linalg.qr(fitted)
+    lowest = []
+    for trial in range(24):
+        noise = SIGMA * np.random.default_rng(trial).standard_normal(found.samples)
+        residual = noise - fitted @ (fitted.T @ noise)
+        location = locate(
+            make_series(residual, SIGMA, found), np.random.default_rng(trial), nuisance=fitted, surrogates=99
+        )
         lowest.append(min(entry.p_value for entry in location.mismatch))
     # binomial bounds at three standard deviations
     for level in (0.05, 0.2, 0.5):

@@ -60,7 +60,7 @@ def test_the_covariate_along_which_a_law_changes_comes_first(effect: str) -> Non
     first = calibrated(effect, values, loads).located(np.random.default_rng(0)).mismatch[0]
     assert first.covariate in covariates
     assert first.p_value <= 0.002
-    assert first.share > 0.5
+    assert first.share > 0.3
 
 
 def test_the_fit_on_every_row_predicts_the_judged_rows_alike() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -16,16 +16,25 @@ _RIDGE: Final = 1e-3
 """Share of a regressor's own energy that holds its coefficient back."""
 
 
+class Beneath(NamedTuple):
+    """What a fit has taken off a residual, block by block: `cross` b x k x q, its products with the regressors;
+    `moment` b x q, with the residual."""
+
+    cross: FloatArray
+    moment: FloatArray
+
+
 @dataclass(frozen=True)
 class BlockSums:
     """Normal equations of each block: `gram` b x k x k, `moment` b x k, `fold` of each block, `energy` b =
-    sum w r^2.
+    sum w r^2; `beneath`: of what has been taken off the residual.
     """
 
     gram: FloatArray
     moment: FloatArray
     fold: IntArray
     energy: FloatArray
+    beneath: Beneath | None = None
 
     @property
     def blocks(self) -> int:
@@ -35,14 +44,25 @@ class BlockSums:
     def select(self, columns: IntArray) -> BlockSums:
         """Return the sums of some of the regressors."""
         return BlockSums(
-            self.gram[:, columns][:, :, columns], self.moment[:, columns], self.fold, self.energy
+            self.gram[:, columns][:, :, columns],
+            self.moment[:, columns],
+            self.fold,
+            self.energy,
+            None if self.beneath is None else self.beneath._replace(cross=self.beneath.cross[:, columns]),
         )
 
 
-def block_sums(basis: FloatArray, residual: FloatArray, weight: FloatArray, block: IntArray) -> BlockSums:
+def block_sums(
+    basis: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    block: IntArray,
+    beneath: FloatArray | None = None,
+) -> BlockSums:
     """Return the weighted normal equations of residual on basis (n x k) for contiguous blocks 0…b-1.
 
-    Blocks are dealt out to the folds in turn, so that every fold sees the whole recording.
+    Blocks are dealt out to the folds in turn, so that every fold sees the whole recording. `beneath` (n x q): what has
+    been taken off the residual and the basis, orthonormal under the weight.
     """
     firsts = np.flatnonzero(np.concatenate(([True], np.diff(block) != 0)))
     bounds = np.append(firsts, len(block))
@@ -51,7 +71,13 @@ def block_sums(basis: FloatArray, residual: FloatArray, weight: FloatArray, bloc
     moment = np.add.reduceat(weighted * residual[:, None], firsts, axis=0)
     energy = np.add.reduceat(weight * residual**2, firsts)
     fold = (np.arange(len(firsts)) % LIMITS.crossfit).astype(np.int64)
-    return BlockSums(gram, moment, fold, np.asarray(energy, dtype=np.float64))
+    taken = None
+    if beneath is not None:
+        spans = list(itertools.pairwise(bounds))
+        cross = np.stack([weighted[a:b].T @ beneath[a:b] for a, b in spans])
+        own = np.stack([beneath[a:b].T @ (weight * residual)[a:b] for a, b in spans])
+        taken = Beneath(cross, own)
+    return BlockSums(gram, moment, fold, np.asarray(energy, dtype=np.float64), taken)
 
 
 def gains(sums: BlockSums) -> FloatArray:
@@ -67,13 +93,21 @@ def gains(sums: BlockSums) -> FloatArray:
 
 
 def surrogate_gains(sums: BlockSums, signs: FloatArray) -> FloatArray:
-    """Return the same, summed over all blocks, for residuals whose blocks have these signs (s x b): s."""
+    """Return the same, summed over all blocks, for residuals whose blocks have these signs (s x b): s.
+
+    What the fit would have taken off them is taken off again: of noise, too, a fit leaves what it cannot follow.
+    """
     total, ridge = _normal(sums)
     whole = signs @ sums.moment
+    again = None if sums.beneath is None else signs @ sums.beneath.moment
+    if sums.beneath is not None:
+        whole = whole - again @ sums.beneath.cross.sum(axis=0).T
     out = np.zeros(len(signs))
     for here in _folds(sums):
         held = sums.gram[here].sum(axis=0)
         moments = signs[:, here] @ sums.moment[here]
+        if sums.beneath is not None:
+            moments = moments - again @ sums.beneath.cross[here].sum(axis=0).T
         c = np.linalg.solve(total - held + ridge, (whole - moments).T).T
         out += np.sum((2.0 * moments - c @ held) * c, axis=1)
     return out

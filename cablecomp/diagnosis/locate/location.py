@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -78,20 +78,30 @@ class _Answer:
 
 @dataclass(frozen=True)
 class _Ground:
-    """Thinned series, blocks and weights, and what every fit contains beside the view."""
+    """Thinned series and its blocks; what is asked about lies beyond `nuisance`, orthonormal under `weight`: the
+    residual and every view are taken without what that can explain. `excess`: energy beyond noise."""
 
     series: Series
     block: IntArray
     weight: FloatArray
     nuisance: FloatArray
+    residual: FloatArray
     excess: float
     drive: Responses | None
 
+    def beyond(self, columns: FloatArray) -> FloatArray:
+        """Columns without what the nuisance can explain of them."""
+        return np.asarray(columns - self.nuisance @ (self.nuisance.T @ (self.weight[:, None] * columns)))
 
-@dataclass(frozen=True)
-class _Base:
-    gain: FloatArray
-    null: FloatArray
+    def sums(self, basis: FloatArray) -> BlockSums:
+        """Normal equations of the residual on a basis, block by block."""
+        return block_sums(self.beyond(basis), self.residual, self.weight, self.block, self.nuisance)
+
+    def with_path(self) -> _Ground:
+        """The same with what a plain loop explains taken off too."""
+        own = _orthonormal(np.column_stack((self.nuisance, load_path(self.series))), self.weight)
+        bare = replace(self, nuisance=own)
+        return replace(bare, residual=bare.beyond(self.residual[:, None])[:, 0])
 
 
 def locate(
@@ -125,23 +135,18 @@ def locate(
 
 def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[list[_Answer], FloatArray]:
     """What every view accounts for; and of each surrogate the largest score over all of them."""
-    plain = _sums(ground, ground.nuisance)
-    signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, plain.blocks))
-    looped = _sums(ground, _with_path(ground))
-    bases = {
-        False: _Base(gains(plain), surrogate_gains(plain, signs)),
-        True: _Base(gains(looped), surrogate_gains(looped, signs)),
-    }
-    energy = float(plain.energy.sum())
+    grounds = {False: ground, True: ground.with_path()}
+    signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, int(ground.block.max()) + 1))
     answers: list[_Answer] = []
     highest = np.full(surrogates, -np.inf)
     for view in views(ground.series, ground.drive):
-        sums = _sums(ground, np.column_stack((_beneath(view, ground), view.basis)))
-        base = bases[view.beyond_loop]
-        per_block = gains(sums) - base.gain
+        here = grounds[view.beyond_loop]
+        energy = float(np.sum(here.weight * here.residual**2))
+        sums = here.sums(view.basis)
+        per_block = gains(sums)
         total = float(per_block.sum())
         strength = float(_strength(total, energy))
-        null = _strength(surrogate_gains(sums, signs) - base.null, energy)
+        null = _strength(surrogate_gains(sums, signs), energy)
         # the lower tail is long where a fit extrapolates: the scale is that of the upper one
         centre, upper = (float(value) for value in np.quantile(null, (0.5, 0.95)))
         scale = max(upper - centre, 1e-12)
@@ -154,7 +159,7 @@ def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[
 def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float) -> Mismatch:
     """One covariate's part, from its best view."""
     name = answer.view.covariate
-    fitted = answer.view.basis @ _own(answer)
+    fitted = ground.beyond(answer.view.basis) @ coefficients(answer.sums)
     return Mismatch(
         name,
         float(np.clip(answer.share, 0.0, 1.0)),
@@ -177,14 +182,20 @@ def _ground(series: Series, nuisance: FloatArray | None, drive: Responses | None
     thinned = thin(series, columns)
     small = thinned.series
     weight = 1.0 / small.sigma**2
-    energy = float(np.sum(weight * small.residual**2))
-    # below a tenth of the energy the part beyond noise is not known well enough to divide by
-    excess = max(energy - small.samples, 0.1 * energy, 1e-300)
     nuisances, said = thinned.extra[:, :own], thinned.extra[:, own:]
-    beneath = _orthonormal(nuisances, weight)
-    return _Ground(
-        small, small.blocks(), weight, beneath, excess, None if drive is None else _parted(drive, said)
+    whole = _Ground(
+        small,
+        small.blocks(),
+        weight,
+        _orthonormal(nuisances, weight),
+        small.residual,
+        0.0,
+        None if drive is None else _parted(drive, said),
     )
+    residual = whole.beyond(small.residual[:, None])[:, 0]
+    energy = float(np.sum(weight * residual**2))
+    # below a tenth of the energy the part beyond noise is not known well enough to divide by
+    return replace(whole, residual=residual, excess=max(energy - small.samples, 0.1 * energy, 1e-300))
 
 
 def _parted(drive: Responses, columns: FloatArray) -> Responses:
@@ -201,23 +212,6 @@ def _orthonormal(columns: FloatArray, weight: FloatArray) -> FloatArray:
     root = np.sqrt(weight)[:, None]
     u, singular, _ = np.linalg.svd(columns * root, full_matrices=False)
     return np.asarray((u / root)[:, singular > 1e-9 * singular[0]], dtype=np.float64)
-
-
-def _with_path(ground: _Ground) -> FloatArray:
-    return np.column_stack((ground.nuisance, load_path(ground.series)))
-
-
-def _beneath(view: View, ground: _Ground) -> FloatArray:
-    return _with_path(ground) if view.beyond_loop else ground.nuisance
-
-
-def _sums(ground: _Ground, basis: FloatArray) -> BlockSums:
-    return block_sums(basis, ground.series.residual, ground.weight, ground.block)
-
-
-def _own(answer: _Answer) -> FloatArray:
-    """Coefficients of the view's own regressors."""
-    return coefficients(answer.sums)[-answer.view.width :]
 
 
 def _p_value(highest: FloatArray, score: float) -> float:
@@ -280,10 +274,9 @@ def _ranked(best: list[_Answer], ground: _Ground) -> list[_Answer]:
 
 
 def _joint_share(first: _Answer, second: _Answer, ground: _Ground) -> float:
-    beneath = _with_path(ground) if first.view.beyond_loop or second.view.beyond_loop else ground.nuisance
-    base = gains(_sums(ground, beneath)).sum()
-    basis = np.column_stack((beneath, first.view.basis, second.view.basis))
-    return float(gains(_sums(ground, basis)).sum() - base) / ground.excess
+    here = ground.with_path() if first.view.beyond_loop or second.view.beyond_loop else ground
+    together = here.sums(np.column_stack((first.view.basis, second.view.basis)))
+    return float(gains(together).sum()) / ground.excess
 
 
 def _range(name: str, fitted: FloatArray, ground: _Ground) -> tuple[float, float]:
