@@ -10,9 +10,11 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.catalogue import role_of
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, covariance
 from cablecomp.estimation.standing import value_of
+from cablecomp.signal.noise import reading_sigma
 
 
 def drive_values(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
@@ -36,10 +38,22 @@ def _parameters(fit: Fit, config: JointConfig, *, effects: bool) -> tuple[Value,
     for p, x, s in zip(fit.problem.parameters, fit.x, sd, strict=True):
         if p.name.startswith("effect.") == effects:
             nominal = None if effects or p.condition else value_of(config, p.base)
-            found.append(
-                Value(p.name, p.value(float(x)), float(s * abs(p.slope(float(x)))), nominal, p.session)
-            )
+            value, own = p.value(float(x)), float(s * abs(p.slope(float(x))))
+            if role_of(p.base) == "instant":
+                own = reading_sigma(own, _gap_around(fit, value))  # between two rows no fit can tell where
+            found.append(Value(p.name, value, own, nominal, p.session))
     return tuple(found)
+
+
+def _gap_around(fit: Fit, instant_s: float) -> float:
+    """Time [s] between the judged rows on both sides of an instant; 0 where there are none."""
+    gaps = []
+    for e in fit.problem.evidence:
+        time = e.at_rows("time_s")[e.counted[JOINT]]
+        k = int(np.searchsorted(time, instant_s))
+        if 0 < k < len(time):
+            gaps.append(float(time[k] - time[k - 1]))
+    return max(gaps, default=0.0)
 
 
 def _zeros(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
