@@ -65,8 +65,9 @@ class Inspection:
 def require_motion(columns: Mapping[str, FloatArray], where: object) -> None:
     """Raise InputError if motor or joint never move: nothing about the drive follows from such a recording."""
     for name in ("motor_position_rad", "joint_position_rad"):
-        values = columns.get(name)
-        if values is not None and len(values) and not np.ptp(values) > 0.0:
+        read = columns.get(name)
+        values = np.empty(0) if read is None else read[np.isfinite(read)]  # a gap is no rest
+        if len(values) and not np.ptp(values) > 0.0:
             raise InputError(
                 f"{where}: {name} is {values[0]:g} in every row; a recording in which the joint moves is needed "
                 "(is the sensor stuck?)"

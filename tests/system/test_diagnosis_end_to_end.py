@@ -117,6 +117,36 @@ def test_parameters_off_their_nominal_values_are_no_missing_physics(tmp_path: Pa
     assert {"bearing_friction", "series_compliance", "routing_friction"} <= unseen
 
 
+def with_gaps(path: Path, channels: dict[str, slice], joint_rad: float | None = None) -> Path:
+    """The recording with no readings on these rows (and, if asked for, a joint that never moves)."""
+    columns = {k: v.copy() for k, v in read_all(path).columns.items()}
+    if joint_rad is not None:
+        columns["joint_position_rad"][:] = joint_rad
+    for name, rows in channels.items():
+        columns[name][rows] = np.nan
+    write_canonical(path, columns)
+    return path
+
+
+@pytest.mark.parametrize("command", ["calibrate", "diagnose"])
+def test_rows_without_a_reading_are_no_rest(tmp_path: Path, command: str) -> None:
+    (first, _) = recordings(tmp_path, [], 12)
+    path = with_gaps(first, {"joint_position_rad": slice(400, 460), "joint_torque_Nm": slice(900, 910)})
+    given = [command, str(path), "--config", str(joint_file(tmp_path)), "--out", str(tmp_path / "out")]
+    assert main(given) == 0
+
+
+def test_a_joint_that_rests_wherever_it_is_read_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (first, _) = recordings(tmp_path, [], 12)
+    path = with_gaps(first, {"joint_position_rad": slice(400, 460)}, joint_rad=0.25)
+    given = ["diagnose", str(path), "--config", str(joint_file(tmp_path)), "--out", str(tmp_path / "out")]
+    assert main(given) == 2
+    assert "joint_position_rad is 0.25 in every row" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_missing_channel_is_one_line_and_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
