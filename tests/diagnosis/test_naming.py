@@ -121,12 +121,15 @@ def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> No
     assert abs(delay.value) < 0.004
 
 
-def test_a_link_that_slips_on_its_shaft_is_a_slip_that_leaves_the_pretension() -> None:
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_link_that_slips_on_its_shaft_is_a_slip_that_leaves_the_pretension(way: float) -> None:
     joint = parse_joint(
         {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
     )
     columns = recording("clamp_slip", Case({"slip_m": 0.0, "time_s": EVENT_S}))
-    columns["joint_position_rad"] = columns["joint_position_rad"] + 2e-3 * (columns["time_s"] >= EVENT_S)
+    columns["joint_position_rad"] = columns["joint_position_rad"] + way * 2e-3 * (
+        columns["time_s"] >= EVENT_S
+    )
     found = diagnose(joint, {"small/1": columns})
     assert [named.effect for named in found.named] == ["clamp_slip"]
     taken_up, instant = (found.named[0].parameters[k] for k in ("taken_up", "time_s"))

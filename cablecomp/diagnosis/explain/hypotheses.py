@@ -13,6 +13,7 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_effect
 
@@ -250,3 +251,24 @@ def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
 def _others(evidence: Sequence[Evidence]) -> list[str]:
     names = [n for n in evidence[0].columns if n.startswith("other_")]
     return [n for n in names if _varies(evidence, n)]
+
+
+def amount_of(fit: Fit, h: Hypothesis) -> tuple[Free, float] | None:
+    """The free parameter that is an effect's own amount, and its value; None where there is none of it."""
+    name = h.key(h.amount.name)
+    for p, x in zip(fit.problem.parameters, fit.x, strict=True):
+        if p.name == name:
+            return p, p.value(float(x))
+    return None
+
+
+def runs_away(fit: Fit, h: Hypothesis) -> bool:
+    """Whether an effect's amount ended on a bound that lies far beyond what is plausible: a pulley whose centre is a
+    third of its radius off bends a short stroke to anything."""
+    found = amount_of(fit, h)
+    if found is None:
+        return False
+    p, value = found
+    plausible = max(abs(b) for b in h.amount.bounds(fit.problem.config))
+    reach = abs(p.high if value > 0.0 else p.low)
+    return reach > LIMITS.beyond_plausible * plausible and abs(value) > LIMITS.on_bound * reach

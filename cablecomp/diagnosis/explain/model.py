@@ -10,7 +10,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
 from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -18,7 +18,6 @@ from cablecomp.effects import Parameter
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
-from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -131,35 +130,11 @@ def best_resolved(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hyp
 def amount_resolved(fit: Fit, term: Term) -> bool:
     """Whether an effect's own amount is more than none: a guide without friction is free cable, and yields as such.
     What depends on a condition may be none where that is none."""
-    found = _amount(fit, term)
+    found = amount_of(fit, term) if isinstance(term, Hypothesis) else None
     if found is None or any(p.name.startswith(f"{found[0].name}~") for p in fit.problem.parameters):
         return True
     assert isinstance(term, Hypothesis)
     return abs(found[1] - term.amount.neutral) > least(term.amount, fit.problem.config)
-
-
-def runs_away(fit: Fit, term: Term) -> bool:
-    """Whether an effect's amount ended on a bound that lies far beyond what is plausible: a pulley whose centre is a
-    third of its radius off bends a short stroke to anything."""
-    found = _amount(fit, term)
-    if found is None:
-        return False
-    assert isinstance(term, Hypothesis)
-    p, value = found
-    plausible = max(abs(b) for b in term.amount.bounds(fit.problem.config))
-    reach = abs(p.high if value > 0.0 else p.low)
-    return reach > LIMITS.beyond_plausible * plausible and abs(value) > LIMITS.on_bound * reach
-
-
-def _amount(fit: Fit, term: Term) -> tuple[Free, float] | None:
-    """The free parameter that is an effect's own amount, and its value; None where there is none of it."""
-    if not isinstance(term, Hypothesis):
-        return None
-    name = term.key(term.amount.name)
-    for p, x in zip(fit.problem.parameters, fit.x, strict=True):
-        if p.name == name:
-            return p, p.value(float(x))
-    return None
 
 
 def least(amount: Parameter, config: JointConfig) -> float:

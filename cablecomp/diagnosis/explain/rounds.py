@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, runs_away
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
@@ -24,7 +24,6 @@ from cablecomp.diagnosis.explain.model import (
     finely,
     loss,
     placed,
-    runs_away,
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
@@ -206,7 +205,8 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
     except InputError:
         return None
     terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    if not amount_resolved(fit, terms[0]) or runs_away(fit, terms[0]):
+    away = isinstance(terms[0], Hypothesis) and runs_away(fit, terms[0])
+    if away or not amount_resolved(fit, terms[0]):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:

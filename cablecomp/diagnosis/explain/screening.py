@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from cablecomp.config import EffectEntry
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants, runs_away
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, approach, inside
@@ -129,7 +129,9 @@ def _event(here: Anchor, h: Hypothesis) -> _Best | None:
     if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
         mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
         other = _best(here, mirrored)
-        if other is not None and other[0] < best[0]:
+        # what one cable promises by the opposite of what it does is the other's
+        opposite = float(best[1][h.amount.name]) * best[3] < 0.0
+        if other is not None and (opposite or other[0] < best[0]):
             best = other
     return best
 
@@ -149,7 +151,9 @@ def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best | None:
         starts.append(Start({**values, **begun, **shape}))
     found.append(_best(here, replace(h, starts=tuple(starts))))
     other = min((f for f in found if f is not None), key=lambda f: f[0], default=None)
-    return other if other is not None and other[0] < LIMITS.shaped * best[0] else None
+    return (
+        other if other is not None and other[0] < best[0] else None
+    )  # by enough? fits tell: a promise may be empty
 
 
 def _best(here: Anchor, h: Hypothesis) -> _Best | None:
@@ -171,7 +175,10 @@ def _best(here: Anchor, h: Hypothesis) -> _Best | None:
         factor = float(left @ own) / square
         if not h.two_sided:
             factor = max(factor, 0.0)
-        factor = min(max(factor, h.amount.minimum / size), h.amount.maximum / size)
+        low, high = sorted(
+            (h.amount.minimum / size, h.amount.maximum / size)
+        )  # a mirrored event's size is negative
+        factor = min(max(factor, low), high)
         cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
         values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
         if best is None or cost < best[0]:
@@ -285,9 +292,10 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     except InputError:
         fit = None
     plain = None if a.plain is None else _begun(a.plain, evaluations)
-    if plain is not None and (fit is None or fit.cost > LIMITS.shaped * plain.cost):
-        return plain
-    return fit
+    if plain is None or fit is None:
+        return fit or plain
+    as_good = fit.cost > LIMITS.shaped * plain.cost and not runs_away(plain, a.hypothesis)
+    return plain if as_good else fit
 
 
 def rough(
