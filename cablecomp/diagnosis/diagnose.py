@@ -28,7 +28,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit
 
-NO_BETTER = "the joint's angle is predicted no better by it on data left out"
+NO_BETTER = "the joint's angle is predicted no better, or hardly, by it on data left out"
 
 
 def diagnose(
@@ -98,7 +98,7 @@ def _judged(
     drive, final, by = case.drive, found.final, found.groups.by
     baseline = errors_of(drive.fit, case.body.final, by)
     augmented = errors_of(final.fit, case.body.final, by) if final.terms else baseline
-    if not predicts(drive.fit, final.fit, baseline, augmented):
+    if not predicts(drive.fit, final, baseline, augmented, drive.floor_rad):
         weighed = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed]
     named = sorted(
         (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: -w.evidence["gain"]

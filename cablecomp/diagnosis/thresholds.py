@@ -197,6 +197,13 @@ class Thresholds:
     what the calibrated drive leaves (RMS), below which it follows that better: a name may rest on this where the
     joint's angle is predicted no better with the session's zero (trials seed 613: zeros five times as far apart as what
     was missing hid two right effects)."""
+    near_noise: float = 2.0
+    """What the calibrated drive leaves of data left out, over the joint encoder's noise (RMS), below which it is near
+    it: a name needs the angle predicted clearly better then."""
+    hardly: float = 0.95
+    """What a model with names leaves of data left out over what the calibrated drive leaves (RMS), near the noise, from
+    which on that is hardly better (trials seeds 616, 620 to 622, 624 and 625: of ten names there seven were wrong, all
+    borne by the motor's torque alone)."""
     structured: float = 1.5
     """Mean square of what is left over what repeats or is noise, beyond which it is called structured."""
     beyond_noise: float = 4.0

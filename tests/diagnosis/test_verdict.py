@@ -11,8 +11,10 @@ import pytest
 
 from cablecomp.diagnosis.answer import verdict
 from cablecomp.diagnosis.answer.verdict import is_structured, predicts, share_left, verdict_of
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects import catalogue
 
 NOISE = 2e-5
 
@@ -60,17 +62,41 @@ def test_each_case_has_its_word(named: bool, structured: bool, calibrated: float
     assert verdict_of(named, structured, drive(1.0, 1.0), model(calibrated)) == word
 
 
+def having(rms: float, torque: float | None = None, *effects: str) -> Any:
+    """A model that leaves so much of the angle (and of the motor's torque), with these effects."""
+    terms = tuple(Hypothesis(catalogue()[e], e, catalogue()[e].parameters[0], (), False) for e in effects)
+    fit = leaving(rms) if torque is None else leaving(rms, torque=torque)
+    return SimpleNamespace(fit=fit, terms=terms)
+
+
 def test_a_model_predicts_by_the_angle_left_out_or_by_another_channel_that_it_follows() -> None:
     before, worse, better = (
         Errors(1.0, 1.0, 1.0, 0.2),
         Errors(0.5, 1.1, 1.0, 0.19),
         Errors(0.5, 0.9, 1.0, 0.2),
     )
-    assert predicts(leaving(1.0), leaving(0.5), before, better)
-    assert not predicts(leaving(1.0), leaving(0.5), before, worse)
-    assert predicts(leaving(1.0, torque=1.0), leaving(0.5, torque=0.5), before, worse)
-    assert not predicts(leaving(1.0, torque=1.0), leaving(0.5, torque=0.95), before, worse)
-    assert predicts(leaving(1.0), leaving(0.5), before, Errors(0.5, 1.1, 1.0, 0.17))
+    far = 0.1
+    assert predicts(leaving(1.0), having(0.5), before, better, far)
+    assert not predicts(leaving(1.0), having(0.5), before, worse, far)
+    assert predicts(leaving(1.0, torque=1.0), having(0.5, 0.5), before, worse, far)
+    assert not predicts(leaving(1.0, torque=1.0), having(0.5, 0.95), before, worse, far)
+    assert predicts(leaving(1.0), having(0.5), before, Errors(0.5, 1.1, 1.0, 0.17), far)
+
+
+def test_near_the_noise_a_model_has_to_predict_the_angle_clearly_better() -> None:
+    before, hardly, clearly = (
+        Errors(1.0, 1.0, 1.0, 0.2),
+        Errors(0.5, 0.97, 1.0, 0.2),
+        Errors(0.5, 0.9, 1.0, 0.2),
+    )
+    far, near = 0.4, 0.6
+    assert predicts(leaving(1.0), having(0.5), before, hardly, far)
+    assert not predicts(leaving(1.0), having(0.5), before, hardly, near)
+    assert predicts(leaving(1.0), having(0.5), before, clearly, near)
+    # the motor's torque alone bears the name of what shows nowhere else, and of nothing that has to show in the angle
+    torque = leaving(1.0, torque=1.0)
+    assert not predicts(torque, having(0.5, 0.5, "bearing_friction"), before, hardly, near)
+    assert predicts(torque, having(0.5, 0.5, "motor_friction"), before, hardly, near)
 
 
 def test_the_share_left_is_all_of_it_where_nothing_was_won_and_none_where_noise_is_left() -> None:

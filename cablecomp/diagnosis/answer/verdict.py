@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, bears
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.locate.series import Series
@@ -24,16 +25,25 @@ def verdict_of(named: bool, structured: bool, drive: Calibrated, kept: Model) ->
     return "recalibrate" if after < LIMITS.recalibrate * before else "consistent"
 
 
-def predicts(before: Fit, after: Fit, baseline: Errors, augmented: Errors) -> bool:
-    """Whether a fit done again without a part predicts that part better than the calibrated drive does; does so
-    clearly where each recording has a zero of its own (zeros that depart by more than any effect does hide all of
-    them); or whether another channel than the joint's angle is followed better."""
-    if augmented.heldout_rmse_rad < baseline.heldout_rmse_rad:
+def predicts(
+    before: Fit,
+    after: Model,
+    baseline: Errors,
+    augmented: Errors,
+    noise_rad: float,
+) -> bool:
+    """Whether a fit done again without a part predicts that part better than the calibrated drive does (clearly, where
+    that is near the noise already); does so clearly where each recording has a zero of its own (zeros that depart by
+    more than any effect does hide all of them); or whether another channel than the joint's angle is followed
+    better (near the noise one that an effect of the model cannot be told without)."""
+    near = baseline.heldout_rmse_rad < LIMITS.near_noise * noise_rad
+    if augmented.heldout_rmse_rad < (LIMITS.hardly if near else 1.0) * baseline.heldout_rmse_rad:
         return True
     if augmented.heldout_own_zero_rmse_rad < LIMITS.followed * baseline.heldout_own_zero_rmse_rad:
         return True
-    others = [c for c in before.problem.channels if c != JOINT]
-    return any(rms_left(after, c) < LIMITS.followed * rms_left(before, c) for c in others)
+    shown = {c for t in after.terms if isinstance(t, Hypothesis) for c in t.effect.needs}
+    others = [c for c in before.problem.channels if c != JOINT and (c in shown or not near)]
+    return any(rms_left(after.fit, c) < LIMITS.followed * rms_left(before, c) for c in others)
 
 
 def is_structured(found: Location, series: Series, repeated_rad: float | None, named: bool) -> bool:
