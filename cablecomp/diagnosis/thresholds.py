@@ -133,7 +133,8 @@ class Thresholds:
     """Part of its amount with which an effect of the model begins beside one that was found without it."""
     shaped: float = 0.9
     """Cost with a shape that an effect may do without (an event that takes its time, a mount that yields more one way)
-    over that of the best without it, after a rough fit, above which it does without it."""
+    over that of the best without it, after a linear step (not of an event) and after a rough fit, above which it does
+    without it."""
     instants: int = 24
     """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
     edge: float = 0.06

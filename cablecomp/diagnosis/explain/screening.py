@@ -151,9 +151,9 @@ def _shaped(here: Anchor, h: Hypothesis, best: _Best) -> _Best | None:
         starts.append(Start({**values, **begun, **shape}))
     found.append(_best(here, replace(h, starts=tuple(starts))))
     other = min((f for f in found if f is not None), key=lambda f: f[0], default=None)
-    return (
-        other if other is not None and other[0] < best[0] else None
-    )  # by enough? fits tell: a promise may be empty
+    # what an event promises may be out of reach of its fit, which then decides between the shapes
+    enough = 1.0 if h.has_instant else LIMITS.shaped
+    return other if other is not None and other[0] < enough * best[0] else None
 
 
 def _best(here: Anchor, h: Hypothesis) -> _Best | None:
