@@ -174,7 +174,7 @@ def _remains(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
 
 
 def _where(d: Diagnosis, mismatch: Sequence[Mapping[str, Any]], unit: Scale) -> Section:
-    first = mismatch[0]
+    first = next((m for m in mismatch if m["p_value"] < _BY_CHANCE), mismatch[0])
     floor = max(d.noise_floor_rad, 1e-12)
     name = first["covariate"]
     if first["p_value"] < _BY_CHANCE:

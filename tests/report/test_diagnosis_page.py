@@ -139,6 +139,14 @@ def test_nothing_is_shaded_where_the_mismatch_is_what_chance_does(found: Diagnos
     assert "where the mismatch sits" not in text_of(diagnosis_page(calm))
 
 
+def test_the_first_that_is_beyond_chance_is_said_to_hold_the_mismatch(found: Diagnosis) -> None:
+    first, second, *rest = found.location.mismatch
+    ranked = (replace(first, p_value=0.2), replace(second, p_value=0.01, share=0.3125), *rest)
+    text = text_of(diagnosis_page(replace(found, location=replace(found.location, mismatch=ranked))))
+    assert "accounts for 31 % of the calibrated drive's mismatch" in text
+    assert "nothing that was asked stands out" not in text
+
+
 def test_repeats_are_said_where_they_limit_what_a_model_can_do(found: Diagnosis) -> None:
     assert "The machine repeats to" in text_of(diagnosis_page(found))
     assert "the machine itself repeats to" in terminal(found)
