@@ -175,9 +175,8 @@ def _best(here: Anchor, h: Hypothesis) -> _Best | None:
         factor = float(left @ own) / square
         if not h.two_sided:
             factor = max(factor, 0.0)
-        low, high = sorted(
-            (h.amount.minimum / size, h.amount.maximum / size)
-        )  # a mirrored event's size is negative
+        # a mirrored event's size is negative
+        low, high = sorted((h.amount.minimum / size, h.amount.maximum / size))
         factor = min(max(factor, low), high)
         cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
         values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}

@@ -159,7 +159,8 @@ def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[
 def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float) -> Mismatch:
     """One covariate's part, from its best view."""
     name = answer.view.covariate
-    fitted = ground.beyond(answer.view.basis) @ coefficients(answer.sums)
+    here = ground.with_path() if answer.view.beyond_loop else ground
+    fitted = here.beyond(answer.view.basis) @ coefficients(answer.sums)
     return Mismatch(
         name,
         float(np.clip(answer.share, 0.0, 1.0)),
