@@ -1,10 +1,10 @@
 """What the drive's own memory makes of a law that changes along a covariate: columns out of the kernel.
 
 A law of the drive that changes along the load, an angle or a speed leaves a residual that remembers: no curve over
-that covariate fits it. So the kernel runs the calibrated drive again with each such change in small: friction by tension
-and by place as hat functions, stiffness by tension, friction that grows with slip speed, cable that follows through a
-play. It says along what a law changes, and not which law it is. What changes slowly (with time, temperature, a
-neighbour) acts as the drive's sensitivities at that moment do (`views.py`).
+that covariate fits it. So the kernel runs the calibrated drive again with each such change in small: friction by
+tension and by place as hat functions, stiffness by tension, friction that grows with slip speed, cable that follows
+through a play. It says along what a law changes, and not which law it is. What changes slowly (with time,
+temperature, a neighbour) acts as the drive's sensitivities at that moment do (`views.py`).
 """
 
 from __future__ import annotations
