@@ -138,7 +138,7 @@ class Problem:
                 for c in self.channels:
                     found[c].append(beside[c][k])
                 continue
-            key = self._stand_key(r)
+            key = self.stand_key(r)
             if key not in cache:
                 cache[key] = simulator(standing(self.config, values, r), self.fine)
             predicted = cache[key].predict(r)
@@ -149,7 +149,8 @@ class Problem:
                     found[c].append(np.full(len(r.rows), np.nan))
         return found
 
-    def _stand_key(self, r: Evidence) -> Any:
+    def stand_key(self, r: Evidence) -> Any:
+        """The same for recordings in which the joint stands alike, wherever x is."""
         own = any(p.session for p in self.parameters)
         return (
             r.session if own else None,

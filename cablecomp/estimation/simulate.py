@@ -14,6 +14,7 @@ from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
 from cablecomp.mechanics.assemble import Model, assemble
+from cablecomp.mechanics.change import Change, together
 from cablecomp.mechanics.start import joint_start
 from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import stepper as st
@@ -100,7 +101,8 @@ def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray
     return columns["joint_torque_Nm"]
 
 
-def simulator(joint: JointConfig, fine: bool = False) -> Simulator:
-    """Set the joint up, to run on judged rows or on all fine ones; raises InputError for values that its laws
-    cannot take."""
-    return Simulator(joint, assemble(joint, extend(joint)), tuple(other_channels(joint)), fine)
+def simulator(joint: JointConfig, fine: bool = False, beside: Change | None = None) -> Simulator:
+    """Set the joint up, to run on judged rows or on all fine ones, with a change beside its own effects; raises
+    InputError for values that its laws cannot take."""
+    change = together([c for c in (extend(joint), beside) if c is not None]) if beside else extend(joint)
+    return Simulator(joint, assemble(joint, change), tuple(other_channels(joint)), fine)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -16,25 +16,19 @@ _RIDGE: Final = 1e-3
 """Share of a regressor's own energy that holds its coefficient back."""
 
 
-class Beneath(NamedTuple):
-    """What a fit has taken off a residual, block by block: `cross` b x k x q, its products with the regressors;
-    `moment` b x q, with the residual."""
-
-    cross: FloatArray
-    moment: FloatArray
-
-
 @dataclass(frozen=True)
 class BlockSums:
     """Normal equations of each block: `gram` b x k x k, `moment` b x k, `fold` of each block, `energy` b =
-    sum w r^2; `beneath`: of what has been taken off the residual.
+    sum w r^2. Of what a fit has taken off the residual: `cross` b x k x q, its products with the regressors, `own`
+    b x q, with the residual.
     """
 
     gram: FloatArray
     moment: FloatArray
     fold: IntArray
     energy: FloatArray
-    beneath: Beneath | None = None
+    cross: FloatArray
+    own: FloatArray
 
     @property
     def blocks(self) -> int:
@@ -48,7 +42,8 @@ class BlockSums:
             self.moment[:, columns],
             self.fold,
             self.energy,
-            None if self.beneath is None else self.beneath._replace(cross=self.beneath.cross[:, columns]),
+            self.cross[:, columns],
+            self.own,
         )
 
 
@@ -67,17 +62,15 @@ def block_sums(
     firsts = np.flatnonzero(np.concatenate(([True], np.diff(block) != 0)))
     bounds = np.append(firsts, len(block))
     weighted = basis * weight[:, None]
-    gram = np.stack([weighted[a:b].T @ basis[a:b] for a, b in itertools.pairwise(bounds)])
+    spans = list(itertools.pairwise(bounds))
+    gram = np.stack([weighted[a:b].T @ basis[a:b] for a, b in spans])
     moment = np.add.reduceat(weighted * residual[:, None], firsts, axis=0)
     energy = np.add.reduceat(weight * residual**2, firsts)
     fold = (np.arange(len(firsts)) % LIMITS.crossfit).astype(np.int64)
-    taken = None
-    if beneath is not None:
-        spans = list(itertools.pairwise(bounds))
-        cross = np.stack([weighted[a:b].T @ beneath[a:b] for a, b in spans])
-        own = np.stack([beneath[a:b].T @ (weight * residual)[a:b] for a, b in spans])
-        taken = Beneath(cross, own)
-    return BlockSums(gram, moment, fold, np.asarray(energy, dtype=np.float64), taken)
+    taken = np.empty((len(block), 0)) if beneath is None else beneath
+    cross = np.stack([weighted[a:b].T @ taken[a:b] for a, b in spans])
+    own = np.stack([taken[a:b].T @ (weight * residual)[a:b] for a, b in spans])
+    return BlockSums(gram, moment, fold, np.asarray(energy, dtype=np.float64), cross, own)
 
 
 def gains(sums: BlockSums) -> FloatArray:
@@ -98,16 +91,12 @@ def surrogate_gains(sums: BlockSums, signs: FloatArray) -> FloatArray:
     What the fit would have taken off them is taken off again: of noise, too, a fit leaves what it cannot follow.
     """
     total, ridge = _normal(sums)
-    whole = signs @ sums.moment
-    again = None if sums.beneath is None else signs @ sums.beneath.moment
-    if sums.beneath is not None:
-        whole = whole - again @ sums.beneath.cross.sum(axis=0).T
+    again = signs @ sums.own
+    whole = signs @ sums.moment - again @ sums.cross.sum(axis=0).T
     out = np.zeros(len(signs))
     for here in _folds(sums):
         held = sums.gram[here].sum(axis=0)
-        moments = signs[:, here] @ sums.moment[here]
-        if sums.beneath is not None:
-            moments = moments - again @ sums.beneath.cross[here].sum(axis=0).T
+        moments = signs[:, here] @ sums.moment[here] - again @ sums.cross[here].sum(axis=0).T
         c = np.linalg.solve(total - held + ridge, (whole - moments).T).T
         out += np.sum((2.0 * moments - c @ held) * c, axis=1)
     return out

@@ -68,30 +68,29 @@ class Location:
 
 
 @dataclass(frozen=True)
-class _Answer:
-    view: View
-    sums: BlockSums
-    share: float
-    per_block: FloatArray
-    score: float
-
-
-@dataclass(frozen=True)
 class _Ground:
     """Thinned series and its blocks; what is asked about lies beyond `nuisance`, orthonormal under `weight`: the
-    residual and every view are taken without what that can explain. `excess`: energy beyond noise."""
+    residual and every view are taken without what that can explain."""
 
     series: Series
     block: IntArray
     weight: FloatArray
     nuisance: FloatArray
     residual: FloatArray
-    excess: float
-    drive: Responses | None
+
+    @property
+    def energy(self) -> float:
+        """Weighted square of the residual."""
+        return float(np.sum(self.weight * self.residual**2))
+
+    @property
+    def excess(self) -> float:
+        """Energy beyond noise; below a tenth of the energy that is not known well enough to divide by."""
+        return max(self.energy - self.series.samples, 0.1 * self.energy, 1e-300)
 
     def beyond(self, columns: FloatArray) -> FloatArray:
         """Columns without what the nuisance can explain of them."""
-        return np.asarray(columns - self.nuisance @ (self.nuisance.T @ (self.weight[:, None] * columns)))
+        return _beyond(columns, self.nuisance, self.weight)
 
     def sums(self, basis: FloatArray) -> BlockSums:
         """Normal equations of the residual on a basis, block by block."""
@@ -100,8 +99,19 @@ class _Ground:
     def with_path(self) -> _Ground:
         """The same with what a plain loop explains taken off too."""
         own = _orthonormal(np.column_stack((self.nuisance, load_path(self.series))), self.weight)
-        bare = replace(self, nuisance=own)
-        return replace(bare, residual=bare.beyond(self.residual[:, None])[:, 0])
+        return replace(self, nuisance=own, residual=_beyond(self.residual, own, self.weight))
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What a view accounts for on its ground; `share`: of the energy beyond noise of the one without a loop."""
+
+    view: View
+    ground: _Ground
+    sums: BlockSums
+    share: float
+    per_block: FloatArray
+    score: float
 
 
 def locate(
@@ -121,8 +131,8 @@ def locate(
     what the drive itself makes of laws that change along a covariate.
     Near ties go to the covariate that leaves less to the other.
     """
-    ground = _ground(series, nuisance, drive)
-    answers, highest = _asked(ground, rng, surrogates)
+    ground, said = _ground(series, nuisance, drive)
+    answers, highest = _asked(ground, said, rng, surrogates)
     regressors = np.column_stack((np.ones(ground.series.samples), load_path(ground.series)))
     pieces = segment(ground.series.residual / ground.series.sigma, regressors)
     mismatch = tuple(
@@ -133,34 +143,34 @@ def locate(
     return Location(mismatch, tuple(float(t) for t in times))
 
 
-def _asked(ground: _Ground, rng: np.random.Generator, surrogates: int) -> tuple[list[_Answer], FloatArray]:
+def _asked(
+    ground: _Ground, drive: Responses | None, rng: np.random.Generator, surrogates: int
+) -> tuple[list[_Answer], FloatArray]:
     """What every view accounts for; and of each surrogate the largest score over all of them."""
     grounds = {False: ground, True: ground.with_path()}
     signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, int(ground.block.max()) + 1))
     answers: list[_Answer] = []
     highest = np.full(surrogates, -np.inf)
-    for view in views(ground.series, ground.drive):
+    for view in views(ground.series, drive):
         here = grounds[view.beyond_loop]
-        energy = float(np.sum(here.weight * here.residual**2))
         sums = here.sums(view.basis)
         per_block = gains(sums)
         total = float(per_block.sum())
-        strength = float(_strength(total, energy))
-        null = _strength(surrogate_gains(sums, signs), energy)
+        strength = float(_strength(total, here.energy))
+        null = _strength(surrogate_gains(sums, signs), here.energy)
         # the lower tail is long where a fit extrapolates: the scale is that of the upper one
         centre, upper = (float(value) for value in np.quantile(null, (0.5, 0.95)))
         scale = max(upper - centre, 1e-12)
         highest = np.maximum(highest, (null - centre) / scale)
         score = (strength - centre) / scale
-        answers.append(_Answer(view, sums, total / ground.excess, per_block, score))
+        answers.append(_Answer(view, here, sums, total / ground.excess, per_block, score))
     return answers, highest
 
 
 def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float) -> Mismatch:
     """One covariate's part, from its best view."""
     name = answer.view.covariate
-    here = ground.with_path() if answer.view.beyond_loop else ground
-    fitted = here.beyond(answer.view.basis) @ coefficients(answer.sums)
+    fitted = answer.ground.beyond(answer.view.basis) @ coefficients(answer.sums)
     return Mismatch(
         name,
         float(np.clip(answer.share, 0.0, 1.0)),
@@ -171,7 +181,10 @@ def _mismatch(answer: _Answer, ground: _Ground, pieces: Segments, p_value: float
     )
 
 
-def _ground(series: Series, nuisance: FloatArray | None, drive: Responses | None) -> _Ground:
+def _ground(
+    series: Series, nuisance: FloatArray | None, drive: Responses | None
+) -> tuple[_Ground, Responses | None]:
+    """Where views are asked, and what the drive says, both thinned."""
     columns = np.ones((series.samples, 1))
     if nuisance is not None:
         columns = np.column_stack((columns, np.asarray(nuisance, dtype=np.float64)))
@@ -183,20 +196,13 @@ def _ground(series: Series, nuisance: FloatArray | None, drive: Responses | None
     thinned = thin(series, columns)
     small = thinned.series
     weight = 1.0 / small.sigma**2
-    nuisances, said = thinned.extra[:, :own], thinned.extra[:, own:]
-    whole = _Ground(
-        small,
-        small.blocks(),
-        weight,
-        _orthonormal(nuisances, weight),
-        small.residual,
-        0.0,
-        None if drive is None else _parted(drive, said),
-    )
-    residual = whole.beyond(small.residual[:, None])[:, 0]
-    energy = float(np.sum(weight * residual**2))
-    # below a tenth of the energy the part beyond noise is not known well enough to divide by
-    return replace(whole, residual=residual, excess=max(energy - small.samples, 0.1 * energy, 1e-300))
+    beneath = _orthonormal(thinned.extra[:, :own], weight)
+    ground = _Ground(small, small.blocks(), weight, beneath, _beyond(small.residual, beneath, weight))
+    return ground, None if drive is None else _parted(drive, thinned.extra[:, own:])
+
+
+def _beyond(columns: FloatArray, nuisance: FloatArray, weight: FloatArray) -> FloatArray:
+    return np.asarray(columns - nuisance @ (nuisance.T @ (weight * columns.T).T), dtype=np.float64)
 
 
 def _parted(drive: Responses, columns: FloatArray) -> Responses:
@@ -275,8 +281,8 @@ def _ranked(best: list[_Answer], ground: _Ground) -> list[_Answer]:
 
 
 def _joint_share(first: _Answer, second: _Answer, ground: _Ground) -> float:
-    here = ground.with_path() if first.view.beyond_loop or second.view.beyond_loop else ground
-    together = here.sums(np.column_stack((first.view.basis, second.view.basis)))
+    here = first if first.view.beyond_loop else second
+    together = here.ground.sums(np.column_stack((first.view.basis, second.view.basis)))
     return float(gains(together).sum()) / ground.excess
 
 

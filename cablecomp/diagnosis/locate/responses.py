@@ -17,18 +17,15 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.locate.views import Response, Responses
-from cablecomp.effects import extend
-from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.simulate import Simulator
-from cablecomp.mechanics.assemble import assemble
-from cablecomp.mechanics.change import Change, Factor, together
+from cablecomp.estimation.simulate import Simulator, simulator
+from cablecomp.estimation.view import INPUT
+from cablecomp.mechanics.change import Change, Factor
 from cablecomp.signal.smoothing import FloatArray
 
-MOTOR_ANGLE: Final = "motor_position_rad"
 _SMALL: Final = 0.3
 """By how much of itself friction changes at the top of a hat."""
 _BY_TENSION: Final = 5
@@ -112,16 +109,13 @@ def _on_every_row(e: Evidence) -> Evidence:
 
 def _run(problem: Problem, x: FloatArray, change: Change | None) -> list[Any] | None:
     """The kernel's answers on all rows with this change beside the joint's own; None where the drive cannot follow."""
-    drives: dict[str, Simulator] = {}
+    drives: dict[Any, Simulator] = {}
     answers = []
     try:
         for e in problem.evidence:
-            joint = problem.joint(x, e)
-            key = joint.model_dump_json()
+            key = problem.stand_key(e)
             if key not in drives:
-                own = [c for c in (extend(joint), change) if c is not None]
-                model = assemble(joint, together(own) if own else None)
-                drives[key] = Simulator(joint, model, tuple(other_channels(joint)), False)
+                drives[key] = simulator(problem.joint(x, e), beside=change)
             answers.append(drives[key].run(e, e.rows))
     except InputError:
         return None
@@ -150,7 +144,7 @@ def _reach(problem: Problem, x: FloatArray, answers: Sequence[Any]) -> Reach:
         for tension in (a.tension_h, a.tension_l):
             over = tension[tension > 0.0] / pretension
             low, high = min(low, float(over.min(initial=1.0))), max(high, float(over.max(initial=1.0)))
-    joint, motor = (np.concatenate([e.columns[k] for e in problem.evidence]) for k in (JOINT, MOTOR_ANGLE))
+    joint, motor = (np.concatenate([e.columns[k] for e in problem.evidence]) for k in (JOINT, INPUT))
     return Reach(
         (float(np.log(max(low, 0.05))), float(np.log(high))),
         (float(joint.min()), float(joint.max())),
