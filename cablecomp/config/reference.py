@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
-from typing import Annotated, Any, Final, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -139,7 +139,7 @@ def _kind(annotation: Any) -> str:
         return f"array of {_kind(inner[0])}"
     if origin is dict:
         return f"table of {_kind(inner[1])}"
-    if origin is not None or type(annotation) is type(Union[int, str]):  # noqa: UP007  # a union
+    if origin is not None:  # a union
         return " | ".join(_kind(part) for part in inner if part is not type(None))
     plain = {float: "number", int: "whole number", str: "text", bool: "true | false"}
     return plain.get(annotation, getattr(annotation, "__name__", "anything"))
