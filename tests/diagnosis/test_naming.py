@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from joints import SMALL, SMALL_NOISE, closed
+from small_drive import STEP_S, TOLERANT, course
 
-from cablecomp.config import parse_joint
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import Value
 from cablecomp.effects import catalogue
@@ -62,10 +62,7 @@ CASES = {
 def recording(effect: str, case: Case) -> dict[str, FloatArray]:
     """25 Hz of the plant with the effect: both pulleys turning, load of two frequencies, noise on all channels."""
     rng = np.random.default_rng(3)
-    time = np.arange(0.0, case.seconds, 0.04)
-    soft = 1.0 - np.exp(-time)
-    motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
-    load = case.loads * soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
+    time, motor, load = course(case.seconds, case.loads)
     given: dict[str, Any] = {
         "temperature_degC": 20.0 + 4.0 * np.sin(0.9 * time),
         "other_1": np.sin(1.3 * time),
@@ -90,10 +87,7 @@ def test_every_effect_of_the_catalogue_has_its_case() -> None:
 
 @pytest.mark.parametrize("effect", CASES)
 def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
-    joint = parse_joint(
-        {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
-    )
-    found = diagnose(joint, {"small/1": recording(effect, CASES[effect])})
+    found = diagnose(TOLERANT, {"small/1": recording(effect, CASES[effect])})
     assert [named.effect for named in found.named] == [effect]
     for value in found.named[0].parameters.values():
         if isinstance(value, Value):
@@ -105,14 +99,11 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
 
 def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> None:
     """The torque sensor's filter lags by 60 ms; the encoders are on time."""
-    joint = parse_joint(
-        {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
-    )
     columns = recording("clock_skew", Case({"delay_s": 0.0}, seconds=30.0))
     columns["joint_torque_Nm"] = np.interp(
         columns["time_s"] - 0.06, columns["time_s"], columns["joint_torque_Nm"]
     )
-    found = diagnose(joint, {"small/1": columns})
+    found = diagnose(TOLERANT, {"small/1": columns})
     assert [named.effect for named in found.named] == ["clock_skew"]
     delay, of_load = (found.named[0].parameters[k] for k in ("delay_s", "load_delay_s"))
     assert isinstance(delay, Value)
@@ -123,19 +114,16 @@ def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> No
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_link_that_slips_on_its_shaft_is_a_slip_that_leaves_the_pretension(way: float) -> None:
-    joint = parse_joint(
-        {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
-    )
     columns = recording("clamp_slip", Case({"slip_m": 0.0, "time_s": EVENT_S}))
     columns["joint_position_rad"] = columns["joint_position_rad"] + way * 2e-3 * (
         columns["time_s"] >= EVENT_S
     )
-    found = diagnose(joint, {"small/1": columns})
+    found = diagnose(TOLERANT, {"small/1": columns})
     assert [named.effect for named in found.named] == ["clamp_slip"]
     taken_up, instant = (found.named[0].parameters[k] for k in ("taken_up", "time_s"))
     assert isinstance(taken_up, Value)
     assert isinstance(instant, Value)
     assert taken_up.value > 0.8
     assert abs(instant.value - EVENT_S) < 0.2
-    # between two rows, 40 ms apart, nothing tells the instant
-    assert instant.sd >= 0.04 / 12.0**0.5
+    # between two rows nothing tells the instant
+    assert instant.sd >= STEP_S / 12.0**0.5

@@ -5,11 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from joints import SMALL, SMALL_NOISE, closed
+from small_drive import TOLERANT, calibrated, recorded
 
-from cablecomp.config import parse_joint
-from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.responses import Place, every_row, responses
 from cablecomp.diagnosis.outcome import Case
@@ -17,7 +14,7 @@ from cablecomp.errors import SlackError
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.mechanics.change import Change
 from cablecomp.signal.smoothing import FloatArray
-from firmware_sim.plant import EffectSpec, PlantConfig, simulate
+from firmware_sim.plant import EffectSpec
 
 LOCATED = {
     "nonlinear_cable": ({"stiffening": 0.6}, 1.0, ("load",)),
@@ -32,39 +29,23 @@ LOCATED = {
 """What the plant has, how large its loads are, and the covariates along which its law changes."""
 
 
-def calibrated(effect: str, values: dict[str, float], loads: float, *, locked: bool = False) -> Case:
-    rng = np.random.default_rng(3)
-    time = np.arange(0.0, 90.0, 0.04)
-    soft = 1.0 - np.exp(-time)
-    motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
-    motor = 0.0 * motor if locked else motor
-    load = loads * soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
-    found = simulate(
-        PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=[EffectSpec(effect, values)]
-    ).channels()
-    columns: dict[str, FloatArray] = {"time_s": time}
-    for name, noise in SMALL_NOISE.items():
-        turned = 0.0 if locked and name == "motor_position_rad" else noise
-        columns[name] = found[name] + turned * rng.standard_normal(len(time))
-    joint = parse_joint(
-        {**closed(SMALL, "small"), "tolerance": {"pretension_N": 0.06, "mu_output": 0.25}}, "small"
-    )
-    body = gather_body(joint, {"small/1": columns}, None)
-    drive = calibrate_drive(joint, body.used, np.random.default_rng(0))
-    return Case(joint, body, drive, tuple(covariates_of(joint, e) for e in drive.fit.problem.evidence))
+def case_of(effect: str, values: dict[str, float], loads: float, *, locked: bool = False) -> Case:
+    body, drive = calibrated(recorded([EffectSpec(effect, values)], 90.0, loads, locked=locked))
+    seen = tuple(covariates_of(TOLERANT, e) for e in drive.fit.problem.evidence)
+    return Case(TOLERANT, body, drive, seen)
 
 
 @pytest.mark.parametrize("effect", LOCATED)
 def test_the_covariate_along_which_a_law_changes_comes_first(effect: str) -> None:
     values, loads, covariates = LOCATED[effect]
-    first = calibrated(effect, values, loads).located(np.random.default_rng(0)).mismatch[0]
+    first = case_of(effect, values, loads).located(np.random.default_rng(0)).mismatch[0]
     assert first.covariate in covariates
     assert first.p_value <= 0.002
     assert first.share > 0.3
 
 
 def test_the_fit_on_every_row_predicts_the_judged_rows_alike() -> None:
-    case = calibrated("nonlinear_cable", {"stiffening": 0.6}, 1.0)
+    case = case_of("nonlinear_cable", {"stiffening": 0.6}, 1.0)
     fit = case.drive.fit
     every = every_row(fit)
     for judged, fine in zip(fit.problem.evidence, every.problem.evidence, strict=True):
@@ -76,7 +57,7 @@ def test_the_fit_on_every_row_predicts_the_judged_rows_alike() -> None:
 
 
 def test_responses_stand_on_counted_rows() -> None:
-    fit = calibrated("nonlinear_cable", {"stiffening": 0.6}, 1.0).drive.fit
+    fit = case_of("nonlinear_cable", {"stiffening": 0.6}, 1.0).drive.fit
     said = responses(fit)
     counted = len(fit.problem.owners(JOINT))
     assert {name for name, _ in said.sensitivities} == {"pretension", "friction on the joint's drum"}
@@ -87,7 +68,7 @@ def test_responses_stand_on_counted_rows() -> None:
 
 
 def test_a_change_that_the_drive_cannot_follow_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    fit = calibrated("nonlinear_cable", {"stiffening": 0.6}, 1.0).drive.fit
+    fit = case_of("nonlinear_cable", {"stiffening": 0.6}, 1.0).drive.fit
 
     def slack(tau: FloatArray) -> FloatArray:
         raise SlackError("the load would slacken the cable")
@@ -102,5 +83,5 @@ def test_a_change_that_the_drive_cannot_follow_is_left_out(monkeypatch: pytest.M
 
 
 def test_what_does_not_change_is_not_asked_about() -> None:
-    case = calibrated("nonlinear_cable", {"stiffening": 0.6}, 1.0, locked=True)
+    case = case_of("nonlinear_cable", {"stiffening": 0.6}, 1.0, locked=True)
     assert "motor_angle" not in {m.covariate for m in case.located(np.random.default_rng(0)).mismatch}
