@@ -66,9 +66,9 @@ def prove_blindly(
     by = Workers(workers, scheduler)
     announce_compilation()
     if recordings is None:
-        if config is not None:
+        if config is not None or physics:
             raise InputError(
-                "--config goes with --in: give recordings too, or leave it out for simulated joints"
+                "--config and --physics go with --in: give recordings too, or leave them out for simulated joints"
             )
         wish = Wish(trials, seed, kinds, laws, imperfections)
         _on_joints(wish, inf if budget is None else budget, out, by, as_json)

@@ -4,8 +4,10 @@ have been found."""
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path, PurePath
@@ -92,15 +94,22 @@ def prove_in(own: Own, wish: OwnWish, tell: Tell, announce: Announce) -> Curves:
 
 
 def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
+    """Conceal in pieces of the recordings; where that fails nothing of it is left."""
     pieces = own.out / PIECES
-    for k in range(wish.rounds):
-        folder = pieces / f"{k:05d}"
-        folder.mkdir(parents=True, exist_ok=True)
-        for n, table in enumerate(piece(own.recordings, wish.seconds, wish.seed, k), start=1):
-            # numpy's stub takes `**` for `allow_pickle`, a bool
-            np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]
-    (pieces / JOINT_FILE).write_text(own.joint, encoding="utf-8")
-    return own.conceal(pieces, wish, own.out, lambda done, of: tell("concealing", done, of))
+    try:
+        for k in range(wish.rounds):
+            folder = pieces / f"{k:05d}"
+            folder.mkdir(parents=True, exist_ok=True)
+            for n, table in enumerate(piece(own.recordings, wish.seconds, wish.seed, k), start=1):
+                # numpy's stub takes `**` for `allow_pickle`, a bool
+                np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]
+        (pieces / JOINT_FILE).write_text(own.joint, encoding="utf-8")
+        return own.conceal(pieces, wish, own.out, lambda done, of: tell("concealing", done, of))
+    except InputError:
+        shutil.rmtree(pieces)
+        with suppress(OSError):  # it holds something else
+            own.out.rmdir()
+        raise
 
 
 def piece(

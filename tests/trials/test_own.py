@@ -173,8 +173,29 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
     assert concealed_beside(tmp_path / "trials") is None
 
 
+@pytest.mark.parametrize("beside", [False, True])
+def test_what_cannot_be_concealed_leaves_nothing(tmp_path: Path, beside: bool) -> None:
+    def unknown(pieces: Path, wish: OwnWish, out: Path, told: Callable[[int, int], None]) -> str:
+        assert (pieces / "00000" / "recording-1.npz").exists()
+        raise InputError("physics is 'sleep'; late, slip are accepted")
+
+    out = tmp_path / "diagnosis"
+    if beside:
+        out.mkdir()
+        (out / "report.html").touch()
+    own = Own(out, {"a.csv": recording(JOINT, 0)}, joint_text(JOINT), unknown, Workers(0))
+    with pytest.raises(InputError, match="'sleep'"):
+        prove_in(own, OwnWish(1, 1, 20.0, physics="sleep"), lambda what, done, of: None, print)
+    assert [p.name for p in tmp_path.rglob("*")] == (["diagnosis", "report.html"] if beside else [])
+
+
 @pytest.mark.parametrize(
-    ("options", "words"), [(["--in", "a.csv"], "--in needs --config"), (["--config", "x"], "goes with --in")]
+    ("options", "words"),
+    [
+        (["--in", "a.csv"], "--in needs --config"),
+        (["--config", "x"], "go with --in"),
+        (["--physics", "late"], "go with --in"),
+    ],
 )
 def test_recordings_and_their_configuration_go_together(
     options: list[str], words: str, capsys: pytest.CaptureFixture[str]
