@@ -162,6 +162,7 @@ class MoteusWire:
         if drive.state is DriveState.DISABLED:
             drive.request(Request.ENABLE, now_s)
             drive.set_mode(Mode.IMPEDANCE)
+        self._move_on(drive, now_s)
         v = command.values
         top = drive.base.torque_limit_Nm if math.isnan(v[0x25]) else max(v[0x25], NO_TORQUE)
         drive.config = replace(drive.config, torque_limit_Nm=min(top, drive.base.torque_limit_Nm))
@@ -173,17 +174,20 @@ class MoteusWire:
             self._control_rad = drive.position_rad
         velocity = 0.0 if math.isnan(v[0x21]) else TURN * v[0x21]
         kp, kd = self.kp * v[0x23] / TURN, self.kd * v[0x24] / TURN
-        self._moved_s = now_s
         drive.command(Setpoint(self._control_rad, velocity, v[0x22], kp, kd), now_s)
 
     def cyclic(self, drive: Drive, now_s: float) -> list[Frame]:
         """Nothing by itself; the control position moves on."""
+        self._move_on(drive, now_s)
+        return []
+
+    def _move_on(self, drive: Drive, now_s: float) -> None:
+        """The control position, moved on at the velocity of the last command until now."""
         passed, self._moved_s = now_s - self._moved_s, now_s
         moving = drive.setpoint.velocity_rad_s
         if self._control_rad is not None and drive.state is DriveState.ENABLED and moving:
             self._control_rad += moving * passed
             drive.setpoint = drive.setpoint._replace(position_rad=self._control_rad)
-        return []
 
     def answer(self, answer_: Answer, frame: Frame, drive: Drive) -> Frame | None:
         """One frame with all that was asked for."""

@@ -162,6 +162,17 @@ def test_the_documents_example() -> None:
     assert answer.data.hex() == "2404000a00000000000000230d301900"
 
 
+def test_velocity_alone_moves_the_position_on_however_often_it_is_commanded() -> None:
+    # int16 from 0x20: no position (NaN), 0.1 turns a second; commands half-way between the drive's cycles of 1 ms
+    drive, wire = Drive(DriveConfig()), MoteusWire(1, *GAINS)
+    frame = Frame(0x8001, bytes.fromhex("01000a" + "0620" + "0080" + "9001"), extended=True, fd=True)
+    for k in range(1000):
+        wire.cyclic(drive, 1e-3 * k)
+        wire.hear(frame, drive, 1e-3 * k + 5e-4)
+    wire.cyclic(drive, 1.0005)
+    assert drive.setpoint.position_rad == pytest.approx(0.1 * 2 * math.pi, rel=1e-3)
+
+
 def test_no_reply_without_its_bit() -> None:
     drive, answer, _ = hear("01000a", identifier=0x0001)
     assert answer is None
