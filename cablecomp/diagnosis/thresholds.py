@@ -250,6 +250,9 @@ class Thresholds:
     # --- what a calibration knows
     untold: float = 0.9
     """Share of its prior's sd from which a parameter's own sd says that the recordings told nothing of it."""
+    known: float = 0.05
+    """Least relative tolerance that the augmented joint states of what was fitted, radii apart: a drive mounted anew,
+    or of another day, differs by more than one fit tells (trials draw 3 to 20 % for what is nominally known)."""
     tied: float = 0.9
     """Correlation from which on two values are said to be known only together."""
 

@@ -4,12 +4,17 @@ controller run it."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import hypot
+
+import numpy as np
 
 from cablecomp.config import Depends, Empirical, JointConfig, Session
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.least_squares import Fit, covariance
+from cablecomp.estimation.limits import EXACT
 from cablecomp.estimation.standing import standing, value_of
 from cablecomp.signal.smoothing import FloatArray
 
@@ -30,7 +35,7 @@ def augmented_joint(
     joint = common.model_copy(
         update={
             "empirical": (*config.empirical, *laws),
-            "tolerance": dict(config.tolerance),
+            "tolerance": _tolerances(config, fit),
             "depends": (*config.depends, *_depends(model, first)),
         }
     )
@@ -54,6 +59,24 @@ def augmented_joint(
                 )
             )
     return joint.model_copy(update={"session": tuple(entries)})
+
+
+def _tolerances(config: JointConfig, fit: Fit) -> dict[str, float]:
+    """Tolerances of what is known now: as wide as values are stated with, and as they differ between sessions; no less
+    than from day to day, and no more than before. What the recordings do not tell stays as it was."""
+    known = dict(config.tolerance)
+    sd = np.sqrt(np.diag(covariance(fit)))
+    untold = {p.name for p, s in zip(fit.problem.parameters, sd, strict=True) if s > LIMITS.untold * p.sd}
+    untold |= set(fit.at_bound())
+    for name, before in config.tolerance.items():
+        mine = [k for k, p in enumerate(fit.problem.parameters) if p.base == name and not p.condition]
+        if not mine or any(fit.problem.parameters[k].name in untold for k in mine):
+            continue
+        p = fit.problem.parameters[mine[0]]
+        least = 0.0 if not p.log else EXACT if p.base.partition(".")[0].endswith("_radius_m") else LIMITS.known
+        width = hypot(LIMITS.wider * float(np.max(sd[mine])), float(np.std(fit.x[mine])))
+        known[name] = min(before, float(f"{max(width, least):.2g}"))
+    return known
 
 
 def _depends(model: Model, first: Evidence) -> tuple[Depends, ...]:
