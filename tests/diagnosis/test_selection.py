@@ -65,3 +65,17 @@ def test_where_others_are_not_enough_better_one_that_adds_to_the_best_is_taken()
 
 def test_what_predicts_no_better_does_not() -> None:
     assert reigning(model(1.0, "a"), model(1.0, "a", "b")) == "a"
+
+
+WAVE = np.sin(np.arange(ROWS) / 25.0)
+
+
+@pytest.mark.parametrize(("unexplained", "first"), [(0.02, "own"), (0.5, "effect")])
+def test_a_drive_mounted_anew_goes_before_an_effect_that_predicts_hardly_better(
+    unexplained: float, first: str
+) -> None:
+    """Both leave the noise, the drive mounted anew a wave more, of so much of the noise's deviation."""
+    effect, own = model(1.0, "effect"), model(1.0, "own")
+    own = Model(own.terms, own.fit, own.left_out + unexplained * WAVE)
+    assert selection._mounted_anew_first([effect, own], {"own"}, GROUPS)[0].name == first
+    assert selection._mounted_anew_first([effect, own], set(), GROUPS)[0].name == "effect"

@@ -41,6 +41,11 @@ class Dependence:
         """Whether it is a parameter of the drive's own."""
         return not self.parameter.startswith("effect.")
 
+    @property
+    def mounted_anew(self) -> bool:
+        """Whether it is how the drive stands in each session, and no effect."""
+        return self.of_drive and self.on == "session"
+
     def belongs_to(self, term: Any) -> bool:
         """Whether it is a parameter of this effect."""
         return hasattr(term, "effect") and self.parameter.startswith(f"effect.{term.effect.id}.")

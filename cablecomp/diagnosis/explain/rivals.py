@@ -147,7 +147,7 @@ def _mounted_anew(base: Model, groups: Groups) -> Plain | None:
     """A pretension of each session's own: sessions follow each other in time, and what lies between two looks like an
     instant; cables less tight look like a coupling that yields."""
     for dependence, _, problem in ask_dependences(base.fit, base.terms, groups.by):
-        if dependence.on == "session" and dependence.of_drive:
+        if dependence.mounted_anew:
             try:
                 fit = solve(problem, placed(base.fit, problem), 10, LIMITS.tolerance)
             except InputError:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -83,13 +83,25 @@ def _carried(tried: Sequence[Tried], groups: Groups, first: bool) -> tuple[list[
     fresh = [m for m in fresh if bears(m.fit)] or fresh
     if not fresh:
         return None
+    anew = {t.model.name for t in tried if isinstance(t.term, Dependence) and t.term.mounted_anew}
     size = common([fresh[0]], groups)
     most = LIMITS.close * loss(fresh[0], size, groups)
-    kept = [m for m in fresh[: LIMITS.beam + 1] if loss(m, size, groups) < most]
+    near = [m for k, m in enumerate(fresh) if k <= LIMITS.beam or m.name in anew]
+    kept = [m for m in near if loss(m, size, groups) < most]
     sharper = searching(fresh[0].fit)
     again = [reweighed(m, sharper, groups) for m in kept]
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
-    return (simplest_first(carried, groups), sharper) if carried else None
+    return (_mounted_anew_first(simplest_first(carried, groups), anew, groups), sharper) if carried else None
+
+
+def _mounted_anew_first(models: list[Model], anew: Collection[str], groups: Groups) -> list[Model]:
+    """Models, best first, but one in which the drive was only mounted anew before effects that do not predict clearly
+    better: that a session's cables are less tight is no physics that is missing, and an effect that is there as well
+    comes beside it."""
+    own = next((m for m in models if m.name in anew), None)
+    if own is None or score_difference(models[0].left_out, own.left_out, groups).z >= LIMITS.z:
+        return models
+    return [own, *(m for m in models if m is not own)]
 
 
 def _reigning(
