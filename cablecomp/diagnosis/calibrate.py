@@ -86,7 +86,7 @@ def calibrate(
     pace.tell("cleaning the recordings", 0.0)
     body = gather_body(config, recordings, sessions)
     pace.tell("a quick fit on thinned rows", 0.1)
-    drive = calibrate_drive(config, _everything(body), np.random.default_rng(seed))
+    drive = calibrate_drive(config, _everything(body), np.random.default_rng(seed), as_stated=True)
     pace.tell("the fit on every sample", 0.3)
     fit = on_every_sample(drive, recordings, pace)
     cut = (OUT_OF_TIME.format(budget_s),) if pace.over else ()

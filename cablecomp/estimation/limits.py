@@ -40,5 +40,9 @@ HISTORY_FAINT: Final = 0.02
 EXACT: Final = 0.003
 """Relative 1-sigma of a radius that is stated without a tolerance: what drawings and calipers leave. Without
 it, calibration would answer a slightly wrong ratio by physics."""
+BY_TAPE: Final = 0.02
+"""Relative 1-sigma of a free length that is stated without a tolerance, where physics that is missing is looked for:
+where a cable leaves its drums and how much its ends yield is on no drawing. Without it, a slightly wrong length is
+answered by a coupling that yields or by friction (blind trials draw 1.5 %)."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

@@ -133,6 +133,20 @@ def test_a_pretension_that_differs_between_sessions_is_no_event() -> None:
     assert d.augmented.heldout_rmse_rad < 0.8 * d.baseline.heldout_rmse_rad
 
 
+@pytest.mark.parametrize("off", [0.95, 1.05])
+def test_a_free_length_stated_a_little_wrong_is_no_physics(off: float) -> None:
+    """Where a cable leaves its drums is read off by the tape. Were the length exact, the cable's stiffness would make up
+    for it, a dozen of its standard deviations off."""
+    stage = {**SMALL, "free_length_m": off * float(SMALL["free_length_m"])}
+    told = parse_joint({**closed(stage, "small"), "tolerance": SMALL_TOLERANCE}, "small")
+    found = diagnose(told, {"small/1": recording([])})
+    assert not found.named
+    assert found.verdict in ("consistent", "recalibrate")
+    values = {v.name: v for v in found.calibration}
+    for name in ("EA_N", "free_length_m"):
+        assert abs(values[name].value - float(SMALL[name])) < 3.0 * values[name].sd
+
+
 def test_a_budget_that_is_over_ends_the_search_with_what_there_is_and_says_so(nothing: Diagnosis) -> None:
     found = diagnose(joint(), {"small/1": recording([BEARING])}, budget_s=0.0)
     assert any("0 s were over" in line for line in found.warnings)

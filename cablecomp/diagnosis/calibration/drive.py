@@ -40,10 +40,12 @@ class Calibrated:
 
 
 def calibrate_drive(
-    config: JointConfig, evidence: Sequence[Evidence], rng: np.random.Generator
+    config: JointConfig, evidence: Sequence[Evidence], rng: np.random.Generator, *, as_stated: bool = False
 ) -> Calibrated:
-    """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one."""
-    parameters = _parameters(config, evidence)
+    """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one.
+
+    `as_stated`: as `of_drive` takes it."""
+    parameters = _parameters(config, evidence, as_stated)
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
     fit = solve(problem, evaluations=15)
@@ -118,11 +120,11 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
     return cut, float(np.mean(constant))
 
 
-def _parameters(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[Parameter, ...]:
+def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bool) -> tuple[Parameter, ...]:
     """What `[tolerance]` frees; what `[session] own` names is each session's."""
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
     own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
-    free = list(of_drive(config))
+    free = list(of_drive(config, as_stated=as_stated))
     if len(sessions) > 1:
         for name in own:
             for p in [p for p in free if p.name == name]:
