@@ -7,22 +7,15 @@ condition.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
+from types import MappingProxyType
 
 from cablecomp.config import JointConfig
 from cablecomp.effects import Effect
 from cablecomp.effects import Parameter as EffectParameter
-from cablecomp.estimation.limits import (
-    BY_TAPE,
-    DECADES,
-    EXACT,
-    INSTANT_REACH_S,
-    INSTANT_STEP_S,
-    OWN_SD,
-    STEP,
-)
+from cablecomp.estimation.limits import DECADES, EXACT, INSTANT_REACH_S, INSTANT_STEP_S, OWN_SD, STEP
 
 DECADE = log(10.0)
 """Prior sd, in the logarithm, of what is known by order of magnitude."""
@@ -78,14 +71,14 @@ class Parameter:
         return self.name.partition("~")[2] or None
 
 
-def of_drive(config: JointConfig, *, as_stated: bool = True) -> tuple[Parameter, ...]:
+def of_drive(
+    config: JointConfig, further: Mapping[str, float] = MappingProxyType({})
+) -> tuple[Parameter, ...]:
     """What `[tolerance]` frees of the drive and its sensors: log-normal priors, 1 and more = known to a decade.
 
-    `as_stated`: a free length without a tolerance is exact; else it is known to `BY_TAPE`."""
+    `further`: tolerances of what has none there."""
     found = []
-    tolerances = dict(config.tolerance)
-    if not as_stated:
-        tolerances |= dict.fromkeys(_by_tape(config), BY_TAPE)
+    tolerances = {**further, **config.tolerance}
     if not any(name.startswith(("input_radius_m", "output_radius_m")) for name in tolerances):
         tolerances["input_radius_m"] = EXACT
     for name, tolerance in tolerances.items():
@@ -117,17 +110,6 @@ def of_drive(config: JointConfig, *, as_stated: bool = True) -> tuple[Parameter,
         reach = exp(DECADES * DECADE if tolerance >= 1.0 else 6.0 * tolerance)
         found.append(Parameter(name, nominal, nominal / reach, nominal * reach, True, 1.0, nominal, sd))
     return tuple(found)
-
-
-def _by_tape(config: JointConfig) -> Iterator[str]:
-    """The free lengths without a tolerance, as parameters of their own; not where the cable's stiffness, which acts as
-    they do, is known by order of magnitude only."""
-    stated, stages = config.tolerance, len(config.drive.stage)
-    for n in range(1, stages + 1):
-        free = any(f"free_length_m{which}" in stated for which in ("", f".{n}"))
-        stiffness = max(stated.get(f"EA_N{which}", 0.0) for which in ("", f".{n}"))
-        if not free and stiffness < 1.0:
-            yield "free_length_m" if stages == 1 else f"free_length_m.{n}"
 
 
 def of_effect(effect: Effect, values: Mapping[str, float], config: JointConfig) -> tuple[Parameter, ...]:

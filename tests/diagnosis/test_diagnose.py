@@ -135,8 +135,8 @@ def test_a_pretension_that_differs_between_sessions_is_no_event() -> None:
 
 @pytest.mark.parametrize("off", [0.95, 1.05])
 def test_a_free_length_stated_a_little_wrong_is_no_physics(off: float) -> None:
-    """Where a cable leaves its drums is read off by the tape. Were the length exact, the cable's stiffness would make up
-    for it, a dozen of its standard deviations off."""
+    """Where a cable leaves its drums is read off by the tape. Were the length exact, the cable's stiffness would make
+    up for it, a dozen of its standard deviations off."""
     stage = {**SMALL, "free_length_m": off * float(SMALL["free_length_m"])}
     told = parse_joint({**closed(stage, "small"), "tolerance": SMALL_TOLERANCE}, "small")
     found = diagnose(told, {"small/1": recording([])})

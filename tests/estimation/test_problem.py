@@ -230,21 +230,3 @@ def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
         moved = x.copy()
         moved[k] += STEP
         np.testing.assert_allclose(J[:, k], (p.residual(moved) - p.residual(x)) / STEP, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("tolerance", "length_sd"),
-    [
-        ({}, 0.02),
-        ({"EA_N": 0.05}, 0.02),
-        ({"EA_N": 1.0}, None),
-        ({"free_length_m": 0.1}, 0.1),
-        ({"free_length_m": 0.0}, None),
-    ],
-)
-def test_a_free_length_is_known_by_the_tape(tolerance: dict[str, float], length_sd: float | None) -> None:
-    joint = JOINT.model_copy(update={"tolerance": tolerance})
-    found = {p.name: p.sd for p in of_drive(joint, as_stated=False)}
-    assert found.get("free_length_m") == (None if length_sd is None else pytest.approx(length_sd))
-    exact = {p.name for p in of_drive(joint)}
-    assert ("free_length_m" in exact) == (tolerance.get("free_length_m", 0.0) > 0.0)

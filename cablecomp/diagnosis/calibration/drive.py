@@ -15,11 +15,13 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
 from cablecomp.estimation.history import forgotten, full_swing
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
+from cablecomp.estimation.limits import BY_TAPE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
+TORQUE_ZERO = "joint_torque_offset_Nm"
 REPLICAS = 2
 """Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
 PASSES = 2
@@ -44,7 +46,7 @@ def calibrate_drive(
 ) -> Calibrated:
     """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one.
 
-    `as_stated`: as `of_drive` takes it."""
+    `as_stated`: free lengths and the torque sensor's zero are exact where no tolerance is stated of them."""
     parameters = _parameters(config, evidence, as_stated)
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
@@ -121,16 +123,40 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
 
 
 def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bool) -> tuple[Parameter, ...]:
-    """What `[tolerance]` frees; what `[session] own` names is each session's."""
+    """What `[tolerance]` frees, and what is exact on paper alone; what `[session] own` names is each session's."""
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
     own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
-    free = list(of_drive(config, as_stated=as_stated))
+    further = {} if as_stated else {**_by_tape(config), **_torque_zero(config, evidence)}
+    free = list(of_drive(config, further))
     if len(sessions) > 1:
         for name in own:
             for p in [p for p in free if p.name == name]:
                 place = free.index(p)
                 free[place : place + 1] = own_of(p, sessions)
     return tuple(free)
+
+
+def _by_tape(config: JointConfig) -> dict[str, float]:
+    """How well free lengths without a tolerance are known; none where the cable's stiffness, which acts as they do, is
+    known by order of magnitude only."""
+    stated, stages = config.tolerance, len(config.drive.stage)
+    found = {}
+    for n in range(1, stages + 1):
+        free = any(f"free_length_m{which}" in stated for which in ("", f".{n}"))
+        stiffness = max(stated.get(f"EA_N{which}", 0.0) for which in ("", f".{n}"))
+        if not free and stiffness < 1.0:
+            found["free_length_m" if stages == 1 else f"free_length_m.{n}"] = BY_TAPE
+    return found
+
+
+def _torque_zero(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str, float]:
+    """How well the zero of a joint's torque sensor without a tolerance is known [N m], where `[session] own` names it
+    and it is read."""
+    if TORQUE_ZERO not in config.session_own or TORQUE_ZERO in config.tolerance:
+        return {}
+    read = [e.columns[c] for e in evidence if (c := load_channel(config, e.columns)) not in (None, MOTOR)]
+    largest = max((float(np.max(np.abs(r))) for r in read), default=0.0)
+    return {TORQUE_ZERO: ZERO_OF_TORQUE * largest} if largest else {}
 
 
 def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing:

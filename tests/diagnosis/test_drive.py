@@ -1,0 +1,81 @@
+"""What is free where a drive is calibrated: what `[tolerance]` says, and what is exact on paper alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from joints import SMALL, SMALL_NOISE, closed
+from small_drive import course, recorded
+
+from cablecomp.config import JointConfig, parse_joint
+from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.calibration.drive import calibrate_drive
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import PlantConfig, simulate
+
+ZERO = "joint_torque_offset_Nm"
+
+
+def fitted(
+    tolerance: dict[str, float], recordings: dict[str, dict[str, FloatArray]], *, as_stated: bool = False
+) -> Fit:
+    """The small joint calibrated with these tolerances."""
+    joint = parse_joint({**closed(SMALL, "small"), "tolerance": tolerance}, "small")
+    used = gather_body(joint, recordings, None).used
+    return calibrate_drive(joint, used, np.random.default_rng(0), as_stated=as_stated).fit
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "length_sd"),
+    [
+        ({}, 0.02),
+        ({"EA_N": 0.05}, 0.02),
+        ({"EA_N": 1.0}, None),  # what stands for the same is known far less
+        ({"free_length_m": 0.1}, 0.1),
+        ({"free_length_m": 0.0}, None),  # whoever says exact means it
+    ],
+)
+def test_a_free_length_is_known_by_the_tape(tolerance: dict[str, float], length_sd: float | None) -> None:
+    fit = fitted(tolerance, {"a/1": recorded([], 20.0)})
+    found = {p.name: p.sd for p in fit.problem.parameters}
+    assert found.get("free_length_m") == (None if length_sd is None else pytest.approx(length_sd))
+
+
+def test_what_is_calibrated_as_stated_is_exact_without_a_tolerance() -> None:
+    fit = fitted({"EA_N": 0.05}, {"a/1": recorded([], 20.0)}, as_stated=True)
+    assert [p.name for p in fit.problem.parameters] == ["EA_N", "input_radius_m"]
+
+
+def opened(own: list[str]) -> JointConfig:
+    """The small joint as an open circuit, whose weight is known exactly; `own`: what each session has its own of."""
+    plain = closed(SMALL, "small")
+    drive = {**plain["drive"], "circuit": "open"}
+    told = {"mu_output": 0.25, "mu_input": 0.25}
+    return parse_joint({**plain, "drive": drive, "tolerance": told, "session": {"own": own}}, "small")
+
+
+def hung(seed: int, misread_Nm: float) -> dict[str, FloatArray]:
+    """What the plant shows of it, its torque sensor reading so much too much."""
+    rng = np.random.default_rng(seed)
+    time, motor, load = course(80.0, loads=0.9)
+    config = closed(SMALL)
+    config["drive"]["circuit"] = "open"
+    found = simulate(PlantConfig.from_dict(config), time, motor, load).channels()
+    seen = {k: found[k] + sd * rng.standard_normal(len(time)) for k, sd in SMALL_NOISE.items()}
+    seen["joint_torque_Nm"] = seen["joint_torque_Nm"] + misread_Nm
+    return {"time_s": time, **seen}
+
+
+def test_a_torque_sensors_zero_is_each_sessions_own_where_it_is_named() -> None:
+    sessions = {"a/1": hung(3, 0.0), "b/1": hung(4, 1e-2)}
+    joint = opened(["joint_position_offset_rad", ZERO])
+    fit = calibrate_drive(joint, gather_body(joint, sessions, None).used, np.random.default_rng(0)).fit
+    largest = max(float(np.max(np.abs(s["joint_torque_Nm"]))) for s in sessions.values())
+    found = {p.session: p for p in fit.problem.parameters if p.base == ZERO}
+    assert set(found) == {"a", "b"}
+    assert found["a"].scale == pytest.approx(0.005 * largest, rel=0.03)
+    assert fit.values[f"{ZERO}@b"] - fit.values[f"{ZERO}@a"] == pytest.approx(1e-2, rel=0.2)
+    common = opened(["joint_position_offset_rad"])
+    fit = calibrate_drive(common, gather_body(common, sessions, None).used, np.random.default_rng(0)).fit
+    assert ZERO not in {p.base for p in fit.problem.parameters}
