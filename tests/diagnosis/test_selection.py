@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from cablecomp.diagnosis.explain import selection
+from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.folds import Groups
+from cablecomp.signal.smoothing import FloatArray
 
 ROWS, BLOCKS = 600, 20
 GROUPS = Groups(
@@ -70,12 +72,31 @@ def test_what_predicts_no_better_does_not() -> None:
 WAVE = np.sin(np.arange(ROWS) / 25.0)
 
 
-@pytest.mark.parametrize(("unexplained", "first"), [(0.02, "own"), (0.5, "effect")])
+OWN = Dependence("pretension_N", "session")
+
+
+def mounted_anew(left: FloatArray, *effects: str) -> Model:
+    """A model in which each session has a pretension of its own, beside these effects."""
+    bare = model(1.0, *effects)
+    return Model((OWN, *bare.terms), bare.fit, left)
+
+
+def first_of(*models: Model) -> str:
+    return selection._mounted_anew_first(list(models), GROUPS)[0].name
+
+
+@pytest.mark.parametrize("shared", [(), ("a",)])
 def test_a_drive_mounted_anew_goes_before_an_effect_that_predicts_hardly_better(
-    unexplained: float, first: str
+    shared: tuple[str, ...],
 ) -> None:
-    """Both leave the noise, the drive mounted anew a wave more, of so much of the noise's deviation."""
-    effect, own = model(1.0, "effect"), model(1.0, "own")
-    own = Model(own.terms, own.fit, own.left_out + unexplained * WAVE)
-    assert selection._mounted_anew_first([effect, own], {"own"}, GROUPS)[0].name == first
-    assert selection._mounted_anew_first([effect, own], set(), GROUPS)[0].name == "effect"
+    """Both leave the noise, the drive mounted anew a wave more: of a fiftieth, or of half of the noise's deviation."""
+    effect = model(1.0, "effect", *shared)
+    near, far = (mounted_anew(NOISE + share * WAVE, *shared) for share in (0.02, 0.5))
+    assert first_of(effect, near) == near.name
+    assert first_of(effect, far) == effect.name
+
+
+def test_a_drive_mounted_anew_with_an_effect_of_its_own_takes_nobodys_place() -> None:
+    effect = model(1.0, "effect")
+    assert first_of(effect, mounted_anew(NOISE + 0.02 * WAVE, "other")) == effect.name
+    assert first_of(effect, mounted_anew(NOISE + 0.02 * WAVE, "effect")) == effect.name

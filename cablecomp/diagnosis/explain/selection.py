@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -83,25 +83,30 @@ def _carried(tried: Sequence[Tried], groups: Groups, first: bool) -> tuple[list[
     fresh = [m for m in fresh if bears(m.fit)] or fresh
     if not fresh:
         return None
-    anew = {t.model.name for t in tried if isinstance(t.term, Dependence) and t.term.mounted_anew}
     size = common([fresh[0]], groups)
     most = LIMITS.close * loss(fresh[0], size, groups)
-    near = [m for k, m in enumerate(fresh) if k <= LIMITS.beam or m.name in anew]
+    near = [m for k, m in enumerate(fresh) if k <= LIMITS.beam or _mounted_anew_for(m, fresh[0])]
     kept = [m for m in near if loss(m, size, groups) < most]
     sharper = searching(fresh[0].fit)
     again = [reweighed(m, sharper, groups) for m in kept]
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
-    return (_mounted_anew_first(simplest_first(carried, groups), anew, groups), sharper) if carried else None
+    return (_mounted_anew_first(simplest_first(carried, groups), groups), sharper) if carried else None
 
 
-def _mounted_anew_first(models: list[Model], anew: Collection[str], groups: Groups) -> list[Model]:
-    """Models, best first, but one in which the drive was only mounted anew before effects that do not predict clearly
-    better: that a session's cables are less tight is no physics that is missing, and an effect that is there as well
-    comes beside it."""
-    own = next((m for m in models if m.name in anew), None)
-    if own is None or score_difference(models[0].left_out, own.left_out, groups).z >= LIMITS.z:
+def _mounted_anew_first(models: list[Model], groups: Groups) -> list[Model]:
+    """Models, best first, but one in which the drive was only mounted anew before one with an effect in the place of
+    that which does not predict clearly better: that a session's cables are less tight is no physics that is missing,
+    and an effect that is there as well comes beside it."""
+    own = next((m for m in models if _mounted_anew_for(m, models[0])), None)
+    if own is None or _better(models[0], own, groups):
         return models
     return [own, *(m for m in models if m is not own)]
+
+
+def _mounted_anew_for(model: Model, other: Model) -> bool:
+    """Whether a model has a drive mounted anew where the other has effects, and otherwise none but effects of that."""
+    mine, others = ({t.name for t in m.terms if not isinstance(t, Dependence)} for m in (model, other))
+    return mine < others and any(isinstance(t, Dependence) and t.mounted_anew for t in model.terms)
 
 
 def _reigning(
