@@ -23,8 +23,9 @@ class JointConfig(Frozen):
     drive: Drive
     tolerance: dict[str, NonNegative] = Field(
         default_factory=dict,
-        description="by key of [[drive.stage]]: relative 1 sigma of what is only nominally known; absent = exact; "
-        "1 and more = order of magnitude only. Offsets of [sensors]: 1 sigma in their own unit",
+        description="by key of [[drive.stage]]: relative 1 sigma of what is only nominally known; absent = exact "
+        "(to a diagnosis: a radius to 0.3 %, free lengths to 2 %); 1 and more = order of magnitude only. "
+        "Offsets of [sensors]: 1 sigma in their own unit",
     )
     sensors: Sensors = Sensors()
     effect: Annotated[tuple[EffectEntry, ...], listed(64)] = ()
