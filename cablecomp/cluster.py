@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -15,6 +16,8 @@ from cablecomp.errors import CablecompError, InputError
 
 R = TypeVar("R")
 
+THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""What tells a process how many threads it may use: read by `estimation.parallel`, and by NumPy's libraries."""
 CONNECT_S: Final = 10.0
 """How long a scheduler is waited for; one that is there answers in milliseconds."""
 
@@ -94,12 +97,18 @@ def _in_processes(
 
 @contextmanager
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool that starts nothing more once its user has gone."""
+    """A pool that starts nothing more once its user has gone. Its processes share the cores: with as many threads in
+    each as there are cores they would wait for each other."""
+    own = {k: os.environ.get(k) for k in THREADS}
+    cores = os.cpu_count() or 1
+    os.environ |= {k: v or str(max(1, cores // processes)) for k, v in own.items()}
     pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
     try:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
+        for k in (k for k, v in own.items() if v is None):
+            del os.environ[k]
 
 
 def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address: str) -> Iterator[Done[R]]:

@@ -15,7 +15,13 @@ MOST = 4
 
 
 def side_by_side(work: Callable[[A], B], items: Sequence[A]) -> Iterator[B]:
-    """Results in the order of the items; `work` must not depend on the order in which they are done."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    with ThreadPoolExecutor(max(1, min(MOST, cores, len(items)))) as pool:
+    """Results in the order of the items; `work` must not depend on the order in which they are done. As many threads as
+    the process has cores, or as `OMP_NUM_THREADS` allows it."""
+    with ThreadPoolExecutor(max(1, min(MOST, _threads(), len(items)))) as pool:
         yield from pool.map(work, items)
+
+
+def _threads() -> int:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    allowed = os.environ.get("OMP_NUM_THREADS", "")
+    return min(cores, int(allowed)) if allowed.isdecimal() else cores

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,6 +52,23 @@ def test_one_failure_stops_nothing() -> None:
     assert {x: d.result for x, d in done.items() if not d.failed} == {1: 1, 2: 4, 6: 36}
     assert done[3].failed == "ZeroDivisionError: three"
     assert done[4].failed == "four.csv: is empty"
+
+
+def threads(_: int) -> int:
+    """How many threads fits would be done in here."""
+    from cablecomp.estimation.parallel import side_by_side
+
+    return len(set(side_by_side(lambda k: (time.sleep(0.05), threading.get_ident())[1], range(8))))
+
+
+def test_processes_share_the_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    assert [d.result for d in spread(threads, [(0,), (1,)], Workers(2))] == [1, 1]
+    assert "OMP_NUM_THREADS" not in os.environ
+    assert [d.result for d in spread(threads, [(0,)], Workers(1))] == [min(2, threads(0))]
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert threads(0) == 1
 
 
 def test_a_process_that_dies_fails_alone() -> None:
