@@ -32,7 +32,7 @@ from cablecomp.monitor.server import PageServer
 from cablecomp.observer import Observer
 from cablecomp.recording.progress import progress_bar
 from cablecomp.recording.reader import Recording
-from cablecomp.recording.replay import required_channels
+from cablecomp.recording.replay import comparable, required_channels
 from cablecomp.recording.replay_summary import ReplaySummary
 from cablecomp.report.page import CSS
 from cablecomp.report.replay_page import write_replay
@@ -70,7 +70,7 @@ def replay(
         work_fleet("replay", [recording], config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)
-    source = reading(joint).open(recording)
+    source = comparable(reading(joint).open(recording), joint)
     joint, stood, said = as_it_stood(joint, recording, source.head, session)
     warn(said)
     announce_compilation(joint, bounds)

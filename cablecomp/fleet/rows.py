@@ -14,7 +14,7 @@ from cablecomp.fleet.change import change
 from cablecomp.fleet.places import Night
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording, read_all
-from cablecomp.recording.replay import Replayed, replay
+from cablecomp.recording.replay import Replayed, comparable, replay
 from cablecomp.recording.streams import Moments
 from cablecomp.signal.smoothing import FloatArray
 
@@ -97,8 +97,9 @@ def replayed_row(night: Night) -> Row:
     """Replay a night's recordings one by one, in bounded memory, whatever their length."""
     sink, samples, seconds = Kept(), 0, 0.0
     for path in night.recordings:
-        recording = open_recording(path)
-        joint, _, _ = as_it_stood(load_joint(night.config), path, recording.head)
+        nominal = load_joint(night.config)
+        recording = comparable(open_recording(path), nominal)
+        joint, _, _ = as_it_stood(nominal, path, recording.head)
         summary = replay(recording, Observer(joint), [sink], config=joint)
         samples, seconds = samples + summary.samples, seconds + summary.duration_s
     compared = sink.residual.count > 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -19,8 +19,15 @@ _GAP_FACTOR: Final = 10.0
 class Checks:
     """Converts units and refuses what must not be bridged; remembers the last time stamp between pieces."""
 
-    def __init__(self, path: Path, columns: Sequence[Column], line_word: str, gaps: bool = False) -> None:
-        self._gaps = gaps
+    def __init__(
+        self,
+        path: Path,
+        columns: Sequence[Column],
+        line_word: str,
+        gaps: bool = False,
+        lacking: Collection[str] = (),
+    ) -> None:
+        self._gaps, self._lacking = gaps, lacking
         self._path, self._columns, self._word = path, columns, line_word
         self._last_time: float | None = None
         self._usual_step = 0.0
@@ -51,7 +58,7 @@ class Checks:
             bad &= ~empty
         if not bad.any():
             return []
-        if self._gaps and column.name != "time_s":
+        if column.name in self._lacking or (self._gaps and column.name != "time_s"):
             values[bad] = np.nan
             return [Remark("empty", raw.first_line + int(np.argmax(bad)), int(bad.sum()), column.name)]
         row = int(np.argmax(bad))

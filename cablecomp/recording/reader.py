@@ -46,6 +46,8 @@ class Recording:
     raw: Callable[[], Iterator[RawRows]]
     notes: tuple[str, ...] = ()
     gaps: bool = False
+    lacking: frozenset[str] = frozenset()
+    """Channels whose cells may be without a finite number, where `gaps` does not let all of them be."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -65,9 +67,10 @@ class Recording:
         """Stream blocks of `rows` rows (the last one may be shorter).
 
         Raises InputError with the line for: a cell that is empty, NaN or infinite (empty cells are remarked
-        upon and let through in `temperature_degC` and `other_*`), time running backwards, malformed rows.
+        upon and let through in `temperature_degC` and `other_*`, and in channels that may be `lacking`), time running
+        backwards, malformed rows.
         """
-        checks = Checks(self.path, self.columns, self.line_word, self.gaps)
+        checks = Checks(self.path, self.columns, self.line_word, self.gaps, self.lacking)
         return regrouped((checks.block(piece) for piece in some(self.raw(), self.path)), rows)
 
     def head(self, rows: int = 200_000) -> dict[str, FloatArray]:

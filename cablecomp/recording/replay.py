@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import time
@@ -20,6 +21,8 @@ from cablecomp.recording.snapshots import END, Instants, Snapshot, WrapProfile, 
 from cablecomp.recording.streams import LineFit, Moments
 from cablecomp.recording.table import Block, FloatArray, RemarkLog
 
+COMPARED: Final = frozenset({"joint_position_rad", "tension_h_N", "tension_l_N"})
+"""Channels that a prediction is compared with."""
 _NEEDED: Final = {
     "joint_torque": ("joint_torque_Nm",),
     "motor_torque": ("motor_torque_Nm",),
@@ -69,6 +72,11 @@ def required_channels(config: JointConfig) -> tuple[str, ...]:
     return ("motor_position_rad", *_NEEDED[config.observer.load])
 
 
+def comparable(recording: Recording, config: JointConfig) -> Recording:
+    """The recording, which may lack a reading of what a prediction is only compared with: joint angle, tensions."""
+    return dataclasses.replace(recording, lacking=COMPARED.difference(required_channels(config)))
+
+
 def replay(
     recording: Recording,
     observer: StreamObserver,
@@ -80,8 +88,10 @@ def replay(
 ) -> ReplaySummary:
     """Stream a recording through the observer and every block into the sinks; see `ReplaySummary`.
 
-    Raises InputError with the file's line where the recording or the joint does not allow a prediction.
+    Rows without a reading of the joint's angle are predicted, and not compared. Raises InputError with the file's line
+    where the recording or the joint does not allow a prediction.
     """
+    recording = comparable(recording, config)
     recording.require(required_channels(config), f"with [observer] load = {config.observer.load!r}")
     run = _Run(recording, observer, config, clock)
     started = clock()
@@ -209,12 +219,13 @@ class _Run:
             self._width_first = float(known[0])
         self._last_time, self._width_last = float(times[-1]), float(width[-1])
         curve = replayed.predicted["deflection_rad"] if shown is None else shown
-        self._lowest = min(self._lowest, float(curve.min()))
-        self._highest = max(self._highest, float(curve.max()))
+        told = np.isfinite(curve)
+        self._lowest = min(self._lowest, float(curve.min(initial=math.inf, where=told)))
+        self._highest = max(self._highest, float(curve.max(initial=-math.inf, where=told)))
         if replayed.residual_rad is not None:
-            self._residual.add(replayed.residual_rad)
+            self._residual.add(replayed.residual_rad[told])
         if shown is not None and replayed.load_Nm is not None:
-            self._fit.add(replayed.load_Nm, shown)
+            self._fit.add(replayed.load_Nm[told], shown[told])
 
 
 class PredictionCsv:

@@ -35,7 +35,7 @@ _UNEVEN: Final = 0.02
 class Display:
     """`rows`: chosen rows of every channel (all NaN where absent); histogram and spectra are of all rows.
 
-    Spectra are None where there is no measured joint position or the sampling is uneven.
+    Spectra are None where there is no measured joint position, not in every row, or the sampling is uneven.
     """
 
     rows: dict[str, FloatArray]
@@ -56,6 +56,7 @@ class DisplaySink:
         self._histogram = Histogram()
         self._residual, self._deflection = Spectrum(), Spectrum()
         self._steps = Moments()
+        self._complete = True
         self._last_time: float | None = None
 
     def take(self, replayed: Replayed) -> None:
@@ -80,16 +81,19 @@ class DisplaySink:
         )
         self._last_time = float(times[-1])
         if replayed.residual_rad is not None and replayed.deflection_measured_rad is not None:
-            self._histogram.add(replayed.residual_rad)
-            self._residual.add(replayed.residual_rad)
-            self._deflection.add(replayed.deflection_measured_rad)
+            told = np.isfinite(replayed.residual_rad)
+            self._complete &= bool(told.all())
+            self._histogram.add(replayed.residual_rad[told])
+            if self._complete:
+                self._residual.add(replayed.residual_rad)
+                self._deflection.add(replayed.deflection_measured_rad)
 
     def display(self) -> Display:
         """Return what was gathered."""
         bins = self._histogram.bins()
         compared = bool(bins.counts.sum() > 0)
         step = self._steps.mean if self._steps.count else 0.0
-        even = step > 0.0 and self._steps.sd < _UNEVEN * step
+        even = self._complete and step > 0.0 and self._steps.sd < _UNEVEN * step
         return Display(
             self._rows.rows(),
             bins if compared else None,

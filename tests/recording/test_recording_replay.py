@@ -105,6 +105,40 @@ def test_numbers_equal_an_independent_calculation(tmp_path: Path) -> None:
     assert summary.bounds_width_last_rad == pytest.approx(2e-3)
 
 
+def test_rows_without_the_joints_angle_are_predicted_and_not_compared(tmp_path: Path) -> None:
+    columns = _columns()
+    there = np.ones(1500, dtype=np.bool_)
+    there[[0, 700, 701, 1499]] = False
+    lacking = {**columns, "joint_position_rad": np.where(there, columns["joint_position_rad"], np.nan)}
+    kept, config = Kept(), joint()
+    summary = replay(_recording(tmp_path, lacking), PlayObserver(), [kept], config=config)
+    truth = PlayObserver().run(columns)
+    residual = (columns["joint_position_rad"] - truth["joint_position_rad"])[there]
+    deflection = (columns["joint_position_rad"] - columns["motor_position_rad"])[there]
+    slope, _ = np.polyfit(columns["joint_torque_Nm"][there], deflection, 1)
+    assert summary.samples == 1500
+    np.testing.assert_allclose(kept.predicted("deflection_rad"), truth["deflection_rad"], atol=1e-12)
+    assert summary.rmse_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-9)
+    assert summary.baseline_linear_slope_rad_per_Nm == pytest.approx(slope, rel=1e-9)
+    assert summary.deflection_range_rad == pytest.approx(np.ptp(deflection), rel=1e-9)
+    assert any("joint_position_rad is empty in 4 rows" in note for note in summary.notes)
+
+
+@pytest.mark.parametrize("channel", ["motor_position_rad", "joint_torque_Nm"])
+def test_rows_without_what_a_prediction_rests_on_are_refused(channel: str, tmp_path: Path) -> None:
+    columns = _columns()
+    columns[channel][700] = np.nan
+    with pytest.raises(InputError, match=f"line 702: column '{channel}' holds 'NaN'"):
+        replay(_recording(tmp_path, columns), PlayObserver(), [], config=joint())
+
+
+def test_no_angle_at_all_has_no_error(tmp_path: Path) -> None:
+    columns = {**_columns(), "joint_position_rad": np.full(1500, np.nan)}
+    summary = replay(_recording(tmp_path, columns), PlayObserver(), [], config=joint())
+    assert summary.rmse_rad is None
+    json.loads(summary.to_json(), parse_constant=pytest.fail)
+
+
 def test_stops_for_snapshots_do_not_change_the_prediction(tmp_path: Path) -> None:
     columns = _columns()
     kept, observer = Kept(), PlayObserver()
