@@ -91,7 +91,11 @@ def _residual(display: Display, unit: replay_figures.Scale) -> str:
     if display.residual_density is not None:
         parts.append(page.figure(replay_figures.spectra(display, unit)))
     else:
-        parts.append(page.paragraph("No spectrum: the sampling is uneven, or the recording too short."))
+        parts.append(
+            page.paragraph(
+                "No spectrum: the sampling is uneven, some rows lack the joint's angle, or the recording is too short."
+            )
+        )
     return page.figure(replay_figures.residual_over_time(display, unit)) + page.columns(*parts)
 
 
