@@ -18,10 +18,10 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect that a parameter within its tolerance makes up for, up to `amount`; the joint with as much of it."""
+    """An effect that parameters within their tolerances make up for, up to `amount`; the joint with as much of it."""
 
     effect: str
-    parameter: str
+    parameters: tuple[str, ...]
     amount: float
     unit: str
     visible: float
@@ -30,9 +30,10 @@ class Hidden:
     @property
     def why(self) -> str:
         """For readers."""
+        names = " and ".join(f"`{name}`" for name in self.parameters)
+        does = "within its tolerance makes" if len(self.parameters) == 1 else "within their tolerances make"
         return (
-            f"`{self.parameter}` within its tolerance makes up for it: up to {self.amount:.3g} {self.unit} of it "
-            "leave no trace in these data"
+            f"{names} {does} up for it: up to {self.amount:.3g} {self.unit} of it leave no trace in these data"
         ).replace("  ", " ")
 
 
@@ -112,19 +113,19 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
     finite = np.array([np.isfinite(p.sd) for p in problem.parameters], dtype=np.bool_)
     if not finite.any() or length <= 0.0:
         return None
+    sds = np.array([p.sd for p in problem.parameters])
     scale = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    s = np.linalg.lstsq(J / scale, d, rcond=1e-6)[0] / scale
+    s = _likeliest(J, d, sds)
     if float(np.linalg.norm(d - J @ s)) > LIMITS.hidden * length:
         return None
-    sds = np.array([p.sd for p in problem.parameters])
     most = float(np.max(np.abs(s[finite]) / sds[finite]))
     factor = LIMITS.hidden_within / max(most, 1e-300)
     amount = min(abs(size) * factor, max(abs(b) for b in h.amount.bounds(problem.config)))
     visible = length * amount / abs(size)
     if visible < LIMITS.unseen:
         return None
-    j = int(np.argmax(np.abs(s) * scale))
-    p = problem.parameters[j]
+    does = np.abs(s) * scale
+    most_of_it = [problem.parameters[j].name for j in np.argsort(-does) if does[j] > 0.5 * np.max(does)]
     made = with_entry(problem, h, h.entry({**h.starts[shape].values, h.amount.name: amount}))
     x = here.fit.x + s * amount / size  # d is the residual without the effect less the one with it
     low, high = problem.bounds()
@@ -135,7 +136,24 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
         or float(np.linalg.norm(there[: len(d)] - here.fit.residual[: len(d)])) > LIMITS.hidden_kept * visible
     ):
         return None
-    return Hidden(h.name, p.name, amount, h.amount.unit, visible, made.joint(moved, problem.evidence[0]))
+    return Hidden(
+        h.name, tuple(most_of_it), amount, h.amount.unit, visible, made.joint(moved, problem.evidence[0])
+    )
+
+
+def _likeliest(J: FloatArray, d: FloatArray, sds: FloatArray) -> FloatArray:
+    """Steps s with J s = d that go least far within tolerances of these deviations: parameters that do nearly the same
+    share what there is to do. Up to half of `LIMITS.hidden` of d is given up for that."""
+    scale = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+    plain = np.asarray(np.linalg.lstsq(J / scale, d, rcond=1e-6)[0] / scale, dtype=np.float64)
+    far = float(np.linalg.norm(plain / sds))
+    if far <= 0.0:
+        return plain
+    price = 0.5 * LIMITS.hidden * float(np.linalg.norm(d)) / far
+    A = np.vstack([J, np.diag(price / sds)]) / scale
+    return np.asarray(
+        np.linalg.lstsq(A, np.append(d, np.zeros(len(sds))), rcond=1e-9)[0] / scale, dtype=np.float64
+    )
 
 
 __all__ = ["Hidden", "could_be_unseen"]
