@@ -199,7 +199,7 @@ def _with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) 
     tolerance = dict(joint.tolerance)
     for p in fit.problem.parameters:
         if p.name in tolerance:
-            tolerance[p.name] = float(f"{max(spread[p.name], EXACT if p.log else 0.0):.2g}")
+            tolerance[p.name] = float(f"{p.scale * max(spread[p.name], EXACT if p.log else 0.0):.2g}")
     return joint.model_copy(update={"tolerance": tolerance})
 
 

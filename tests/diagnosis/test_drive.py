@@ -9,7 +9,9 @@ from small_drive import course, recorded
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
+from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
@@ -79,3 +81,18 @@ def test_a_torque_sensors_zero_is_each_sessions_own_where_it_is_named() -> None:
     common = opened(["joint_position_offset_rad"])
     fit = calibrate_drive(common, gather_body(common, sessions, None).used, np.random.default_rng(0)).fit
     assert ZERO not in {p.base for p in fit.problem.parameters}
+
+
+@pytest.mark.parametrize("by", ["calibrate", "diagnose"])
+def test_a_tolerance_in_a_unit_of_its_own_stays_in_it(by: str) -> None:
+    """A torque's zero known to 50 mN m: told to some of them, not to some hundredths of 1 N m."""
+    stated_Nm, misread_Nm = 0.05, 0.03
+    plain = opened(["joint_position_offset_rad"])
+    joint = plain.model_copy(update={"tolerance": {**plain.tolerance, ZERO: stated_Nm}})
+    recordings = {"a/1": hung(3, misread_Nm)}
+    if by == "calibrate":
+        found = calibrate(joint, recordings).config
+    else:
+        found = diagnose(joint, recordings, budget_s=0.0).augmented_joint
+    assert 0.0 < found.tolerance[ZERO] < 0.4 * stated_Nm
+    assert abs(found.sensors.joint_torque_offset_Nm - misread_Nm) < 3.0 * found.tolerance[ZERO]

@@ -73,10 +73,9 @@ def _tolerances(config: JointConfig, fit: Fit) -> dict[str, float]:
         if not mine or any(fit.problem.parameters[k].name in untold for k in mine):
             continue
         p = fit.problem.parameters[mine[0]]
-        least = (
-            0.0 if not p.log else EXACT if p.base.partition(".")[0].endswith("_radius_m") else LIMITS.known
-        )
-        width = hypot(LIMITS.wider * float(np.max(sd[mine])), float(np.std(fit.x[mine])))
+        radius = p.base.partition(".")[0].endswith("_radius_m")
+        least = 0.0 if not p.log else EXACT if radius else LIMITS.known
+        width = p.scale * hypot(LIMITS.wider * float(np.max(sd[mine])), float(np.std(fit.x[mine])))
         known[name] = min(before, float(f"{max(width, least):.2g}"))
     return known
 

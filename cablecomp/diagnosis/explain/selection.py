@@ -104,7 +104,7 @@ def _mounted_anew_first(models: list[Model], groups: Groups) -> list[Model]:
 
 
 def _mounted_anew_for(model: Model, other: Model) -> bool:
-    """Whether a model has a drive mounted anew where the other has effects, and otherwise none but effects of that."""
+    """Whether a model has a drive mounted anew in place of effects of the other, and no effect that this one lacks."""
     mine, others = ({t.name for t in m.terms if not isinstance(t, Dependence)} for m in (model, other))
     return mine < others and any(isinstance(t, Dependence) and t.mounted_anew for t in model.terms)
 
