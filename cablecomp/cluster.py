@@ -16,8 +16,8 @@ from cablecomp.errors import CablecompError, InputError
 
 R = TypeVar("R")
 
-THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""What tells a process how many threads it may use: read by `estimation.parallel`, and by NumPy's libraries."""
+THREADS: Final = "OMP_NUM_THREADS"
+"""What tells a process how many threads it may use: heeded by `estimation.parallel`, and by NumPy's libraries."""
 CONNECT_S: Final = 10.0
 """How long a scheduler is waited for; one that is there answers in milliseconds."""
 
@@ -99,19 +99,16 @@ def _in_processes(
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """A pool that starts nothing more once its user has gone. Its processes share the cores: with as many threads in
     each as there are cores they would wait for each other."""
-    own = {k: os.environ.get(k) for k in THREADS}
-    cores = os.cpu_count() or 1
-    os.environ |= {k: v or str(max(1, cores // processes)) for k, v in own.items()}
+    stated = THREADS in os.environ
+    if not stated:
+        os.environ[THREADS] = str(max(1, (os.cpu_count() or 1) // processes))
     pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
     try:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
-        for k, v in own.items():
-            if v is None:
-                os.environ.pop(k, None)
-            else:
-                os.environ[k] = v
+        if not stated:
+            os.environ.pop(THREADS, None)
 
 
 def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address: str) -> Iterator[Done[R]]:

@@ -28,6 +28,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel, noise_mean
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.limits import EXACT
+from cablecomp.estimation.parallel import algebra_in_one_thread
 from cablecomp.estimation.parameter import Parameter
 
 LOAD_BY_MOTOR = 0.05
@@ -68,6 +69,7 @@ class Calibration:
         return next(v for v in self.values if v.name == name)
 
 
+@algebra_in_one_thread
 def calibrate(
     config: JointConfig,
     recordings: Mapping[str, Columns],

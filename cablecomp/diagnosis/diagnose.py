@@ -27,10 +27,12 @@ from cablecomp.diagnosis.result import Diagnosis
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parallel import algebra_in_one_thread
 
 NO_BETTER = "the joint's angle is predicted no better, or hardly, by it on data left out"
 
 
+@algebra_in_one_thread
 def diagnose(
     config: JointConfig,
     recordings: Mapping[str, Columns],

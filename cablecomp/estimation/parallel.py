@@ -1,14 +1,19 @@
-"""Independent fits side by side in threads: the compiled kernels let go of the interpreter."""
+"""Independent fits side by side in threads: the compiled kernels let go of the interpreter. Linear algebra has none of
+its own meanwhile."""
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
+
+from threadpoolctl import threadpool_limits
 
 A = TypeVar("A")
 B = TypeVar("B")
+P = ParamSpec("P")
 
 MOST = 4
 """Threads; beyond, the interpreter between kernel calls is what they wait for."""
@@ -25,3 +30,15 @@ def _threads() -> int:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     allowed = os.environ.get("OMP_NUM_THREADS", "")
     return min(cores, int(allowed)) if allowed.isdecimal() else cores
+
+
+def algebra_in_one_thread(work: Callable[P, B]) -> Callable[P, B]:
+    """The function, done while NumPy's and SciPy's linear algebra keeps to one thread: its systems are small here, and
+    its threads only wait for each other."""
+
+    @functools.wraps(work)
+    def alone(*args: P.args, **kwargs: P.kwargs) -> B:
+        with threadpool_limits(limits=1, user_api="blas"):
+            return work(*args, **kwargs)
+
+    return alone

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from joints import SMALL, SMALL_NOISE, SMALL_TOLERANCE, closed
+from threadpoolctl import threadpool_info, threadpool_limits
 from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig, parse_joint
@@ -154,6 +155,22 @@ def test_a_budget_that_is_over_ends_the_search_with_what_there_is_and_says_so(no
     assert found.tested == ()
     assert found.augmented.rmse_rad == found.baseline.rmse_rad
     assert not any("were over" in line for line in nothing.warnings)
+
+
+def test_linear_algebra_keeps_to_one_thread_meanwhile() -> None:
+    """Of many small systems its threads only wait for each other."""
+
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    seen: set[int] = set()
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = threads()
+        diagnose(
+            joint(), {"small/1": recording([])}, lambda what, share: seen.update(threads()), budget_s=0.0
+        )
+        assert threads() == before
+    assert seen == {1}
 
 
 def test_of_many_recordings_in_which_nothing_is_missing_all_are_reported() -> None:
