@@ -45,7 +45,7 @@ BY_TAPE: Final = 0.02
 where a cable leaves its drums and how much its ends yield is on no drawing. Without it, a slightly wrong length is
 answered by a coupling that yields or by friction (blind trials draw 1.5 %)."""
 ZERO_OF_TORQUE: Final = 0.005
-"""1-sigma of a torque sensor's zero that is stated without a tolerance, over the largest torque it reads: what mounting
-and warming up leave (blind trials draw 0.4 %)."""
+"""1-sigma of a torque sensor's zero that `[session] own` names without a tolerance, over the largest torque it reads:
+what mounting and warming up leave (blind trials draw 0.4 %)."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

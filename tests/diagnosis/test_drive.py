@@ -69,10 +69,12 @@ def hung(seed: int, misread_Nm: float) -> dict[str, FloatArray]:
     return {"time_s": time, **seen}
 
 
-def test_a_torque_sensors_zero_is_each_sessions_own_where_it_is_named() -> None:
+@pytest.mark.parametrize("as_stated", [False, True])
+def test_a_torque_sensors_zero_is_each_sessions_own_where_it_is_named(as_stated: bool) -> None:
     sessions = {"a/1": hung(3, 0.0), "b/1": hung(4, 1e-2)}
     joint = opened(["joint_position_offset_rad", ZERO])
-    fit = calibrate_drive(joint, gather_body(joint, sessions, None).used, np.random.default_rng(0)).fit
+    used = gather_body(joint, sessions, None).used
+    fit = calibrate_drive(joint, used, np.random.default_rng(0), as_stated=as_stated).fit
     largest = max(float(np.max(np.abs(s["joint_torque_Nm"]))) for s in sessions.values())
     found = {p.session: p for p in fit.problem.parameters if p.base == ZERO}
     assert set(found) == {"a", "b"}
@@ -96,3 +98,14 @@ def test_a_tolerance_in_a_unit_of_its_own_stays_in_it(by: str) -> None:
         found = diagnose(joint, recordings, budget_s=0.0).augmented_joint
     assert 0.0 < found.tolerance[ZERO] < 0.4 * stated_Nm
     assert abs(found.sensors.joint_torque_offset_Nm - misread_Nm) < 3.0 * found.tolerance[ZERO]
+
+
+def test_calibrate_tells_each_sessions_torque_zero() -> None:
+    sessions = {"a/1": hung(3, 0.0), "b/1": hung(4, 1e-2)}
+    found = calibrate(opened(["joint_position_offset_rad", ZERO]), sessions)
+    values = {v.session: v for v in found.values if v.name.startswith(ZERO)}
+    apart = values["b"].value - values["a"].value
+    assert abs(apart - 1e-2) < 3.0 * np.hypot(values["a"].sd, values["b"].sd)
+    common = found.config.sensors.joint_torque_offset_Nm
+    stood = {s.name: s.values.get(ZERO, common) for s in found.config.sessions}
+    assert stood == pytest.approx({k: v.value for k, v in values.items() if k})

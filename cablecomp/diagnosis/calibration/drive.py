@@ -46,7 +46,7 @@ def calibrate_drive(
 ) -> Calibrated:
     """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one.
 
-    `as_stated`: free lengths and the torque sensor's zero are exact where no tolerance is stated of them."""
+    `as_stated`: free lengths are exact where no tolerance is stated of them."""
     parameters = _parameters(config, evidence, as_stated)
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
@@ -126,8 +126,8 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bo
     """What `[tolerance]` frees, and what is exact on paper alone; what `[session] own` names is each session's."""
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
     own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
-    further = {} if as_stated else {**_by_tape(config), **_torque_zero(config, evidence)}
-    free = list(of_drive(config, further))
+    by_tape = {} if as_stated else _by_tape(config)
+    free = list(of_drive(config, {**by_tape, **_torque_zero(config, evidence)}))
     if len(sessions) > 1:
         for name in own:
             for p in [p for p in free if p.name == name]:
