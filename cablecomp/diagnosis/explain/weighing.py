@@ -10,6 +10,7 @@ import numpy as np
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
+from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
@@ -100,6 +101,8 @@ def _weighed(
         confidence = learnt().probability(evidence)
         why_not = _against((*instead.effects, *instead.plain), own, evidence)
     removes = max(evidence["share_total"], _alone(selection, term))
+    if lacks := untold(final.fit, term, removes):
+        confidence, why_not = min(confidence, LIMITS.event_untold), lacks
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes)
 

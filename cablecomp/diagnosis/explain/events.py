@@ -1,0 +1,34 @@
+"""What an event has to show for its name: it is asked at many instants, and the best of them counts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.least_squares import Fit, covariance
+
+
+def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
+    """What of an event the data do not tell, in words; "" where they do, and for what is no event.
+
+    Its size has to stand out of none by `LIMITS.event_size` stated deviations (noise has its best of many instants,
+    too). Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated
+    drive's mean square (`removes`)."""
+    found = amount_of(fit, term)
+    if not term.has_instant or found is None:
+        return ""
+    amount, value = found
+    sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))
+    place = {p.name: k for k, p in enumerate(fit.problem.parameters)}
+    k = place[amount.name]
+    own = LIMITS.wider * float(sd[k]) * abs(amount.slope(float(fit.x[k])))
+    if abs(value - term.amount.neutral) < LIMITS.event_size * own:
+        return f"its size is {abs(value - term.amount.neutral) / max(own, 1e-300):.1f} of its own deviations"
+    when = place.get(term.key(term.instant))
+    if when is None or removes >= LIMITS.event_anywhere:
+        return ""
+    low, high = fit.problem.bounds()
+    if float(sd[when]) < LIMITS.event_placed * float(high[when] - low[when]):
+        return ""
+    return f"these data do not tell when it happened, and it takes off {removes:.0%} alone"

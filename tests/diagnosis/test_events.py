@@ -1,0 +1,63 @@
+"""What an event has to show for its name."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.diagnosis.explain.events import untold
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.effects.catalogue import catalogue
+from cablecomp.estimation.parameter import Parameter
+
+SLIP_M = 1e-4
+REACH_S = 6.0
+
+
+def slip(size_sd: float, instant_sd: float) -> tuple[Any, Any]:
+    """A fit that holds a slip of 0.1 mm, with these deviations (by the likelihood) of its size, in units of it, and of
+    its instant [s]; and the hypothesis."""
+    size = Parameter("effect.clamp_slip.slip_m", 0.0, -1.0, 1.0, False, SLIP_M)
+    when = Parameter("effect.clamp_slip.time_s", 40.0, 40.0 - REACH_S / 2, 40.0 + REACH_S / 2, False)
+    problem = SimpleNamespace(
+        parameters=(size, when),
+        bounds=lambda: (np.array([-1e4, when.low]), np.array([1e4, when.high])),
+    )
+    J = np.diag([1.0 / size_sd, 1.0 / instant_sd if instant_sd < REACH_S else 0.0])
+    fit = SimpleNamespace(problem=problem, x=np.array([1.0, 40.0]), J=J)
+    effect = catalogue()["clamp_slip"]
+    term = SimpleNamespace(
+        has_instant=True,
+        instant="time_s",
+        amount=effect.parameter("slip_m"),
+        key=lambda k: f"effect.clamp_slip.{k}",
+    )
+    return fit, term
+
+
+@pytest.mark.parametrize(
+    ("size_sd", "instant_sd", "removes", "said"),
+    [
+        (0.05, 0.1, 0.1, ""),
+        (0.2, 0.1, 0.9, "its size is 3.1 of its own deviations"),  # stated 1.6 times as wide
+        (0.05, REACH_S, 0.1, "do not tell when it happened, and it takes off 10% alone"),
+        (0.05, REACH_S, 0.9, ""),
+    ],
+)
+def test_an_event_shows_its_size_and_its_place(
+    size_sd: float, instant_sd: float, removes: float, said: str
+) -> None:
+    fit, term = slip(size_sd, instant_sd)
+    reason = untold(fit, term, removes)
+    assert said in reason
+    assert bool(said) == bool(reason)
+
+
+def test_what_is_no_event_has_nothing_to_place() -> None:
+    fit, term = slip(0.5, REACH_S)
+    term.has_instant = False
+    plain: Hypothesis = term
+    assert untold(fit, plain, 0.0) == ""
