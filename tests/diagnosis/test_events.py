@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.effects.catalogue import catalogue
-from cablecomp.estimation.parameter import Parameter
+from cablecomp.estimation.parameter import DECADE, Parameter
 
 SLIP_M = 1e-4
 REACH_S = 6.0
@@ -54,6 +55,14 @@ def test_an_event_shows_its_size_and_its_place(
     reason = untold(fit, term, removes)
     assert said in reason
     assert bool(said) == bool(reason)
+
+
+def test_a_size_that_trades_places_with_a_vague_drive_is_not_held_against_it() -> None:
+    fit, term = slip(0.5, REACH_S)
+    assert untold(fit, term, 0.0)
+    size, when = fit.problem.parameters
+    fit.problem.parameters = (size, replace(when, centre=40.0, sd=DECADE))
+    assert untold(fit, term, 0.0) == ""
 
 
 def test_what_is_no_event_has_nothing_to_place() -> None:
