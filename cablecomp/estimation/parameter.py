@@ -66,6 +66,16 @@ class Parameter:
         return self.name.partition("@")[2] or None
 
     @property
+    def vague(self) -> bool:
+        """Whether it is known by order of magnitude only."""
+        return DECADE <= self.sd < inf
+
+    @property
+    def of_effect(self) -> bool:
+        """Whether it is an effect's, and not the drive's own."""
+        return self.name.startswith("effect.")
+
+    @property
     def condition(self) -> str | None:
         """The condition that this is a gain by, or None."""
         return self.name.partition("~")[2] or None

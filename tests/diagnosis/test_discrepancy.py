@@ -18,6 +18,7 @@ from cablecomp.diagnosis.explain.scores import left_out, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.parameter import Parameter
 from cablecomp.signal.smoothing import FloatArray
 
 FRICTION = "routing_friction.mu_angle"
@@ -45,7 +46,7 @@ def model(y: FloatArray, columns: Mapping[str, FloatArray]) -> Model:
     problem = SimpleNamespace(
         config=CONFIG,
         bounds=lambda: (np.full(n, -1e3), np.full(n, 1e3)),
-        parameters=[SimpleNamespace(name=f"effect.{k}", base=f"effect.{k}", sd=1.0) for k in columns],
+        parameters=[Parameter(f"effect.{k}", 0.0, -1e3, 1e3, False, sd=1.0) for k in columns],
         channels=(JOINT,),
         evidence=(recording,),
         bases={JOINT: SimpleNamespace(penalty_rows=0)},

@@ -16,6 +16,7 @@ from cablecomp.diagnosis.explain.scores import (
     selected_in,
 )
 from cablecomp.diagnosis.folds import Groups
+from cablecomp.estimation.parameter import Parameter
 from cablecomp.signal.smoothing import FloatArray
 
 BLOCKS, ROWS = 30, 20
@@ -33,7 +34,7 @@ def linear(y: FloatArray, A: FloatArray, prior_sd: float) -> Linear:
     x = np.linalg.lstsq(np.vstack([A, np.eye(n) / prior_sd]), np.concatenate([y, np.zeros(n)]), rcond=None)[0]
     problem = SimpleNamespace(
         bounds=lambda: (np.full(n, -1e3), np.full(n, 1e3)),
-        parameters=[SimpleNamespace(base="gain", sd=prior_sd) for _ in range(n)],
+        parameters=[Parameter("gain", 0.0, -1e3, 1e3, False, sd=prior_sd) for _ in range(n)],
     )
     return Linear(problem, x, np.concatenate([y - A @ x, x / prior_sd]), J)
 

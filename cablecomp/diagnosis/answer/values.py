@@ -36,7 +36,7 @@ def _parameters(fit: Fit, config: JointConfig, *, effects: bool) -> tuple[Value,
     sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))
     found = []
     for p, x, s in zip(fit.problem.parameters, fit.x, sd, strict=True):
-        if p.name.startswith("effect.") == effects:
+        if p.of_effect == effects:
             nominal = None if effects or p.condition else value_of(config, p.base)
             value, own = p.value(float(x)), float(s * abs(p.slope(float(x))))
             if role_of(p.base) == "instant":

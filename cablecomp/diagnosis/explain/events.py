@@ -7,7 +7,6 @@ import numpy as np
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, covariance
-from cablecomp.estimation.parameter import DECADE
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
@@ -18,7 +17,7 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     too). Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated
     drive's mean square (`removes`)."""
     found = amount_of(fit, term)
-    vague = any(p.sd >= DECADE for p in fit.problem.parameters if np.isfinite(p.sd))
+    vague = any(p.vague and not p.of_effect for p in fit.problem.parameters)
     if not term.has_instant or found is None or vague:
         return ""
     amount, value = found

@@ -22,7 +22,6 @@ from cablecomp.effects.catalogue import role_of
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
-from cablecomp.estimation.parameter import DECADE
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -31,7 +30,7 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 def left_out(fit: Fit, groups: Groups) -> FloatArray:
     """Weighted residual of every data row with its fold left out of the fit: one Gauss-Newton step each, or
     fits done again where the drive is known by order of magnitude only."""
-    if any(p.sd >= DECADE for p in fit.problem.parameters if np.isfinite(p.sd)):
+    if any(p.vague for p in fit.problem.parameters):
         return left_out_exactly(fit, groups)
     return left_out_linearly(fit.residual, fit.J[:, movable(fit)], groups)
 
