@@ -14,7 +14,7 @@ from time import monotonic
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.answer.augmented import augmented_joint
+from cablecomp.diagnosis.answer.augmented import augmented_joint, with_tolerances
 from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.counts import count_rad
@@ -27,7 +27,6 @@ from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel, noise_mean
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
-from cablecomp.estimation.limits import EXACT
 from cablecomp.estimation.parallel import algebra_in_one_thread
 from cablecomp.estimation.parameter import Parameter
 
@@ -98,7 +97,7 @@ def calibrate(
     fit = _without(fit, tuple(unknown))
     joint = augmented_joint(config, Model((), fit, fit.residual), (), body.names)
     return Calibration(
-        _with_tolerances(joint, fit, spread),
+        with_tolerances(joint, fit, spread),
         tuple(_as_wide(v, fit, spread) for v in drive_values(fit, config)),
         tuple(_kept(drive, name, why) for name, why in unknown.items()),
         tied,
@@ -194,15 +193,6 @@ def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:
             if abs(correlation) > LIMITS.tied:
                 found.append((names[k], names[i], correlation))
     return tuple(found)
-
-
-def _with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) -> JointConfig:
-    """Tolerances of what is known now: what the fit leaves, never less than what a drawing does."""
-    tolerance = dict(joint.tolerance)
-    for p in fit.problem.parameters:
-        if p.name in tolerance:
-            tolerance[p.name] = float(f"{p.scale * max(spread[p.name], EXACT if p.log else 0.0):.2g}")
-    return joint.model_copy(update={"tolerance": tolerance})
 
 
 def _warnings(drive: Calibrated, fit: Fit, recordings: Mapping[str, Columns]) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ def augmented_joint(
     joint = common.model_copy(
         update={
             "empirical": (*config.empirical, *laws),
-            "tolerance": _tolerances(config, fit),
+            "tolerance": dict(config.tolerance),
             "depends": (*config.depends, *_depends(model, first)),
         }
     )
@@ -61,23 +61,35 @@ def augmented_joint(
     return joint.model_copy(update={"session": tuple(entries)})
 
 
-def _tolerances(config: JointConfig, fit: Fit) -> dict[str, float]:
-    """Tolerances of what is known now: as wide as values are stated with, and as they differ between sessions; no less
-    than from day to day, and no more than before. What the recordings do not tell stays as it was."""
-    known = dict(config.tolerance)
-    sd = np.sqrt(np.diag(covariance(fit)))
-    untold = {p.name for p, s in zip(fit.problem.parameters, sd, strict=True) if s > LIMITS.untold * p.sd}
-    untold |= set(fit.at_bound())
-    for name, before in config.tolerance.items():
+def with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) -> JointConfig:
+    """The joint with tolerances of what was fitted: `spread`, by parameter in its coordinate, never less than what a
+    drawing does, and how far sessions lie apart. What has no spread stays as it was."""
+    tolerance = dict(joint.tolerance)
+    for name in tolerance:
         mine = [k for k, p in enumerate(fit.problem.parameters) if p.base == name and not p.condition]
-        if not mine or any(fit.problem.parameters[k].name in untold for k in mine):
+        widths = [spread.get(fit.problem.parameters[k].name) for k in mine]
+        told = [w for w in widths if w is not None]
+        if not told or len(told) < len(mine):
             continue
         p = fit.problem.parameters[mine[0]]
+        width = hypot(max(*told, EXACT if p.log else 0.0), float(np.std(fit.x[mine])))
+        tolerance[name] = float(f"{p.scale * width:.2g}")
+    return joint.model_copy(update={"tolerance": tolerance})
+
+
+def told_by(fit: Fit, stated: Mapping[str, float]) -> dict[str, float]:
+    """How well parameters are known after a diagnosis: as wide as their values are stated, radii apart no less than
+    from day to day, and no more than before. What the recordings do not tell is left out."""
+    bounded = fit.at_bound()
+    found = {}
+    for p, sd in zip(fit.problem.parameters, np.sqrt(np.diag(covariance(fit))), strict=True):
+        if sd > LIMITS.untold * p.sd or p.name in bounded or p.base not in stated:
+            continue
         radius = p.base.partition(".")[0].endswith("_radius_m")
-        least = 0.0 if not p.log else EXACT if radius else LIMITS.known
-        width = p.scale * hypot(LIMITS.wider * float(np.max(sd[mine])), float(np.std(fit.x[mine])))
-        known[name] = min(before, float(f"{max(width, least):.2g}"))
-    return known
+        least = LIMITS.known if p.log and not radius else 0.0
+        before = stated[p.base] / p.scale
+        found[p.name] = min(before, max(LIMITS.wider * float(sd), least))
+    return found
 
 
 def _depends(model: Model, first: Evidence) -> tuple[Depends, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.diagnosis.answer.augmented import augmented_joint
+from cablecomp.diagnosis.answer.augmented import augmented_joint, told_by, with_tolerances
 from cablecomp.diagnosis.answer.entries import (
     candidates,
     channel_word,
@@ -61,7 +61,11 @@ def diagnosis_of(
         remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.names),
         notes=notes(case),
-        augmented_joint=augmented_joint(case.config, kept, outcome.empirical, case.body.names),
+        augmented_joint=with_tolerances(
+            augmented_joint(case.config, kept, outcome.empirical, case.body.names),
+            kept.fit,
+            told_by(kept.fit, case.config.tolerance),
+        ),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates)),
         warnings=(*((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()), *warnings_of(kept)),
