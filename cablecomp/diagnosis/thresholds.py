@@ -125,6 +125,10 @@ class Thresholds:
     calibrated drive far off a tenth is more than there is left (45 recordings of a jaw: friction of path, motor and jaw
     with a stiffening cable left half of what two of them and a slip left, which was 5 % of what these had taken off;
     36 of them: the same four left 0.64 of what two and a delay left)."""
+    z_dethrone: float = 2.0
+    """Standard errors by which such a model has to predict better than one that keeps these effects, beside another
+    (the jaw's recordings one by one: its path alone explains most, by far; with the motor's friction beside it, the
+    jaw's own in its place predicts better by one standard error)."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0

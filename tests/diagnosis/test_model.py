@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from turning import JOINT
@@ -13,6 +15,7 @@ from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
 
@@ -34,13 +37,19 @@ def fitted(config: JointConfig, load_Nm: float) -> Fit:
     return Fit(problem, nothing, problem.residual(nothing), np.empty((len(e.rows), 0)))
 
 
-def beside(effect: str, amount: dict[str, float]) -> tuple[Fit, Hypothesis]:
+def beside(effect: str, amount: dict[str, float], config: JointConfig = JOINT) -> tuple[Fit, Hypothesis]:
     """The joint's fit with an effect of these values beside it, and that effect as a hypothesis."""
-    fit = fitted(JOINT, 1.0)
+    fit = fitted(config, 1.0)
     (h,) = [h for h in hypotheses(JOINT, fit.problem.evidence) if h.name == effect]
     problem = with_entry(fit.problem, h, h.entry({**h.starts[0].values, **amount}))
+    problem = replace(problem, parameters=(*problem.parameters, *of_drive(config)))
     x = np.array([p.x(amount.get(p.name.rpartition(".")[2], p.start)) for p in problem.parameters])
     return Fit(problem, x, fit.residual, np.empty((0, len(x)))), h
+
+
+def with_tolerance(relative: float) -> JointConfig:
+    """The joint with cables known this well."""
+    return JOINT.model_copy(update={"tolerance": {"EA_N": relative}})
 
 
 def holding(force_N: float | None) -> JointConfig:
@@ -113,3 +122,15 @@ def test_an_amount_at_many_times_what_is_plausible_has_run_away(
 ) -> None:
     fit, h = beside(effect, amount)
     assert runs_away(fit, h) is away
+
+
+@pytest.mark.parametrize(("eccentricity_m", "away"), [(2e-4, False), (4e-3, True)])
+def test_where_nothing_holds_the_drive_an_amount_runs_away_without_a_bound(
+    eccentricity_m: float, away: bool
+) -> None:
+    """Plausible are up to 0.03 of the radius of 25 mm: a quarter of that may be, 4 mm are five times as much; the
+    bound lies at 10 mm. A drive that is known holds it."""
+    amount = {"eccentricity_m": eccentricity_m}
+    fit, h = beside("pulley_runout", amount)
+    assert not runs_away(fit, h)
+    assert runs_away(*beside("pulley_runout", amount, with_tolerance(1.0))) is away

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cablecomp.diagnosis.explain import selection
+from cablecomp.diagnosis.explain import selection, ties
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.folds import Groups
@@ -21,6 +22,7 @@ GROUPS = Groups(
     "block",
     np.zeros(ROWS, dtype=np.int64),
 )
+WAVE = np.sin(np.arange(ROWS) / 25.0)
 NOISE = np.random.default_rng(1).standard_normal(ROWS)
 
 
@@ -65,11 +67,18 @@ def test_where_others_are_not_enough_better_one_that_adds_to_the_best_is_taken()
     assert reigning(model(1.0, "a"), model(0.94, "b", "c"), model(0.95, "a", "c")) == "a + c"
 
 
+@pytest.mark.parametrize(("more", "reigns"), [(0.02, "a + c"), (0.5, "b + c")])
+def test_two_others_reign_where_they_predict_clearly_better_than_one_that_adds_to_the_best(
+    more: float, reigns: str
+) -> None:
+    """All leave noise of half the size; what keeps the best leaves a wave more: of a twenty-fifth, or as large."""
+    others, keeping = model(0.5, "b", "c"), model(0.5, "a", "c")
+    keeping = replace(keeping, left_out=0.5 * NOISE + more * WAVE)
+    assert reigning(model(1.0, "a"), others, keeping) == reigns
+
+
 def test_what_predicts_no_better_does_not() -> None:
     assert reigning(model(1.0, "a"), model(1.0, "a", "b")) == "a"
-
-
-WAVE = np.sin(np.arange(ROWS) / 25.0)
 
 
 OWN = Dependence("pretension_N", "session")
@@ -82,7 +91,7 @@ def mounted_anew(left: FloatArray, *effects: str) -> Model:
 
 
 def first_of(*models: Model) -> str:
-    return selection._mounted_anew_first(list(models), GROUPS)[0].name
+    return ties._mounted_anew_first(list(models), GROUPS)[0].name
 
 
 @pytest.mark.parametrize("shared", [(), ("a",)])

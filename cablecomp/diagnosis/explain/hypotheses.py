@@ -263,12 +263,29 @@ def amount_of(fit: Fit, h: Hypothesis) -> tuple[Free, float] | None:
 
 
 def runs_away(fit: Fit, h: Hypothesis) -> bool:
-    """Whether an effect's amount ended on a bound that lies far beyond what is plausible: a pulley whose centre is a
-    third of its radius off bends a short stroke to anything."""
+    """Whether an effect's amount lies far beyond what is plausible, for the drive as configured and as fitted, and
+    nothing holds it: it is on its bound, or the drive is known by order of magnitude only (a pulley whose centre is a
+    third of its radius off bends a short stroke to anything)."""
+    over = min(_over_plausible(fit, h, fit.problem.config), over_plausible(fit, h))
+    if over <= LIMITS.beyond_plausible:
+        return False
+    held = not any(p.vague for p in fit.problem.parameters if not p.of_effect)
+    return not held or _on_bound(fit, h)
+
+
+def _on_bound(fit: Fit, h: Hypothesis) -> bool:
     found = amount_of(fit, h)
     if found is None:
         return False
     p, value = found
-    plausible = max(abs(b) for b in h.amount.bounds(fit.problem.config))
-    reach = abs(p.high if value > 0.0 else p.low)
-    return reach > LIMITS.beyond_plausible * plausible and abs(value) > LIMITS.on_bound * reach
+    return abs(value) > LIMITS.on_bound * abs(p.high if value > 0.0 else p.low)
+
+
+def over_plausible(fit: Fit, h: Hypothesis) -> float:
+    """An effect's amount over the largest that is plausible for the drive as fitted; 0 where it has none."""
+    return _over_plausible(fit, h, fit.problem.joint(fit.x, fit.problem.evidence[0]))
+
+
+def _over_plausible(fit: Fit, h: Hypothesis, joint: JointConfig) -> float:
+    found = amount_of(fit, h)
+    return 0.0 if found is None else abs(found[1]) / max(abs(b) for b in h.amount.bounds(joint))

@@ -24,6 +24,15 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.rounds import Beginning, cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
+from cablecomp.diagnosis.explain.ties import (
+    implausible,
+    in_order,
+    keeps,
+    mounted_anew_for,
+    outdoes,
+    with_the_first,
+    worth_its_terms,
+)
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -63,71 +72,67 @@ def select(
             known = [t.model for r in rounds for t in r.tried]
             rounds.append(one_round(Beginning(model, start, pool, groups, pace, number, cold, known), rng))
             tried += rounds[-1].tried
-        found = _carried(tried, groups, first=number == 0)
+        found = _carried(tried, groups, None if number == 0 else best)
         if found is None:
             break
         carried, sharper = found
         best = _reigning(best, carried, first, sharper, groups) if number else carried[0]
         if quiet(best.fit):
             break
+        carried = sorted(carried, key=lambda m: m is not best)
         # a law that is run on every sample is a hundred times as dear: the best model alone goes on from there
         beam = [(m, None) for m in carried[: 1 if carried[0].fit.problem.fine else LIMITS.beam]]
-    return Selection(first, tuple(rounds), _pruned(best, groups), groups)
+    final = _pruned(best, groups)
+    return Selection(first, tuple(rounds), with_the_first(final, rounds, groups) if rounds else final, groups)
 
 
-def _carried(tried: Sequence[Tried], groups: Groups, first: bool) -> tuple[list[Model], Weighing] | None:
+def _carried(
+    tried: Sequence[Tried], groups: Groups, before: Model | None
+) -> tuple[list[Model], Weighing] | None:
     """The models that data left out demand and that come near the best one, fitted to the weights that this one asks
-    for, best first; with those weights. None where there is none."""
-    good = [t.model for t in tried if demanded(t.difference, first=first)]
+    for, best first; with those weights. None where there is none. `before`: the best of earlier rounds; where the best
+    now lacks an effect of it, what keeps these and predicts as well is carried on, too."""
+    good = [t.model for t in tried if demanded(t.difference, first=before is None)]
     fresh = ranked(good, groups)
     fresh = [m for m in fresh if bears(m.fit)] or fresh
     if not fresh:
         return None
     size = common([fresh[0]], groups)
     most = LIMITS.close * loss(fresh[0], size, groups)
-    near = [m for k, m in enumerate(fresh) if k <= LIMITS.beam or _mounted_anew_for(m, fresh[0])]
+    near = [m for k, m in enumerate(fresh) if k <= LIMITS.beam or mounted_anew_for(m, fresh[0])]
     kept = [m for m in near if loss(m, size, groups) < most]
+    if before is not None and not keeps(fresh[0], before):
+        others = ranked(
+            [t.model for t in tried if t.difference.gain > 0.0 and keeps(t.model, before)], groups
+        )
+        if others and not any(others[0] is m for m in kept) and not outdoes(fresh[0], others[0], groups):
+            kept.append(others[0])
     sharper = searching(fresh[0].fit)
     again = [reweighed(m, sharper, groups) for m in kept]
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
-    return (_mounted_anew_first(simplest_first(carried, groups), groups), sharper) if carried else None
-
-
-def _mounted_anew_first(models: list[Model], groups: Groups) -> list[Model]:
-    """Models, best first, but one in which the drive was only mounted anew before one with an effect in the place of
-    that which does not predict clearly better: that a session's cables are less tight is no physics that is missing,
-    and an effect that is there as well comes beside it."""
-    own = next((m for m in models if _mounted_anew_for(m, models[0])), None)
-    if own is None or _better(models[0], own, groups):
-        return models
-    return [own, *(m for m in models if m is not own)]
-
-
-def _mounted_anew_for(model: Model, other: Model) -> bool:
-    """Whether a model has a drive mounted anew in place of effects of the other, and no effect that this one lacks."""
-    mine, others = ({t.name for t in m.terms if not isinstance(t, Dependence)} for m in (model, other))
-    return mine < others and any(isinstance(t, Dependence) and t.mounted_anew for t in model.terms)
+    if not carried:
+        return None
+    return in_order(carried, groups), sharper
 
 
 def _reigning(
     best: Model, carried: Sequence[Model], baseline: Model, sharper: Weighing, groups: Groups
 ) -> Model:
     """The model to go by: the first of those carried on that is worth its further terms, if it extends the best so
-    far, or if it takes off much that this one leaves. Laws have other forms in reality, and two wrong ones can follow
-    what is left of the right one a little more closely."""
+    far, or if it takes off much that this one leaves, and predicts clearly better than one that extends this. Laws
+    have other forms in reality, and two wrong ones can follow what is left of the right one a little more closely."""
     if best.fit.problem.fine != carried[0].fit.problem.fine:
         return carried[0]
     rival = reweighed(best, sharper, groups)
-    mine = {t.name for t in best.terms}
     base: Model | None = None
     for m in carried:
-        if not _better(m, rival, groups):
+        if not worth_its_terms(m, rival, groups):
             continue
-        if mine <= {t.name for t in m.terms}:
+        if keeps(m, best):
             return m
         base = base or reweighed(baseline, sharper, groups)
         if _dethrones(m, rival, base, groups):
-            return m
+            return next((k for k in carried if keeps(k, best) and not outdoes(m, k, groups)), m)
     return best
 
 
@@ -143,21 +148,6 @@ def _dethrones(model: Model, best: Model, baseline: Model, groups: Groups) -> bo
     return gone > min(LIMITS.dethrone * taken_off, LIMITS.dethrone_left * part * left)
 
 
-def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
-    """Models, best first, but one with fewer parameters before one that predicts as well: what a law adds to
-    another has to bring something."""
-    size = common(models, groups)
-    most = (1.0 + LIMITS.tie) * loss(models[0], size, groups)
-    alike = [m for m in models if loss(m, size, groups) <= most]
-    first = min(alike, key=lambda m: len(m.fit.problem.parameters))
-    return [first, *(m for m in models if m is not first)]
-
-
-def _better(model: Model, than: Model, groups: Groups) -> bool:
-    """Whether a model is worth its further terms."""
-    return demanded(score_difference(model.left_out, than.left_out, groups))
-
-
 def quiet(fit: Fit) -> bool:
     """Whether all that is left of every channel is its sensor's noise."""
     problem = fit.problem
@@ -167,14 +157,14 @@ def quiet(fit: Fit) -> bool:
 
 def _pruned(model: Model, groups: Groups) -> Model:
     """Leave out, weakest first, every term whose absence costs less than it had to bring: the first of all as the
-    first, the others as further ones."""
+    first, the others as further ones. None whose part another takes up with an amount that is not plausible."""
     while len(model.terms) > 1:
         weakest: tuple[float, Model] | None = None
         for term in model.terms[:-1]:
             if any(isinstance(t, Dependence) and t.belongs_to(term) for t in model.terms):
                 continue
             smaller = without(model, term, groups)
-            if smaller is None:
+            if smaller is None or implausible(smaller) > implausible(model):
                 continue
             step = score_difference(model.left_out, smaller.left_out, groups)
             first = term is model.terms[0]

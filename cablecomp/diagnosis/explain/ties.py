@@ -1,0 +1,122 @@
+"""What goes first where data left out do not tell models apart: the fewer parameters, what is no physics, what is
+plausible, what explains most alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, over_plausible, runs_away
+from cablecomp.diagnosis.explain.model import (
+    Model,
+    Round,
+    Term,
+    amount_resolved,
+    common,
+    loss,
+    ranked,
+    without,
+)
+from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
+from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
+from cablecomp.diagnosis.folds import Groups
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.least_squares import solve
+
+
+def in_order(models: list[Model], groups: Groups) -> list[Model]:
+    """Models, best first, in the order in which a search takes them."""
+    return _plausible_first(_mounted_anew_first(simplest_first(models, groups), groups), groups)
+
+
+def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
+    """Models, best first, but one with fewer parameters before one that predicts as well: what a law adds to
+    another has to bring something."""
+    size = common(models, groups)
+    most = (1.0 + LIMITS.tie) * loss(models[0], size, groups)
+    alike = [m for m in models if loss(m, size, groups) <= most]
+    first = min(alike, key=lambda m: len(m.fit.problem.parameters))
+    return [first, *(m for m in models if m is not first)]
+
+
+def _mounted_anew_first(models: list[Model], groups: Groups) -> list[Model]:
+    """Models, best first, but one in which the drive was only mounted anew before one with an effect in the place of
+    that which does not predict clearly better: that a session's cables are less tight is no physics that is missing,
+    and an effect that is there as well comes beside it."""
+    own = next((m for m in models if mounted_anew_for(m, models[0])), None)
+    if own is None or worth_its_terms(models[0], own, groups):
+        return models
+    return [own, *(m for m in models if m is not own)]
+
+
+def mounted_anew_for(model: Model, other: Model) -> bool:
+    """Whether a model has a drive mounted anew in place of effects of the other, and no effect that this one lacks."""
+    mine, others = ({t.name for t in m.terms if not isinstance(t, Dependence)} for m in (model, other))
+    return mine < others and any(isinstance(t, Dependence) and t.mounted_anew for t in model.terms)
+
+
+def _plausible_first(models: list[Model], groups: Groups) -> list[Model]:
+    """Models, best first, but one of no more effects, more of which have plausible amounts, before one that does not
+    predict better by far."""
+    best = models[0]
+    plain = [m for m in models if len(m.terms) <= len(best.terms) and implausible(m) < implausible(best)]
+    first = next((m for m in plain if not outdoes(best, m, groups)), best)
+    return [first, *(m for m in models if m is not first)]
+
+
+def outdoes(model: Model, than: Model, groups: Groups) -> bool:
+    """Whether a model predicts clearly better than another; by far, where it takes more that is not plausible."""
+    step = score_difference(model.left_out, than.left_out, groups)
+    far = step.gain > LIMITS.dethrone_left or implausible(model) <= implausible(than)
+    return far and step.z >= LIMITS.z_dethrone
+
+
+def implausible(model: Model) -> int:
+    """How many of its effects have amounts far beyond what is plausible for the drive as fitted."""
+    effects = [t for t in model.terms if isinstance(t, Hypothesis)]
+    return sum(over_plausible(model.fit, h) > LIMITS.beyond_plausible for h in effects)
+
+
+def with_the_first(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
+    """The model with what explains most alone in the place of an effect that was tried alone too, where that predicts
+    as well: two that stand in for each other are told apart by what they explain alone, if by anything."""
+    alone = [t for t in rounds[0].tried if len(t.model.terms) == 1]
+    first = max(alone, key=lambda t: t.selected_in, default=None)
+    if first is None or keeps(model, first.model) or not demanded(first.difference, first=True):
+        return model
+    term, values, others = first.term, first.model.fit.values, {t.term.name for t in alone}
+    if not isinstance(term, Hypothesis):
+        return model
+    swapped = [_in_its_place(model, t, term, values, groups) for t in model.terms if t.name in others]
+    as_well = [m for m in swapped if m is not None and not outdoes(model, m, groups)]
+    return simplest_first([*ranked(as_well, groups)[:1], model], groups)[0]
+
+
+def _in_its_place(
+    model: Model, term: Term, other: Hypothesis, alone: Mapping[str, float], groups: Groups
+) -> Model | None:
+    """The model with another effect, `alone` the values with it alone, in the place of one of its own; None where it
+    cannot follow."""
+    base = without(model, term, groups)
+    answers = ask_all([anchor(base.fit)], other) if base else []
+    begun = rough(answers, LIMITS.rough, [alone]) if answers else []
+    if base is None or not begun:
+        return None
+    try:
+        fit = solve(begun[0].problem, begun[0].x, LIMITS.settled, LIMITS.tolerance, begun[0].J)
+    except InputError:
+        return None
+    if runs_away(fit, other) or not amount_resolved(fit, other):
+        return None
+    return Model((*base.terms, other), fit, left_out(fit, groups))
+
+
+def keeps(model: Model, before: Model) -> bool:
+    """Whether a model has all that was added to an earlier one."""
+    return {t.name for t in before.terms} <= {t.name for t in model.terms}
+
+
+def worth_its_terms(model: Model, than: Model, groups: Groups) -> bool:
+    """Whether a model is worth its further terms."""
+    return demanded(score_difference(model.left_out, than.left_out, groups))

@@ -1,0 +1,87 @@
+"""What goes first where data left out do not tell models apart."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cablecomp.diagnosis.explain import ties
+from cablecomp.diagnosis.explain.model import Model, Round, Tried
+from cablecomp.diagnosis.explain.scores import ScoreDifference
+from cablecomp.diagnosis.folds import Groups
+
+ROWS, BLOCKS = 600, 20
+GROUPS = Groups(
+    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS),
+    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS) % 6,
+    "block",
+    np.zeros(ROWS, dtype=np.int64),
+)
+NOISE = np.random.default_rng(1).standard_normal(ROWS)
+WAVE = np.sin(np.arange(ROWS) / 25.0)
+
+
+def model(more: float, *names: str, parameters: int = 2) -> Model:
+    """A model with these terms that leaves noise of deviation one and a wave of this size."""
+    terms: Any = tuple(SimpleNamespace(name=n) for n in names)
+    fit: Any = SimpleNamespace(problem=SimpleNamespace(parameters=range(parameters)), values={})
+    return Model(terms, fit, NOISE + more * WAVE)
+
+
+@pytest.fixture(autouse=True)
+def _by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Amounts are implausible by name here; how plausible they are is held by `test_model.py`."""
+    monkeypatch.setattr(ties, "implausible", lambda m: sum(t.name.startswith("absurd") for t in m.terms))
+    monkeypatch.setattr(ties, "Hypothesis", SimpleNamespace)
+
+
+@pytest.mark.parametrize(("more", "first"), [(0.0, "plausible"), (0.7, "plausible"), (3.0, "absurd")])
+def test_a_plausible_effect_goes_before_one_that_does_not_predict_better_by_far(
+    more: float, first: str
+) -> None:
+    """It leaves as much, a quarter more (clearly worse, for all that), and five times as much."""
+    absurd, plausible = model(0.0, "absurd"), model(more, "plausible")
+    assert ties._plausible_first([absurd, plausible], GROUPS)[0].name == first
+    assert ties.outdoes(model(0.0, "other"), plausible, GROUPS) is (more > 0.0)
+
+
+def test_no_second_effect_is_taken_for_being_plausible() -> None:
+    models = [model(0.0, "absurd"), model(0.0, "plausible", "two")]
+    assert ties._plausible_first(models, GROUPS)[0].name == "absurd"
+
+
+def rounds(*alone: tuple[str, float]) -> list[Round]:
+    """A first round in which these effects were tried, each the best in so many resampled data."""
+    large = ScoreDifference(0.9, 20.0, 10.0)
+    tried = [Tried(m.terms[0], m, large, share) for name, share in alone if (m := model(1.0, name))]
+    return [Round(model(5.0), tuple(tried), tried[0])]
+
+
+@pytest.mark.parametrize(
+    ("more", "parameters", "final"),
+    [(0.02, 2, "path + motor"), (0.7, 2, "jaw + motor"), (0.02, 3, "path + motor")],
+)
+def test_what_explains_most_alone_stands_where_it_predicts_as_well(
+    monkeypatch: pytest.MonkeyPatch, more: float, parameters: int, final: str
+) -> None:
+    """In the jaw's place the path predicts as well, or clearly worse (a quarter of the square more); in the motor's,
+    which was not tried alone, nothing is put."""
+    replaced = []
+
+    def in_its_place(m: Model, term: Any, other: Any, values: Any, groups: Groups) -> Model:
+        replaced.append(term.name)
+        return model(more, other.name, "motor", parameters=parameters)
+
+    monkeypatch.setattr(ties, "_in_its_place", in_its_place)
+    two = model(0.0, "jaw", "motor", parameters=3)
+    assert ties.with_the_first(two, rounds(("jaw", 0.1), ("path", 0.9)), GROUPS).name == final
+    assert replaced == ["jaw"]
+
+
+def test_a_model_that_has_what_explains_most_alone_stays() -> None:
+    two = model(0.0, "path", "motor")
+    assert ties.with_the_first(two, rounds(("jaw", 0.1), ("path", 0.9)), GROUPS) is two
+    assert ties.with_the_first(two, [Round(model(5.0), (), None)], GROUPS) is two
