@@ -17,7 +17,7 @@ from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.search import Search, search, without_effects
+from cablecomp.diagnosis.explain.search import Search, done_without, search, without_effects
 from cablecomp.diagnosis.explain.weighing import Weighed, weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
@@ -55,9 +55,8 @@ def diagnose(
     location = case.located(rng.spawn(1)[0])
     before = case.remainder_of(case.drive.fit, rng)
     found = search(case.drive, hypotheses(config, case.body.used), rng, pace)
-    after = case.remainder_of(found.final.fit, rng)
     pace.tell("holding each name against its rivals", 0.92)
-    weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
+    found, after, weighed = _weighed(case, found, rng)
     outcome = _judged(case, before, found, after, weighed, rng, pace)
     answer = diagnosis_of(case, location, found, outcome, rng, budget_s)
     return replace(answer, runtime_s=time.monotonic() - begin_s)
@@ -85,6 +84,23 @@ def _calibrated(
 def _counted(body: Body, fit: Fit) -> tuple[Evidence, ...]:
     """The recordings kept for the end, counted from where their histories are forgotten, as the ones used are."""
     return body.final if body.final_by == "block" else tuple(without_history(fit, body.final)[0])
+
+
+def _weighed(
+    case: Case, found: Search, rng: np.random.Generator
+) -> tuple[Search, Remainder, Sequence[Weighed]]:
+    """The search's model, what it leaves, its effects weighed; without those that are not missed beside the others,
+    weakest first: of three that trade places none is missed while the others are there."""
+    while True:
+        after = case.remainder_of(found.final.fit, rng)
+        weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
+        needless = [w for w in weighed if w.evidence["z"] < LIMITS.z_missed and w.depends is None]
+        if not needless or len(weighed) < 2:
+            return found, after, weighed
+        fewer = done_without(found, min(needless, key=lambda w: w.evidence["z"]).term, case.drive)
+        if fewer is None:
+            return found, after, weighed
+        found = fewer
 
 
 def _judged(

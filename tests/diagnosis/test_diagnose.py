@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.config_text import joint_text
+from cablecomp.diagnosis import diagnose as diagnose_module
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import Diagnosis, report_json
 from cablecomp.signal.smoothing import FloatArray
@@ -189,3 +192,34 @@ def test_a_zero_set_anew_between_recordings_is_no_slip(sigmas: float) -> None:
     found = diagnose(joint(), {"small/1": first, "small/2": second})
     assert not found.named
     assert found.verdict in ("consistent", "recalibrate")
+
+
+@pytest.mark.parametrize(
+    ("z", "kept"), [([-2.7, -0.6, 0.2], 1), ([3.0, 5.0], 2), ([-1.0], 1), ([0.1, 4.0], 2)]
+)
+def test_what_is_not_missed_beside_the_others_goes_weakest_first(
+    monkeypatch: pytest.MonkeyPatch, z: list[float], kept: int
+) -> None:
+    """Of three that trade places each is missed (z = 5) once it is alone; one alone stays whatever it shows."""
+    shown = {str(k): v for k, v in enumerate(z)}
+
+    def weighed(names: Sequence[str], *_: Any) -> list[Any]:
+        alone = len(names) == 1 and len(z) > 1
+        return [
+            SimpleNamespace(term=n, depends=None, evidence={"z": 5.0 if alone else shown[n]}) for n in names
+        ]
+
+    def less(found: Any, term: str, drive: Any) -> Any:
+        final = [n for n in found.final.fit if n != term]
+        return SimpleNamespace(final=SimpleNamespace(fit=final))
+
+    case: Any = SimpleNamespace(remainder_of=lambda fit, rng: SimpleNamespace(location=None), drive=None)
+    monkeypatch.setattr(diagnose_module, "weigh", lambda found, *_: weighed(found.final.fit))
+    monkeypatch.setattr(diagnose_module, "share_left", lambda drive, final: 0.0)
+    monkeypatch.setattr(diagnose_module, "done_without", less)
+    begin: Any = SimpleNamespace(final=SimpleNamespace(fit=list(shown)))
+    found, _, last = diagnose_module._weighed(case, begin, np.random.default_rng(0))
+    assert len(last) == kept
+    assert [w.term for w in last] == list(found.final.fit)
+    strongest = max(shown, key=lambda n: shown[n])
+    assert strongest in [w.term for w in last]

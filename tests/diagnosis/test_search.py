@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from turning import JOINT, recorded
 
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
+from cablecomp.diagnosis.explain import search as search_module
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.search import search, without_effects
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
+from cablecomp.diagnosis.explain.model import Model, placed
+from cablecomp.diagnosis.explain.screening import with_entry
+from cablecomp.diagnosis.explain.search import done_without, search, without_effects
 from cablecomp.diagnosis.folds import make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import with_effects
-from cablecomp.estimation.least_squares import covariance, weighed
+from cablecomp.errors import InputError
+from cablecomp.estimation.least_squares import Fit, covariance, solve, weighed
 
 FREE = JOINT.model_copy(update={"tolerance": {"EA_N": 0.1}})
 
@@ -61,6 +67,48 @@ def test_the_final_fit_is_about_all_recordings_and_weighs_them_by_what_it_leaves
     for key, value in true.items():
         k = next(k for k, p in enumerate(fit.problem.parameters) if p.name == f"effect.gravity_load.{key}")
         assert abs(fit.x[k] - fit.problem.parameters[k].x(value)) < 4.0 * spread[k]
+
+
+def test_a_last_fit_that_cannot_be_followed_leaves_the_model_as_it_was_found(
+    drive: Calibrated, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stranded(*_: Any) -> Fit:
+        raise InputError("the tensions could not be solved")
+
+    monkeypatch.setattr(search_module, "refit", stranded)
+    found = search_module._settled((), drive.fit, drive, make_groups(drive.fit))
+    assert found.fit is drive.fit
+
+
+def test_done_without_a_term_the_model_is_fitted_again() -> None:
+    """A weight of 0.3 N m and friction that is not there: without the one the other holds, and the weight is found as
+    before; both fits, about the recordings searched and about all, are done again."""
+    true = {"moment_Nm": 0.3, "phase_rad": 0.6}
+    heavy = with_effects(FREE, [("gravity_load", true)])
+    body = gather_body(
+        FREE, {f"all/{k}": recorded(heavy, seed=k, duration_s=5.0) for k in range(LIMITS.searched + 2)}
+    )
+    drive = calibrate_drive(FREE, body.used, np.random.default_rng(0))
+    pool = [h for h in hypotheses(FREE, drive.fit.problem.evidence) if h.name == "gravity_load"]
+    found = search(drive, pool, np.random.default_rng(0), Pace(lambda what, share: None))
+    (rubbing,) = [h for h in hypotheses(FREE, drive.fit.problem.evidence) if h.name == "bearing_friction"]
+    both, about = (beside(m, rubbing) for m in (found.final, found.selection.final))
+    fewer = done_without(
+        replace(found, final=both, selection=replace(found.selection, final=about)), rubbing, drive
+    )
+    assert fewer is not None
+    for model, before in ((fewer.final, found.final), (fewer.selection.final, found.selection.final)):
+        assert model.name == "gravity_load"
+        assert len(model.fit.problem.evidence) == len(before.fit.problem.evidence)
+        moment_Nm = before.fit.values["effect.gravity_load.moment_Nm"]
+        assert model.fit.values["effect.gravity_load.moment_Nm"] == pytest.approx(moment_Nm, rel=0.02)
+
+
+def beside(model: Model, h: Hypothesis) -> Model:
+    """The model with little of an effect beside it, fitted again."""
+    problem = with_entry(model.fit.problem, h, h.entry({**h.starts[0].values, "torque_Nm": 1e-4}))
+    fit = solve(problem, placed(model.fit, problem), 3)
+    return Model((*model.terms, h), fit, fit.residual)
 
 
 def test_a_time_that_is_up_is_said(drive: Calibrated) -> None:

@@ -42,6 +42,15 @@ def test_one_jaw_recording_names_the_friction_of_the_path(one_jaw: Diagnosis) ->
     assert one_jaw.verdict in ("explained", "partly explained")
 
 
+def test_without_a_load_the_path_is_named_and_not_the_jaw_in_its_place() -> None:
+    """In `L_2/02` friction of jaw and motor predict by a standard error better than that of path and motor, which
+    explains most alone."""
+    (path,) = [p for p in jaw.of_session("L_2") if p.name == "02.csv.gz"]
+    found = files.diagnosed(files.joint("davinci-jaw"), [path])
+    assert "routing_friction" in {n.effect for n in found.named}
+    assert not {"bearing_friction", "pulley_runout"} & {n.effect for n in found.named}
+
+
 def test_what_it_names_predicts_what_it_was_not_fitted_to(one_jaw: Diagnosis) -> None:
     before, after = one_jaw.baseline, one_jaw.augmented
     print(f"\n  jaw, one recording, kept for the end: {degrees(before.final_rmse_rad):.2f} -> "

@@ -11,7 +11,7 @@ from cablecomp.diagnosis.body import spread
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Selection, Term, placed, stripped
+from cablecomp.diagnosis.explain.model import Model, Selection, Term, placed, stripped, without
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.folds import Groups, make_groups
@@ -56,6 +56,21 @@ def search(drive: Calibrated, pool: Sequence[Hypothesis], rng: np.random.Generat
     return Search(pool, selection, final, groups, cut_short)
 
 
+def done_without(found: Search, term: Term, drive: Calibrated) -> Search | None:
+    """The search's model without one of its terms; None where it cannot follow the recordings then."""
+    smaller = without(found.final, term, found.groups)
+    if smaller is None:
+        return None
+    final = _settled(smaller.terms, smaller.fit, drive, found.groups)
+    whole = found.selection.final is found.final
+    about = final if whole else without(found.selection.final, term, found.selection.groups)
+    return (
+        None
+        if about is None
+        else replace(found, final=final, selection=replace(found.selection, final=about))
+    )
+
+
 def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:
     """The fit about some of its recordings."""
     return solve(fit.problem.with_evidence(some), fit.x, 6, J=derivative_of_part(fit, some))
@@ -77,9 +92,13 @@ def _nominal(fit: Fit) -> Fit:
 
 
 def _settled(terms: tuple[Term, ...], fit: Fit, drive: Calibrated, groups: Groups) -> Model:
-    """The fit with weights that its own remainder asks for, so that its uncertainties mean something."""
+    """The fit with weights that its own remainder asks for, so that its uncertainties mean something; as it is where
+    the drive cannot be followed with these."""
     for _ in range(2):
-        fit = refit(fit, weighed(fit, drive.floor), 6)
+        try:
+            fit = refit(fit, weighed(fit, drive.floor), 6)
+        except InputError:
+            break
     return Model(terms, fit, left_out(fit, groups))
 
 

@@ -12,6 +12,7 @@ from cablecomp.diagnosis.explain.model import (
     Round,
     Term,
     amount_resolved,
+    bears,
     common,
     loss,
     ranked,
@@ -107,7 +108,7 @@ def _in_its_place(
         fit = solve(begun[0].problem, begun[0].x, LIMITS.settled, LIMITS.tolerance, begun[0].J)
     except InputError:
         return None
-    if runs_away(fit, other) or not amount_resolved(fit, other):
+    if runs_away(fit, other) or not amount_resolved(fit, other) or not bears(fit):
         return None
     return Model((*base.terms, other), fit, left_out(fit, groups))
 
