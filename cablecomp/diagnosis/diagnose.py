@@ -89,13 +89,14 @@ def _counted(body: Body, fit: Fit) -> tuple[Evidence, ...]:
 def _weighed(
     case: Case, found: Search, rng: np.random.Generator
 ) -> tuple[Search, Remainder, Sequence[Weighed]]:
-    """The search's model, what it leaves, its effects weighed; without those that are not missed beside the others,
-    weakest first: of three that trade places none is missed while the others are there."""
+    """The search's model, what it leaves, its effects weighed. Where none of them is sure, without those that are not
+    missed beside the others, weakest first: of three that trade places none is missed while the others are there."""
     while True:
         after = case.remainder_of(found.final.fit, rng)
         weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
         needless = [w for w in weighed if w.evidence["z"] < LIMITS.z_missed and w.depends is None]
-        if not needless or len(weighed) < 2:
+        sure = any(w.confidence >= LIMITS.name for w in weighed)
+        if sure or not needless or len(weighed) < 2:
             return found, after, weighed
         fewer = done_without(found, min(needless, key=lambda w: w.evidence["z"]).term, case.drive)
         if fewer is None:

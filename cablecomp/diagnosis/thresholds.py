@@ -220,8 +220,8 @@ class Thresholds:
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     z_missed: float = 0.0
     """Standard errors by which the final model has to predict better than without an effect, its other laws in other
-    forms in both, or that effect goes: three kinds of friction of one jaw recording (`L_4/44`) took off 95 % together,
-    and none of them was missed."""
+    forms in both, or that effect goes where none is named: three kinds of friction of one jaw recording (`L_4/44`) took
+    off 95 % together, and none of them was missed."""
     name: float = 0.5
     """Confidence from which an effect is named; weaker ones are candidates."""
     event_size: float = 4.5

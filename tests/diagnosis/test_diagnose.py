@@ -195,18 +195,23 @@ def test_a_zero_set_anew_between_recordings_is_no_slip(sigmas: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("z", "kept"), [([-2.7, -0.6, 0.2], 1), ([3.0, 5.0], 2), ([-1.0], 1), ([0.1, 4.0], 2)]
+    ("z", "surest", "kept"),
+    [([-2.7, -0.6, 0.2], 0.4, 1), ([-2.7, -0.6, 0.2], 0.6, 3), ([0.1, 0.2], 0.4, 2), ([-1.0], 0.1, 1)],
 )
-def test_what_is_not_missed_beside_the_others_goes_weakest_first(
-    monkeypatch: pytest.MonkeyPatch, z: list[float], kept: int
+def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_first(
+    monkeypatch: pytest.MonkeyPatch, z: list[float], surest: float, kept: int
 ) -> None:
-    """Of three that trade places each is missed (z = 5) once it is alone; one alone stays whatever it shows."""
+    """Of three that trade places the last is missed (z = 5) once it is alone; where one is sure all stay, as one alone
+    does whatever it shows."""
     shown = {str(k): v for k, v in enumerate(z)}
 
     def weighed(names: Sequence[str], *_: Any) -> list[Any]:
         alone = len(names) == 1 and len(z) > 1
         return [
-            SimpleNamespace(term=n, depends=None, evidence={"z": 5.0 if alone else shown[n]}) for n in names
+            SimpleNamespace(
+                term=n, depends=None, confidence=surest, evidence={"z": 5.0 if alone else shown[n]}
+            )
+            for n in names
         ]
 
     def less(found: Any, term: str, drive: Any) -> Any:
