@@ -100,9 +100,9 @@ class Thresholds:
     """Share of the cost that a step has to win while hypotheses are compared, or the fit ends: names differ by
     far more."""
     beyond_plausible: float = 2.0
-    """Bound over the largest plausible amount from which an effect that ends on it is no explanation (bounds lie ten
-    times as far where amounts are known roughly): set on the jaw's L_4/13, where a pulley a third of its radius off its
-    centre bent what was left of a short stroke."""
+    """Times the largest plausible amount beyond which an effect is no explanation where it ends on its bound, or where
+    the drive is known by order of magnitude only (bounds lie ten times as far there): set on the jaw's L_4/13, where a
+    pulley a third of its radius off its centre bent what was left of a short stroke."""
     on_bound: float = 0.98
     """Share of the bound from which an amount is on it."""
     none: float = 2e-4

@@ -81,6 +81,11 @@ class Parameter:
         return self.name.partition("~")[2] or None
 
 
+def vague_drive(parameters: Sequence[Parameter]) -> bool:
+    """Whether the drive is known by order of magnitude only: a parameter of its own is."""
+    return any(p.vague and not p.of_effect for p in parameters)
+
+
 def of_drive(
     config: JointConfig, further: Mapping[str, float] = MappingProxyType({})
 ) -> tuple[Parameter, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, covariance
+from cablecomp.estimation.parameter import vague_drive
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
@@ -17,8 +18,7 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     too). Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated
     drive's mean square (`removes`)."""
     found = amount_of(fit, term)
-    vague = any(p.vague and not p.of_effect for p in fit.problem.parameters)
-    if not term.has_instant or found is None or vague:
+    if not term.has_instant or found is None or vague_drive(fit.problem.parameters):
         return ""
     amount, value = found
     sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))

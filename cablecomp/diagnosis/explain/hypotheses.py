@@ -15,7 +15,7 @@ from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter as Free
-from cablecomp.estimation.parameter import of_effect
+from cablecomp.estimation.parameter import of_effect, vague_drive
 
 
 @dataclass(frozen=True)
@@ -266,26 +266,20 @@ def runs_away(fit: Fit, h: Hypothesis) -> bool:
     """Whether an effect's amount lies far beyond what is plausible, for the drive as configured and as fitted, and
     nothing holds it: it is on its bound, or the drive is known by order of magnitude only (a pulley whose centre is a
     third of its radius off bends a short stroke to anything)."""
-    over = min(_over_plausible(fit, h, fit.problem.config), over_plausible(fit, h))
-    if over <= LIMITS.beyond_plausible:
-        return False
-    held = not any(p.vague for p in fit.problem.parameters if not p.of_effect)
-    return not held or _on_bound(fit, h)
-
-
-def _on_bound(fit: Fit, h: Hypothesis) -> bool:
     found = amount_of(fit, h)
     if found is None:
         return False
     p, value = found
-    return abs(value) > LIMITS.on_bound * abs(p.high if value > 0.0 else p.low)
+    configured = abs(value) / max(abs(b) for b in h.amount.bounds(fit.problem.config))
+    if min(configured, over_plausible(fit, h)) <= LIMITS.beyond_plausible:
+        return False
+    return vague_drive(fit.problem.parameters) or abs(value) > LIMITS.on_bound * abs(
+        p.high if value > 0.0 else p.low
+    )
 
 
 def over_plausible(fit: Fit, h: Hypothesis) -> float:
     """An effect's amount over the largest that is plausible for the drive as fitted; 0 where it has none."""
-    return _over_plausible(fit, h, fit.problem.joint(fit.x, fit.problem.evidence[0]))
-
-
-def _over_plausible(fit: Fit, h: Hypothesis, joint: JointConfig) -> float:
     found = amount_of(fit, h)
+    joint = fit.problem.joint(fit.x, fit.problem.evidence[0])
     return 0.0 if found is None else abs(found[1]) / max(abs(b) for b in h.amount.bounds(joint))
