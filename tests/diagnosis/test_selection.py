@@ -6,24 +6,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
+from grouped import GROUPS, NOISE, WAVE
 
 from cablecomp.diagnosis.explain import selection, ties
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.folds import Groups
 from cablecomp.signal.smoothing import FloatArray
-
-ROWS, BLOCKS = 600, 20
-GROUPS = Groups(
-    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS),
-    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS) % 6,
-    "block",
-    np.zeros(ROWS, dtype=np.int64),
-)
-WAVE = np.sin(np.arange(ROWS) / 25.0)
-NOISE = np.random.default_rng(1).standard_normal(ROWS)
 
 
 def model(size: float, *names: str) -> Model:

@@ -5,23 +5,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
+from grouped import GROUPS, NOISE, WAVE
 
 from cablecomp.diagnosis.explain import ties
 from cablecomp.diagnosis.explain.model import Model, Round, Tried
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.folds import Groups
-
-ROWS, BLOCKS = 600, 20
-GROUPS = Groups(
-    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS),
-    np.repeat(np.arange(BLOCKS), ROWS // BLOCKS) % 6,
-    "block",
-    np.zeros(ROWS, dtype=np.int64),
-)
-NOISE = np.random.default_rng(1).standard_normal(ROWS)
-WAVE = np.sin(np.arange(ROWS) / 25.0)
 
 
 def model(more: float, *names: str, parameters: int = 2) -> Model:
