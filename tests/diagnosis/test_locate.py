@@ -10,7 +10,7 @@ from planted import SIGMA, autoregressive, causes, columns, recording
 
 from cablecomp.diagnosis.locate.covariates import Covariates, covariates
 from cablecomp.diagnosis.locate.crossfit import block_sums, gains, surrogate_gains
-from cablecomp.diagnosis.locate.location import locate
+from cablecomp.diagnosis.locate.location import Mismatch, beyond_chance_first, locate
 from cablecomp.diagnosis.locate.segments import segment
 from cablecomp.diagnosis.locate.series import make_series, thin
 from cablecomp.diagnosis.locate.views import hats, load_path
@@ -169,3 +169,26 @@ def gain_of_rows(basis: FloatArray, residual: FloatArray, weight: FloatArray, bl
         c = np.linalg.lstsq(stacked, np.concatenate((target[~here], np.zeros(len(ridge)))), rcond=None)[0]
         gain += float(np.sum(target[here] ** 2) - np.sum((target[here] - rows[here] @ c) ** 2))
     return gain
+
+
+@pytest.mark.parametrize(
+    ("shares", "p_values", "first"),
+    [
+        ((0.35, 0.32), (0.16, 0.001), 1),
+        ((0.35, 0.32), (0.04, 0.001), 0),  # both beyond chance: the larger
+        ((0.35, 0.20), (0.16, 0.001), 0),  # accounts for far less
+        ((0.35, 0.32), (0.16, 0.2), 0),
+        ((0.35, 0.34, 0.33), (0.3, 0.2, 0.01), 2),
+    ],
+)
+def test_what_is_followed_beyond_chance_goes_before_what_may_be_chance(
+    shares: tuple[float, ...], p_values: tuple[float, ...], first: int
+) -> None:
+    parts = tuple(
+        Mismatch(str(k), share, 0.0, 1.0, (), p, "")
+        for k, (share, p) in enumerate(zip(shares, p_values, strict=True))
+    )
+    found = beyond_chance_first(parts)
+    assert found[0] is parts[first]
+    assert sorted(m.covariate for m in found) == [m.covariate for m in parts]
+    assert beyond_chance_first(()) == ()

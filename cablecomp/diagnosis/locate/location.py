@@ -17,6 +17,10 @@ _ENERGY_SHARE: Final = 0.8
 """Share of the fitted energy that a range, or intervals, are told to hold."""
 _TIE: Final = 0.05
 """Least difference of shares by which one covariate is told before another, whatever each leaves of the other."""
+_NEAR: Final = 0.9
+"""Share over the first one's from which a covariate that is followed beyond chance is told before one that is not."""
+_CHANCE: Final = 0.05
+"""p-value below which something is followed beyond chance."""
 _MOST_INTERVALS: Final = 40
 """Intervals that are told of one covariate."""
 
@@ -62,7 +66,7 @@ class Location:
     mismatch: tuple[Mismatch, ...]
     changes_s: tuple[float, ...]
 
-    def significant(self, level: float = 0.05) -> tuple[Mismatch, ...]:
+    def significant(self, level: float = _CHANCE) -> tuple[Mismatch, ...]:
         """Return the covariates whose corrected p-value is below `level`."""
         return tuple(entry for entry in self.mismatch if entry.p_value < level)
 
@@ -129,7 +133,7 @@ def locate(
     the largest score over all views of each surrogate. `nuisance` (n x p): sensitivities of the prediction
     to the calibration parameters; what they can explain is not counted, for the covariate or against it. `drive`:
     what the drive itself makes of laws that change along a covariate.
-    Near ties go to the covariate that leaves less to the other.
+    Near ties go to the covariate that leaves less to the other, and to one that is followed beyond chance.
     """
     ground, said = _ground(series, nuisance, drive)
     answers, highest = _asked(ground, said, rng, surrogates)
@@ -140,7 +144,17 @@ def locate(
         for answer in _ranked(_best_views(answers, ground.excess), ground)
     )
     times = ground.series.covariates.values["time"][pieces.changes]
-    return Location(mismatch, tuple(float(t) for t in times))
+    return Location(beyond_chance_first(mismatch), tuple(float(t) for t in times))
+
+
+def beyond_chance_first(mismatch: tuple[Mismatch, ...]) -> tuple[Mismatch, ...]:
+    """Covariates, best first, but where the first may be chance, one before it that is not and accounts for nearly as
+    much."""
+    if not mismatch or mismatch[0].p_value < _CHANCE:
+        return mismatch
+    sure = [m for m in mismatch if m.p_value < _CHANCE and m.share >= _NEAR * mismatch[0].share]
+    first = max(sure, key=lambda m: m.share, default=mismatch[0])
+    return (first, *(m for m in mismatch if m is not first))
 
 
 def _asked(
