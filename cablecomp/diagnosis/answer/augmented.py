@@ -24,8 +24,8 @@ STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
 def augmented_joint(
     config: JointConfig, model: Model, laws: Sequence[Empirical], names: Sequence[str]
 ) -> JointConfig:
-    """The configuration with what was fitted. Several sessions, or a parameter that depends on something: a
-    `[[session]]` for each way in which the drive stood, which claims its recordings."""
+    """The configuration with what was fitted, tolerances as they were. Several sessions, or a parameter that depends on
+    something: a `[[session]]` for each way in which the drive stood, which claims its recordings."""
     fit = model.fit
     zeros = fit.problem.zeros(fit.x)
     tied = any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)
@@ -35,7 +35,6 @@ def augmented_joint(
     joint = common.model_copy(
         update={
             "empirical": (*config.empirical, *laws),
-            "tolerance": dict(config.tolerance),
             "depends": (*config.depends, *_depends(model, first)),
         }
     )
