@@ -64,11 +64,9 @@ def done_without(found: Search, term: Term, drive: Calibrated) -> Search | None:
     final = _settled(smaller.terms, smaller.fit, drive, found.groups)
     whole = found.selection.final is found.final
     about = final if whole else without(found.selection.final, term, found.selection.groups)
-    return (
-        None
-        if about is None
-        else replace(found, final=final, selection=replace(found.selection, final=about))
-    )
+    if about is None:
+        return None
+    return replace(found, final=final, selection=replace(found.selection, final=about))
 
 
 def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:
