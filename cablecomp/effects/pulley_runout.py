@@ -23,6 +23,7 @@ def _wind(c: Any, p: Any, s: Any) -> None:
     arm = p.eccentricity * math.cos(angle)
     whole = c.load - c.moment + p.hanging
     c.moment += whole * arm / (p.radius + arm)
+    c.moment_slope *= p.radius / (p.radius + arm)
     c.moment_slope -= whole * p.eccentricity * math.sin(angle) * p.radius / (p.radius + arm) ** 2
 
 
