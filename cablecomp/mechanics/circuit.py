@@ -33,6 +33,8 @@ class Solved(NamedTuple):
     angle: float  # of the output pulley, rad
     compliance: float  # rad/(N m)
     status: int
+    by_h: float  # turn of the output pulley per length of cable h wound up between its drums, rad/m
+    by_l: float  # of cable l
 
 
 @inlined_kernel
@@ -72,6 +74,8 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
     x = x_guess
     last_l = d.states[first_l + count - 1]
     unit = d.cables[first_l + count - 1].T0
+    weight_h, weight_l = d.cables[first_h + count - 1].weight, d.cables[first_l + count - 1].weight
+    by_h = by_l = 0.0
     lowest = floor if pull >= 0.0 else floor - pull
     if closed:
         guess = last_l.unloaded - last_l.share * pull + last_l.miss
@@ -79,7 +83,7 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
     else:
         tension = unit * last_l.pretension
         if tension + pull <= floor:
-            return Solved(x, 0.0, STATUS_SLACK)
+            return Solved(x, 0.0, STATUS_SLACK, by_h, by_l)
     low, high = lowest, 1e300
     on_h = on_l = Chain(0.0, 0.0, 0.0)
     for iteration in range(80):
@@ -93,17 +97,21 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
         off = rigid + on_h.theta - x
         if not closed:
             turn = off / (1.0 - on_h.by_shaft)
+            by_h = -weight_h / (1.0 - on_h.by_shaft)
             if laws is None and count == 1 and abs(turn) <= SMALL and cable_nudge(d, first_h, 0.0, turn):
-                return Solved(x + turn, on_h.compliance / radius, STATUS_OK)
+                return Solved(x + turn, on_h.compliance / radius, STATUS_OK, by_h, by_l)
             if abs(turn) <= (1e-11 if iteration < 12 else 1e-9):
-                return Solved(x + turn, on_h.compliance / radius, STATUS_OK)
+                return Solved(x + turn, on_h.compliance / radius, STATUS_OK, by_h, by_l)
             x += turn if iteration < 12 else off
             continue
         gap = on_h.theta + on_l.theta
         if tension <= lowest and gap >= 0.0:  # one side is slack: the other alone carries and positions
             new = rigid + on_h.theta if pull >= 0.0 else rigid - on_l.theta
             if abs(new - x) <= 1e-11:
-                return Solved(new, (on_h.compliance if pull >= 0.0 else on_l.compliance) / radius, STATUS_OK)
+                by_h = -weight_h / (1.0 - on_h.by_shaft) if pull >= 0.0 else 0.0
+                by_l = weight_l / (1.0 + on_l.by_shaft) if pull < 0.0 else 0.0
+                compliance = (on_h.compliance if pull >= 0.0 else on_l.compliance) / radius
+                return Solved(new, compliance, STATUS_OK, by_h, by_l)
             x = new
             continue
         # Newton in (T_l, x) on gap = 0 and off = 0
@@ -112,13 +120,14 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
         scale = 1.0 / (by_tension * (on_h.by_shaft - 1.0) - on_h.compliance * by_shaft)
         step = (off * by_shaft - gap * (on_h.by_shaft - 1.0)) * scale
         turn = (gap * on_h.compliance - off * by_tension) * scale
+        by_h, by_l = weight_h * on_l.compliance * scale, -weight_l * on_h.compliance * scale
         if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
-            return Solved(x + turn, compliance, STATUS_OK)
+            return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)
         if laws is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
             if abs(step) <= SMALL * min(tension, tension + pull):
                 done = cable_nudge(d, first_h, step, turn)
                 if done and cable_nudge(d, first_l, step, turn):
-                    return Solved(x + turn, compliance, STATUS_OK)
+                    return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)
         x += turn
         if gap > 0.0:
             high = tension
@@ -129,10 +138,10 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
             tension = lowest
         elif iteration > 8 and high < 1e299:
             if high - low <= 1e-11 * unit:
-                return Solved(x, compliance, STATUS_OK)
+                return Solved(x, compliance, STATUS_OK, by_h, by_l)
             if not low < tension < high:
                 tension = 0.5 * (low + high)
-    return Solved(x, 0.0, STATUS_DIVERGED)
+    return Solved(x, 0.0, STATUS_DIVERGED, by_h, by_l)
 
 
 @inlined_kernel

@@ -53,7 +53,7 @@ def _distribute(d: Drive) -> None:
 def _solve_all(d: Drive, laws: Floats, moment: float) -> Solved:
     """The joint with `moment` [N m] on its output pulley, through all circuits from the motor outward."""
     angle = d.context.motor
-    compliance = 0.0
+    compliance = by_h = by_l = 0.0
     for ic in range(d.size.circuits):
         circuit = d.circuits[ic]
         last = d.states[circuit.first[0] + circuit.count - 1]
@@ -61,9 +61,10 @@ def _solve_all(d: Drive, laws: Floats, moment: float) -> Solved:
         solved = circuit_solve(d, laws, ic, moment * circuit.share, angle, guess)
         angle = solved.angle
         if solved.status != STATUS_OK:
-            return Solved(angle, compliance, solved.status)
+            return Solved(angle, compliance, solved.status, by_h, by_l)
         compliance = compliance * circuit.ratio * circuit.ratio + solved.compliance
-    return Solved(angle, compliance, STATUS_OK)
+        by_h, by_l = solved.by_h, solved.by_l
+    return Solved(angle, compliance, STATUS_OK, by_h, by_l)
 
 
 @inlined_kernel
@@ -85,8 +86,9 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
     if d.size.terms == 0:
         solved = _solve_all(d, laws, load)
     else:
-        solved = Solved(x.joint, 0.0, STATUS_DIVERGED)
+        solved = Solved(x.joint, 0.0, STATUS_DIVERGED, 0.0, 0.0)
         low, high = -1e300, 1e300
+        followed = False
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
@@ -100,7 +102,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
                 continue
             if solved.status != STATUS_OK:
                 break
-            moved = abs(solved.angle - x.joint)
+            moved = solved.angle - x.joint
             x.joint = solved.angle
             _show_tensions(d)
             run_terms(d, terms)
@@ -108,13 +110,26 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
             scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15
             # settled, or nothing that the solve depends on has followed the angle
             same = x.length_h == before_h and x.length_l == before_l
-            if abs(excess) <= scale and (moved <= 1e-12 or (same and before_slope == 0.0)):
+            if abs(excess) <= scale and (abs(moved) <= 1e-12 or (same and before_slope == 0.0)):
                 break
+            # lengths that follow the angle turn it further: on to where that ends (Steffensen's step)
+            turn = solved.by_h * (x.length_h - before_h) + solved.by_l * (x.length_l - before_l)
+            reach = 1.0
+            if turn != 0.0:
+                followed = True
+                if abs(turn) < 0.95 * abs(moved):
+                    reach = 1.0 / (1.0 - turn / moved)
+                    x.joint += reach * turn
+                    run_terms(d, terms)
+                    excess = moment - (load - x.moment)
             if excess > 0.0:
                 high = min(high, moment)
             else:
                 low = max(low, moment)
-            moment -= excess / (1.0 + x.moment_slope * solved.compliance)
+            step = excess / (1.0 + x.moment_slope * solved.compliance * reach)
+            if followed and abs(step) > 1e5 * (high - low):
+                low, high = -1e300, 1e300  # an end found while the angle was still far off
+            moment -= step
             if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
                 moment = 0.5 * (low + high)
     x.joint = solved.angle

@@ -78,3 +78,15 @@ def still(time: Floats, load: Floats, motor: Floats | float = 0.0, **more: Float
         "joint_torque_Nm": load,
         **more,
     }
+
+
+def second_differences(time: Floats, q: Floats) -> Floats:
+    """Acceleration by the two-step backward formula, twice, even steps; zero for the first two samples."""
+    h = time[1] - time[0]
+    v = np.zeros_like(q)
+    v[0] = v[1] = (q[1] - q[0]) / h
+    a = np.zeros_like(q)
+    for n in range(2, len(q)):
+        v[n] = (1.5 * q[n] - 2.0 * q[n - 1] + 0.5 * q[n - 2]) / h
+        a[n] = (1.5 * v[n] - 2.0 * v[n - 1] + 0.5 * v[n - 2]) / h
+    return a

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from effect_cases import Columns, Floats, excitation, joint, run, still
+from effect_cases import Columns, Floats, excitation, joint, run, second_differences, still
 
 from cablecomp.config import JointConfig
 
@@ -64,18 +64,6 @@ def test_gravity_turns_with_the_joint(name: str) -> None:
     ]
     expected = fed_with(config, columns, columns["joint_torque_Nm"] - weight * np.sin(found + 0.7))
     assert found == pytest.approx(expected, abs=1e-10)
-
-
-def second_differences(time: Floats, q: Floats) -> Floats:
-    """Acceleration by the two-step backward formula, twice, even steps; zero for the first two samples."""
-    h = time[1] - time[0]
-    v = np.zeros_like(q)
-    v[0] = v[1] = (q[1] - q[0]) / h
-    a = np.zeros_like(q)
-    for n in range(2, len(q)):
-        v[n] = (1.5 * q[n] - 2.0 * q[n - 1] + 0.5 * q[n - 2]) / h
-        a[n] = (1.5 * v[n] - 2.0 * v[n - 1] + 0.5 * v[n - 2]) / h
-    return a
 
 
 @pytest.mark.parametrize("name", JOINTS)
