@@ -103,3 +103,34 @@ def test_steps_of_two_stages(benchmark: Any, names: tuple[str, ...], bounds: boo
     p50, p99 = np.percentile(taken, [50, 99])
     benchmark.extra_info.update(p50_us=p50, p99_us=p99)
     print(f"\n{'+'.join(names) or 'plain'}{', bounds' if bounds else ''}: p50 {p50:.1f} p99 {p99:.1f} us")
+
+
+@pytest.mark.benchmark(group="replay, the output pulley off its centre")
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.25, 0.5])
+def test_runout_over_plain(benchmark: Any, share: float) -> None:
+    """How many plain rows a row costs whose cable lengths follow the angle; about three, however far off."""
+    config = load_joint(CONFIG.with_name("tendon-finger.toml"))
+    stage = config.drive.stage[-1]
+    effect = ("pulley_runout", {"eccentricity_m": share * stage.output_radius_m, "phase_rad": 0.5})
+    time = 1e-3 * np.arange(SAMPLES)
+    columns = {
+        "time_s": time,
+        "motor_position_rad": 0.6 * np.sin(0.9 * time),
+        "joint_torque_Nm": 0.12 * np.sin(2.3 * time) * np.cos(0.31 * time),
+    }
+
+    def seconds(chosen: JointConfig) -> float:
+        """Of the quickest of five replays."""
+        best = np.inf
+        for _ in range(5):
+            observer = Observer(chosen)
+            observer.compile()
+            begin = perf_counter()
+            observer.run(columns)
+            best = min(best, perf_counter() - begin)
+        return best
+
+    plain = seconds(config)
+    off = benchmark.pedantic(lambda: seconds(with_effects(config, [effect])), rounds=1)
+    benchmark.extra_info["over_plain"] = off / plain
+    print(f"\n{100.0 * share:.0f} % off its centre: {off / plain:.1f} plain rows")
