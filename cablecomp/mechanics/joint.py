@@ -16,6 +16,9 @@ from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
 
+UNSETTLED = 1e-6
+"""Share of the moments by which a row may miss its balance after all iterations; farther off it is refused."""
+
 
 @inner_kernel
 def run_terms(d: Drive, terms: Terms) -> None:
@@ -89,6 +92,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
         solved = Solved(x.joint, 0.0, STATUS_DIVERGED, 0.0, 0.0)
         low, high = -1e300, 1e300
         followed = False
+        excess = 0.0
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
@@ -132,6 +136,8 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
             moment -= step
             if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
                 moment = 0.5 * (low + high)
+        if solved.status == STATUS_OK and abs(excess) > UNSETTLED * (abs(load) + abs(moment)) + 1e-9:
+            solved = Solved(solved.angle, solved.compliance, STATUS_DIVERGED, 0.0, 0.0)
     x.joint = solved.angle
     x.compliance = solved.compliance
     _show_tensions(d)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def test_the_angle_winds_up_what_the_motor_lets_out(share: float) -> None:
 
 
 @term(parameters=("channel",))
-def wind_up(c, p, s):  # type: ignore[no-untyped-def]
+def wind_up(c: Any, p: Any, s: Any) -> None:
     c.length_h += c.other[int(p.channel)]
     c.length_l -= c.other[int(p.channel)]
 
