@@ -12,7 +12,7 @@ from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Senso
 from cablecomp.config.schema import JointConfig
 from cablecomp.config.sessions import Depends, Empirical, Session
 from cablecomp.config.toml_file import TomlTable, read_toml
-from cablecomp.config.values import in_session, session_of, with_values
+from cablecomp.config.values import claiming, in_session, session_of, with_values
 
 __all__ = [
     "Depends",
@@ -31,6 +31,7 @@ __all__ = [
     "Stage",
     "Text",
     "TomlTable",
+    "claiming",
     "doubts",
     "in_session",
     "load_joint",

@@ -23,8 +23,8 @@ class Session(Frozen):
     """One `[[session]]`; without a name (`[session]`) it says what holds for all sessions.
 
     `own`: names of the parameters that may differ from session to session. `recordings`: patterns of paths
-    (`*` and `?` as in a shell; a folder stands for all that is in it), matched from the right. `values`: what
-    this session's own parameters are, by name.
+    (`*` and `?` as in a shell; a folder stands for all that is in it), matched from the right; one that is a
+    recording's own path goes before all others. `values`: what this session's own parameters are, by name.
     """
 
     name: str = ""
@@ -42,6 +42,10 @@ class Session(Frozen):
         """Whether one of the patterns names this recording or a folder that it is in."""
         places = (recording, *recording.parents)
         return any(place.match(pattern) for pattern in self.recordings for place in places if place.name)
+
+    def names(self, recording: Path) -> bool:
+        """Whether one of the patterns is this recording's own path, from the right."""
+        return any(recording.parts[-len(p.parts) :] == p.parts for p in map(Path, self.recordings))
 
 
 class Depends(Frozen):

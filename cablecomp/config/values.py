@@ -57,6 +57,12 @@ def effect_name(name: str) -> tuple[str, str]:
     return parts[1], parts[2]
 
 
+def claiming(config: JointConfig, recording: Path | None) -> list[Session]:
+    """The sessions that claim a recording: those that name it, else all whose patterns match."""
+    matching = [s for s in config.sessions if recording is not None and s.matches(recording)]
+    return [s for s in matching if recording is not None and s.names(recording)] or matching
+
+
 def session_of(config: JointConfig, recording: Path | None, name: str | None) -> Session | None:
     """The session by its name, else the one whose patterns match the recording; None if there is none.
 
@@ -68,7 +74,7 @@ def session_of(config: JointConfig, recording: Path | None, name: str | None) ->
         if not found:
             raise InputError(f"--session {name}: {config.name} has no session of that name; it has {known}")
         return found[0]
-    matching = [s for s in config.sessions if recording is not None and s.matches(recording)]
+    matching = claiming(config, recording)
     if len(matching) > 1:
         names = ", ".join(s.name for s in matching)
         raise InputError(f"{recording}: several sessions claim it ({names}); choose one with --session")

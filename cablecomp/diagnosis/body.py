@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, claiming
 from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -31,10 +31,15 @@ class Body:
     final_by: str
 
     @property
+    def whole_for_the_end(self) -> tuple[Evidence, ...]:
+        """Recordings of which nothing is used before the end."""
+        return tuple(f for f in self.final if f.name not in {u.name for u in self.used})
+
+    @property
     def sessions(self) -> dict[str, list[str]]:
         """Recordings of each session."""
         found: dict[str, list[str]] = {}
-        for e in (*self.used, *(f for f in self.final if f.name not in {u.name for u in self.used})):
+        for e in (*self.used, *self.whole_for_the_end):
             found.setdefault(e.session, []).append(e.name)
         return found
 
@@ -46,7 +51,7 @@ def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | No
     paths = {name: PurePath(name) for name in names}
     files, folders = _told_apart(set(paths.values())), _told_apart({p.parent for p in paths.values()})
     for name, path in paths.items():
-        claimed = [s.name for s in config.sessions if s.matches(Path(name))] if mode is None else []
+        claimed = [s.name for s in claiming(config, Path(name))] if mode is None else []
         if claimed:
             found[name] = claimed[0]
         elif mode == "each":

@@ -95,7 +95,7 @@ def calibrate(
     unknown = _not_told(fit)
     spread, tied = _spread(fit), _tied(fit)
     fit = _without(fit, tuple(unknown))
-    joint = augmented_joint(config, Model((), fit, fit.residual), (), body.names)
+    joint = augmented_joint(config, Model((), fit, fit.residual), ())
     return Calibration(
         with_tolerances(joint, fit, spread),
         tuple(_as_wide(v, fit, spread) for v in drive_values(fit, config)),

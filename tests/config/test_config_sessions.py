@@ -81,6 +81,20 @@ def test_a_session_is_found_by_name_or_by_the_recordings_path() -> None:
         session_of(joint, Path("night/monday/a.csv"), None)
 
 
+def test_a_recording_that_is_named_goes_before_its_folder() -> None:
+    text = """
+[[session]]
+name = "after"
+recordings = ["monday"]
+[[session]]
+name = "before"
+recordings = ["monday/a.csv"]
+"""
+    for path, expected in {"x/monday/a.csv": "before", "x/monday/b.csv": "after", "b/a.csv": None}.items():
+        found = session_of(config(text), Path(path), None)
+        assert (found and found.name) == expected, path
+
+
 def test_a_sessions_values_take_the_place_of_the_joints_own() -> None:
     joint = config(SESSIONS)
     monday = in_session(joint, joint.sessions[0])

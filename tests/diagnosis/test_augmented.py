@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import log
+from pathlib import Path
 
+import numpy as np
 import pytest
-from joints import SMALL, closed
-from small_drive import recorded
+from joints import SMALL, SMALL_NOISE, closed
+from small_drive import TOLERANT, course, recorded
 
-from cablecomp.config import parse_joint
+from cablecomp.config import JointConfig, parse_joint
+from cablecomp.diagnosis.answer.augmented import augmented_joint
+from cablecomp.diagnosis.body import Columns, gather_body
+from cablecomp.diagnosis.calibration.drive import first_weights
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.diagnosis.result import Diagnosis
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.result import Diagnosis, Value
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.standing import as_it_stood
+from cablecomp.observer import Observer
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 VAGUE = {"pretension_N": 1.0, "mu_output": 1.0, "mu_input": 1.0, "EA_N": 0.02}
+SLIP_M = 2e-4
+LEFT_RAD = 0.125 * SLIP_M / (2.0 * SMALL["output_radius_m"])
+"""An eighth of what a slip of one cable moves the joint by: a recording begun in mid-motion carries over more than
+the sensors' noise."""
 AS_BUILT = closed(SMALL)["drive"]["stage"][0]
 
 
@@ -40,3 +59,80 @@ def test_what_the_recordings_do_not_tell_is_known_no_better_than_before() -> Non
     """A motor that stands still: no cable runs over the motor's pulley but by its stretch."""
     tolerance = diagnosed(locked=True).augmented_joint.tolerance
     assert tolerance["mu_input"] == pytest.approx(1.0)
+
+
+def one_after_the_other(slip_s: float) -> dict[str, Columns]:
+    """90 s of the small joint in which a clamp slips, cut into three recordings, each of which starts its own clock."""
+    time, motor, load = course(90.0)
+    slip = EffectSpec("clamp_slip", {"slip_m": SLIP_M, "time_s": slip_s})
+    found = simulate(PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=[slip]).channels()
+    rng = np.random.default_rng(3)
+    noisy = {name: found[name] + sd * rng.standard_normal(len(time)) for name, sd in SMALL_NOISE.items()}
+    parts = {f"day/{k}": (time >= 30.0 * k) & (time < 30.0 * (k + 1)) for k in range(3)}
+    return {
+        name: {"time_s": time[part] - time[part][0], **{c: v[part] for c, v in noisy.items()}}
+        for name, part in parts.items()
+    }
+
+
+def left_rad(joint: JointConfig, recording: str, columns: Columns) -> float:
+    """What the joint, as it stood in a recording, leaves of its second half (RMS)."""
+    stood, _, _ = as_it_stood(joint, Path(recording), lambda: columns)
+    predicted = Observer(stood).run(columns)["joint_position_rad"] + stood.sensors.joint_position_offset_rad
+    half = len(predicted) // 2
+    return float(np.sqrt(np.mean((columns["joint_position_rad"] - predicted)[half:] ** 2)))
+
+
+def test_an_event_stands_on_each_recordings_own_clock() -> None:
+    """Before the slip there is none, in its recording it comes when it came, and from then on it has been."""
+    recordings = one_after_the_other(slip_s=45.0)
+    found = diagnose(TOLERANT, recordings)
+    assert [n.effect for n in found.named] == ["clamp_slip"]
+    said = found.named[0].parameters
+    assert said["recording"] == "day/1"
+    assert isinstance(said["time_s"], Value)
+    assert abs(said["time_s"].value - 15.0) < 0.2
+    joint = found.augmented_joint
+    instants = {}
+    for name, columns in recordings.items():
+        assert left_rad(joint, name, columns) < LEFT_RAD, name
+        (slip,) = as_it_stood(joint, Path(name), lambda columns=columns: columns)[0].effect
+        instants[name] = slip.parameters["time_s"] if slip.parameters["slip_m"] else None
+    assert instants == {"day/0": None, "day/1": pytest.approx(15.0, abs=0.1), "day/2": 0.0}
+    later = left_rad(joint, "day/3", recordings["day/2"])
+    assert later < LEFT_RAD  # it has not been mended since
+
+
+def with_a_slip(evidence: Sequence[Evidence], instant_s: float) -> Model:
+    """A drive that slips at an instant on the common clock, as it is, not fitted."""
+    slip = next(h for h in hypotheses(TOLERANT, evidence) if h.effect.id == "clamp_slip")
+    values = {**slip.starts[0].values, "slip_m": SLIP_M, "time_s": instant_s}
+    joint = TOLERANT.model_copy(update={"effect": (slip.entry(values),)})
+    free = (*of_drive(TOLERANT), *slip.free(values, TOLERANT))
+    problem = Problem(joint, free, tuple(evidence), first_weights(TOLERANT, evidence))
+    x = problem.start
+    residual = problem.residual(x)
+    return Model((slip,), Fit(problem, x, residual, np.zeros((len(residual), len(x)))), residual)
+
+
+@pytest.mark.parametrize(
+    ("slips_in", "expected"),
+    [
+        ("mon/1", {"mon/0": None, "mon/1": 8.0, "mon/2": 0.0, "mon/later": 0.0, "tue/0": 0.0, "wed/0": 0.0}),
+        ("tue/0", {"mon/0": None, "mon/1": None, "mon/later": None, "tue/0": 8.0, "tue/later": 0.0}),
+    ],
+)
+def test_a_session_before_an_event_knows_none_and_one_after_it_does(
+    slips_in: str, expected: dict[str, float | None]
+) -> None:
+    """Two sessions; one recording of the first is kept for the end, and stands as it stood all the same."""
+    names = ("mon/0", "mon/1", "mon/2", "tue/0")
+    evidence = gather_body(TOLERANT, {name: recorded([], 16.0) for name in names}).used
+    (e,) = (e for e in evidence if e.name == slips_in)
+    used = [e for e in evidence if e.name != "mon/0"]
+    joint = augmented_joint(TOLERANT, with_a_slip(used, 8.0 + e.shift_s), (), [evidence[0]])
+    for name, instant_s in expected.items():
+        (slip,) = as_it_stood(joint, Path(name), dict)[0].effect
+        found = slip.parameters["time_s"] if slip.parameters["slip_m"] else None
+        assert found == (None if instant_s is None else pytest.approx(instant_s)), name
+    assert joint.effect[0].parameters["time_s"] == 0.0  # as it stands now

@@ -3,13 +3,14 @@ controller run it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from math import hypot
+from collections.abc import Iterator, Mapping, Sequence
+from math import hypot, inf
 
 import numpy as np
 
-from cablecomp.config import Depends, Empirical, JointConfig, Session
+from cablecomp.config import Depends, Empirical, JointConfig, Session, with_values
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
@@ -22,42 +23,99 @@ STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
 
 
 def augmented_joint(
-    config: JointConfig, model: Model, laws: Sequence[Empirical], names: Sequence[str]
+    config: JointConfig, model: Model, laws: Sequence[Empirical], kept: Sequence[Evidence] = ()
 ) -> JointConfig:
-    """The configuration with what was fitted, tolerances as they were. Several sessions, or a parameter that depends on
-    something: a `[[session]]` for each way in which the drive stood, which claims its recordings."""
+    """The configuration with what was fitted, tolerances as they were. Several sessions, a parameter that depends on
+    something, or an event: a `[[session]]` for each way in which the drive stood, which claims its recordings, those
+    `kept` for the end among them."""
     fit = model.fit
     zeros = fit.problem.zeros(fit.x)
-    tied = any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)
-    sessions = fit.problem.sessions
-    first = fit.problem.evidence[0]
-    common = standing(fit.problem.config, fit.values, first)
+    first, latest = fit.problem.evidence[0], fit.problem.evidence[-1]
+    common = _afterwards(standing(fit.problem.config, fit.values, first), model, latest)
     joint = common.model_copy(
         update={
             "empirical": (*config.empirical, *laws),
             "depends": (*config.depends, *_depends(model, first)),
         }
     )
-    if len(sessions) == 1 and not tied:
-        return _with_zeros(joint, _zeros_of(zeros, sessions[0]))
-    entries = [Session(own=tuple(config.session_own))]
-    for session in sessions:
-        mine = [e for e in fit.problem.evidence if e.session == session]
-        ways = {tuple(e.condition.values()) for e in mine} if tied else {()}
-        for way in sorted(ways):
-            members = [e for e in mine if not tied or tuple(e.condition.values()) == way]
-            stood = standing(fit.problem.config, fit.values, members[0])
-            label = session + "".join(
-                f" {k} {v:.4g}" for k, v in zip(members[0].condition, way, strict=False)
-            )
-            entries.append(
-                Session(
-                    name=label,
-                    recordings=_patterns(members, names, session, tied),
-                    values={**_zeros_of(zeros, session), **_own(stood, common, fit)},
-                )
-            )
-    return joint.model_copy(update={"session": tuple(entries)})
+    sessions = fit.problem.sessions
+    if len(sessions) == 1:
+        joint = _with_zeros(joint, _zeros_of(zeros, sessions[0]))
+    entries = []
+    for label, members in _ways(model):
+        recordings = [*members, *(e for e in kept if _alike(e, members[0], model))]
+        last = max(recordings, key=lambda e: float(e.columns["time_s"][0]))
+        stood = standing(fit.problem.config, fit.values, members[0])
+        own_zeros = _zeros_of(zeros, members[0].session)
+        after = _afterwards(stood, model, last)
+        if len(sessions) > 1 or _tied(model):
+            values = {**own_zeros, **_own(after, common, fit)}
+            entries.append(Session(name=label, recordings=_patterns(members, model), values=values))
+        for e in recordings:
+            now = _meanwhile(stood, model, e)
+            if now != after:
+                values = {**own_zeros, **_own(now, common, fit)}
+                entries.append(Session(name=f"{label} {_short(e)}", recordings=(_short(e),), values=values))
+    if not entries:
+        return joint
+    return joint.model_copy(update={"session": (Session(own=tuple(config.session_own)), *entries)})
+
+
+def _tied(model: Model) -> bool:
+    """Whether a parameter grows with a condition."""
+    return any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)
+
+
+def _alike(e: Evidence, other: Evidence, model: Model) -> bool:
+    """Whether the drive stood alike in two recordings, events apart."""
+    here = tuple(e.condition.values()) == tuple(other.condition.values())
+    return e.session == other.session and (here or not _tied(model))
+
+
+def _ways(model: Model) -> Iterator[tuple[str, list[Evidence]]]:
+    """The ways in which the drive stood, each with its name and its recordings."""
+    evidence = model.fit.problem.evidence
+    for session in model.fit.problem.sessions:
+        mine = [e for e in evidence if e.session == session]
+        for way in sorted({tuple(e.condition.values()) for e in mine} if _tied(model) else {()}):
+            members = [e for e in mine if not _tied(model) or tuple(e.condition.values()) == way]
+            named = zip(members[0].condition, way, strict=False)
+            yield session + "".join(f" {k} {v:.4g}" for k, v in named), members
+
+
+def _meanwhile(joint: JointConfig, model: Model, e: Evidence) -> JointConfig:
+    """The joint with the model's events as they stand on a recording's own clock: yet to come, under way, or over
+    before it began. Where recordings share one clock, as it is."""
+    begin_s, end_s = (float(e.columns["time_s"][k]) - e.shift_s for k in (0, -1))
+    return _with_events(joint, model, e.shift_s, begin_s, end_s)
+
+
+def _afterwards(joint: JointConfig, model: Model, e: Evidence) -> JointConfig:
+    """The same after a recording: what has begun is over."""
+    end_s = float(e.columns["time_s"][-1]) - e.shift_s
+    return _with_events(joint, model, e.shift_s, inf, end_s)
+
+
+def _with_events(
+    joint: JointConfig, model: Model, shift_s: float, over_by_s: float, begun_by_s: float
+) -> JointConfig:
+    """The joint with events on a clock that is `shift_s` behind that of the fit: those that begin later than
+    `begun_by_s` on it do not happen, those that end before `over_by_s` have been."""
+    if not any(e.shift_s for e in model.fit.problem.evidence):
+        return joint
+    changes: dict[str, float] = {}
+    for term in (t for t in model.terms if isinstance(t, Hypothesis)):
+        given = next(dict(e.parameters) for e in joint.effect if e.id == term.effect.id)
+        lasts_s = given.get(term.duration, 0.0)
+        for p in (p for p in term.effect.parameters if p.role in ("instant", "begin") and p.name in given):
+            instant_s = given[p.name] - shift_s
+            if p.role == "instant" and instant_s > begun_by_s:
+                changes[term.key(term.amount.name)] = term.amount.neutral
+            elif p.role == "instant" and instant_s + lasts_s <= over_by_s:
+                changes[term.key(p.name)] = -lasts_s
+            else:
+                changes[term.key(p.name)] = instant_s
+    return with_values(joint, changes)
 
 
 def with_tolerances(joint: JointConfig, fit: Fit, spread: Mapping[str, float]) -> JointConfig:
@@ -110,10 +168,16 @@ def _depends(model: Model, first: Evidence) -> tuple[Depends, ...]:
     return tuple(found)
 
 
-def _patterns(members: Sequence[Evidence], names: Sequence[str], session: str, tied: bool) -> tuple[str, ...]:
-    if not tied and all(session in n.split("/") for n in names if n in {e.name for e in members}):
+def _patterns(members: Sequence[Evidence], model: Model) -> tuple[str, ...]:
+    session = members[0].session
+    if not _tied(model) and all(session in e.name.split("/") for e in members):
         return (session,)
-    return tuple("/".join(e.name.split("/")[-2:]) for e in members)
+    return tuple(_short(e) for e in members)
+
+
+def _short(e: Evidence) -> str:
+    """A recording's name with its folder."""
+    return "/".join(e.name.split("/")[-2:])
 
 
 def _zeros_of(zeros: Mapping[str, Mapping[str, FloatArray]], session: str) -> dict[str, float]:

@@ -62,7 +62,7 @@ def diagnosis_of(
         tested=tested(found.selection, outcome.names),
         notes=notes(case),
         augmented_joint=with_tolerances(
-            augmented_joint(case.config, kept, outcome.empirical, case.body.names),
+            augmented_joint(case.config, kept, outcome.empirical, case.body.whole_for_the_end),
             kept.fit,
             told_by(kept.fit, case.config.tolerance),
         ),

@@ -13,6 +13,7 @@ from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_lev
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.experiment import best_experiment
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection
 from cablecomp.diagnosis.explain.unseen import Hidden
 from cablecomp.diagnosis.explain.weighing import Weighed
@@ -36,7 +37,10 @@ def named_of(w: Weighed, final: Model) -> Named:
     if w.confidence >= LIMITS.name:
         found = side_by_side(lambda v: profile_interval(final.fit, v.name, LIMITS.wider), values)
         values = [replace(v, interval_95=i) for v, i in zip(values, found, strict=True)]
+    values, recording = _in_its_recording(values, w.term, final.fit)
     parameters: dict[str, Value | str] = {v.name.removeprefix(mine): v for v in values}
+    if recording:
+        parameters["recording"] = recording
     if w.term.channel:
         parameters[effect.texts[0]] = w.term.channel
     return Named(
@@ -51,6 +55,23 @@ def named_of(w: Weighed, final: Model) -> Named:
         w.term.acts_through,
         "" if w.confidence >= LIMITS.name else w.why_not,
     )
+
+
+def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:
+    """The values with an event's instant on the clock of the recording in which it came, or after which; and that
+    recording's name, "" where all share one clock."""
+    evidence = fit.problem.evidence
+    when = next((v.value for v in values if h.has_instant and v.name == h.key(h.instant)), None)
+    if when is None or not any(e.shift_s for e in evidence):
+        return list(values), ""
+    begun = [e for e in evidence if float(e.columns["time_s"][0]) <= when] or [evidence[0]]
+    e = max(begun, key=lambda e: float(e.columns["time_s"][0]))
+
+    def moved(v: Value) -> Value:
+        interval = v.interval_95 and (v.interval_95[0] - e.shift_s, v.interval_95[1] - e.shift_s)
+        return replace(v, value=v.value - e.shift_s, interval_95=interval)
+
+    return [moved(v) if v.name == h.key(h.instant) else v for v in values], e.name
 
 
 def _depends(d: Dependence | None, final: Model) -> dict[str, object] | None:
