@@ -88,6 +88,12 @@ class Thresholds:
     four of the rough answers wherever it was found at all)."""
     tried_later: int = 7
     """Hypotheses of a later round that are tried, by what they promise."""
+    tried_trading: int = 3
+    """Further ones, where several sessions have several recordings, of those that trade places with a drive known by
+    order of magnitude: what they promise beside it says little (jaw's wrist pitches: the stiffening cable promised 2 %,
+    after four events and late channels, and took off an eighth). Fewer recordings tell no more of them apart: with
+    these the jaw's path was named in fewer recordings alone, and of five bends of a sheath a cable that stiffens took
+    the place of a play that predicts better."""
     beam: int = 2
     """Models carried from round to round: two kinds of friction may look alike until a third effect is there."""
     worth_rates: float = 1.08

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 from turning import JOINT, recorded
 
+from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.hypotheses import hypotheses, instants
+from cablecomp.diagnosis.explain.hypotheses import hypotheses, in_no_recording, instants
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parameter import of_drive
 
 
 def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_session() -> None:
@@ -15,13 +21,39 @@ def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_sessi
     body = gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": recorded(seed=2), "b/1": recorded(seed=3)})
     spans = [(e.columns["time_s"][0], e.columns["time_s"][-1]) for e in body.used]
     between_a, between_ab = (spans[0][1], spans[1][0]), (spans[1][1], spans[2][0])
-    asked = np.array(instants(body.used))
+    asked = np.array(instants(body.used, between=True))
     assert np.any((asked > between_a[0]) & (asked < between_a[1]))
     assert not np.any((asked > between_ab[0]) & (asked < between_ab[1]))
     for first, last in spans:
         inside = asked[(asked >= first) & (asked <= last)]
         assert len(inside) >= 3
         assert inside.min() >= first + 0.9 * LIMITS.edge * (last - first)
+
+
+VAGUE = JOINT.model_copy(update={"tolerance": {**JOINT.tolerance, "pretension_N": 1.0}})
+"""The same joint with a pretension that is known by order of magnitude."""
+
+
+def test_beside_a_drive_known_by_order_of_magnitude_an_event_lies_in_a_recording() -> None:
+    """Recordings at other loads, one after the other, look like an event between them to a drive that is not known."""
+    body = gather_body(VAGUE, {"a/1": recorded(seed=1), "a/2": recorded(seed=2)})
+    spans = [(e.columns["time_s"][0], e.columns["time_s"][-1]) for e in body.used]
+    slip = next(h for h in hypotheses(VAGUE, body.used) if h.effect.id == "clamp_slip")
+    asked = [float(s.values["time_s"]) for s in slip.starts]
+    assert len(asked) >= 6
+    assert all(any(a < t < b for a, b in spans) for t in asked)
+
+    def lost(config: JointConfig, instant_s: float, lasts_s: float = 0.0) -> bool:
+        values = {slip.key("time_s"): instant_s, slip.key("duration_s"): lasts_s}
+        problem = SimpleNamespace(parameters=of_drive(config), evidence=body.used)
+        return in_no_recording(cast("Fit", SimpleNamespace(problem=problem, values=values)), slip)
+
+    first_ends_s, second_begins_s = spans[0][1], spans[1][0]
+    assert not lost(VAGUE, 0.5 * first_ends_s)
+    assert lost(VAGUE, 0.5 * (first_ends_s + second_begins_s))
+    assert lost(VAGUE, second_begins_s + 0.01)  # nothing of the recording lies before it
+    assert lost(VAGUE, 0.5 * first_ends_s, lasts_s=1.05 * first_ends_s)  # nor after its middle
+    assert not lost(JOINT, 0.5 * (first_ends_s + second_begins_s))
 
 
 def test_an_effect_that_reads_a_channel_is_asked_once_for_each_channel_that_varies() -> None:

@@ -15,7 +15,7 @@ from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter as Free
-from cablecomp.estimation.parameter import of_effect, vague_drive
+from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tu
     if p.role == "phase":
         return (0.0, 0.5 * math.pi)
     if p.role == "instant":
-        return instants(evidence)
+        return instants(evidence, between=not vague_drive(of_drive(config)))
     if p.role == "reference":
         means = [
             float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns
@@ -200,17 +200,13 @@ def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tu
     return (0.5 * (low + high),)
 
 
-def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
-    """Times at which an event is asked for: even over what counts, well inside of a recording, and between
-    recordings of one session; between sessions the joint was taken apart."""
+def instants(evidence: Sequence[Evidence], *, between: bool) -> tuple[float, ...]:
+    """Times at which an event is asked for: even over what counts, well inside of a recording, and, if `between`,
+    between recordings of one session; between sessions the joint was taken apart."""
     spans = []
     for k, e in enumerate(evidence):
-        time = (
-            e.columns["time_s"][e.rows[e.counted[JOINT]]] if e.counted[JOINT].any() else e.columns["time_s"]
-        )
-        margin = LIMITS.edge * float(time[-1] - time[0])
-        spans.append((float(time[0]) + margin, float(time[-1]) - margin))
-        if k and evidence[k - 1].session == e.session:
+        spans.append(_inside(e))
+        if between and k and evidence[k - 1].session == e.session:
             last = float(evidence[k - 1].columns["time_s"][-1])
             spans.append((last, float(e.columns["time_s"][0])))
     inside = [s for s in spans if s[1] > s[0]]
@@ -220,6 +216,24 @@ def instants(evidence: Sequence[Evidence]) -> tuple[float, ...]:
         count = max(1, round(LIMITS.instants * (b - a) / length))
         found += [a + (b - a) * (k + 0.5) / count for k in range(count)]
     return tuple(found)
+
+
+def _inside(e: Evidence) -> tuple[float, float]:
+    """From when to when an event in a recording has a before and an after that show it [s]."""
+    time = e.columns["time_s"][e.rows[e.counted[JOINT]]] if e.counted[JOINT].any() else e.columns["time_s"]
+    margin = LIMITS.edge * float(time[-1] - time[0])
+    return float(time[0]) + margin, float(time[-1]) - margin
+
+
+def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
+    """Whether an event has moved to where none of several recordings shows it, beside a drive known by order of
+    magnitude: recordings differ in load and order, and such a drive may differ from one to the next in many ways."""
+    several = len(fit.problem.evidence) > 1
+    if not (h.has_instant and several and vague_drive(fit.problem.parameters)):
+        return False
+    instant = fit.values[h.key(h.instant)]
+    middle = instant + 0.5 * fit.values.get(h.key(h.duration), 0.0)
+    return not any(a <= middle <= b for a, b in map(_inside, fit.problem.evidence))
 
 
 def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, in_no_recording, runs_away
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
@@ -168,12 +168,16 @@ def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun],
     worth = [a for a in answers if a[0].cost < LIMITS.promise * at.cost or at.trades(a[0].hypothesis)]
     if at.number > 0:
         dear = 2 if model.fit.problem.fine else 1
-        worth = sorted(worth, key=lambda a: a[0].cost)[: LIMITS.tried_later // dear]
+        worth = sorted(worth, key=lambda a: a[0].cost)
+        most = LIMITS.tried_later // dear
+        further = LIMITS.tried_trading // dear if len(model.fit.problem.repeated) > 1 else 0
+        worth = worth[:most] + [a for a in worth[most:] if at.trades(a[0].hypothesis)][:further]
 
     def begin(a: list[Answer]) -> list[Fit]:
         h = a[0].hypothesis
         at.tell(f"trying {h.name}")
-        return [] if at.pace.over else rough(a, LIMITS.rough, _further(h, at) if h.trades else [])
+        found = [] if at.pace.over else rough(a, LIMITS.rough, _further(h, at) if h.trades else [])
+        return [f for f in found if not in_no_recording(f, h)]
 
     first: list[Begun] = []
     second: list[Begun] = []
@@ -205,14 +209,18 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
     except InputError:
         return None
     terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    away = isinstance(terms[0], Hypothesis) and runs_away(fit, terms[0])
-    if away or not amount_resolved(fit, terms[0]):
+    if _lost(fit, terms[0]) or not amount_resolved(fit, terms[0]):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:
         size = scales(at.model.left_out, at.groups)
         ratio = loss(at.model, size, at.groups) / max(loss(fine, size, at.groups), 1e-300)
     return Model((*at.model.terms, *terms), fit, left_out(fit, at.groups), ratio)
+
+
+def _lost(fit: Fit, term: Term) -> bool:
+    """Whether an effect has left what is plausible of it, or all recordings."""
+    return isinstance(term, Hypothesis) and (runs_away(fit, term) or in_no_recording(fit, term))
 
 
 def _compared(

@@ -1,0 +1,45 @@
+"""Which hypotheses a round tries."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from cablecomp.diagnosis.explain import rounds
+from cablecomp.diagnosis.thresholds import LIMITS
+
+
+def beginning(sessions: int, **further: Any) -> Any:
+    """A later round beside a model of cost 100."""
+    problem = SimpleNamespace(fine=False, parameters=(), repeated=("session",) * sessions)
+    return SimpleNamespace(
+        number=2, cost=100.0, cold={}, pace=SimpleNamespace(over=False), tell=lambda what: None, groups=None,
+        model=SimpleNamespace(fit=SimpleNamespace(problem=problem), terms=()), **further,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("sessions", "further"), [(1, 0), (2, LIMITS.tried_trading)])
+def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_promises_more(
+    sessions: int, further: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried = []
+
+    def rough(answers: Any, evaluations: int, further: Any) -> list[Any]:
+        tried.append(answers[0].hypothesis.name)
+        return []
+
+    monkeypatch.setattr(rounds, "rough", rough)
+    monkeypatch.setattr(rounds, "ask_dependences", lambda *_: [])
+    monkeypatch.setattr(rounds, "_further", lambda h, at: [])
+    plain = [f"event {k}" for k in range(LIMITS.tried_later + 2)]
+    trading = [f"friction {k}" for k in range(LIMITS.tried_trading + 1)]
+    answers: Any = [
+        [SimpleNamespace(cost=50.0 + k, hypothesis=SimpleNamespace(name=n, trades=n in trading))]
+        for k, n in enumerate((*plain, *trading))
+    ]
+    at = beginning(sessions, trades=lambda h: h.trades)
+    at.groups = SimpleNamespace(by="block")
+    rounds._begun(at, answers)
+    assert sorted(tried) == [*plain[: LIMITS.tried_later], *trading[:further]]
