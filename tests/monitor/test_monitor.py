@@ -220,7 +220,8 @@ def test_a_recording_is_played(tmp_path: Path) -> None:
         server.take(found)
     server.finish()
     with browser() as chromium, opened(chromium, server.address) as page:
-        page.wait_for_function("over && document.getElementById('play').textContent === 'play'")
+        page.wait_for_function("over && !dirty")  # drawn, too
+        assert page.inner_text("#play") == "play"
         assert "a recording, 100 frames" in page.inner_text("#words")
         assert not page.is_visible("text=Timing")
         page.evaluate(NARROWEST)
