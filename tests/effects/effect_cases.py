@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import importlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
-from cablecomp.effects import catalogue, with_effects
+from cablecomp.effects import Change, Effect, Parameter, catalogue, register, with_effects
+from cablecomp.effects.base import CompiledTerm
 from cablecomp.observer import Observer
 
 Floats = NDArray[np.float64]
@@ -78,6 +81,30 @@ def still(time: Floats, load: Floats, motor: Floats | float = 0.0, **more: Float
         "joint_torque_Nm": load,
         **more,
     }
+
+
+def register_alone(
+    monkeypatch: pytest.MonkeyPatch,
+    identifier: str,
+    parameter: str,
+    change: Callable[[Mapping[str, Any]], CompiledTerm],
+    *texts: str,
+) -> None:
+    """An effect of one amount, and of channels by name, known for this test alone; `change`: its term."""
+    monkeypatch.setattr(importlib.import_module("cablecomp.effects.catalogue"), "_registered", {})
+    register(
+        Effect(
+            id=identifier,
+            statement="For a test.",
+            equation="",
+            source="",
+            parameters=(Parameter(parameter, "", 0.0, 0.5, 2.0, ""),),
+            acts_through=("other",),
+            bounded=False,
+            change=lambda values, config: Change(terms=change(values)),
+            texts=texts,
+        )
+    )
 
 
 def second_differences(time: Floats, q: Floats) -> Floats:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from effect_cases import joint, run, second_differences, still
+from effect_cases import joint, register_alone, run, second_differences, still
 from scipy.optimize import brentq
 
 from cablecomp.config import JointConfig
-from cablecomp.effects import Change, Effect, Parameter, register, term, with_effects
+from cablecomp.effects import term, with_effects
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
 
@@ -55,20 +54,7 @@ def test_the_angle_is_what_repeated_substitution_ends_at(
     name: str, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same drive, told the length and the moment by hand, sample by sample, until nothing moves any more."""
-    monkeypatch.setattr(importlib.import_module("cablecomp.effects.catalogue"), "_registered", {})
-    register(
-        Effect(
-            id="told",
-            statement="The length wound up is told.",
-            equation="",
-            source="",
-            parameters=(Parameter("amount", "-", 0.0, 0.5, 2.0, ""),),
-            acts_through=("other",),
-            bounded=False,
-            change=lambda values, config: Change(terms=wind_up(channel=values["channel"])),
-            texts=("channel",),
-        )
-    )
+    register_alone(monkeypatch, "told", "amount", lambda v: wind_up(channel=v["channel"]), "channel")
     config = joint(name)
     radius = config.drive.stage[-1].output_radius_m
     eccentricity = min(max(share * radius, -0.01), 0.01)  # as far as the law goes

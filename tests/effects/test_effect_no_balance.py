@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import pytest
-from effect_cases import joint
+from effect_cases import joint, register_alone
 
-from cablecomp.effects import Change, Effect, Parameter, register, term, with_effects
+from cablecomp.effects import term, with_effects
 from cablecomp.observer import Observer
 from cablecomp.observer.refusal import SampleRefused
 from cablecomp.signals import Sample
@@ -23,19 +22,7 @@ def against(c: Any, p: Any, s: Any) -> None:
 
 
 def test_a_row_without_a_balance_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.import_module("cablecomp.effects.catalogue"), "_registered", {})
-    register(
-        Effect(
-            id="jump",
-            statement="A moment that turns about at once.",
-            equation="",
-            source="",
-            parameters=(Parameter("moment_Nm", "N m", 0.0, 0.5, 2.0, ""),),
-            acts_through=("joint_angle",),
-            bounded=False,
-            change=lambda values, config: Change(terms=against(moment=values["moment_Nm"])),
-        )
-    )
+    register_alone(monkeypatch, "jump", "moment_Nm", lambda v: against(moment=v["moment_Nm"]))
     config = joint("snow-closed-rig")
     unit = config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
     observer = Observer(with_effects(config, [("jump", {"moment_Nm": 0.3 * unit})]))
