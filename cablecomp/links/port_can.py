@@ -58,6 +58,7 @@ def _open_bus(
     wanted = {k: v for k, v in chosen.items() if v is not None}
     try:
         return can.Bus(interface=interface, ignore_config=True, **wanted, **options)
+    # NotImplementedError: what python-can raises for an interface that this system does not have
     except (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError) as error:
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise DeviceError(

@@ -69,7 +69,7 @@ class LinePort(PortBase):
         try:
             self._fd = self._port.fileno()
             os.set_blocking(self._fd, False)
-        except (AttributeError, OSError, NotImplementedError):
+        except (AttributeError, OSError, NotImplementedError):  # a port of pyserial's without a file
             self._fd = -1
         self._pending.clear()
         self.state, self.fault = BusState.ACTIVE, ""

@@ -36,7 +36,7 @@ def open_npz(path: Path) -> RawTable:
         OSError,
         ValueError,
         EOFError,
-        NotImplementedError,
+        NotImplementedError,  # packed in a way that zipfile does not know
         RuntimeError,
         zipfile.BadZipFile,
         zlib.error,
