@@ -13,7 +13,6 @@ from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import JsonOption, announce_compilation, console, echo_json, read_joint, warn
 from cablecomp.cli.sources import Reading, reads_recordings
 from cablecomp.cluster import Workers
-from cablecomp.config_text import joint_text
 from cablecomp.errors import InputError, path_text
 from cablecomp.examples import resolve
 from cablecomp.recording.folder import find_recordings
@@ -78,7 +77,7 @@ def prove_blindly(
     joint = read_joint(resolve(config, "joints"))
     source = reading(joint)
     data = {path_text(p): source.read(p, gaps=True).columns for p in find_recordings(recordings)}
-    own = Own(out.absolute(), data, joint_text(joint), conceal_in, by)
+    own = Own(out.absolute(), data, joint, conceal_in, by)
     wish_own = OwnWish(seed, rounds, seconds, 60.0 if budget is None else budget, physics)
     _in_recordings(own, wish_own, out, as_json)
 

@@ -25,9 +25,12 @@ class Session(Frozen):
     `own`: names of the parameters that may differ from session to session. `recordings`: patterns of paths
     (`*` and `?` as in a shell; a folder stands for all that is in it), matched from the right; one that is a
     recording's own path goes before all others. `values`: what this session's own parameters are, by name.
+    `mounting`: the session that this is a part of, where the drive stood differently in its recordings (before and
+    after an event; bent more or less): zeros, and what is `own`, are the mounting's.
     """
 
     name: str = ""
+    mounting: str = ""
     own: Annotated[tuple[Text, ...], Listed] | None = None
     recordings: Annotated[tuple[Text, ...], Listed] = ()
     values: dict[str, Finite] = Field(default_factory=dict)

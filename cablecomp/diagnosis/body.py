@@ -14,7 +14,8 @@ from cablecomp.config import JointConfig, claiming
 from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence, gather, rows_for
+from cablecomp.estimation.evidence import MOTOR, Evidence, gather, load_channel, rows_for
+from cablecomp.estimation.standing import apart_of, stated_of
 from cablecomp.signal.smoothing import FloatArray
 
 Sessions = Literal["folder", "each", "one"]
@@ -45,13 +46,13 @@ class Body:
 
 
 def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | None = None) -> dict[str, str]:
-    """The session of each recording: as `[[session]]` claims it, else its folder (`each`: its own, `one`: all
-    together)."""
+    """The session of each recording: as `[[session]]` claims it (one that is a part of a mounting: that), else its
+    folder (`each`: its own, `one`: all together)."""
     found = {}
     paths = {name: PurePath(name) for name in names}
     files, folders = _told_apart(set(paths.values())), _told_apart({p.parent for p in paths.values()})
     for name, path in paths.items():
-        claimed = [s.name for s in claiming(config, Path(name))] if mode is None else []
+        claimed = [s.mounting or s.name for s in claiming(config, Path(name))] if mode is None else []
         if claimed:
             found[name] = claimed[0]
         elif mode == "each":
@@ -93,7 +94,11 @@ def gather_body(
             e = replace(e, columns={**e.columns, "time_s": e.columns["time_s"] + shift}, shift_s=shift)
             end += shift
         after = end
-        found.append(e)
+        stated = stated_of(config, Path(name), recordings[name])
+        motor_is_load = load_channel(config, e.columns) == MOTOR
+        found.append(
+            replace(e, apart=apart_of(config, stated, shift_s=e.shift_s, motor_is_load=motor_is_load))
+        )
     return Body(tuple(names), *kept_for_the_end(found))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,13 @@ SPIKE: Final = 8.0
 """Deviations (scaled median) from the neighbours beyond which a reading is an outlier."""
 
 
+class Apart(NamedTuple):
+    """How far from the common value a parameter stands: value = factor common + addend."""
+
+    factor: float = 1.0
+    addend: float = 0.0
+
+
 @dataclass(frozen=True)
 class Evidence:
     """One recording, ready to be fitted.
@@ -49,7 +56,8 @@ class Evidence:
     judged, thinned by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time
     that a judged row stands for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it;
     `outliers`: readings set aside; `shift_s`: what was added to the recording's own clock; `carryover`: by output
-    channel, what histories that nobody recorded would add to the judged rows, a column each.
+    channel, what histories that nobody recorded would add to the judged rows, a column each; `apart`: by parameter,
+    in this order, how the configuration states that the joint stood apart in this recording.
     """
 
     name: str
@@ -65,6 +73,7 @@ class Evidence:
     step_s: float = 0.0
     shift_s: float = 0.0
     carryover: Mapping[str, FloatArray] = field(default_factory=dict)
+    apart: Mapping[str, Apart] = field(default_factory=dict)
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""

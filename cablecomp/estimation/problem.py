@@ -154,6 +154,7 @@ class Problem:
         own = any(p.session for p in self.parameters)
         return (
             r.session if own else None,
+            *r.apart.items(),
             *(r.condition[p.condition] for p in self.parameters if p.condition),
         )
 

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cablecomp.config import JointConfig, in_session, session_of, with_values
+from cablecomp.config import JointConfig, claiming, in_session, session_of, with_values
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.evidence import Apart, Evidence
 from cablecomp.signal.smoothing import FloatArray
 
 PRETENSION = "pretension_N"
+JOINT_ZERO, MOTOR_ZERO = "joint_position_offset_rad", "motor_torque_offset_Nm"
+ON_THE_CLOCK = ("instant", "begin")
+"""Roles of effects' parameters that are read on the recordings' clock."""
 
 
 def standing(config: JointConfig, values: Mapping[str, float], recording: Evidence) -> JointConfig:
@@ -23,7 +26,7 @@ def standing(config: JointConfig, values: Mapping[str, float], recording: Eviden
     values at that pretension follow from those at the common one.
     """
     common = {k: v for k, v in values.items() if "@" not in k and "~" not in k}
-    joint = with_values(config, _checked(config, common))
+    joint = in_its_place(with_values(config, _checked(config, common)), recording)
     own: dict[str, float] = {}
     for name, value in values.items():
         base, at, session = name.partition("@")
@@ -41,6 +44,51 @@ def standing(config: JointConfig, values: Mapping[str, float], recording: Eviden
     return with_values(joint, _checked(joint, gained)) if gained else joint
 
 
+def in_its_place(joint: JointConfig, recording: Evidence) -> JointConfig:
+    """A joint of common values as it stands in a recording by what its configuration states of that one."""
+    for name, apart in recording.apart.items():
+        joint = with_values(joint, {name: apart.factor * value_of(joint, name) + apart.addend})
+    return joint
+
+
+def stated_of(config: JointConfig, recording: Path, columns: Mapping[str, FloatArray]) -> dict[str, float]:
+    """The values that the configuration states of a recording alone: those of the session that claims it, else what
+    its conditions make."""
+    claimed = claiming(config, recording)
+    return dict(claimed[0].values) if claimed else _gained(config, columns)[0]
+
+
+def apart_of(
+    config: JointConfig, stated: Mapping[str, float], *, shift_s: float = 0.0, motor_is_load: bool = False
+) -> dict[str, Apart]:
+    """How far from the common values of the configuration the joint stands with these `stated` ones; instants on a
+    clock that is `shift_s` before the recording's own. Zeros are found inside of the fit, but for that of a motor's
+    torque which is the load."""
+    found: dict[str, Apart] = {}
+    joint = config
+    for name, value in stated.items():
+        if name == JOINT_ZERO or (name == MOTOR_ZERO and not motor_is_load):
+            continue
+        common = value_of(joint, name)
+        scaled = common > 0.0 and not name.startswith("effect.") and "_offset_" not in name
+        found[name] = Apart(value / common) if scaled else Apart(1.0, value - common)
+        joint = with_values(joint, {name: value})
+    if shift_s:
+        for name in on_the_clock(config):
+            found[name] = Apart(1.0, found.get(name, Apart()).addend + shift_s)
+    return found
+
+
+def on_the_clock(config: JointConfig) -> tuple[str, ...]:
+    """Names of the effects' parameters that are instants on a recording's clock."""
+    return tuple(
+        f"effect.{entry.id}.{p.name}"
+        for entry in config.effect
+        for p in catalogue()[entry.id].parameters
+        if p.role in ON_THE_CLOCK and p.name in entry.parameters
+    )
+
+
 def as_it_stood(
     config: JointConfig,
     recording: Path,
@@ -55,15 +103,15 @@ def as_it_stood(
         return in_session(config, found), found.name, ()
     if not config.depends:
         return config, None, ()
-    joint, said = in_condition(config, head())
-    return joint, None, tuple(f"{recording.name}: {line}" for line in said)
+    gained, said = _gained(config, head())
+    return with_values(config, gained), None, tuple(f"{recording.name}: {line}" for line in said)
 
 
-def in_condition(
+def _gained(
     config: JointConfig, columns: Mapping[str, FloatArray]
-) -> tuple[JointConfig, tuple[str, ...]]:
-    """The joint as it stands in a recording that no session claims, by its `[[depends]]`; a note for each
-    condition that lies beyond what they were told from."""
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """What parameters come to in a recording that no session claims, by the `[[depends]]`; a note for each condition
+    that lies beyond what they were told from."""
     gained: dict[str, float] = {}
     said = []
     for law in config.depends:
@@ -83,7 +131,7 @@ def in_condition(
             )
         before = gained.get(law.parameter, value_of(config, law.parameter))
         gained[law.parameter] = before + law.per_unit * (inside - law.at)
-    return with_values(config, _checked(config, gained)), tuple(said)
+    return _checked(config, gained), tuple(said)
 
 
 def at_pretension(config: JointConfig, pretension_N: float) -> JointConfig:

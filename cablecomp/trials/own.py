@@ -10,13 +10,18 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cablecomp.cluster import Workers
+from cablecomp.config import JointConfig
+from cablecomp.config.sessions import Session
+from cablecomp.config_text import write_joint
+from cablecomp.diagnosis.body import session_names
 from cablecomp.errors import InputError
+from cablecomp.estimation.standing import stated_of
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.curves import Concealed, Curves, curves, score_concealed
 from cablecomp.trials.run import (
@@ -55,11 +60,11 @@ class OwnWish:
 
 @dataclass(frozen=True)
 class Own:
-    """A run's folder, the recordings by their paths, their joint's configuration as text, and what works on them."""
+    """A run's folder, the recordings by their paths, their joint, and what works on them."""
 
     out: Path
     recordings: Mapping[str, Columns]
-    joint: str
+    joint: JointConfig
     conceal: Conceal
     workers: Workers
     diagnose: Diagnose = diagnose_folder
@@ -100,10 +105,11 @@ def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
         for k in range(wish.rounds):
             folder = pieces / f"{k:05d}"
             folder.mkdir(parents=True, exist_ok=True)
-            for n, table in enumerate(piece(own.recordings, wish.seconds, wish.seed, k), start=1):
+            drawn = piece(own.joint, own.recordings, wish.seconds, wish.seed, k)
+            for n, table in enumerate(drawn.values(), start=1):
                 # numpy's stub takes `**` for `allow_pickle`, a bool
                 np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]
-        (pieces / JOINT_FILE).write_text(own.joint, encoding="utf-8")
+            write_joint(folder / JOINT_FILE, joint_of_piece(own.joint, drawn))
         return own.conceal(pieces, wish, own.out, lambda done, of: tell("concealing", done, of))
     except InputError:
         shutil.rmtree(pieces)
@@ -113,9 +119,10 @@ def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
 
 
 def piece(
-    recordings: Mapping[str, Columns], seconds: float, seed: int, number: int
-) -> list[dict[str, FloatArray]]:
-    """One piece: stretches of recordings of one session (folder), at most `seconds` together, drawn from the seed.
+    joint: JointConfig, recordings: Mapping[str, Columns], seconds: float, seed: int, number: int
+) -> dict[str, dict[str, FloatArray]]:
+    """One piece: stretches of recordings of one session, at most `seconds` together, drawn from the seed; by the
+    recordings' names.
 
     Raises InputError where nothing lasts long enough to be diagnosed.
     """
@@ -124,8 +131,9 @@ def piece(
     if not usable:
         raise InputError("no recording holds 200 samples of joint_position_rad; physics is concealed in such")
     names = list(usable)
+    session = session_names(joint, names)
     first = names[int(rng.integers(len(names)))]
-    mates = [n for n in names if PurePath(n).parent == PurePath(first).parent and n != first]
+    mates = [n for n in names if session[n] == session[first] and n != first]
     chosen, left = {}, seconds
     for name in (first, *(str(n) for n in rng.permutation(np.asarray(mates, dtype=object)))):
         if left < 0.2 * seconds:
@@ -134,7 +142,18 @@ def piece(
         left -= float(np.ptp(stretch["time_s"]))
         chosen[name] = stretch
     shared = set.intersection(*(set(c) for c in chosen.values()))
-    return [{k: v for k, v in chosen[n].items() if k in shared} for n in names if n in chosen]
+    return {n: {k: v for k, v in chosen[n].items() if k in shared} for n in names if n in chosen}
+
+
+def joint_of_piece(joint: JointConfig, drawn: Mapping[str, Columns]) -> JointConfig:
+    """The joint with what it states of each recording of a piece under the name that the recording has in there."""
+    stated = [stated_of(joint, Path(name), columns) for name, columns in drawn.items()]
+    sessions = [s for s in joint.session if not s.name]
+    if any(stated):
+        for k, values in enumerate(stated, start=1):
+            name = f"recording-{k}"
+            sessions.append(Session(name=name, mounting="piece", recordings=(f"{name}.npz",), values=values))
+    return joint.model_copy(update={"session": tuple(sessions), "depends": ()})
 
 
 def _stretch(rng: np.random.Generator, columns: Columns, seconds: float) -> dict[str, FloatArray]:

@@ -1,9 +1,9 @@
 """`python -m firmware_sim.conceal --in PIECES --seed S [--physics A,B…] --out DIR`: conceal physics in pieces of
 recordings, seal the truth.
 
-PIECES/00000 holds `recording-1.npz`, … (canonical channels) of the first round, and so on; `PIECES/joint.toml`
-goes along into every trial's folder DIR/trials/00000; its truth is sealed in DIR/sealed/00000.zip. Prints
-`written K of N`, then `sha256 HEX` of all seals.
+PIECES/00000 holds `recording-1.npz`, … (canonical channels) of the first round and the `joint.toml` that goes along
+into the folders DIR/trials/00000, … of its trials, and so on; what is true of a trial is sealed in
+DIR/sealed/00000.zip. Prints `written K of N`, then `sha256 HEX` of all seals.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ def conceal(pieces: Path, seed: int, out: Path, only: Sequence[str] = ()) -> str
     tables = [_read(f) for f in folders]
     if not tables or not all(usable(t) for t in tables):
         raise SimError(f"{pieces}: holds no piece with a joint_position_rad in every recording")
-    joint = (pieces / JOINT_FILE).read_text(encoding="utf-8")
+    joints = [(f / JOINT_FILE).read_text(encoding="utf-8") for f in folders]
     trials, missing = trials_of(tables, seed, only)
     for k, trial in enumerate(trials, start=1):
         name = f"{trial.number:05d}"
-        _write(out / "trials" / name, trial, joint)
+        _write(out / "trials" / name, trial, joints[trial.round])
         write_seal(out / SEALED / f"{name}.zip", {TRUTH: truth_text(trial.truth())})
         print(f"written {k} of {len(trials)}", flush=True)
     for physics, why in missing.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import log
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from joints import SMALL, SMALL_NOISE, closed
 from small_drive import TOLERANT, course, recorded
 
 from cablecomp.config import JointConfig, parse_joint
+from cablecomp.config.sessions import Session
 from cablecomp.diagnosis.answer.augmented import augmented_joint
 from cablecomp.diagnosis.body import Columns, gather_body
 from cablecomp.diagnosis.calibration.drive import first_weights
@@ -101,6 +103,32 @@ def test_an_event_stands_on_each_recordings_own_clock() -> None:
     assert instants == {"day/0": None, "day/1": pytest.approx(15.0, abs=0.1), "day/2": 0.0}
     later = left_rad(joint, "day/3", recordings["day/2"])
     assert later < LEFT_RAD  # it has not been mended since
+    again = diagnose(joint, recordings)
+    assert again.verdict == "consistent"
+    assert list(again.sessions) == ["day"]
+    for name, columns in recordings.items():
+        assert left_rad(again.augmented_joint, name, columns) < LEFT_RAD, name
+
+
+def test_sessions_that_the_recordings_do_not_belong_to_stay_as_they_were() -> None:
+    """A joint of two days: the third day's slip is not in them, nor is the factor by which one was tighter lost."""
+    tension_N = TOLERANT.drive.stage[0].pretension_N
+    days = (
+        Session(name="mon", recordings=("mon",), values={"joint_position_offset_rad": 0.02}),
+        Session(name="tue", recordings=("tue",), values={"pretension_N": 1.25 * tension_N}),
+    )
+    known = TOLERANT.model_copy(update={"session": days})
+    evidence = gather_body(known, {"wed/0": recorded([], 16.0)}).used
+    model = with_a_slip(evidence, 8.0)
+    tighter = model.fit.x.copy()
+    tighter[0] += log(1.1)
+    joint = augmented_joint(known, replace(model, fit=replace(model.fit, x=tighter)), ())
+    assert joint.effect[0].parameters["slip_m"] == pytest.approx(SLIP_M)
+    stood = {day: as_it_stood(joint, Path(f"{day}/0"), dict)[0] for day in ("mon", "tue")}
+    assert stood["mon"].sensors.joint_position_offset_rad == 0.02
+    assert stood["mon"].drive.stage[0].pretension_N == pytest.approx(1.1 * tension_N)
+    assert stood["tue"].drive.stage[0].pretension_N == pytest.approx(1.25 * 1.1 * tension_N)
+    assert {s.effect[0].parameters["slip_m"] for s in stood.values()} == {0.0}
 
 
 def with_a_slip(evidence: Sequence[Evidence], instant_s: float) -> Model:

@@ -32,6 +32,26 @@ def test_a_session_of_the_configuration_claims_its_recordings_unless_told_otherw
     assert list(session_names(claimed, names, "folder").values()) == ["monday", "tuesday"]
 
 
+def test_parts_of_a_mounting_are_one_session_with_what_else_is_in_its_folder() -> None:
+    parts = [
+        {"name": "before", "mounting": "monday", "recordings": ["monday/1.csv"]},
+        {"name": "after", "mounting": "monday", "recordings": ["monday/2.csv"]},
+    ]
+    joint = parse_joint({**PLAIN, "session": parts}, "x")
+    names = [f"data/monday/{k}.csv" for k in (1, 2, 3)]
+    assert set(session_names(joint, names).values()) == {"monday"}
+
+
+def test_a_recording_stands_apart_as_its_session_states() -> None:
+    """Tighter by a factor, loaded from another zero; its encoder's zero is found inside of the fit."""
+    values = {"pretension_N": 1.2 * JOINT.drive.stage[0].pretension_N, "joint_torque_offset_Nm": 0.25}
+    tight = {"name": "tight", "recordings": ["b"], "values": {**values, "joint_position_offset_rad": 0.1}}
+    joint = parse_joint({**PLAIN, "session": [tight]}, "x")
+    for e in gather_body(joint, {"a/1": recorded(seed=1), "b/1": recorded(seed=2)}).used:
+        stated = {"pretension_N": (pytest.approx(1.2), 0.0), "joint_torque_offset_Nm": (1.0, 0.25)}
+        assert e.apart == (stated if e.session == "tight" else {})
+
+
 def test_the_end_of_few_recordings_is_kept_and_never_used() -> None:
     body = gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": recorded(seed=2)})
     assert body.final_by == "block"

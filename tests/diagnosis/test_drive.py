@@ -8,11 +8,12 @@ from joints import SMALL, SMALL_NOISE, closed
 from small_drive import course, recorded
 
 from cablecomp.config import JointConfig, parse_joint
+from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
 
@@ -109,3 +110,43 @@ def test_calibrate_tells_each_sessions_torque_zero() -> None:
     common = found.config.sensors.joint_torque_offset_Nm
     stood = {s.name: s.values.get(ZERO, common) for s in found.config.sessions}
     assert stood == pytest.approx({k: v.value for k, v in values.items() if k})
+
+
+def test_a_sessions_own_value_begins_where_the_session_states_it() -> None:
+    """Two mountings as they stood: nothing is left to be found, and each is told by its own."""
+    plain = closed(SMALL, "small")
+    tension_N = plain["drive"]["stage"][0]["pretension_N"]
+    sessions = [
+        {"name": "tight", "recordings": ["tight"], "values": {"pretension_N": 1.3 * tension_N}},
+        {"name": "loose", "recordings": ["loose"], "values": {"pretension_N": 0.8 * tension_N}},
+    ]
+    joint = parse_joint({**plain, "tolerance": {"pretension_N": 0.05}, "session": sessions}, "small")
+    recordings = {
+        f"{name}/1": mounted(factor * tension_N) for name, factor in (("tight", 1.3), ("loose", 0.8))
+    }
+    drive = calibrate_drive(joint, gather_body(joint, recordings).used, np.random.default_rng(0))
+    own = {p.session: (p.start, p.centre) for p in drive.fit.problem.parameters if p.base == "pretension_N"}
+    assert own["tight"] == pytest.approx((1.3 * tension_N, 1.3 * tension_N))
+    assert own["loose"] == pytest.approx((0.8 * tension_N, 0.8 * tension_N))
+    stated = {
+        v.session: v.nominal for v in drive_values(drive.fit, joint) if v.name.startswith("pretension_N")
+    }
+    assert stated == pytest.approx({"tight": 1.3 * tension_N, "loose": 0.8 * tension_N})
+    assert rms_left(drive.nominal) < 1.1 * drive.floor_rad
+    one = parse_joint({**plain, "tolerance": {"pretension_N": 0.05}}, "small")
+    drive = calibrate_drive(one, gather_body(one, recordings).used, np.random.default_rng(0))
+    assert rms_left(drive.nominal) > 10.0 * drive.floor_rad  # it is what is stated that tells
+
+
+def mounted(pretension_N: float) -> dict[str, FloatArray]:
+    """What the plant shows of the small joint with this pretension."""
+    plain = closed(SMALL)
+    (stage,) = plain["drive"]["stage"]
+    built = {**plain, "drive": {**plain["drive"], "stage": [{**stage, "pretension_N": pretension_N}]}}
+    rng = np.random.default_rng(5)
+    time, motor, load = course(40.0)
+    found = simulate(PlantConfig.from_dict(built), time, motor, load).channels()
+    return {
+        "time_s": time,
+        **{k: found[k] + sd * rng.standard_normal(len(time)) for k, sd in SMALL_NOISE.items()},
+    }

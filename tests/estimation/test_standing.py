@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from turning import JOINT
+from turning import JOINT, recorded
 
-from cablecomp.config import JointConfig, parse_joint
+from cablecomp.config import JointConfig, in_session, parse_joint
+from cablecomp.config.sessions import Session
 from cablecomp.config_text import joint_text
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.estimation.standing import as_it_stood, at_pretension
+from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.standing import apart_of, as_it_stood, at_pretension, standing, value_of
 from cablecomp.signal.smoothing import FloatArray
 
 BOTH = with_effects(
@@ -84,6 +87,43 @@ def test_beyond_what_told_a_law_it_is_held_and_said() -> None:
     assert "bend_rad = 5 lies beyond 0 to 2" in said[0]
     with pytest.raises(InputError, match="other_bend"):
         as_it_stood(joint, Path("new.csv"), dict)
+
+
+def standing_apart(config: JointConfig, values: dict[str, float], stated: dict[str, float]) -> JointConfig:
+    """The joint with these common values in a recording of which its configuration states others."""
+    e = gather(config, "one", recorded(), "all", fine_rows=400, judged_rows=60)
+    return standing(config, values, replace(e, apart=apart_of(config, stated)))
+
+
+def test_what_a_recording_differs_by_stays_where_the_common_values_move() -> None:
+    stage = JOINT.drive.stage[0]
+    stated = {"pretension_N": 1.5 * stage.pretension_N, "joint_torque_offset_Nm": 0.1}
+    found = standing_apart(JOINT, {}, stated)
+    assert found.drive.stage[0].pretension_N == pytest.approx(1.5 * stage.pretension_N)
+    moved = standing_apart(JOINT, {"pretension_N": 40.0, "joint_torque_offset_Nm": -0.02}, stated)
+    assert moved.drive.stage[0].pretension_N == pytest.approx(60.0)
+    assert moved.sensors.joint_torque_offset_Nm == pytest.approx(0.08)
+    own = standing_apart(JOINT, {"pretension_N@all": 35.0}, stated)
+    assert own.drive.stage[0].pretension_N == pytest.approx(35.0)
+
+
+def test_a_stage_of_its_own_stands_as_stated_beside_all_stages() -> None:
+    two = parse_joint({**PLAIN, "drive": {**PLAIN["drive"], "stage": 2 * PLAIN["drive"]["stage"]}}, "two")
+    stated = {"pretension_N": 90.0, "pretension_N.2": 30.0}
+    found = standing_apart(two, {}, stated)
+    assert [s.pretension_N for s in found.drive.stage] == pytest.approx([90.0, 30.0])
+    assert found == in_session(two, Session(name="x", values=stated))
+
+
+def test_events_that_are_stated_stand_on_the_clock_of_the_recordings_together() -> None:
+    slipping = with_effects(JOINT, [("clamp_slip", {"slip_m": 1e-4, "time_s": 3.0})])
+    name = "effect.clamp_slip.time_s"
+    for stated, instant_s in (({}, 103.0), ({name: 7.0}, 107.0)):
+        apart = apart_of(slipping, stated, shift_s=100.0)
+        e = gather(slipping, "one", recorded(), "all", fine_rows=400, judged_rows=60)
+        stood = standing(slipping, {}, replace(e, apart=apart))
+        assert value_of(stood, name) == pytest.approx(instant_s)
+    assert apart_of(slipping, {}) == {}
 
 
 def test_a_law_on_what_is_no_condition_is_refused() -> None:

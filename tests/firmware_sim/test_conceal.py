@@ -134,7 +134,7 @@ def test_command_line_writes_public_folders_and_seals(
 ) -> None:
     piece = tmp_path / "pieces" / "00000"
     piece.mkdir(parents=True)
-    (tmp_path / "pieces" / "joint.toml").write_text("schema = 1\n")
+    (piece / "joint.toml").write_text("schema = 1\n")
     np.savez(piece / "recording-1.npz", **table())
     arguments = ["--in", str(tmp_path / "pieces"), "--seed", "3", "--out", str(tmp_path / "out")]
     assert main(arguments) == 0

@@ -17,11 +17,13 @@ from blind_joint import JOINT, recording
 
 from cablecomp.cli import main
 from cablecomp.cluster import Workers
-from cablecomp.config_text import joint_text
+from cablecomp.config.sessions import Session
+from cablecomp.diagnosis.body import session_names
 from cablecomp.errors import InputError
+from cablecomp.estimation.standing import as_it_stood
 from cablecomp.report.concealed_page import concealed_page, concealed_section, concealed_table
 from cablecomp.trials.curves import Curves, curves, score_concealed
-from cablecomp.trials.own import SCORED, Own, OwnWish, concealed_beside, piece, prove_in
+from cablecomp.trials.own import SCORED, Own, OwnWish, concealed_beside, joint_of_piece, piece, prove_in
 from cablecomp.trials.run import Verdict
 from cablecomp.trials.sealed import digest
 
@@ -123,17 +125,33 @@ def test_page_table_and_section_hold_it() -> None:
 def test_pieces_are_stretches_of_one_session_and_the_same_again() -> None:
     whole = {f"{s}/{k}.csv": recording(JOINT, k) for s in ("one", "two") for k in range(2)}
     for number in range(4):
-        found = piece(whole, 30.0, 2, number)
+        found = list(piece(JOINT, whole, 30.0, 2, number).values())
         assert sum(float(np.ptp(t["time_s"])) for t in found) == pytest.approx(30.0, abs=0.1)
-        np.testing.assert_array_equal(found[0]["time_s"], piece(whole, 30.0, 2, number)[0]["time_s"])
-    assert len(piece(whole, 70.0, 2, 0)) == 2
+        np.testing.assert_array_equal(
+            found[0]["time_s"], next(iter(piece(JOINT, whole, 30.0, 2, number).values()))["time_s"]
+        )
+    assert len(piece(JOINT, whole, 70.0, 2, 0)) == 2
     with pytest.raises(InputError, match="200 samples"):
-        piece({"a": {"time_s": np.arange(5.0)}}, 20.0, 0, 0)
+        piece(JOINT, {"a": {"time_s": np.arange(5.0)}}, 20.0, 0, 0)
+
+
+def test_a_pieces_joint_states_what_the_joint_states_of_its_recordings() -> None:
+    tight = Session(name="tight", recordings=("one/1.csv",), values={"pretension_N": 71.0})
+    joint = JOINT.model_copy(update={"session": (Session(own=("pretension_N",)), tight)})
+    drawn = {f"one/{k}.csv": recording(JOINT, k) for k in range(3)}
+    there = joint_of_piece(joint, drawn)
+    names = [f"recordings/recording-{k}.npz" for k in (1, 2, 3)]
+    common = JOINT.drive.stage[0].pretension_N
+    stood = [as_it_stood(there, Path(n), dict)[0].drive.stage[0].pretension_N for n in names]
+    assert stood == [common, 71.0, common]
+    assert len(set(session_names(there, names).values())) == 1
+    assert there.session_own == joint.session_own
+    assert joint_of_piece(JOINT, drawn) == JOINT
 
 
 def _conceal(pieces: Path, wish: OwnWish, out: Path, told: Callable[[int, int], None]) -> str:
     (out / "sealed").mkdir()
-    assert (pieces / "joint.toml").exists()
+    assert (pieces / "00000" / "joint.toml").exists()
     for k, physics in enumerate(("twin", "late", "late")):
         (out / "trials" / f"{k:05d}").mkdir(parents=True)
         with zipfile.ZipFile(out / "sealed" / f"{k:05d}.zip", "w") as archive:
@@ -151,7 +169,7 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
             json.dumps(said(*(["clock_skew"] if folder.name != "00000" else [])))
         )
 
-    own = Own(tmp_path, {"a.csv": recording(JOINT, 0)}, joint_text(JOINT), _conceal, Workers(0), diagnose)
+    own = Own(tmp_path, {"a.csv": recording(JOINT, 0)}, JOINT, _conceal, Workers(0), diagnose)
     wish = OwnWish(1, 1, 20.0, 0.0)
     first = prove_in(own, wish, lambda what, done, of: None, log.append)
     seal = digest(tmp_path / "sealed")
@@ -183,7 +201,7 @@ def test_what_cannot_be_concealed_leaves_nothing(tmp_path: Path, beside: bool) -
     if beside:
         out.mkdir()
         (out / "report.html").touch()
-    own = Own(out, {"a.csv": recording(JOINT, 0)}, joint_text(JOINT), unknown, Workers(0))
+    own = Own(out, {"a.csv": recording(JOINT, 0)}, JOINT, unknown, Workers(0))
     with pytest.raises(InputError, match="'sleep'"):
         prove_in(own, OwnWish(1, 1, 20.0, physics="sleep"), lambda what, done, of: None, print)
     assert [p.name for p in tmp_path.rglob("*")] == (["diagnosis", "report.html"] if beside else [])

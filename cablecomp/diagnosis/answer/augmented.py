@@ -3,12 +3,15 @@ controller run it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import hypot, inf
+from pathlib import Path
 
 import numpy as np
 
-from cablecomp.config import Depends, Empirical, JointConfig, Session, with_values
+from cablecomp.config import Depends, Empirical, JointConfig, Session, claiming, with_values
+from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
@@ -16,7 +19,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit, covariance
 from cablecomp.estimation.limits import EXACT
-from cablecomp.estimation.standing import standing, value_of
+from cablecomp.estimation.standing import apart_of, on_the_clock, standing, value_of
 from cablecomp.signal.smoothing import FloatArray
 
 STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
@@ -31,7 +34,7 @@ def augmented_joint(
     fit = model.fit
     zeros = fit.problem.zeros(fit.x)
     first, latest = fit.problem.evidence[0], fit.problem.evidence[-1]
-    common = _afterwards(standing(fit.problem.config, fit.values, first), model, latest)
+    common = _afterwards(_stood(config, fit, replace(first, apart={})), model, latest)
     joint = common.model_copy(
         update={
             "empirical": (*config.empirical, *laws),
@@ -45,25 +48,58 @@ def augmented_joint(
     for label, members in _ways(model):
         recordings = [*members, *(e for e in kept if _alike(e, members[0], model))]
         last = max(recordings, key=lambda e: float(e.columns["time_s"][0]))
-        stood = standing(fit.problem.config, fit.values, members[0])
-        own_zeros = _zeros_of(zeros, members[0].session)
-        after = _afterwards(stood, model, last)
-        if len(sessions) > 1 or _tied(model):
+        session = members[0].session
+        own_zeros = _zeros_of(zeros, session)
+        after = _afterwards(_stood(config, fit, last), model, last)
+        if len(sessions) > 1 or _tied(model) or after != common:
             values = {**own_zeros, **_own(after, common, fit)}
-            entries.append(Session(name=label, recordings=_patterns(members, model), values=values))
+            part = "" if label == session else session
+            entries.append(
+                Session(name=label, mounting=part, recordings=_patterns(members, model), values=values)
+            )
         for e in recordings:
-            now = _meanwhile(stood, model, e)
+            now = _meanwhile(_stood(config, fit, e), model, e)
             if now != after:
                 values = {**own_zeros, **_own(now, common, fit)}
-                entries.append(Session(name=f"{label} {_short(e)}", recordings=(_short(e),), values=values))
+                name = f"{label} {_short(e)}"
+                entries.append(Session(name=name, mounting=session, recordings=(_short(e),), values=values))
+    known = [*fit.problem.evidence, *kept]
+    entries += [s for s in _others(config, model, common, known) if s.name not in {e.name for e in entries}]
     if not entries:
         return joint
     return joint.model_copy(update={"session": (Session(own=tuple(config.session_own)), *entries)})
 
 
+def _others(
+    config: JointConfig, model: Model, common: JointConfig, known: Sequence[Evidence]
+) -> Iterator[Session]:
+    """The configuration's sessions that claim none of the recordings: beside the new common values as they stood
+    beside the old, without the events found now."""
+    fit, first = model.fit, model.fit.problem.evidence[0]
+    claimed = {s.name for e in known for s in claiming(config, Path(e.name))}
+    for s in config.sessions:
+        if s.name in claimed:
+            continue
+        there = replace(first, session="", apart=apart_of(config, s.values))
+        stood = _with_events(standing(fit.problem.config, fit.values, there), model, 0.0, inf, -inf)
+        zeros = {n: v for n, v in s.values.items() if n in ZEROS}
+        yield s.model_copy(update={"values": {**zeros, **_own(stood, common, fit, s.values)}})
+
+
+def _stood(config: JointConfig, fit: Fit, e: Evidence) -> JointConfig:
+    """The joint as it stood in a recording; events that the configuration states, on the recording's own clock."""
+    own = {
+        n: e.apart[n]._replace(addend=e.apart[n].addend - e.shift_s)
+        for n in on_the_clock(config)
+        if n in e.apart
+    }
+    return standing(fit.problem.config, fit.values, replace(e, apart={**e.apart, **own}))
+
+
 def _tied(model: Model) -> bool:
     """Whether a parameter grows with a condition."""
-    return any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)
+    found = any(isinstance(t, Dependence) and t.on != "session" for t in model.terms)
+    return found or bool(model.fit.problem.config.depends)
 
 
 def _alike(e: Evidence, other: Evidence, model: Model) -> bool:
@@ -86,14 +122,22 @@ def _ways(model: Model) -> Iterator[tuple[str, list[Evidence]]]:
 def _meanwhile(joint: JointConfig, model: Model, e: Evidence) -> JointConfig:
     """The joint with the model's events as they stand on a recording's own clock: yet to come, under way, or over
     before it began. Where recordings share one clock, as it is."""
+    if _one_clock(model):
+        return joint
     begin_s, end_s = (float(e.columns["time_s"][k]) - e.shift_s for k in (0, -1))
     return _with_events(joint, model, e.shift_s, begin_s, end_s)
 
 
 def _afterwards(joint: JointConfig, model: Model, e: Evidence) -> JointConfig:
     """The same after a recording: what has begun is over."""
+    if _one_clock(model):
+        return joint
     end_s = float(e.columns["time_s"][-1]) - e.shift_s
     return _with_events(joint, model, e.shift_s, inf, end_s)
+
+
+def _one_clock(model: Model) -> bool:
+    return not any(e.shift_s for e in model.fit.problem.evidence)
 
 
 def _with_events(
@@ -101,8 +145,6 @@ def _with_events(
 ) -> JointConfig:
     """The joint with events on a clock that is `shift_s` behind that of the fit: those that begin later than
     `begun_by_s` on it do not happen, those that end before `over_by_s` have been."""
-    if not any(e.shift_s for e in model.fit.problem.evidence):
-        return joint
     changes: dict[str, float] = {}
     for term in (t for t in model.terms if isinstance(t, Hypothesis)):
         given = next(dict(e.parameters) for e in joint.effect if e.id == term.effect.id)
@@ -191,10 +233,12 @@ def _with_zeros(joint: JointConfig, zeros: Mapping[str, float]) -> JointConfig:
     return joint.model_copy(update={"sensors": joint.sensors.model_copy(update=dict(zeros))})
 
 
-def _own(stood: JointConfig, common: JointConfig, fit: Fit) -> dict[str, float]:
-    """What of the drive differs where it stood so."""
+def _own(stood: JointConfig, common: JointConfig, fit: Fit, further: Iterable[str] = ()) -> dict[str, float]:
+    """What of the drive differs where it stood so; `further` names may."""
     found = {}
     names = [*STAGE_OWN, *(p.base for p in fit.problem.parameters if p.session or p.condition)]
+    names += [n for e in fit.problem.evidence for n in e.apart]
+    names += [n for n in further if n not in ZEROS]
     names += [
         f"effect.{e.id}.{k}" for e in common.effect for k, v in e.parameters.items() if isinstance(v, float)
     ]

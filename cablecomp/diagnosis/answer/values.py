@@ -13,7 +13,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, covariance
-from cablecomp.estimation.standing import value_of
+from cablecomp.estimation.standing import in_its_place, value_of
 from cablecomp.signal.noise import reading_sigma
 
 
@@ -37,12 +37,18 @@ def _parameters(fit: Fit, config: JointConfig, *, effects: bool) -> tuple[Value,
     found = []
     for p, x, s in zip(fit.problem.parameters, fit.x, sd, strict=True):
         if p.of_effect == effects:
-            nominal = None if effects or p.condition else value_of(config, p.base)
+            nominal = None if effects or p.condition else value_of(_stated(fit, config, p.session), p.base)
             value, own = p.value(float(x)), float(s * abs(p.slope(float(x))))
             if role_of(p.base) == "instant":
                 own = reading_sigma(own, _gap_around(fit, value))  # between two rows no fit can tell where
             found.append(Value(p.name, value, own, nominal, p.session))
     return tuple(found)
+
+
+def _stated(fit: Fit, config: JointConfig, session: str | None) -> JointConfig:
+    """The joint as the configuration has it in a session; without one, in general."""
+    recording = next((e for e in fit.problem.evidence if e.session == session), None)
+    return config if recording is None else in_its_place(config, recording)
 
 
 def _gap_around(fit: Fit, instant_s: float) -> float:

@@ -19,6 +19,7 @@ from cablecomp.estimation.limits import BY_TAPE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.estimation.standing import in_its_place
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
 TORQUE_ZERO = "joint_torque_offset_Nm"
@@ -127,12 +128,23 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bo
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
     own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
     by_tape = {} if as_stated else _by_tape(config)
-    free = list(of_drive(config, {**by_tape, **_torque_zero(config, evidence)}))
+    further = {**by_tape, **_torque_zero(config, evidence)}
+    free = list(of_drive(config, further))
     if len(sessions) > 1:
+        first = [next(e for e in evidence if e.session == s) for s in sessions]
+        theirs = [of_drive(in_its_place(config, e), further) for e in first]
         for name in own:
-            for p in [p for p in free if p.name == name]:
-                place = free.index(p)
-                free[place : place + 1] = own_of(p, sessions)
+            if any(
+                e.apart.get(name) != f.apart.get(name)
+                for f in first
+                for e in evidence
+                if e.session == f.session
+            ):
+                continue  # within a session it follows what the configuration says
+            for k in [k for k, p in enumerate(free) if p.name == name]:
+                free[k : k + 1] = [
+                    p for s, ps in zip(sessions, theirs, strict=True) for p in own_of(ps[k], (s,))
+                ]
     return tuple(free)
 
 

@@ -214,6 +214,7 @@ def _all_rows(problem: Problem, thin: Evidence, columns: Columns, group: int) ->
         carryover=carryover,
         condition=thin.condition,
         shift_s=thin.shift_s,
+        apart=thin.apart,
     )
 
 

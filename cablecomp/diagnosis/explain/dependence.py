@@ -116,7 +116,8 @@ def _ways(
     sessions = problem.sessions
     place = problem.parameters.index(p)
     shown = sessions if by == "block" else problem.repeated
-    if len(shown) > 1 and _along_path(p.base):
+    stated = any(p.base in e.apart for e in problem.evidence)  # how it differs is known
+    if len(shown) > 1 and not stated and _along_path(p.base):
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

@@ -38,7 +38,8 @@ def with_own_pretensions(
     common = next((p for p in problem.parameters if p.name == PRETENSION), None)
     sessions = problem.sessions
     shown = sessions if by == "block" else problem.repeated
-    if common is None or len(sessions) < 2 or len(shown) < 2:
+    stated = any(PRETENSION in e.apart for e in problem.evidence)  # how it differs is known
+    if common is None or stated or len(sessions) < 2 or len(shown) < 2:
         return None
     place = problem.parameters.index(common)
     free = (*problem.parameters[:place], *own_of(common, sessions), *problem.parameters[place + 1 :])
