@@ -37,6 +37,11 @@ class Body:
         return tuple(f for f in self.final if f.name not in {u.name for u in self.used})
 
     @property
+    def clock_s(self) -> dict[str, float]:
+        """When recordings that start their own clock begin it on that of all together."""
+        return {e.name: e.shift_s for e in (*self.used, *self.whole_for_the_end) if e.shift_s}
+
+    @property
     def sessions(self) -> dict[str, list[str]]:
         """Recordings of each session."""
         found: dict[str, list[str]] = {}
@@ -60,6 +65,11 @@ def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | No
         else:
             found[name] = "all" if mode == "one" else (folders[path.parent] or "all")
     return found
+
+
+def short(recording: str) -> str:
+    """A recording's name with the folder that it is in."""
+    return "/".join(recording.replace("\\", "/").split("/")[-2:])
 
 
 def _told_apart(paths: Set[PurePath]) -> dict[PurePath, str]:

@@ -97,11 +97,15 @@ class Traces:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything found."""
+    """Everything found.
+
+    `clock_s`: where recordings begin their own clocks on the one that they share here (times of `location`, `traces`).
+    """
 
     config: JointConfig
     recordings: tuple[str, ...]
     sessions: Mapping[str, Sequence[str]]
+    clock_s: Mapping[str, float]
     verdict: str
     noise_floor_rad: float
     repeatability_rad: float | None
@@ -142,6 +146,7 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
         "schema": 2,
         "recordings": list(d.recordings),
         "sessions": {k: list(v) for k, v in d.sessions.items()},
+        "clock_s": dict(d.clock_s),
         "verdict": d.verdict,
         "noise_floor_rad": d.noise_floor_rad,
         "repeatability_rad": d.repeatability_rad,

@@ -15,7 +15,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.estimation.evidence import JOINT, MOTOR
 from cablecomp.estimation.evidence import load_channel as channel_of_load
-from cablecomp.estimation.lateness import delays, rather_late
+from cablecomp.estimation.lateness import accounted_for, delays, rather_late
 from cablecomp.estimation.view import INPUT, Suspicion, View, mrad, partial, rms
 from cablecomp.signal.smoothing import FloatArray
 
@@ -73,6 +73,8 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
         found += late
     else:
         found += rather_late(view, fits, _linear)
+    if config.effect:
+        found = [s for s in found if s.kind != "delay" or not accounted_for(config, columns, s)]
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
         found += _motor_torque(config, _rows(columns, (INPUT, MOTOR, "joint_torque_Nm")))
     return tuple(found)

@@ -7,7 +7,7 @@ lost motion of any width, and both are where all moves at one speed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from math import inf
@@ -15,6 +15,8 @@ from typing import Final
 
 import numpy as np
 
+from cablecomp.config import JointConfig
+from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import CablecompError
 from cablecomp.estimation.evidence import JOINT, MOTOR
 from cablecomp.estimation.view import INPUT, Suspicion, View, bare, mrad, rms
@@ -77,6 +79,26 @@ def rather_late(
         return [said]
     kinds = " or ".join(f"the {f.kind} of {f.channel}" for f in fits)
     return [replace(said, text=f"{said.text}; or {kinds} is off: these data do not tell them apart")]
+
+
+def accounted_for(config: JointConfig, columns: Mapping[str, FloatArray], said: Suspicion) -> bool:
+    """Whether the joint with the effects that its configuration has leaves as little of the recording as it is: what
+    trails there is theirs."""
+    read = {"time_s", INPUT, JOINT, MOTOR, "joint_torque_Nm", "temperature_degC", *other_channels(config)}
+    finite = np.all([np.isfinite(columns[name]) for name in read & set(columns)], axis=0)
+    rows = {name: columns[name][finite] for name in read & set(columns)}
+    time = rows["time_s"]
+    moved = np.interp(time + said.numbers["late_s"], time, rows[said.channel])
+
+    def left(rows: Mapping[str, FloatArray]) -> float:
+        predicted = Observer(config).run(rows)[JOINT]
+        line = np.column_stack((np.ones_like(time), rows[INPUT]))
+        return rms(_beyond(line, rows[JOINT] - predicted))
+
+    try:
+        return left(rows) * LATE_GAIN < left({**rows, said.channel: moved})
+    except CablecompError:  # what the joint cannot bear accounts for nothing
+        return False
 
 
 def _delay(view: View, name: str, late: float, before: float, after: float) -> Suspicion:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.result import Diagnosis, Traces
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report import page
@@ -20,7 +21,6 @@ from cablecomp.report.diagnosis_words import (
     plain,
     repeats_limit,
     sentence,
-    short,
     values_of,
 )
 from cablecomp.report.page import Fact, Section, Tone

@@ -8,6 +8,7 @@ from html import escape
 from typing import Any, Final
 
 from cablecomp.counting import counted
+from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.result import Diagnosis, Traces, report_json
 from cablecomp.effects import Effect, catalogue
 from cablecomp.report import diagnosis_figures as figures
@@ -34,7 +35,6 @@ from cablecomp.report.diagnosis_words import (
     depends,
     plain,
     sentence,
-    short,
 )
 from cablecomp.report.page import Section
 from cablecomp.report.replay_figures import Scale

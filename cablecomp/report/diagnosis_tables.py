@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.result import Tested, Traces
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.report import page
 from cablecomp.report.diagnosis_figures import residual
-from cablecomp.report.diagnosis_words import plain, short
+from cablecomp.report.diagnosis_words import plain
 from cablecomp.report.replay_figures import Scale
 from cablecomp.units import suffix_of
 

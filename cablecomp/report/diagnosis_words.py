@@ -37,11 +37,6 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def short(recording: str) -> str:
-    """A recording's name with the folder that it is in."""
-    return "/".join(recording.replace("\\", "/").split("/")[-2:])
-
-
 def covariate(name: str) -> str:
     """A covariate's name in plain words."""
     for prefix in ("other:", "condition:"):

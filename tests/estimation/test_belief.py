@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from turning import JOINT, course, recorded
 
+from cablecomp.config import JointConfig
+from cablecomp.effects import with_effects
 from cablecomp.estimation.belief import suspicions
 from cablecomp.estimation.view import Suspicion
 from cablecomp.observer import Observer
@@ -19,7 +21,7 @@ TIME = np.arange(0.0, 20.0, 0.02)
 ONE_SPEED = 0.3 * TIME  # turns
 TWO_SPEEDS = np.where(TIME < 10.0, 0.2 * TIME, 2.0 + 0.6 * (TIME - 10.0))
 BACKLASH = EffectSpec("termination_backlash", {"gap_rad": 0.003})
-FRICTION = EffectSpec("bearing_friction", {"torque_Nm": 0.2})
+FRICTION = EffectSpec("bearing_friction", {"torque_Nm": 0.2, "presliding_rad": 1e-4, "load_coefficient": 0.0})
 
 
 def kinds(**changed: FloatArray) -> list[tuple[str, str]]:
@@ -105,10 +107,22 @@ def swung(turns: FloatArray, later_rad: float = 0.0) -> FloatArray:
     return np.sin(2.0 * np.pi * turns + later_rad) * (1.0 - np.exp(-TIME))
 
 
-def delays_of(columns: dict[str, FloatArray], late: str = "", late_s: float = 0.0) -> list[Suspicion]:
+def delays_of(
+    columns: dict[str, FloatArray], late: str = "", late_s: float = 0.0, joint: JointConfig = JOINT
+) -> list[Suspicion]:
     if late:
         columns = {**columns, late: np.interp(TIME - late_s, TIME, columns[late])}
-    return [s for s in suspicions(JOINT, columns) if s.kind == "delay"]
+    return [s for s in suspicions(joint, columns) if s.kind == "delay"]
+
+
+@pytest.mark.parametrize("lost", [BACKLASH, FRICTION])
+def test_lost_motion_that_the_joint_is_known_to_have_is_said_to_be_no_delay(lost: EffectSpec) -> None:
+    columns = plant(1.8 * swung(ONE_SPEED), 1.2 * swung(ONE_SPEED, 1.0), lost)
+    assert delays_of(columns)
+    known = with_effects(JOINT, [(lost.id, dict(lost.parameters))])
+    assert delays_of(columns, joint=known) == []
+    (said,) = delays_of(columns, "joint_position_rad", 0.1, known)
+    assert said.numbers["late_s"] > 0.05
 
 
 @pytest.mark.parametrize("lost", [BACKLASH, FRICTION])

@@ -34,6 +34,7 @@ def example(samples: int = 2_400) -> Diagnosis:
         config=config,
         recordings=names,
         sessions={"rig-1": [first], "rig-2": [second]},
+        clock_s={second: 20.0},
         verdict="partly explained",
         noise_floor_rad=NOISE,
         repeatability_rad=1.4 * NOISE,

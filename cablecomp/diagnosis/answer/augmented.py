@@ -12,6 +12,7 @@ import numpy as np
 
 from cablecomp.config import Depends, Empirical, JointConfig, Session, claiming, with_values
 from cablecomp.config.sessions import ZEROS
+from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
@@ -61,8 +62,10 @@ def augmented_joint(
             now = _meanwhile(_stood(config, fit, e), model, e)
             if now != after:
                 values = {**own_zeros, **_own(now, common, fit)}
-                name = f"{label} {_short(e)}"
-                entries.append(Session(name=name, mounting=session, recordings=(_short(e),), values=values))
+                name = f"{label} {short(e.name)}"
+                entries.append(
+                    Session(name=name, mounting=session, recordings=(short(e.name),), values=values)
+                )
     known = [*fit.problem.evidence, *kept]
     entries += [s for s in _others(config, model, common, known) if s.name not in {e.name for e in entries}]
     if not entries:
@@ -214,12 +217,7 @@ def _patterns(members: Sequence[Evidence], model: Model) -> tuple[str, ...]:
     session = members[0].session
     if not _tied(model) and all(session in e.name.split("/") for e in members):
         return (session,)
-    return tuple(_short(e) for e in members)
-
-
-def _short(e: Evidence) -> str:
-    """A recording's name with its folder."""
-    return "/".join(e.name.split("/")[-2:])
+    return tuple(short(e.name) for e in members)
 
 
 def _zeros_of(zeros: Mapping[str, Mapping[str, FloatArray]], session: str) -> dict[str, float]:

@@ -39,6 +39,7 @@ def diagnosis_of(
         config=case.config,
         recordings=case.body.names,
         sessions=case.body.sessions,
+        clock_s=case.body.clock_s,
         verdict=outcome.verdict,
         noise_floor_rad=drive.floor_rad,
         repeatability_rad=outcome.repeated_rad,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.diagnosis.answer.values import as_trials_say, effect_values
+from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
@@ -27,6 +28,9 @@ from cablecomp.estimation.evidence import JOINT, load_channel
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.profile import profile_interval
+
+SAID = 4
+"""Recordings whose clock is told in a note; of more, the file has it."""
 
 
 def named_of(w: Weighed, final: Model) -> Named:
@@ -228,6 +232,13 @@ def notes(case: Case) -> tuple[str, ...]:
     outliers = sum(e.outliers for e in body.used)
     if outliers:
         found.append(f"{outliers} single readings set aside as outliers")
+    if body.clock_s:
+        begun = [f"{short(name)} from {s:.4g} s" for name, s in body.clock_s.items()]
+        more = f" and {len(begun) - SAID} more, `clock_s` in diagnosis.json" if len(begun) > SAID else ""
+        found.append(
+            "recordings that start their own clock are taken one after the other; on the clock of this page "
+            f"{', '.join(begun[:SAID])}{more}"
+        )
     return tuple(found)
 
 
