@@ -62,8 +62,10 @@ def chain_eval(
 
 
 @inner_kernel
-def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x_guess: float) -> Solved:
-    """Circuit `ic` under `moment` [N m] at input angle x_in [rad]."""
+def circuit_solve(
+    d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x_guess: float, again: bool
+) -> Solved:
+    """Circuit `ic` under `moment` [N m] at input angle x_in [rad]; `again`: near its pending solution."""
     circuit = d.circuits[ic]
     first_h, first_l, count = circuit.first[0], circuit.first[1], circuit.count
     closed = circuit.chains == 2
@@ -79,6 +81,12 @@ def circuit_solve(d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x
     lowest = floor if pull >= 0.0 else floor - pull
     if closed:
         guess = last_l.unloaded - last_l.share * pull + last_l.miss
+        if again:
+            last_h = d.states[first_h + count - 1]
+            share = last_l.share
+            if count == 1:
+                share = last_h.compliance / (last_h.compliance + last_l.compliance)
+            guess = last_l.tension - share * (pull - (last_h.tension - last_l.tension))
         tension = max(guess, lowest)
     else:
         tension = unit * last_l.pretension

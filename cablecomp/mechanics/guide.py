@@ -42,7 +42,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     target = (state.side - cable.sign * radius * (x_in - state.shaft_in)) / unit
     low, high = v_out - width, v_out + width
     least, most = low, high
-    v_in = min(max(state.guide_end, low), high)
+    v_in = min(max(state.guide_try + state.guide_follow * (v_out - state.guide_far), low), high)
     side = by_v = 0.0
     on_guide = ArcMeet(0.0, 0.0, 0.0, 0.0, 0.0)
     slides = False
@@ -83,6 +83,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     follow = 1.0
     if not slides:
         follow = per_turn * on_guide.swap / (by_v + per_turn * (on_guide.by_near + on_guide.swap))
+    state.guide_follow = follow
     total, by_far = arc_total(d.profiles[arc], laws, d.heights[arc], v_out, 1.0, on_guide)
     slope = per_turn * by_far + follow * (by_v + per_turn * on_guide.by_near)
     return Split(side + per_turn * total, slope, tau_of_v(laws, ELSEWHERE, v_in))

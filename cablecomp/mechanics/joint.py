@@ -16,8 +16,11 @@ from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
 
-UNSETTLED = 1e-6
-"""Share of the moments by which a row may miss its balance after all iterations; farther off it is refused."""
+UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
+"""Share of the moments by which a row may miss its balance after all iterations, and how far its angle may still turn;
+farther off it is refused."""
+EPSILON = 2.3e-16
+"""Last digit of 1."""
 
 
 @inner_kernel
@@ -53,15 +56,16 @@ def _distribute(d: Drive) -> None:
 
 
 @inlined_kernel
-def _solve_all(d: Drive, laws: Floats, moment: float) -> Solved:
-    """The joint with `moment` [N m] on its output pulley, through all circuits from the motor outward."""
+def _solve_all(d: Drive, laws: Floats, moment: float, again: bool) -> Solved:
+    """The joint with `moment` [N m] on its output pulley, through all circuits from the motor outward; `again`: it is
+    near what was solved just now."""
     angle = d.context.motor
     compliance = by_h = by_l = 0.0
     for ic in range(d.size.circuits):
         circuit = d.circuits[ic]
         last = d.states[circuit.first[0] + circuit.count - 1]
         guess = last.shaft if ic < d.size.circuits - 1 else d.context.joint
-        solved = circuit_solve(d, laws, ic, moment * circuit.share, angle, guess)
+        solved = circuit_solve(d, laws, ic, moment * circuit.share, angle, guess, again)
         angle = solved.angle
         if solved.status != STATUS_OK:
             return Solved(angle, compliance, solved.status, by_h, by_l)
@@ -87,18 +91,21 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
     x = d.context
     load = x.load
     if d.size.terms == 0:
-        solved = _solve_all(d, laws, load)
+        solved = _solve_all(d, laws, load, False)
     else:
         solved = Solved(x.joint, 0.0, STATUS_DIVERGED, 0.0, 0.0)
         low, high = -1e300, 1e300
         followed = False
-        excess = 0.0
+        excess = moved = 0.0
+        again = settled = False
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
             _distribute(d)
-            before_slope, before_h, before_l = x.moment_slope, x.length_h, x.length_l
-            solved = _solve_all(d, laws, moment)
+            before_h, before_l = x.length_h, x.length_l
+            stiff_h, stiff_l = x.stiffness_h, x.stiffness_l
+            solved = _solve_all(d, laws, moment, again)
+            again = solved.status == STATUS_OK
             if solved.status == STATUS_SLACK and load > moment:
                 # a trial moment that no open circuit can take (a first guess of the acceleration): nearer to the load
                 low = max(low, moment)
@@ -111,10 +118,13 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
             _show_tensions(d)
             run_terms(d, terms)
             excess = moment - (load - x.moment)
-            scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15
+            # as near as the last digits of moments and angle let it
+            scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15 + 4.0 * EPSILON * abs(x.moment_slope * x.joint)
             # settled, or nothing that the solve depends on has followed the angle
             same = x.length_h == before_h and x.length_l == before_l
-            if abs(excess) <= scale and (abs(moved) <= 1e-12 or (same and before_slope == 0.0)):
+            same = same and x.stiffness_h == stiff_h and x.stiffness_l == stiff_l
+            if abs(excess) <= scale and (abs(moved) <= 1e-12 or same):
+                settled = True
                 break
             # lengths that follow the angle turn it further: on to where that ends (Steffensen's step)
             turn = solved.by_h * (x.length_h - before_h) + solved.by_l * (x.length_l - before_l)
@@ -136,8 +146,9 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
             moment -= step
             if not low < moment < high and abs(excess) > 1e-9 * (abs(load) + 1e-9) and high - low < 1e299:
                 moment = 0.5 * (low + high)
-        if solved.status == STATUS_OK and abs(excess) > UNSETTLED * (abs(load) + abs(moment)) + 1e-9:
-            solved = Solved(solved.angle, solved.compliance, STATUS_DIVERGED, 0.0, 0.0)
+        if solved.status == STATUS_OK and not settled:
+            if abs(excess) > UNSETTLED * (abs(load) + abs(moment)) + 1e-9 or abs(moved) > UNSETTLED_RAD:
+                solved = Solved(solved.angle, solved.compliance, STATUS_DIVERGED, 0.0, 0.0)
     x.joint = solved.angle
     x.compliance = solved.compliance
     _show_tensions(d)

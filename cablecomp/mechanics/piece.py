@@ -13,6 +13,7 @@ from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
     GROOVED,
     HEAD,
+    LEAST_STIFFNESS,
     MODE,
     PLAIN,
     STIFF,
@@ -23,6 +24,17 @@ from cablecomp.mechanics.tables import (
     strain,
 )
 
+LEAST_CLOSED = 1e-6
+"""Stiffening coefficient from which on a piece is done in closed form."""
+PI2_6 = math.pi**2 / 6.0
+# Bernoulli's numbers over (2 k + 1)!
+B2, B4, B6, B8, B10, B12, B14 = (
+    numerator / (denominator * math.factorial(2 * _k + 1))
+    for _k, (numerator, denominator) in enumerate(
+        [(1.0, 6.0), (-1.0, 30.0), (1.0, 42.0), (-1.0, 30.0), (5.0, 66.0), (-691.0, 2730.0), (7.0, 6.0)],
+        start=1,
+    )
+)
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
@@ -42,7 +54,7 @@ def piece(
     laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
 ) -> tuple[float, float]:
     """Integral of e(v) over y1..y2 and of de/dv; e = strain * EA/T0 = tau - 1 for the plain cable, whose tau
-    are tau1, tau2."""
+    are tau1, tau2 (exp(v) wherever friction is plain)."""
     dy = y2 - y1
     d = v2 - v1
     if laws is None:
@@ -50,7 +62,7 @@ def piece(
     if laws[0, HEAD, MODE] == PLAIN:
         return piece_plain(dy, d, tau1, tau2)
     if laws[0, HEAD, MODE] == STIFF:
-        return _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, d)
+        return _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, tau1, v2, tau2)
     return piece_table(laws, law, y1, v1, y2, v2)
 
 
@@ -65,16 +77,51 @@ def piece_plain(dy: float, d: float, tau1: float, tau2: float) -> tuple[float, f
 
 
 @inner_kernel
-def _piece_stiff(b: float, dy: float, v1: float, d: float) -> tuple[float, float]:
-    """`piece` for a cable that stiffens under plain friction: Gauss-Legendre quadrature, its error below 1e-13 of the
-    strain with 3 points on short pieces, with 5 on middling ones."""
-    if abs(d) < 0.05:
+def _piece_stiff(b: float, dy: float, v1: float, tau1: float, v2: float, tau2: float) -> tuple[float, float]:
+    """`piece` for a cable that stiffens under plain friction: in closed form, but for short pieces, where differences
+    would cancel, and where a cable softens beyond its law; these by Gauss-Legendre quadrature.
+
+    e(v) = (ln(1 - b) + ln(1 + c exp v))/b with c = b/(1 - b); int ln(1 + c exp v) dv = -Li2(-c exp v).
+    """
+    d = v2 - v1
+    if abs(d) < 0.05 and b >= 0.0:
         total, slope = _stiff_sums(SHORT_X, SHORT_W, b, v1, d)
-    elif abs(d) < 0.4:
+    elif abs(d) < 0.05:
         total, slope = _stiff_sums(MIDDLE_X, MIDDLE_W, b, v1, d)
+    elif abs(b) > LEAST_CLOSED and 1.0 + b * (max(tau1, tau2) - 1.0) > LEAST_STIFFNESS:
+        c = b / (1.0 - b)
+        area1, l1 = log_area(c * tau1)
+        area2, l2 = log_area(c * tau2)
+        total = (math.log1p(-b) + (area2 - area1) / d) / b
+        slope = (l2 - l1) / (b * d)
     else:
         total, slope = _stiff_sums(LONG_X, LONG_W, b, v1, d)
     return total * dy, slope * dy
+
+
+@inner_kernel
+def log_area(z: float) -> tuple[float, float]:
+    """-Li2(-z), the integral of ln(1 + z)/z from 0 to z > -1, and ln(1 + z).
+
+    By u = ln(1 + z) where |z| is small, u = ln(1 + 1/z) beyond 1, u = -ln(-z) below -1/2: by Li2's reflections a series
+    in Bernoulli's numbers whose terms fall at least as (ln 2/2 pi)^2 (NIST Digital Library of Mathematical Functions,
+    25.12).
+    """
+    grown = math.log1p(z)
+    u, log_z = grown, 0.0
+    if z > 1.0:
+        log_z = math.log(z)
+        u = grown - log_z
+    elif z < -0.5:
+        log_z = math.log(-z)
+        u = -log_z
+    w = u * u
+    odd = u * (1.0 + w * (B2 + w * (B4 + w * (B6 + w * (B8 + w * (B10 + w * (B12 + w * B14)))))))
+    if z > 1.0:
+        return PI2_6 - grown * (0.5 * grown - log_z) - odd + 0.25 * w, grown
+    if z < -0.5:
+        return odd - 0.25 * w + log_z * grown - PI2_6, grown
+    return odd + 0.25 * w, grown
 
 
 @inner_kernel

@@ -46,7 +46,8 @@ def retension(d: Drive, laws: Floats, c: int, factor: float) -> None:
     if d.size.stacks > 2 * d.size.cables:
         arc = 2 * d.size.cables + c
         _shift(d, laws, ELSEWHERE, arc, 1.0, ratio)
-        state.guide_end = d.profiles[arc, 0].v
+        state.guide_end = state.guide_try = d.profiles[arc, 0].v
+        state.guide_follow = 0.0
 
 
 @inner_kernel

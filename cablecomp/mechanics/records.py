@@ -120,6 +120,7 @@ STATE = record(
         ("side", "f8"),  # with a guide: stretch of the input side,
         ("guide_end", "f8"),  # end values of the guide,
         ("guide_far", "f8"),
+        ("guide_follow", "f8"),  # how far the near one followed the far one, to begin the next solution with,
         ("shaft_in", "f8"),  # input shaft
         ("side_try", "f8"),
         ("guide_try", "f8"),

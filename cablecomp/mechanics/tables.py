@@ -24,6 +24,7 @@ from cablecomp.mechanics.jit import constant, inner_kernel, leaf_kernel
 Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
+LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften further
 LEAST_U, MOST_U = -7.0, 2.5
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
 # laws: of the joint's own drum in chain h and l, of all other places, of the motor's own drum in chain h and l
@@ -230,9 +231,9 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
     if b == 0.0:
         return tau - 1.0, 1.0
     stiffness = 1.0 + b * (tau - 1.0)
-    if stiffness < 0.05:  # the law makes no sense beyond; stay finite and monotone
-        edge = (0.05 - 1.0) / b
-        return math.log(0.05) / b + (tau - 1.0 - edge) / 0.05, 1.0 / 0.05
+    if stiffness < LEAST_STIFFNESS:  # the law makes no sense beyond; stay finite and monotone
+        edge = (LEAST_STIFFNESS - 1.0) / b
+        return math.log(LEAST_STIFFNESS) / b + (tau - 1.0 - edge) / LEAST_STIFFNESS, 1.0 / LEAST_STIFFNESS
     return math.log1p(b * (tau - 1.0)) / b, 1.0 / stiffness
 
 

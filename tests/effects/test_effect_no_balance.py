@@ -1,4 +1,5 @@
-"""A row in which moments cannot balance is refused, and leaves the state as it was."""
+"""A row in which moments cannot balance, or the angle does not settle, is refused, and leaves the state as it was; a
+stiffness that follows the angle is that of the angle found."""
 
 from __future__ import annotations
 
@@ -15,24 +16,69 @@ from cablecomp.signals import Sample
 JUMP_RAD = 0.02
 
 
+@term(parameters=("length",))
+def elsewhere(c: Any, p: Any, s: Any) -> None:
+    """A length that turns about at once at an angle: whichever it is, the joint stands where it is the other."""
+    c.length_h += p.length if c.joint > JUMP_RAD else -p.length
+
+
+@term(parameters=("share",))
+def softer(c: Any, p: Any, s: Any) -> None:
+    """Cables the softer, the farther the joint has turned."""
+    c.stiffness_h *= 1.0 - p.share * c.joint
+    c.stiffness_l *= 1.0 - p.share * c.joint
+
+
+@term(parameters=("share",))
+def soft(c: Any, p: Any, s: Any) -> None:
+    """Cables softer by so much."""
+    c.stiffness_h *= 1.0 - p.share
+    c.stiffness_l *= 1.0 - p.share
+
+
 @term(parameters=("moment",))
 def against(c: Any, p: Any, s: Any) -> None:
     """A moment that turns about at once at an angle: nothing holds a joint there."""
     c.moment += p.moment if c.joint > JUMP_RAD else -p.moment
 
 
-def test_a_row_without_a_balance_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    register_alone(monkeypatch, "jump", "moment_Nm", lambda v: against(moment=v["moment_Nm"]))
+@pytest.mark.parametrize("what", ["moment", "length"])
+def test_a_row_without_a_balance_is_refused(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     config = joint("snow-closed-rig")
-    unit = config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
-    observer = Observer(with_effects(config, [("jump", {"moment_Nm": 0.3 * unit})]))
+    stage = config.drive.stage[-1]
+    if what == "moment":
+        register_alone(monkeypatch, "jump", "amount", lambda v: against(moment=v["amount"]))
+        amount = 0.3 * stage.output_radius_m * stage.pretension_N
+    else:
+        register_alone(monkeypatch, "jump", "amount", lambda v: elsewhere(length=v["amount"]))
+        amount = 2e-3 * stage.output_radius_m
+    jump = with_effects(config, [("jump", {"amount": amount})])
+    observer = Observer(jump)
     far = 0.5 / config.drive.ratio
     before = observer.step(Sample(0.0, 0.0, 0.0)).joint_position_rad
     assert before < JUMP_RAD
     with pytest.raises(SampleRefused):  # on the jump: the joint can be neither before nor beyond it
         observer.step(Sample(0.1, JUMP_RAD / config.drive.ratio, 0.0))
-    fresh = Observer(with_effects(config, [("jump", {"moment_Nm": 0.3 * unit})]))
+    fresh = Observer(jump)
     fresh.step(Sample(0.0, 0.0, 0.0))
     after = observer.step(Sample(0.2, far, 0.0)).joint_position_rad
     assert after > JUMP_RAD
     assert after == fresh.step(Sample(0.2, far, 0.0)).joint_position_rad
+
+
+def test_a_stiffness_that_follows_the_angle_is_that_of_the_angle_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Loaded and turned at once, against the drive with the factor that belongs to where it ends."""
+    config = joint("snow-closed-rig")
+    unit = config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
+    share, rows = 0.4, [Sample(0.0, 0.0, 0.0), Sample(0.1, 0.6 / config.drive.ratio, 0.5 * unit)]
+    register_alone(monkeypatch, "softer", "share", lambda v: softer(share=v["share"]))
+    observer = Observer(with_effects(config, [("softer", {"share": share})]))
+    start, found = (observer.step(row).joint_position_rad for row in rows)
+    assert start == pytest.approx(0.0, abs=1e-12)
+    register_alone(monkeypatch, "soft", "share", lambda v: soft(share=v["share"]))
+    given = with_effects(config, [("soft", {"share": share * found})])
+    observer = Observer(given)
+    _, expected = (observer.step(row).joint_position_rad for row in rows)
+    assert found == pytest.approx(expected, abs=1e-12)

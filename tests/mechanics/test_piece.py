@@ -1,0 +1,33 @@
+"""A straight piece of a profile: its strain's integral against quadrature, across the ways in which it is done."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from cablecomp.mechanics.piece import piece
+from cablecomp.mechanics.tables import LEAST_STIFFNESS, stiffening_law
+
+WIDTH_RAD = 2.0
+
+
+@pytest.mark.parametrize("stiffening", [-0.4, 1e-7, 2e-6, 0.02, 0.5, 0.95])
+@pytest.mark.parametrize("rise", [0.01, 0.049, 0.051, 0.2, 0.5, 2.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_stiffening_piece_is_the_integral_of_its_strain(stiffening: float, rise: float, way: float) -> None:
+    """e(tau) = int_1^tau dt/(1 + b (t - 1)) = ln(1 + b (tau - 1))/b, tau = exp(v)."""
+    law = np.stack([stiffening_law(stiffening)])
+
+    def strain(v: float) -> float:
+        return float(np.log1p(stiffening * np.expm1(v)) / stiffening)
+
+    for begin in (-2.5, -0.6, 0.0, 0.4):
+        end = begin + way * rise
+        if 1.0 + stiffening * np.expm1(max(begin, end)) < LEAST_STIFFNESS:
+            continue  # softer than the law is meant for
+        total, slope = piece(law, 0, 1.0, begin, np.exp(begin), 1.0 + WIDTH_RAD, end, np.exp(end))
+        mean = quad(strain, begin, end, epsabs=1e-14, epsrel=1e-13)[0] / (end - begin)
+        assert total == pytest.approx(WIDTH_RAD * mean, abs=2e-13)
+        mean_slope = (strain(end) - strain(begin)) / (end - begin)
+        assert slope == pytest.approx(WIDTH_RAD * mean_slope, abs=2e-12)
