@@ -25,7 +25,8 @@ class JointConfig(Frozen):
         default_factory=dict,
         description="by key of [[drive.stage]]: relative 1 sigma of what is only nominally known; absent = exact "
         "(to a diagnosis: a radius to 0.3 %, free lengths to 2 %); 1 and more = order of magnitude only. "
-        "Offsets of [sensors]: 1 sigma in their own unit",
+        "Offsets of [sensors]: 1 sigma in their own unit. effect.ID.KEY: of an effect that the joint is known to have, "
+        "relative; in its own unit where it may have either sign",
     )
     sensors: Sensors = Sensors()
     effect: Annotated[tuple[EffectEntry, ...], listed(64)] = ()

@@ -8,12 +8,12 @@ condition.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, inf, log
 from types import MappingProxyType
 
 from cablecomp.config import JointConfig
-from cablecomp.effects import Effect
+from cablecomp.effects import Effect, catalogue
 from cablecomp.effects import Parameter as EffectParameter
 from cablecomp.estimation.limits import DECADES, EXACT, INSTANT_REACH_S, INSTANT_STEP_S, OWN_SD, STEP
 
@@ -82,14 +82,16 @@ class Parameter:
 
 
 def vague_drive(parameters: Sequence[Parameter]) -> bool:
-    """Whether the drive is known by order of magnitude only: a parameter of its own is."""
-    return any(p.vague and not p.of_effect for p in parameters)
+    """Whether the drive is known by order of magnitude only: how much it yields, that is; coefficients of friction that
+    no recording has told leave that known."""
+    return any(p.vague and not p.of_effect and not p.base.startswith("mu_") for p in parameters)
 
 
 def of_drive(
     config: JointConfig, further: Mapping[str, float] = MappingProxyType({})
 ) -> tuple[Parameter, ...]:
-    """What `[tolerance]` frees of the drive and its sensors: log-normal priors, 1 and more = known to a decade.
+    """What `[tolerance]` frees of the drive, its sensors and its effects: log-normal priors, 1 and more = known to a
+    decade; normal ones, in the parameter's unit, of zeros and of what an effect may have of either sign.
 
     `further`: tolerances of what has none there."""
     found = []
@@ -98,6 +100,9 @@ def of_drive(
         tolerances["input_radius_m"] = EXACT
     for name, tolerance in tolerances.items():
         if tolerance <= 0.0:
+            continue
+        if name.startswith("effect."):
+            found += _of_known_effect(name, tolerance, config)
             continue
         key, _, which = name.partition(".")
         stage = config.drive.stage[int(which) - 1 if which else 0]
@@ -108,23 +113,37 @@ def of_drive(
             continue  # zeros are found inside of the fit
         nominal = float(nominal)
         if key.endswith("_offset_Nm"):
-            found.append(
-                Parameter(
-                    name,
-                    nominal,
-                    nominal - 8 * tolerance,
-                    nominal + 8 * tolerance,
-                    False,
-                    tolerance,
-                    nominal,
-                    1.0,
-                )
-            )
-            continue
-        sd = DECADE if tolerance >= 1.0 else tolerance
-        reach = exp(DECADES * DECADE if tolerance >= 1.0 else 6.0 * tolerance)
-        found.append(Parameter(name, nominal, nominal / reach, nominal * reach, True, 1.0, nominal, sd))
+            found.append(_about(name, nominal, tolerance))
+        else:
+            found.append(_by_factor(name, nominal, tolerance))
     return tuple(found)
+
+
+def _by_factor(name: str, nominal: float, tolerance: float) -> Parameter:
+    """A value above zero, known to a share of itself; to a decade from 1 on."""
+    sd = DECADE if tolerance >= 1.0 else tolerance
+    reach = exp(DECADES * DECADE if tolerance >= 1.0 else 6.0 * tolerance)
+    return Parameter(name, nominal, nominal / reach, nominal * reach, True, 1.0, nominal, sd)
+
+
+def _about(name: str, nominal: float, tolerance: float) -> Parameter:
+    """A value of either sign, known in its own unit."""
+    width = 8.0 * tolerance
+    return Parameter(name, nominal, nominal - width, nominal + width, False, tolerance, nominal, 1.0)
+
+
+def _of_known_effect(name: str, tolerance: float, config: JointConfig) -> list[Parameter]:
+    """A parameter of an effect that the joint is known to have, inside what its law can take; none of one that it has
+    not."""
+    _, identifier, key = name.split(".")
+    entry = next((e for e in config.effect if e.id == identifier), None)
+    value = None if entry is None else entry.parameters.get(key)
+    if not isinstance(value, int | float):
+        return []
+    law = catalogue()[identifier].parameter(key)
+    by_factor = value > 0.0 and law.minimum >= 0.0
+    p = _by_factor(name, value, tolerance) if by_factor else _about(name, value, tolerance)
+    return [replace(p, low=max(p.low, law.minimum), high=min(p.high, law.maximum))]
 
 
 def of_effect(effect: Effect, values: Mapping[str, float], config: JointConfig) -> tuple[Parameter, ...]:

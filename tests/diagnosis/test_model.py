@@ -15,7 +15,7 @@ from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.parameter import of_drive, vague_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
 
@@ -134,3 +134,24 @@ def test_where_nothing_holds_the_drive_an_amount_runs_away_without_a_bound(
     fit, h = beside("pulley_runout", amount)
     assert not runs_away(fit, h)
     assert runs_away(*beside("pulley_runout", amount, with_tolerance(1.0))) is away
+
+
+@pytest.mark.parametrize(("share", "away"), [(1.5, False), (3.0, True)])
+def test_an_unseen_weight_may_be_as_large_as_the_loads_that_are_seen(share: float, away: bool) -> None:
+    """A drive under loads far beyond what its pretension bears: a weight is judged by these."""
+    loose = with_tolerance(1.0)
+    largest = 1.5 * JOINT.drive.stage[0].pretension_moment_Nm  # plausible by the drive alone
+    fit, h = beside("gravity_load", {"moment_Nm": share * 2.0 * largest, "phase_rad": 0.5}, loose)
+    assert runs_away(fit, h)
+    (e,) = fit.problem.evidence
+    torque = e.columns["joint_torque_Nm"]
+    heavy = {**e.columns, "joint_torque_Nm": torque * (2.0 * largest / np.max(np.abs(torque)))}
+    loaded = fit.problem.with_evidence([replace(e, columns=heavy)])
+    assert runs_away(replace(fit, problem=loaded), h) is away
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "vague"), [({"EA_N": 1.0}, True), ({"mu_output": 1.0, "mu_input": 1.0}, False)]
+)
+def test_coefficients_of_friction_alone_leave_a_drive_known(tolerance: dict[str, float], vague: bool) -> None:
+    assert vague_drive(of_drive(JOINT.model_copy(update={"tolerance": tolerance}))) is vague

@@ -194,6 +194,31 @@ def told_by(fit: Fit, stated: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
+def with_tolerances_of(joint: JointConfig, model: Model) -> JointConfig:
+    """The joint with tolerances of how much of each effect was found, events apart, where the recordings tell it: as
+    wide as stated, no less than from day to day. A later diagnosis or calibration moves them within these."""
+    fit = model.fit
+    sds = np.sqrt(np.diag(covariance(fit)))
+    tolerance = dict(joint.tolerance)
+    for term in (t for t in model.terms if isinstance(t, Hypothesis) and not t.has_instant):
+        for p, x, sd in zip(fit.problem.parameters, fit.x, sds, strict=True):
+            known = term.effect.parameter(p.base.rpartition(".")[2]) if p.base in _keys(term) else None
+            if known is None or known.shape or p.session or p.condition:
+                continue
+            value = p.value(float(x))
+            width = LIMITS.wider * float(sd) * abs(p.slope(float(x)))
+            if not value or width > LIMITS.untold * abs(value):
+                continue
+            share = max(width / abs(value), LIMITS.known)
+            by_factor = value > 0.0 and known.minimum >= 0.0
+            tolerance[p.base] = float(f"{share if by_factor else share * abs(value):.2g}")
+    return joint.model_copy(update={"tolerance": tolerance})
+
+
+def _keys(term: Hypothesis) -> set[str]:
+    return {term.key(p.name) for p in term.effect.parameters}
+
+
 def _depends(model: Model, first: Evidence) -> tuple[Depends, ...]:
     """The laws that tie parameters to conditions; the common values are those of the first recording's."""
     fit = model.fit

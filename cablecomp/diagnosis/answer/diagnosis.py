@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.diagnosis.answer.augmented import augmented_joint, told_by, with_tolerances
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.answer.augmented import (
+    augmented_joint,
+    told_by,
+    with_tolerances,
+    with_tolerances_of,
+)
 from cablecomp.diagnosis.answer.entries import (
     candidates,
     channel_word,
@@ -62,15 +68,19 @@ def diagnosis_of(
         remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.names),
         notes=notes(case),
-        augmented_joint=with_tolerances(
-            augmented_joint(case.config, kept, outcome.empirical, case.body.whole_for_the_end),
-            kept.fit,
-            told_by(kept.fit, case.config.tolerance),
-        ),
+        augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates)),
         warnings=(*((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()), *warnings_of(kept)),
     )
+
+
+def _augmented(case: Case, outcome: Outcome) -> JointConfig:
+    """The joint with what was found, and how well that is known."""
+    model = outcome.kept
+    joint = augmented_joint(case.config, model, outcome.empirical, case.body.whole_for_the_end)
+    joint = with_tolerances(joint, model.fit, told_by(model.fit, case.config.tolerance))
+    return with_tolerances_of(joint, model)
 
 
 def _channels(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:

@@ -18,13 +18,16 @@ from cablecomp.signal.noise import reading_sigma
 
 
 def drive_values(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
-    """The drive's parameters and the joint encoder's zeros; nominal values as `config` has them."""
-    return (*_parameters(fit, config, effects=False), *_zeros(fit, config))
+    """The parameters of the drive and of the effects that `config` has, and the joint encoder's zeros; nominal values
+    as `config` has them."""
+    known = tuple(f"effect.{e.id}." for e in config.effect)
+    mine = [k for k, p in enumerate(fit.problem.parameters) if not p.of_effect or p.base.startswith(known)]
+    return (*_parameters(fit, mine, config), *_zeros(fit, config))
 
 
 def effect_values(fit: Fit) -> tuple[Value, ...]:
     """The effects' parameters, named `effect.ID.KEY`."""
-    return _parameters(fit, fit.problem.config, effects=True)
+    return _parameters(fit, [k for k, p in enumerate(fit.problem.parameters) if p.of_effect])
 
 
 def as_trials_say(values: Sequence[Value]) -> tuple[Value, ...]:
@@ -32,16 +35,18 @@ def as_trials_say(values: Sequence[Value]) -> tuple[Value, ...]:
     return tuple(replace(v, sd=LIMITS.wider * v.sd) for v in values)
 
 
-def _parameters(fit: Fit, config: JointConfig, *, effects: bool) -> tuple[Value, ...]:
+def _parameters(fit: Fit, mine: Sequence[int], config: JointConfig | None = None) -> tuple[Value, ...]:
     sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))
     found = []
-    for p, x, s in zip(fit.problem.parameters, fit.x, sd, strict=True):
-        if p.of_effect == effects:
-            nominal = None if effects or p.condition else value_of(_stated(fit, config, p.session), p.base)
-            value, own = p.value(float(x)), float(s * abs(p.slope(float(x))))
-            if role_of(p.base) == "instant":
-                own = reading_sigma(own, _gap_around(fit, value))  # between two rows no fit can tell where
-            found.append(Value(p.name, value, own, nominal, p.session))
+    for k in mine:
+        p, x = fit.problem.parameters[k], float(fit.x[k])
+        nominal = None
+        if config is not None and not p.condition:
+            nominal = value_of(_stated(fit, config, p.session), p.base)
+        value, own = p.value(x), float(sd[k] * abs(p.slope(x)))
+        if role_of(p.base) == "instant":
+            own = reading_sigma(own, _gap_around(fit, value))  # between two rows no fit can tell where
+        found.append(Value(p.name, value, own, nominal, p.session))
     return tuple(found)
 
 

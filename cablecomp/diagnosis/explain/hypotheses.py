@@ -16,6 +16,7 @@ from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
+from cablecomp.estimation.simulate import load_of
 
 
 @dataclass(frozen=True)
@@ -284,7 +285,7 @@ def runs_away(fit: Fit, h: Hypothesis) -> bool:
     if found is None:
         return False
     p, value = found
-    configured = abs(value) / max(abs(b) for b in h.amount.bounds(fit.problem.config))
+    configured = abs(value) / _most(h, fit.problem.config, fit)
     if min(configured, over_plausible(fit, h)) <= LIMITS.beyond_plausible:
         return False
     return vague_drive(fit.problem.parameters) or abs(value) > LIMITS.on_bound * abs(
@@ -296,4 +297,14 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
     """An effect's amount over the largest that is plausible for the drive as fitted; 0 where it has none."""
     found = amount_of(fit, h)
     joint = fit.problem.joint(fit.x, fit.problem.evidence[0])
-    return 0.0 if found is None else abs(found[1]) / max(abs(b) for b in h.amount.bounds(joint))
+    return 0.0 if found is None else abs(found[1]) / _most(h, joint, fit)
+
+
+def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:
+    """The largest plausible amount of an effect; a load that its channel does not see may be as large as those that it
+    does."""
+    most = max(abs(b) for b in h.amount.bounds(joint))
+    if not (h.has_phase and h.amount.unit == "N m"):
+        return most
+    loads = (np.max(np.abs(load_of(joint, e.columns))) for e in fit.problem.evidence)
+    return max(most, *(float(load) for load in loads))

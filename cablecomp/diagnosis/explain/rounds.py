@@ -43,7 +43,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import MOTOR
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parallel import side_by_side
-from cablecomp.estimation.parameter import by_condition
+from cablecomp.estimation.parameter import by_condition, vague_drive
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
@@ -265,7 +265,7 @@ def _further(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
 def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
     """Where every effect would begin beside the nominal drive; None where the drive is known better than by
     order of magnitude (calibration then stays in its valley)."""
-    if not any(p.vague for p in baseline.problem.parameters):
+    if not vague_drive(baseline.problem.parameters):
         return None
     evidence = baseline.problem.evidence
     torque = [
