@@ -10,7 +10,7 @@ import pytest
 from cablecomp.diagnosis.answer import entries
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows
+from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, _too_little
 
 
 @pytest.mark.parametrize(
@@ -53,6 +53,16 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
     reason = _against(instead, ScoreDifference(0.5, z, z), {**STRONG, **weak})
     assert said in reason
     assert ";" not in reason
+
+
+@pytest.mark.parametrize(
+    ("removes", "left", "little"),
+    [(0.1, 0.85, True), (0.1, 0.4, False), (0.03, 0.0, False), (0.3, 0.7, False)],
+)
+def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float, little: bool) -> None:
+    said = _too_little(removes, left)
+    assert bool(said) is little
+    assert not little or (f"{removes:.0%}" in said and f"{left:.0%}" in said)
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:

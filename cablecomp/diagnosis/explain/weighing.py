@@ -21,6 +21,8 @@ from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.effects.catalogue import parameter_of
+from cablecomp.estimation.evidence import JOINT, noise_rms
+from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.signal.smoothing import FloatArray
 
 ALONE = ScoreDifference(1.0, 99.0, 10.0)
@@ -103,8 +105,24 @@ def _weighed(
     removes = max(evidence["share_total"], _alone(selection, term))
     if lacks := untold(final.fit, term, removes):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
+    elif little := _too_little(removes, share_left * _beyond_noise(final.fit)):
+        confidence, why_not = min(confidence, LIMITS.little_told), little
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes)
+
+
+def _too_little(removes: float, left: float) -> str:
+    """What is to be said of an effect that takes off little beside what is `left` beyond noise, both as shares of the
+    calibrated drive's mean square; "" of one that takes off enough."""
+    if removes >= LIMITS.little * left:
+        return ""
+    return f"it takes off {removes:.0%} of the mismatch, and {left:.0%} of it, beyond noise, is left"
+
+
+def _beyond_noise(fit: Fit) -> float:
+    """Share of the mean square left of the joint's angle that is not the sensors' noise."""
+    left, noise = rms_left(fit), noise_rms(fit.problem.evidence, JOINT)
+    return max(1.0 - (noise / max(left, 1e-300)) ** 2, 0.0)
 
 
 def _at_bound(model: Model, term: Hypothesis) -> bool:
