@@ -14,7 +14,7 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.screening import anchor, contribution
-from cablecomp.diagnosis.explain.unseen import _bound_of_phase, could_be_unseen
+from cablecomp.diagnosis.explain.unseen import _bound_of_phase, _likeliest, could_be_unseen
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT as ANGLE
 from cablecomp.estimation.evidence import gather
@@ -95,3 +95,12 @@ def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() ->
     as_it_is = np.concatenate(fit.problem.left(fit.x))
     alone, beside = (float(np.std(left(j) - as_it_is)) for j in (bare, mount.joint))
     assert beside < 0.5 * alone
+
+
+def test_a_parameter_that_does_nothing_takes_no_step() -> None:
+    """Two that do the same in part, one that shows nothing."""
+    rng = np.random.default_rng(2)
+    J = np.column_stack([rng.standard_normal(50), np.zeros(50), rng.standard_normal(50)])
+    with np.errstate(all="raise"):
+        s = _likeliest(J, 0.3 * J[:, 0] - 0.1 * J[:, 2], np.array([1.0, 0.5, 1.0]))
+    assert s == pytest.approx([0.3, 0.0, -0.1], abs=0.05)
