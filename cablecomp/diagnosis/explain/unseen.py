@@ -143,7 +143,8 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
 
 def _likeliest(J: FloatArray, d: FloatArray, sds: FloatArray) -> FloatArray:
     """Steps s with J s = d that go least far within tolerances of these deviations: parameters that do nearly the same
-    share what there is to do, and one that does nothing stays. Up to half of `LIMITS.hidden` of d is given up for that."""
+    share what there is to do, and one that does nothing stays. Up to half of `LIMITS.hidden` of d is given up for
+    that."""
     does = np.linalg.norm(J, axis=0)
     scale = np.where(does > 0.0, does, 1.0)
     plain = np.asarray(np.linalg.lstsq(J / scale, d, rcond=1e-6)[0] / scale, dtype=np.float64)
