@@ -105,32 +105,56 @@ def test_steps_of_two_stages(benchmark: Any, names: tuple[str, ...], bounds: boo
     print(f"\n{'+'.join(names) or 'plain'}{', bounds' if bounds else ''}: p50 {p50:.1f} p99 {p99:.1f} us")
 
 
-@pytest.mark.benchmark(group="replay, the output pulley off its centre")
-@pytest.mark.parametrize("share", [0.01, 0.1, 0.25, 0.5])
-def test_runout_over_plain(benchmark: Any, share: float) -> None:
-    """How many plain rows a row costs whose cable lengths follow the angle; about three, however far off."""
-    config = load_joint(CONFIG.with_name("tendon-finger.toml"))
-    stage = config.drive.stage[-1]
-    effect = ("pulley_runout", {"eccentricity_m": share * stage.output_radius_m, "phase_rad": 0.5})
-    time = 1e-3 * np.arange(SAMPLES)
-    columns = {
+FINGER = CONFIG.with_name("tendon-finger.toml")
+
+
+def course(step_s: float) -> dict[str, np.ndarray]:
+    """20 s in which both pulleys of the finger turn, a row every `step_s`."""
+    time = np.arange(0.0, 20.0, step_s)
+    return {
         "time_s": time,
         "motor_position_rad": 0.6 * np.sin(0.9 * time),
         "joint_torque_Nm": 0.12 * np.sin(2.3 * time) * np.cos(0.31 * time),
     }
 
-    def seconds(chosen: JointConfig) -> float:
-        """Of the quickest of five replays."""
-        best = np.inf
-        for _ in range(5):
-            observer = Observer(chosen)
-            observer.compile()
-            begin = perf_counter()
-            observer.run(columns)
-            best = min(best, perf_counter() - begin)
-        return best
 
-    plain = seconds(config)
-    off = benchmark.pedantic(lambda: seconds(with_effects(config, [effect])), rounds=1)
+def seconds(config: JointConfig, columns: dict[str, np.ndarray]) -> float:
+    """What a replay takes, the quickest of five."""
+    best = np.inf
+    for _ in range(5):
+        observer = Observer(config)
+        observer.compile()
+        begin = perf_counter()
+        observer.run(columns)
+        best = min(best, perf_counter() - begin)
+    return best
+
+
+@pytest.mark.benchmark(group="replay, the output pulley off its centre")
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.25, 0.5])
+def test_runout_over_plain(benchmark: Any, share: float) -> None:
+    """How many plain rows a row costs whose cable lengths follow the angle; about three, however far off."""
+    config, columns = load_joint(FINGER), course(1e-3)
+    stage = config.drive.stage[-1]
+    effect = ("pulley_runout", {"eccentricity_m": share * stage.output_radius_m, "phase_rad": 0.5})
+    plain = seconds(config, columns)
+    off = benchmark.pedantic(lambda: seconds(with_effects(config, [effect]), columns), rounds=1)
     benchmark.extra_info["over_plain"] = off / plain
     print(f"\n{100.0 * share:.0f} % off its centre: {off / plain:.1f} plain rows")
+
+
+@pytest.mark.benchmark(group="replay of rows 20 ms apart, a weight that nobody measures")
+def test_weight_over_none(benchmark: Any) -> None:
+    """Rows as a diagnosis thins them: friction on the path and a stiffening cable, with a weight and without."""
+    config, columns = load_joint(FINGER), course(0.02)
+    stage = config.drive.stage[-1]
+    guided: list[tuple[str, dict[str, float]]] = [
+        ("routing_friction", {"mu_angle": 0.4, "arc_length_m": 0.05 * stage.free_length_m, "skew": 0.0}),
+        ("nonlinear_cable", {"stiffening": 0.7}),
+    ]
+    weight = ("gravity_load", {"moment_Nm": 0.3 * stage.pretension_moment_Nm, "phase_rad": 0.5})
+    without = seconds(with_effects(config, guided), columns)
+    weighed = benchmark.pedantic(lambda: seconds(with_effects(config, [*guided, weight]), columns), rounds=1)
+    rows = len(columns["time_s"])
+    benchmark.extra_info["over_none"] = weighed / without
+    print(f"\n{1e6 * without / rows:.1f} us a row, with a weight {1e6 * weighed / rows:.1f}")
