@@ -60,10 +60,9 @@ def test_an_event_shows_its_size_and_its_place(
 def test_a_size_that_trades_places_with_a_vague_drive_is_not_held_against_it() -> None:
     fit, term = slip(0.5, REACH_S)
     assert untold(fit, term, 0.0)
-    own = Parameter("pretension_N", 0.1, 1e-3, 10.0, True, centre=0.1, sd=DECADE)
-    rubs = replace(own, name="mu_output")  # leaves how much the drive yields known
+    own = Parameter("mu_output", 0.1, 1e-3, 10.0, True, centre=0.1, sd=DECADE)
     shape = replace(own, name="effect.thermal_pretension.lag_s")
-    for beside, said in ((own, False), (rubs, True), (shape, True)):
+    for beside, said in ((own, False), (shape, True)):
         also = slip(0.5, REACH_S)[0]
         also.problem.parameters = (*fit.problem.parameters, beside)
         also.problem.bounds = lambda: (np.array([-1e4, 37.0, -7.0]), np.array([1e4, 43.0, 3.0]))

@@ -7,18 +7,19 @@ import numpy as np
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, covariance
-from cablecomp.estimation.parameter import vague_drive
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     """What of an event the data do not tell, in words; "" where they do, for what is no event, and where
-    the drive is known by order of magnitude only: there a size trades places with it, and its deviation says little.
+    anything of the drive is known by order of magnitude only: there a size trades places with it, and its deviation
+    says little.
 
     Its size has to stand out of none by `LIMITS.event_size` stated deviations (noise has its best of many instants,
     too). Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated
     drive's mean square (`removes`)."""
     found = amount_of(fit, term)
-    if not term.has_instant or found is None or vague_drive(fit.problem.parameters):
+    loosely = any(p.vague and not p.of_effect for p in fit.problem.parameters)
+    if not term.has_instant or found is None or loosely:
         return ""
     amount, value = found
     sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))
