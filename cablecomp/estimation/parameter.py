@@ -132,6 +132,11 @@ def _about(name: str, nominal: float, tolerance: float) -> Parameter:
     return Parameter(name, nominal, nominal - width, nominal + width, False, tolerance, nominal, 1.0)
 
 
+def known_by_factor(law: EffectParameter, value: float) -> bool:
+    """Whether a tolerance of an effect's value is a share of it: else it is in the value's own unit."""
+    return value > 0.0 and law.minimum >= 0.0
+
+
 def _of_known_effect(name: str, tolerance: float, config: JointConfig) -> list[Parameter]:
     """A parameter of an effect that the joint is known to have, inside what its law can take; none of one that it has
     not."""
@@ -141,8 +146,7 @@ def _of_known_effect(name: str, tolerance: float, config: JointConfig) -> list[P
     if not isinstance(value, int | float):
         return []
     law = catalogue()[identifier].parameter(key)
-    by_factor = value > 0.0 and law.minimum >= 0.0
-    p = _by_factor(name, value, tolerance) if by_factor else _about(name, value, tolerance)
+    p = (_by_factor if known_by_factor(law, value) else _about)(name, value, tolerance)
     return [replace(p, low=max(p.low, law.minimum), high=min(p.high, law.maximum))]
 
 

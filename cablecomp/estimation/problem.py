@@ -257,6 +257,10 @@ class Problem:
         count = Counter(r.session for r in self.evidence)
         return frozenset(s for s, n in count.items() if n > 1)
 
+    def states(self, name: str) -> bool:
+        """Whether the configuration states how a parameter differs between the recordings."""
+        return any(name in r.apart for r in self.evidence)
+
     def spans(self) -> dict[str, slice]:
         """Where each channel's rows lie in the residual."""
         found, first = {}, 0

@@ -20,7 +20,8 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit, covariance
 from cablecomp.estimation.limits import EXACT
-from cablecomp.estimation.standing import apart_of, on_the_clock, standing, value_of
+from cablecomp.estimation.parameter import known_by_factor
+from cablecomp.estimation.standing import ON_THE_CLOCK, apart_of, on_the_clock, standing, value_of
 from cablecomp.signal.smoothing import FloatArray
 
 STAGE_OWN = ("pretension_N", "EA_N", "mu_output", "mu_input")
@@ -152,7 +153,7 @@ def _with_events(
     for term in (t for t in model.terms if isinstance(t, Hypothesis)):
         given = next(dict(e.parameters) for e in joint.effect if e.id == term.effect.id)
         lasts_s = given.get(term.duration, 0.0)
-        for p in (p for p in term.effect.parameters if p.role in ("instant", "begin") and p.name in given):
+        for p in (p for p in term.effect.parameters if p.role in ON_THE_CLOCK and p.name in given):
             instant_s = given[p.name] - shift_s
             if p.role == "instant" and instant_s > begun_by_s:
                 changes[term.key(term.amount.name)] = term.amount.neutral
@@ -210,8 +211,7 @@ def with_tolerances_of(joint: JointConfig, model: Model) -> JointConfig:
             if not value or width > LIMITS.untold * abs(value):
                 continue
             share = max(width / abs(value), LIMITS.known)
-            by_factor = value > 0.0 and known.minimum >= 0.0
-            tolerance[p.base] = float(f"{share if by_factor else share * abs(value):.2g}")
+            tolerance[p.base] = float(f"{share if known_by_factor(known, value) else share * abs(value):.2g}")
     return joint.model_copy(update={"tolerance": tolerance})
 
 

@@ -116,8 +116,7 @@ def _ways(
     sessions = problem.sessions
     place = problem.parameters.index(p)
     shown = sessions if by == "block" else problem.repeated
-    stated = any(p.base in e.apart for e in problem.evidence)  # how it differs is known
-    if len(shown) > 1 and not stated and _along_path(p.base):
+    if len(shown) > 1 and _along_path(p.base) and not problem.states(p.base):
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

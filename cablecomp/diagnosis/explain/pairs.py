@@ -38,8 +38,7 @@ def with_own_pretensions(
     common = next((p for p in problem.parameters if p.name == PRETENSION), None)
     sessions = problem.sessions
     shown = sessions if by == "block" else problem.repeated
-    stated = any(PRETENSION in e.apart for e in problem.evidence)  # how it differs is known
-    if common is None or stated or len(sessions) < 2 or len(shown) < 2:
+    if common is None or len(sessions) < 2 or len(shown) < 2 or problem.states(PRETENSION):
         return None
     place = problem.parameters.index(common)
     free = (*problem.parameters[:place], *own_of(common, sessions), *problem.parameters[place + 1 :])
