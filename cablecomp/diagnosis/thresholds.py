@@ -135,10 +135,6 @@ class Thresholds:
     """Standard errors by which such a model has to predict better than one that keeps these effects, beside another
     (the jaw's recordings one by one: its path alone explains most, by far; with the motor's friction beside it, the
     jaw's own in its place predicts better by one standard error)."""
-    strained: float = 9.0
-    """Squared deviations, summed, by which a model has to leave the drive nearer to what is stated of it to go before
-    one that does not predict better (a slip in a piece of the jaw's `L_4`, in whose place broken wires predicted as
-    well, with the pretension six and EA four deviations off)."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0

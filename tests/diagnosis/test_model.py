@@ -10,9 +10,8 @@ from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses, runs_away
-from cablecomp.diagnosis.explain.model import Model, amount_resolved, bears
+from cablecomp.diagnosis.explain.model import amount_resolved, bears
 from cablecomp.diagnosis.explain.screening import with_entry
-from cablecomp.diagnosis.explain.ties import strain
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
@@ -156,16 +155,3 @@ def test_an_unseen_weight_may_be_as_large_as_the_loads_that_are_seen(share: floa
 )
 def test_coefficients_of_friction_alone_leave_a_drive_known(tolerance: dict[str, float], vague: bool) -> None:
     assert vague_drive(of_drive(JOINT.model_copy(update={"tolerance": tolerance}))) is vague
-
-
-def test_a_drive_is_strained_by_what_is_stated_of_it_alone() -> None:
-    """A pretension two deviations off counts four; a stiffness known by order of magnitude nothing."""
-    told = {"pretension_N": 0.05, "EA_N": 1.0}
-    config = JOINT.model_copy(update={"tolerance": told})
-    stage = JOINT.drive.stage[0]
-    off = {"pretension_N": stage.pretension_N * np.exp(0.1), "EA_N": 3.0 * stage.EA_N}
-    fit, h = beside("bearing_friction", {"torque_Nm": 2e-3}, config)
-    x = np.array(
-        [p.x(off.get(p.name, p.value(float(v)))) for p, v in zip(fit.problem.parameters, fit.x, strict=True)]
-    )
-    assert strain(Model((h,), replace(fit, x=x), fit.residual)) == pytest.approx(4.0)

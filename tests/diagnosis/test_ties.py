@@ -26,7 +26,6 @@ def _by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     """Amounts are implausible by name here; how plausible they are is held by `test_model.py`."""
     monkeypatch.setattr(ties, "implausible", lambda m: sum(t.name.startswith("absurd") for t in m.terms))
     monkeypatch.setattr(ties, "Hypothesis", SimpleNamespace)
-    monkeypatch.setattr(ties, "strain", lambda m: 10.0 * sum(t.name.startswith("forced") for t in m.terms))
 
 
 @pytest.mark.parametrize(("more", "first"), [(0.0, "plausible"), (0.7, "plausible"), (3.0, "absurd")])
@@ -37,16 +36,6 @@ def test_a_plausible_effect_goes_before_one_that_does_not_predict_better_by_far(
     absurd, plausible = model(0.0, "absurd"), model(more, "plausible")
     assert ties._plausible_first([absurd, plausible], GROUPS)[0].name == first
     assert ties.outdoes(model(0.0, "other"), plausible, GROUPS) is (more > 0.0)
-
-
-@pytest.mark.parametrize(("more", "first"), [(0.0, "fitting"), (0.7, "forced")])
-def test_a_drive_as_it_is_stated_goes_before_one_that_is_forced_and_predicts_no_better(
-    more: float, first: str
-) -> None:
-    forced, fitting = model(0.0, "forced"), model(more, "fitting")
-    assert ties._as_stated_first([forced, fitting], GROUPS)[0].name == first
-    assert ties._as_stated_first([forced, model(0.0, "fitting", "two")], GROUPS)[0].name == "forced"
-    assert ties._as_stated_first([fitting, forced], GROUPS)[0].name == "fitting"
 
 
 def test_no_second_effect_is_taken_for_being_plausible() -> None:

@@ -1,11 +1,9 @@
-"""What goes first where data left out do not tell models apart: the fewer parameters, what is no physics, what leaves
-the drive as it is stated, what is plausible, what explains most alone."""
+"""What goes first where data left out do not tell models apart: the fewer parameters, what is no physics, what is
+plausible, what explains most alone."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-
-import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, over_plausible, runs_away
@@ -30,8 +28,7 @@ from cablecomp.estimation.least_squares import solve
 
 def in_order(models: list[Model], groups: Groups) -> list[Model]:
     """Models, best first, in the order in which a search takes them."""
-    plain = _mounted_anew_first(simplest_first(models, groups), groups)
-    return _plausible_first(_as_stated_first(plain, groups), groups)
+    return _plausible_first(_mounted_anew_first(simplest_first(models, groups), groups), groups)
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
@@ -58,26 +55,6 @@ def mounted_anew_for(model: Model, other: Model) -> bool:
     """Whether a model has a drive mounted anew in place of effects of the other, and no effect that this one lacks."""
     mine, others = ({t.name for t in m.terms if not isinstance(t, Dependence)} for m in (model, other))
     return mine < others and any(isinstance(t, Dependence) and t.mounted_anew for t in model.terms)
-
-
-def _as_stated_first(models: list[Model], groups: Groups) -> list[Model]:
-    """Models, best first, but one of no more effects that leaves the drive far nearer to what is stated of it before
-    one that does not predict clearly better."""
-    best = models[0]
-    near = [
-        m for m in models if len(m.terms) <= len(best.terms) and strain(m) < strain(best) - LIMITS.strained
-    ]
-    first = min((m for m in near if not outdoes(best, m, groups)), key=strain, default=best)
-    return [first, *(m for m in models if m is not first)]
-
-
-def strain(model: Model) -> float:
-    """How far a model's drive is from what is stated of it: squared deviations of its priors, summed; what is known by
-    order of magnitude left out."""
-    problem = model.fit.problem
-    off = problem.prior(model.fit.x)
-    stated = [not (p.vague or p.condition) for p in problem.parameters]
-    return float(np.sum(off[stated] ** 2))
 
 
 def _plausible_first(models: list[Model], groups: Groups) -> list[Model]:
