@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, field_validator, model_validator
 
 from cablecomp.config.base import Frozen, Listed, NonNegative, Text, listed
 from cablecomp.config.drive import Drive, Stage
@@ -83,8 +84,32 @@ class JointConfig(Frozen):
                 raise ValueError(
                     f"[[depends]]: on `{d.on}`, which [condition] does not name; it names {known}"
                 )
-        held = {f"effect.{e.id}" for e in self.effect}
+        held = {f"effect.{e.id}": e.parameters for e in self.effect}
         for key in self.tolerance:
-            if "." in key and key.partition(".")[0] not in PARAMETERS and key.rpartition(".")[0] not in held:
+            if "." not in key or key.partition(".")[0] in PARAMETERS:
+                continue
+            effect, _, name = key.rpartition(".")
+            if effect not in held:
                 raise ValueError(f"[tolerance]: `{key}`: the configuration has no such effect; add it first")
+            numbers = [k for k, v in held[effect].items() if isinstance(v, int | float)]
+            if name not in numbers:
+                raise ValueError(
+                    f"[tolerance]: `{key}`: that effect has {', '.join(numbers) or 'no number'} here"
+                )
+        for session in self.session:
+            self._values_of(session, held)
         return self
+
+    def _values_of(self, session: Session, held: Mapping[str, object]) -> None:
+        """Raise ValueError for a session's value of an effect that the joint has not, or that no stage can have."""
+        for key, value in session.values.items():
+            head, _, which = key.partition(".")
+            where = f"[[session]] `{session.name}`: `{key}` = {value:g}"
+            if head in Stage.model_fields:
+                stage = self.drive.stage[int(which) - 1 if which else 0]
+                try:
+                    Stage(**{**stage.model_dump(), head: value})
+                except ValidationError as error:
+                    raise ValueError(f"{where}: {error.errors()[0]['msg'].lower()}") from None
+            elif head == "effect" and key.rpartition(".")[0] not in held:
+                raise ValueError(f"{where}: the configuration has no such effect; add it first")

@@ -37,8 +37,8 @@ class Session(Frozen):
 
     @model_validator(mode="after")
     def _named(self) -> Self:
-        if not self.name and (self.recordings or self.values):
-            raise ValueError("a session with `recordings` or `values` needs a `name`; add it")
+        if not self.name and (self.recordings or self.values or self.mounting):
+            raise ValueError("a session with `recordings`, `values` or a `mounting` needs a `name`; add it")
         return self
 
     def matches(self, recording: Path) -> bool:

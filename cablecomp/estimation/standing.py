@@ -157,7 +157,14 @@ def value_of(config: JointConfig, name: str) -> float:
         entry = next((e for e in config.effect if e.id == identifier), None)
         if entry is None:
             raise InputError(f"{config.name}: effect `{identifier}` is not in the configuration; add it")
-        return float(entry.parameters[key])
+        value = entry.parameters.get(key)
+        if value is None:  # left out: what that means
+            laws = {p.name: p.omitted for p in catalogue()[identifier].parameters}
+            value = laws.get(key)
+        if not isinstance(value, int | float):
+            takes = ", ".join(p.name for p in catalogue()[identifier].parameters)
+            raise InputError(f"{config.name}: effect `{identifier}` has no number `{key}`; it takes {takes}")
+        return float(value)
     key, _, which = name.partition(".")
     stage = config.drive.stage[int(which) - 1 if which else 0]
     return float(getattr(stage, key)) if hasattr(stage, key) else float(getattr(config.sensors, key))

@@ -167,3 +167,23 @@ def test_the_zero_of_the_motor_torque_is_taken_off_its_reading() -> None:
         {**columns, "motor_torque_Nm": torque + 0.25}
     )
     np.testing.assert_allclose(shifted["joint_position_rad"], plain["joint_position_rad"], atol=1e-15)
+
+
+RUBS = (
+    '[[effect]]\nid = "bearing_friction"\ntorque_Nm = 0.01\npresliding_rad = 1e-4\nload_coefficient = 0.0\n'
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[tolerance]\n"effect.bearing_friction.torq" = 0.1\n', "that effect has torque_Nm"),
+        ('[[session]]\nname = "a"\nvalues = {"effect.slip.size_m" = 0.1}\n', "has no such effect"),
+        ('[[session]]\nname = "a"\nvalues = {pretension_N = -5.0}\n', "`pretension_N` = -5"),
+        ('[[session]]\nmounting = "a"\n', "needs a `name`"),
+    ],
+)
+def test_what_no_joint_can_have_is_said_when_it_is_read(text: str, words: str) -> None:
+    data = tomllib.loads(JOINT.read_text())
+    with pytest.raises(InputError, match=words):
+        parse_joint(data | tomllib.loads(RUBS + text), "joint.toml")

@@ -129,3 +129,10 @@ def test_events_that_are_stated_stand_on_the_clock_of_the_recordings_together() 
 def test_a_law_on_what_is_no_condition_is_refused() -> None:
     with pytest.raises(InputError, match="bend_rad"):
         parse_joint({**PLAIN, **BENT, "condition": {}}, "bent")
+
+
+def test_a_value_that_an_effect_leaves_out_is_the_one_that_stands_for_it() -> None:
+    slipping = with_effects(JOINT, [("clamp_slip", {"slip_m": 1e-4, "time_s": 3.0})])
+    assert value_of(slipping, "effect.clamp_slip.duration_s") == 0.0
+    with pytest.raises(InputError, match=r"no number `size_m`; it takes slip_m"):
+        value_of(slipping, "effect.clamp_slip.size_m")
