@@ -35,6 +35,8 @@ LEAST_FINE: Final = 1_000
 """Rows that a recording keeps of these, however many there are."""
 SPARSE: Final = 0.6
 """Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
+OVERFLOWN: Final = 1e15
+"""From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 ABSURD: Final = 20.0
 """Ranges (2 to 98 %) from the middle beyond which no joint has been: counters that overflow, words for "no reading"."""
 SPIKE: Final = 8.0
@@ -147,7 +149,7 @@ def gather(
 
 def _good(name: str, raw: Mapping[str, FloatArray]) -> tuple[dict[str, BoolArray], int]:
     """Which readings of each channel are to be trusted, and how many were set aside as outliers."""
-    good = {k: np.isfinite(v) for k, v in raw.items() if k != "time_s"}
+    good = {k: np.abs(v) < OVERFLOWN for k, v in raw.items() if k != "time_s"}
     outliers = 0
     for key, kept in good.items():
         if kept.sum() < 40:

@@ -102,13 +102,13 @@ def accounted_for(config: JointConfig, columns: Mapping[str, FloatArray], said: 
 
 
 def _delay(view: View, name: str, late: float, before: float, after: float) -> Suspicion:
-    """The words for a channel that is so late [s], and what the nominal drive leaves [rad] as it is and shifted."""
+    """The words for a channel that is so late [s], and what is left at best [rad] as it is and shifted."""
     of_speed = _of_speed(view, name, late)
     how = "late" if late > 0.0 else "early"
     both = "" if of_speed > OF_SPEED else ", or to trail by lost motion (at one speed they look alike)"
     rubs = ", or the motor's own friction stands in it" if name == MOTOR else ""
     words = (
-        f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}{rubs}: the nominal drive leaves {mrad(before)} "
+        f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}{rubs}: at best the drive leaves {mrad(before)} "
         f"RMS, {mrad(after)} with it shifted"
     )
     numbers = {"late_s": late, "rms_rad": before, "left_rad": after, "of_speed": of_speed}

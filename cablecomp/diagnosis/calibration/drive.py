@@ -118,7 +118,9 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
     for e in evidence:
         swing = full_swing(fit.problem, e, LIMITS.history_most)
         found = forgotten(fit.problem, fit.x, e, size, LIMITS.history, swing)
-        cut.append(replace(e.counting_from(found.first), carryover=found.carryover))
+        read = np.flatnonzero(e.counted[JOINT])
+        most = int(read[len(read) // 2]) if len(read) else 0  # of an encoder that was read at first only
+        cut.append(replace(e.counting_from(min(found.first, most)), carryover=found.carryover))
         constant.append(found.constant_rad)
     return cut, float(np.mean(constant))
 

@@ -1,5 +1,6 @@
 """What the machine itself repeats: the joint angle at the same motor angle, load and distance from the last
-reversals, what creeps with time taken off (a slip or a drift is something to explain, not what cannot be repeated)."""
+reversals, what creeps with time taken off (a slip or a drift is something to explain, not what cannot be repeated), and
+what a model tells apart (a late channel differs at another speed, and that repeats)."""
 
 from __future__ import annotations
 
@@ -11,34 +12,45 @@ from scipy.spatial import cKDTree
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
-def repeatability(evidence: Sequence[Evidence], covariates: Sequence[Covariates]) -> float | None:
-    """RMS difference [rad] between repeats of the same state in one recording, over sqrt 2; None where nothing
+def repeatability(
+    evidence: Sequence[Evidence], covariates: Sequence[Covariates], left: Sequence[FloatArray]
+) -> float | None:
+    """RMS difference [rad] between repeats of the same state in one recording, over sqrt 2: of the joint's angle, or of
+    what a model leaves of it on the judged rows (`left`, by recording), whichever is less; None where nothing
     repeats."""
-    squares: list[FloatArray] = []
-    for e, c in zip(evidence, covariates, strict=True):
-        v = c.values
-        state = np.column_stack((v["motor_angle"], v["load"], c.motion_reversal, v["reversal"]))
-        span = np.ptp(state, axis=0)
-        used = span > 0.0
-        points = np.column_stack((state[:, used] / span[used], c.motion_direction, v["load_direction"]))
-        time = v["time"]
-        apart = 0.1 * float(time[-1] - time[0])
-        near = cKDTree(points).query_pairs(LIMITS.repeats * np.sqrt(points.shape[1]), output_type="ndarray")
-        near = near[np.abs(time[near[:, 0]] - time[near[:, 1]]) > apart]
-        if len(near) < LIMITS.repeats_fewest:
-            continue
-        joint = e.at_rows(JOINT)
-        a, b = near[:, 0], near[:, 1]
-        alike = used.sum()
-        slow = _hats(time)
-        apart_by = np.column_stack((points[a, :alike] - points[b, :alike], slow[a] - slow[b]))
-        squares.append(_beside(apart_by, joint[a] - joint[b]) ** 2)
-    if not squares:
+    read, modelled = [], []
+    for e, c, beside in zip(evidence, covariates, left, strict=True):
+        pairs, apart_by = _repeats(c)
+        if len(pairs):
+            a, b = pairs[:, 0], pairs[:, 1]
+            joint = e.at_rows(JOINT)
+            read.append(_beside(apart_by, joint[a] - joint[b]) ** 2)
+            modelled.append(_beside(apart_by, beside[a] - beside[b]) ** 2)
+    if not read:
         return None
-    return float(np.sqrt(0.5 * np.median(np.concatenate(squares)) / 0.455))
+    return min(float(np.sqrt(0.5 * np.median(np.concatenate(s)) / 0.455)) for s in (read, modelled))
+
+
+def _repeats(c: Covariates) -> tuple[IntArray, FloatArray]:
+    """Pairs of judged rows of a recording, far apart in time, in the same state, and by what their states and times
+    still lie apart; none where too few repeat."""
+    v = c.values
+    state = np.column_stack((v["motor_angle"], v["load"], c.motion_reversal, v["reversal"]))
+    span = np.ptp(state, axis=0)
+    used = span > 0.0
+    points = np.column_stack((state[:, used] / span[used], c.motion_direction, v["load_direction"]))
+    time = v["time"]
+    apart = 0.1 * float(time[-1] - time[0])
+    near = cKDTree(points).query_pairs(LIMITS.repeats * np.sqrt(points.shape[1]), output_type="ndarray")
+    near = near[np.abs(time[near[:, 0]] - time[near[:, 1]]) > apart]
+    if len(near) < LIMITS.repeats_fewest:
+        return np.empty((0, 2), dtype=np.int64), np.empty((0, 0))
+    a, b = near[:, 0], near[:, 1]
+    slow = _hats(time)
+    return near, np.column_stack((points[a, : used.sum()] - points[b, : used.sum()], slow[a] - slow[b]))
 
 
 def _hats(time: FloatArray) -> FloatArray:
