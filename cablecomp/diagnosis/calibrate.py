@@ -189,9 +189,9 @@ def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:
     found = []
     for i in range(len(names)):
         for k in range(i):
-            correlation = float(cov[i, k] / (sd[i] * sd[k]))
-            if abs(correlation) > LIMITS.tied:
-                found.append((names[k], names[i], correlation))
+            together = float(sd[i] * sd[k])
+            if together > 0.0 and abs(cov[i, k]) > LIMITS.tied * together:
+                found.append((names[k], names[i], float(cov[i, k]) / together))
     return tuple(found)
 
 

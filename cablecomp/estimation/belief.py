@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.estimation.evidence import JOINT, MOTOR
+from cablecomp.estimation.evidence import INPUT, JOINT, MOTOR
 from cablecomp.estimation.evidence import load_channel as channel_of_load
 from cablecomp.estimation.lateness import accounted_for, delays, rather_late
-from cablecomp.estimation.view import INPUT, Suspicion, View, mrad, partial, rms
+from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
 from cablecomp.signal.smoothing import FloatArray
 
 ROWS: Final = 20_000

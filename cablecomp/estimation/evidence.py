@@ -22,21 +22,26 @@ from cablecomp.signal.smoothing import FloatArray, IntArray, group_means, keep_c
 BoolArray = NDArray[np.bool_]
 
 JOINT: Final = "joint_position_rad"
+INPUT: Final = "motor_position_rad"
 MOTOR: Final = "motor_torque_Nm"
 OUTPUTS: Final = (JOINT, MOTOR, "tension_h_N", "tension_l_N")
 """Channels that a model has to account for, where they are recorded."""
 
-NEEDED: Final = ("time_s", "motor_position_rad", JOINT)
+NEEDED: Final = ("time_s", INPUT, JOINT)
 FINE_ROWS: Final = 6_000
 """Rows of all recordings together that are kept after cleaning."""
 RATED: Final = 2
 """Every so many of them a law with rates is run at, beside the judged ones."""
 LEAST_FINE: Final = 1_000
 """Rows that a recording keeps of these, however many there are."""
+FEWEST: Final = 40
+"""Readings of a channel, and rows, below which there is nothing to fit."""
 SPARSE: Final = 0.6
 """Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
 OVERFLOWN: Final = 1e15
 """From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
+DIED: Final = 10.0
+"""Usual steps of such a channel beyond which it was not read for a while, or no more."""
 ABSURD: Final = 20.0
 """Ranges (2 to 98 %) from the middle beyond which no joint has been: counters that overflow, words for "no reading"."""
 SPIKE: Final = 8.0
@@ -133,9 +138,14 @@ def gather(
             raise InputError(f"{name}: channel `{key}` is missing; a diagnosis needs {', '.join(NEEDED)}")
     raw = _in_order(name, {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()})
     load = load_channel(config, raw)
-    good, outliers = _good(name, raw)
+    good, outliers = _good(name, raw, load)
+    raw = {k: v for k, v in raw.items() if k == "time_s" or k in good}
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
-    raw, finite = _bridged(raw, good, _drivable(raw, good, load))
+    noise |= _unresolved(config.drive.ratio, raw, good, noise)
+    drivable = _drivable(raw, good, load)
+    if drivable.sum() < FEWEST:
+        raise _too_few(name, load or INPUT, int(drivable.sum()))
+    raw, finite = _bridged(raw, good, drivable)
     means, counted = _fine(raw, finite, noise, fine_rows, load)
     rows = thinned(means, load, judged_rows)
     time = means["time_s"][rows]
@@ -147,27 +157,44 @@ def gather(
     )  # fmt: skip
 
 
-def _good(name: str, raw: Mapping[str, FloatArray]) -> tuple[dict[str, BoolArray], int]:
-    """Which readings of each channel are to be trusted, and how many were set aside as outliers."""
+def _good(name: str, raw: Mapping[str, FloatArray], load: str | None) -> tuple[dict[str, BoolArray], int]:
+    """Which readings of each channel are to be trusted, and how many were set aside as outliers; without the channels
+    that may be missing and were hardly read."""
     good = {k: np.abs(v) < OVERFLOWN for k, v in raw.items() if k != "time_s"}
     outliers = 0
-    for key, kept in good.items():
-        if kept.sum() < 40:
-            raise InputError(f"{name}: channel `{key}` has {int(kept.sum())} finite readings; 40 are needed")
+    for key, kept in list(good.items()):
+        if kept.sum() < FEWEST:
+            if key in NEEDED or key == load:
+                raise _too_few(name, key, int(kept.sum()))
+            del good[key]
+            continue
         spikes = _spikes(raw[key], kept)
         outliers += int(spikes.sum())
         kept &= ~spikes
     return good, outliers
 
 
+def _too_few(name: str, key: str, count: int) -> InputError:
+    return InputError(f"{name}: channel `{key}` has {count} finite readings; {FEWEST} are needed")
+
+
 def _drivable(raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], load: str | None) -> BoolArray:
     """Rows at which the inputs were read: the drive goes from reading to reading, and where an input has none, a
-    bridged value would be an error of the prediction."""
-    kept = np.ones(len(raw["time_s"]), dtype=np.bool_)
-    for key in ("motor_position_rad", *([load] if load else [])):
-        if good[key].mean() > SPARSE:
-            kept &= good[key]
+    bridged value would be an error of the prediction. Of a channel of a lower rate, rows between two readings of it."""
+    time = raw["time_s"]
+    kept = np.ones(len(time), dtype=np.bool_)
+    for key in (INPUT, *([load] if load else [])):
+        kept &= good[key] if good[key].mean() > SPARSE else _between(time, time[good[key]])
     return kept
+
+
+def _between(time: FloatArray, read: FloatArray) -> BoolArray:
+    """Rows between two readings (at these times) that are no further apart than `DIED` times what is usual."""
+    steps = np.diff(read)
+    after = np.searchsorted(read, time, side="right")
+    inside = (after > 0) & ((after < len(read)) | (time == read[-1]))
+    step = steps[np.clip(after - 1, 0, len(steps) - 1)]
+    return np.asarray(inside & (step <= DIED * np.median(steps)), dtype=np.bool_)
 
 
 def _bridged(
@@ -219,7 +246,7 @@ def thinned(columns: Mapping[str, FloatArray], load: str | None, count: int) -> 
         return np.arange(n)
     span = float(time[-1] - time[0]) or 1.0
     travel = np.gradient(time) / span
-    drivers = ["motor_position_rad", *([load] if load else [])]
+    drivers = [INPUT, *([load] if load else [])]
     for key in (*drivers, JOINT):
         values = columns[key]
         width = float(np.ptp(values))
@@ -259,8 +286,8 @@ def _in_order(name: str, columns: dict[str, FloatArray]) -> dict[str, FloatArray
     time = columns["time_s"]
     kept = np.isfinite(time)
     kept[1:] &= np.diff(np.maximum.accumulate(np.where(kept, time, -np.inf))) > 0.0
-    if kept.sum() < 40:
-        raise InputError(f"{name}: {int(kept.sum())} samples with a time of their own; 40 are needed")
+    if kept.sum() < FEWEST:
+        raise InputError(f"{name}: {int(kept.sum())} samples with a time of their own; {FEWEST} are needed")
     return {k: v[kept] for k, v in columns.items()}
 
 
@@ -292,6 +319,19 @@ def _absurd(v: FloatArray) -> BoolArray:
     for first, end in edges.reshape(-1, 2):
         found[first:end] = min(leap[first], leap[end]) > 0.5 * away[first:end].max()
     return found
+
+
+def _unresolved(
+    ratio: float, raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], noise: Mapping[str, float]
+) -> dict[str, float]:
+    """Noise of the angles that were read so seldom that motion looks like noise (twice as much): that of the joint's
+    angle beyond the rigid drive, which holds both."""
+    both = good[JOINT] & good[INPUT]
+    if both.sum() < FEWEST:
+        return {}
+    beyond = _noise(raw["time_s"][both], raw[JOINT][both] - ratio * raw[INPUT][both])
+    found = {JOINT: beyond, INPUT: beyond / abs(ratio)}
+    return {k: v for k, v in found.items() if 0.0 < v < 0.5 * noise[k]}
 
 
 def _noise(time: FloatArray, values: FloatArray) -> float:

@@ -18,8 +18,8 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import CablecompError
-from cablecomp.estimation.evidence import JOINT, MOTOR
-from cablecomp.estimation.view import INPUT, Suspicion, View, bare, mrad, rms
+from cablecomp.estimation.evidence import INPUT, JOINT, MOTOR
+from cablecomp.estimation.view import Suspicion, View, bare, mrad, rms
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 

@@ -10,11 +10,9 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.control.stiffness import plain, stiffness_range
 from cablecomp.errors import CablecompError
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import INPUT, JOINT
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
-
-INPUT = "motor_position_rad"
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,18 @@ def test_a_torque_sensors_zero_is_each_sessions_own_where_it_is_named(as_stated:
     assert ZERO not in {p.base for p in fit.problem.parameters}
 
 
+def test_each_of_several_values_is_each_sessions_own() -> None:
+    """Of three sessions, whatever stands beside them: none is lost, and no other takes its place."""
+    config = closed(SMALL, "small")
+    own = ["joint_position_offset_rad", ZERO, "pretension_N"]
+    told = {"EA_N": 0.03, "pretension_N": 0.05, "mu_output": 0.1, "mu_input": 0.1}
+    joint = parse_joint({**config, "tolerance": told, "session": {"own": own}}, "small")
+    used = gather_body(joint, {f"{s}/1": recorded([], 20.0) for s in "abc"}, None).used
+    names = [p.name for p in calibrate_drive(joint, used, np.random.default_rng(0)).fit.problem.parameters]
+    common = ["EA_N", "free_length_m", "input_radius_m", "mu_input", "mu_output"]
+    assert sorted(names) == sorted(common + [f"{n}@{s}" for n in own[1:] for s in "abc"])
+
+
 @pytest.mark.parametrize("by", ["calibrate", "diagnose"])
 def test_a_tolerance_in_a_unit_of_its_own_stays_in_it(by: str) -> None:
     """A torque's zero known to 50 mN m: told to some of them, not to some hundredths of 1 N m."""

@@ -14,9 +14,8 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import INPUT, JOINT, Evidence
 from cablecomp.estimation.simulate import load_of
-from cablecomp.estimation.view import INPUT
 from cablecomp.signal.noise import channel_noise, reading_sigma
 from cablecomp.signal.smoothing import FloatArray
 

@@ -144,9 +144,8 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bo
             ):
                 continue  # within a session it follows what the configuration says
             for k in [k for k, p in enumerate(free) if p.name == name]:
-                free[k : k + 1] = [
-                    p for s, ps in zip(sessions, theirs, strict=True) for p in own_of(ps[k], (s,))
-                ]
+                mine = [next(p for p in ps if p.name == name) for ps in theirs]
+                free[k : k + 1] = [p for s, m in zip(sessions, mine, strict=True) for p in own_of(m, (s,))]
     return tuple(free)
 
 

@@ -18,11 +18,10 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.locate.views import Response, Responses
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import INPUT, JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import Simulator, simulator
-from cablecomp.estimation.view import INPUT
 from cablecomp.mechanics.change import Change, Factor
 from cablecomp.signal.smoothing import FloatArray
 
