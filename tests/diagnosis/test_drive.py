@@ -86,6 +86,18 @@ def test_a_torque_sensors_zero_is_each_sessions_own_where_it_is_named(as_stated:
     assert ZERO not in {p.base for p in fit.problem.parameters}
 
 
+def test_an_encoder_that_dies_early_still_counts() -> None:
+    """What the history before takes of a recording is no more than half of its readings."""
+    joint = parse_joint({**closed(SMALL, "small"), "tolerance": {"EA_N": 0.03}}, "small")
+    whole, died = recorded([], 40.0), recorded([], 40.0)
+    died["joint_position_rad"][len(died["time_s"]) // 25 :] = np.nan
+    used = gather_body(joint, {"a/1": whole, "a/2": died}, None).used
+    fit = calibrate_drive(joint, used, np.random.default_rng(0)).fit
+    before = {e.name: int(e.counted["joint_position_rad"].sum()) for e in used}
+    after = {e.name: int(e.counted["joint_position_rad"].sum()) for e in fit.problem.evidence}
+    assert after["a/2"] >= before["a/2"] // 2 > 10
+
+
 def test_each_of_several_values_is_each_sessions_own() -> None:
     """Of three sessions, whatever stands beside them: none is lost, and no other takes its place."""
     config = closed(SMALL, "small")

@@ -119,3 +119,36 @@ def test_a_run_of_absurd_readings_is_set_aside_and_a_quick_motion_after_a_long_r
     )
     before = gathered({**rested, "motor_position_rad": 1e-5 * np.sin(np.arange(n))}).outliers
     assert gathered(rested).outliers == before
+
+
+def test_a_motor_that_was_read_at_first_only_drives_nothing_later() -> None:
+    """Nor is a channel of a lower rate bridged over a hole."""
+    columns = recorded()
+    died = {k: v.copy() for k, v in columns.items()}
+    died["motor_position_rad"][300:] = np.nan
+    assert gathered(died).columns["time_s"][-1] <= columns["time_s"][299]
+    seldom = {k: v.copy() for k, v in columns.items()}
+    read = np.arange(len(columns["time_s"])) % 4 == 0
+    read[400:600] = False
+    seldom["joint_torque_Nm"][~read] = np.nan
+    time = gathered(seldom).columns["time_s"]
+    inside = (time > columns["time_s"][396]) & (time < columns["time_s"][600])
+    assert not inside.any()
+    assert np.mean(np.isin(columns["time_s"][:397], time)) > 0.95
+
+
+def test_a_channel_that_may_be_missing_and_was_not_read_is_missing() -> None:
+    columns = recorded()
+    e = gathered({**columns, "temperature_degC": np.full(len(columns["time_s"]), np.nan)})
+    assert "temperature_degC" not in e.columns
+    np.testing.assert_array_equal(e.rows, gathered(columns).rows)
+
+
+def test_motion_that_few_readings_do_not_resolve_is_no_noise() -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 60.0, 0.2)
+    motor = 2.0 * np.sin(2.0 * np.pi * 0.2 * time) + 0.3 * np.sin(2.0 * np.pi * 1.1 * time)
+    joint = JOINT.drive.ratio * motor + 1e-4 * rng.standard_normal(len(time))
+    e = gathered({"time_s": time, "motor_position_rad": motor, "joint_position_rad": joint})
+    assert e.noise["joint_position_rad"] == pytest.approx(1e-4, rel=0.2)
+    assert e.noise["motor_position_rad"] == pytest.approx(1e-4 / JOINT.drive.ratio, rel=0.2)
