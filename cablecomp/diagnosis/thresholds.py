@@ -54,6 +54,9 @@ class Thresholds:
     tighter: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
     """Standard deviations of its tolerance by which an open circuit's pretension begins higher where the nominal one
     would let its cable slacken (trials seed 620: two of 72 came to no verdict, 2.4 and 3.3 of them too low)."""
+    spoiled: float = 1.2
+    """What a first fit leaves of the joint's angle over what the nominal drive leaves, from which on another channel
+    has spoiled it, and the angle goes first (a motor torque of the wrong sign where the encoder had died)."""
     history: float = 0.15
     """Part of what is usually left over that an unknown history may still move the joint by where rows count."""
     history_most: float = 0.4

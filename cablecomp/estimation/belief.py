@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.estimation.evidence import INPUT, JOINT, MOTOR
+from cablecomp.estimation.evidence import FEWEST, INPUT, JOINT, MOTOR
 from cablecomp.estimation.evidence import load_channel as channel_of_load
 from cablecomp.estimation.lateness import accounted_for, delays, rather_late
 from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
@@ -59,7 +59,7 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
         return tuple(found)
     load = channel_of_load(config, columns)
     rows = _rows(columns, (INPUT, JOINT, *((load,) if load else ())))
-    if len(rows["time_s"]) < 40:
+    if len(rows["time_s"]) < FEWEST:
         return tuple(found)
     view = View(config, rows, load)
     fits = _angles(view)
@@ -76,7 +76,8 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     if config.effect:
         found = [s for s in found if s.kind != "delay" or not accounted_for(config, columns, s)]
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
-        found += _motor_torque(config, _rows(columns, (INPUT, MOTOR, "joint_torque_Nm")))
+        rows = _rows(columns, (INPUT, MOTOR, "joint_torque_Nm"))
+        found += _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
     return tuple(found)
 
 

@@ -134,6 +134,18 @@ def test_a_load_read_off_the_motor_is_said_to_hold_its_friction() -> None:
         assert any("motor's own friction" in line for line in found.warnings) == said
 
 
+def test_a_torque_of_the_wrong_sign_does_not_stop_the_drive() -> None:
+    """An encoder that died, a motor torque that goes on, a drive known by order of magnitude: the joint's angle is
+    followed, not the torque by a drive that does not turn."""
+    tolerance = dict.fromkeys(("input_radius_m", "EA_N", "pretension_N", "mu_output", "mu_input"), 1.0)
+    vague = NOMINAL.model_copy(update={"tolerance": tolerance})
+    columns = recording(NOMINAL, 1, noise_rad=2e-3)
+    columns["motor_torque_Nm"] = 3.0 * NOMINAL.drive.ratio * columns["joint_torque_Nm"]
+    columns["joint_position_rad"][len(columns["time_s"]) // 5 :] = np.nan
+    found = calibrate(vague, {"one": columns}, budget_s=0.0)
+    assert found.rmse_rad < 1.2 * found.nominal_rmse_rad
+
+
 @pytest.mark.parametrize("way", [-1.0, 1.0])
 def test_a_motors_own_friction_in_the_load_is_not_taken_for_the_cables(way: float) -> None:
     """2 % of the greatest load, as a motor that yields to its load holds it: no value lies further from the truth than

@@ -179,3 +179,7 @@ def test_at_one_speed_a_turned_load_a_scale_and_a_ratio_are_no_delay(
 ) -> None:
     found = suspicions(JOINT, {**at_one_speed, changed: factor * at_one_speed[changed]})
     assert [(s.kind, s.channel) for s in found] == [told]
+
+
+def test_a_motor_torque_that_was_never_read_says_nothing() -> None:
+    assert kinds(motor_torque_Nm=np.full(len(COLUMNS["time_s"]), np.nan)) == []

@@ -25,6 +25,8 @@ from cablecomp.signal.smoothing import FloatArray, keep_corners
 TORQUE_ZERO = "joint_torque_offset_Nm"
 REPLICAS = 2
 """Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
+BESIDE = 1e3
+"""Times its sigma that a further channel has where the joint's angle is followed first."""
 PASSES = 2
 """Times that histories are looked for: what is left over tells how faint a carry-over matters, and the first time it
 holds those."""
@@ -51,8 +53,7 @@ def calibrate_drive(
     parameters = _parameters(config, evidence, as_stated)
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
-    fit = solve(problem, evaluations=15)
-    fit = refit(fit, weighed(fit, floor), 10)
+    fit = _begun(problem, floor)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
     sensors = floor
     for _ in range(PASSES):
@@ -71,6 +72,20 @@ def calibrate_drive(
     nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))
     lost = before - sum(int(e.counted[JOINT].sum()) for e in cut)
     return Calibrated(fit, nominal, floor, floor_rad, lost)
+
+
+def _begun(problem: Problem, floor: Weighing) -> Fit:
+    """The first fit, each channel then weighed by what is left of it: on all together, or, where that follows the
+    joint's angle worse than the nominal drive does, on this first (a torque of the wrong sign was followed by a drive
+    that does not turn)."""
+    fit = solve(problem, evaluations=15)
+    fit = refit(fit, weighed(fit, floor), 10)
+    nominal = replace(fit, x=problem.start)
+    if len(problem.channels) == 1 or rms_left(fit) <= LIMITS.spoiled * rms_left(nominal):
+        return fit
+    sigma = {c: s if c == JOINT else BESIDE * s for c, s in problem.weighing.sigma.items()}
+    fit = solve(problem.with_weighing(replace(problem.weighing, sigma=sigma)), evaluations=15)
+    return refit(fit, weighed(fit, floor), 10)
 
 
 def _followed(problem: Problem) -> Problem:
