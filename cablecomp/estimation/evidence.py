@@ -62,9 +62,10 @@ class Evidence:
     `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are
     judged, thinned by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time
     that a judged row stands for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it;
-    `outliers`: readings set aside; `shift_s`: what was added to the recording's own clock; `carryover`: by output
-    channel, what histories that nobody recorded would add to the judged rows, a column each; `apart`: by parameter,
-    in this order, how the configuration states that the joint stood apart in this recording.
+    `outliers`: readings set aside; `unread`: channels left out, hardly read; `shift_s`: what was added to the
+    recording's own clock; `carryover`: by output channel, what histories that nobody recorded would add to the
+    judged rows, a column each; `apart`: by parameter, in this order, how the configuration states that the joint
+    stood apart in this recording.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Evidence:
     shift_s: float = 0.0
     carryover: Mapping[str, FloatArray] = field(default_factory=dict)
     apart: Mapping[str, Apart] = field(default_factory=dict)
+    unread: tuple[str, ...] = ()
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""
@@ -139,7 +141,8 @@ def gather(
     raw = _in_order(name, {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()})
     load = load_channel(config, raw)
     good, outliers = _good(name, raw, load)
-    raw = {k: v for k, v in raw.items() if k == "time_s" or k in good}
+    unread = tuple(k for k in raw if k != "time_s" and k not in good)
+    raw = {k: v for k, v in raw.items() if k not in unread}
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
     noise |= _unresolved(config.drive.ratio, raw, good, noise)
     drivable = _drivable(raw, good, load)
@@ -153,7 +156,7 @@ def gather(
     weight = np.sqrt(share / share.mean())
     return Evidence(
         name, session, {}, means, rows, {k: v[rows] for k, v in counted.items()}, weight, noise, outliers,
-        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))),
+        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread,
     )  # fmt: skip
 
 

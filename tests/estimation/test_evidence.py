@@ -141,6 +141,7 @@ def test_a_channel_that_may_be_missing_and_was_not_read_is_missing() -> None:
     columns = recorded()
     e = gathered({**columns, "temperature_degC": np.full(len(columns["time_s"]), np.nan)})
     assert "temperature_degC" not in e.columns
+    assert e.unread == ("temperature_degC",)
     np.testing.assert_array_equal(e.rows, gathered(columns).rows)
 
 

@@ -232,6 +232,9 @@ def notes(case: Case) -> tuple[str, ...]:
     outliers = sum(e.outliers for e in body.used)
     if outliers:
         found.append(f"{outliers} single readings set aside as outliers")
+    unread = [f"{', '.join(e.unread)} of {short(e.name)}" for e in body.used if e.unread]
+    if unread:
+        found.append(f"hardly read, and left out: {'; '.join(unread)}")
     if body.clock_s:
         begun = [f"{short(name)} from {s:.4g} s" for name, s in body.clock_s.items()]
         more = f" and {len(begun) - SAID} more, `clock_s` in diagnosis.json" if len(begun) > SAID else ""
