@@ -9,7 +9,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import Any, Final, Generic, TypeVar
 
 from cablecomp.errors import CablecompError, InputError
@@ -102,13 +103,26 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     stated = THREADS in os.environ
     if not stated:
         os.environ[THREADS] = str(max(1, (os.cpu_count() or 1) // processes))
-    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(processes, get_context("spawn"), _end_with_its_starter)
     try:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
         if not stated:
             os.environ.pop(THREADS, None)
+
+
+def _end_with_its_starter() -> None:
+    """Have this process end when the one that started it has died: no pipe tells it, a pool's processes hold the other
+    end of theirs themselves."""
+    starter = parent_process()
+
+    def watch() -> None:
+        if starter is not None:
+            starter.join()
+            os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address: str) -> Iterator[Done[R]]:

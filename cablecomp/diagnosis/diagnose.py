@@ -128,8 +128,8 @@ def _judged(
     if kept is not final:
         remainder = case.remainder_of(kept.fit, rng) if kept.terms else before
     laws = empirical_laws(final, found.groups) if named else []
-    left = kept.fit.problem.left(kept.fit.x)
-    repeated_rad = repeatability(drive.fit.problem.evidence, case.covariates, left)
+    told = kept.fit.problem.left(kept.fit.x) if named else None
+    repeated_rad = repeatability(drive.fit.problem.evidence, case.covariates, told)
     structured = is_structured(remainder.location, remainder.series, repeated_rad, bool(named))
     pace.tell("counting errors on data left out", 0.95)
     if kept is not final or laws:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from firmware_sim.plant import PlantError
 from firmware_sim.trials.folder import full_truth, true_angles, write_public
 from firmware_sim.trials.order import Wanted
+from firmware_sim.trials.processes import processes
 from firmware_sim.trials.seal import ANGLES, SEALED, TRUTH, digest, truth_text, write_seal
 from firmware_sim.trials.world import draw_world
 from firmware_sim.trials.writing import folder_name
@@ -64,7 +64,7 @@ def generate(
             done += 1
             tell()
         return digest(out / SEALED)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with processes(workers) as pool:
         for job in as_completed([pool.submit(make_trial, wanted, k, str(out)) for k in left]):
             job.result()
             done += 1

@@ -10,13 +10,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 
 from firmware_sim.plant import PlantError
 from firmware_sim.trials.folder import write_world
 from firmware_sim.trials.order import IMPERFECTIONS, KINDS, LAWS, Wanted
+from firmware_sim.trials.processes import processes
 from firmware_sim.trials.world import draw_world
 from firmware_sim.trials.writing import folder_name
 
@@ -46,7 +46,7 @@ def make(wanted: Wanted, count: int, out: Path, first: int = 0, workers: int = 1
             done += 1
             print(f"written {done} of {count}", flush=True)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with processes(workers) as pool:
         for job in as_completed([pool.submit(make_one, wanted, k, str(out)) for k in numbers]):
             job.result()
             done += 1

@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -103,3 +104,37 @@ def test_no_scheduler_there_is_one_line(address: str) -> None:
     with pytest.raises(InputError, match=r"no Dask scheduler answers there") as caught:
         list(spread(square, [(1,)], Workers(scheduler=address)))
     assert "\n" not in str(caught.value)
+
+
+def sleeping(place: str) -> None:
+    """Say who this is, and sleep far longer than the test."""
+    Path(place).write_text(str(os.getpid()), encoding="utf-8")
+    time.sleep(600.0)
+
+
+def test_processes_end_with_a_starter_that_is_killed(tmp_path: Path) -> None:
+    said = tmp_path / "pid"
+    starter = get_context("spawn").Process(target=start_sleeping, args=(str(said),))
+    starter.start()
+    end = time.monotonic() + 60.0
+    while not (said.exists() and said.read_text(encoding="utf-8")) and time.monotonic() < end:
+        time.sleep(0.05)
+    worker = int(said.read_text(encoding="utf-8"))
+    starter.kill()
+    starter.join()
+    while lives(worker) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not lives(worker)
+
+
+def start_sleeping(place: str) -> None:
+    """One job in a process of its own."""
+    list(spread(sleeping, [(place,)], Workers(1)))
+
+
+def lives(process: int) -> bool:
+    """Whether there is such a process, and it is more than a remembrance."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

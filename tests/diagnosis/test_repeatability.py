@@ -29,8 +29,7 @@ def repeated(amplitudes: np.ndarray, compliance: float, sigma: float) -> float |
         "joint_position_rad": joint,
     }
     evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
-    left = evidence.at_rows("joint_position_rad")
-    return repeatability([evidence], [covariates_of(CONFIG, evidence)], [left])
+    return repeatability([evidence], [covariates_of(CONFIG, evidence)])
 
 
 @pytest.mark.parametrize("compliance", [0.0, 0.01])
@@ -57,9 +56,9 @@ def test_what_a_model_tells_apart_is_no_scatter() -> None:
     columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": joint}
     evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
     seen = [covariates_of(CONFIG, evidence)]
-    y = evidence.at_rows("joint_position_rad")
-    alone, known = y, y - np.interp(evidence.at_rows("time_s"), time, motor - late)
-    without, told = (repeatability([evidence], seen, [left]) for left in (alone, known))
+    known = np.interp(evidence.at_rows("time_s"), time, motor - late)
+    without = repeatability([evidence], seen)
+    told = repeatability([evidence], seen, [evidence.at_rows("joint_position_rad") - known])
     assert without is not None
     assert told is not None
     assert without > 1e-3

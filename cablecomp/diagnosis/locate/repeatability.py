@@ -16,22 +16,23 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
 def repeatability(
-    evidence: Sequence[Evidence], covariates: Sequence[Covariates], left: Sequence[FloatArray]
+    evidence: Sequence[Evidence], covariates: Sequence[Covariates], told: Sequence[FloatArray] | None = None
 ) -> float | None:
     """RMS difference [rad] between repeats of the same state in one recording, over sqrt 2: of the joint's angle, or of
-    what a model leaves of it on the judged rows (`left`, by recording), whichever is less; None where nothing
-    repeats."""
-    read, modelled = [], []
-    for e, c, beside in zip(evidence, covariates, left, strict=True):
+    what a model with named effects leaves of it on the judged rows (`told`, by recording), whichever is less; None
+    where nothing repeats."""
+    joint = [e.at_rows(JOINT) for e in evidence]
+    views = (joint,) if told is None else (joint, told)
+    squares: list[list[FloatArray]] = [[] for _ in views]
+    for k, c in enumerate(covariates):
         pairs, apart_by = _repeats(c)
         if len(pairs):
             a, b = pairs[:, 0], pairs[:, 1]
-            joint = e.at_rows(JOINT)
-            read.append(_beside(apart_by, joint[a] - joint[b]) ** 2)
-            modelled.append(_beside(apart_by, beside[a] - beside[b]) ** 2)
-    if not read:
+            for found, seen in zip(squares, views, strict=True):
+                found.append(_beside(apart_by, seen[k][a] - seen[k][b]) ** 2)
+    if not squares[0]:
         return None
-    return min(float(np.sqrt(0.5 * np.median(np.concatenate(s)) / 0.455)) for s in (read, modelled))
+    return min(float(np.sqrt(0.5 * np.median(np.concatenate(s)) / 0.455)) for s in squares)
 
 
 def _repeats(c: Covariates) -> tuple[IntArray, FloatArray]:
