@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.estimation.evidence import FEWEST, INPUT, JOINT, MOTOR
+from cablecomp.estimation.evidence import FEWEST, INPUT, JOINT, MOTOR, OVERFLOWN
 from cablecomp.estimation.evidence import load_channel as channel_of_load
 from cablecomp.estimation.lateness import accounted_for, delays, rather_late
 from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
@@ -198,10 +198,10 @@ def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
 
 
 def _rows(columns: Mapping[str, FloatArray], names: tuple[str, ...]) -> dict[str, FloatArray]:
-    """Rows with a finite value in all of these channels, at most `ROWS`, their time rising."""
+    """Rows with a reading in all of these channels, at most `ROWS`, their time rising."""
     good = np.isfinite(columns["time_s"])
     for name in names:
-        good &= np.isfinite(columns[name])
+        good &= np.abs(columns[name]) < OVERFLOWN
     place = np.flatnonzero(good)
     place = place[:: max(1, len(place) // ROWS)]
     place = place[np.concatenate(([True], np.diff(columns["time_s"][place]) > 0.0))] if len(place) else place

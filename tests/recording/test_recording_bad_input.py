@@ -78,7 +78,6 @@ CASES: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "NaN": ("a.csv", _replaced(b"0.2,2", b"0.2,nan"), ("line 3", "'joint_torque_Nm' holds 'nan'")),
     "infinite": ("a.csv", _replaced(b"0.2,2", b"0.2,-inf"), ("line 3", "'joint_torque_Nm' holds '-inf'")),
     "too large": ("a.csv", _replaced(b"0.2,2", b"0.2,1e999"), ("line 3", "'joint_torque_Nm' holds '1e999'")),
-    "overflown": ("a.csv", _replaced(b"0.2,2", b"0.2,-4e205"), ("'joint_torque_Nm' holds '-4e205'", "1e+15")),
     "infinite in an optional channel": (
         "a.csv",
         b"time_s,other_x\n0,1\n1,inf\n",
