@@ -38,10 +38,10 @@ FEWEST: Final = 40
 """Readings of a channel, and rows, below which there is nothing to fit."""
 SPARSE: Final = 0.6
 """Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
-OVERFLOWN: Final = 1e15
-"""From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 DIED: Final = 10.0
 """Usual steps of such a channel beyond which it was not read for a while, or no more."""
+OVERFLOWN: Final = 1e15
+"""From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 ABSURD: Final = 20.0
 """Ranges (2 to 98 %) from the middle beyond which no joint has been: counters that overflow, words for "no reading"."""
 SPIKE: Final = 8.0
@@ -147,7 +147,9 @@ def gather(
     noise |= _unresolved(config.drive.ratio, raw, good, noise)
     drivable = _drivable(raw, good, load)
     if drivable.sum() < FEWEST:
-        raise _too_few(name, load or INPUT, int(drivable.sum()))
+        raise InputError(
+            f"{name}: motor angle and load were read together at {int(drivable.sum())} instants; {FEWEST} are needed"
+        )
     raw, finite = _bridged(raw, good, drivable)
     means, counted = _fine(raw, finite, noise, fine_rows, load)
     rows = thinned(means, load, judged_rows)
@@ -168,17 +170,15 @@ def _good(name: str, raw: Mapping[str, FloatArray], load: str | None) -> tuple[d
     for key, kept in list(good.items()):
         if kept.sum() < FEWEST:
             if key in NEEDED or key == load:
-                raise _too_few(name, key, int(kept.sum()))
+                raise InputError(
+                    f"{name}: channel `{key}` has {int(kept.sum())} finite readings; {FEWEST} are needed"
+                )
             del good[key]
             continue
         spikes = _spikes(raw[key], kept)
         outliers += int(spikes.sum())
         kept &= ~spikes
     return good, outliers
-
-
-def _too_few(name: str, key: str, count: int) -> InputError:
-    return InputError(f"{name}: channel `{key}` has {count} finite readings; {FEWEST} are needed")
 
 
 def _drivable(raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], load: str | None) -> BoolArray:

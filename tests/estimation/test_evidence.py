@@ -137,6 +137,14 @@ def test_a_motor_that_was_read_at_first_only_drives_nothing_later() -> None:
     assert np.mean(np.isin(columns["time_s"][:397], time)) > 0.95
 
 
+def test_a_motor_and_a_load_that_were_never_read_together_are_said_to_be() -> None:
+    columns = recorded()
+    columns["motor_position_rad"][500:] = np.nan
+    columns["joint_torque_Nm"][:500] = np.nan
+    with pytest.raises(InputError, match="one: motor angle and load were read together at 0 instants; 40"):
+        gathered(columns)
+
+
 def test_a_channel_that_may_be_missing_and_was_not_read_is_missing() -> None:
     columns = recorded()
     e = gathered({**columns, "temperature_degC": np.full(len(columns["time_s"]), np.nan)})
