@@ -133,8 +133,10 @@ def start_sleeping(place: str) -> None:
 
 
 def lives(process: int) -> bool:
-    """Whether there is such a process, and it is more than a remembrance."""
+    """Whether there is such a process, and it is more than one that nobody has buried."""
     try:
-        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
-    except OSError:
+        os.kill(process, 0)
+    except ProcessLookupError:
         return False
+    stat = Path(f"/proc/{process}/stat")
+    return not (stat.exists() and stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "Z")
