@@ -21,7 +21,7 @@ def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
     lines += _table("drive", drive)
     for stage in stages:
         lines += _table("drive.stage", stage, array=True)
-    for name in ("tolerance", "sensors", "observer", "limits", "condition"):
+    for name in ("tolerance", "sensors", "observer", "limits", "condition", "remainder"):
         if data.get(name):
             lines += _table(name, data[name])
     for effect in config.effect:

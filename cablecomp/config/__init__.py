@@ -8,7 +8,7 @@ from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
 from cablecomp.config.doubts import doubts
 from cablecomp.config.drive import Drive, Stage, ratios_to_last
 from cablecomp.config.load import load_joint, parse_joint, validated
-from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Sensors
+from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Remainder, Sensors
 from cablecomp.config.schema import JointConfig
 from cablecomp.config.sessions import Depends, Empirical, Session
 from cablecomp.config.toml_file import TomlTable, read_toml
@@ -26,6 +26,7 @@ __all__ = [
     "NonNegative",
     "ObserverOptions",
     "Positive",
+    "Remainder",
     "Sensors",
     "Session",
     "Stage",

@@ -10,6 +10,7 @@ from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
 
 _NOISE = "white noise, 1 sigma; absent = estimated from the recording"
 _STEP = "resolution: one count"
+_LEFT = "left of this channel; absent = nothing beyond noise"
 
 
 class Sensors(Frozen):
@@ -30,6 +31,20 @@ class Sensors(Frozen):
     motor_torque_noise_Nm: NonNegative | None = Field(None, description=_NOISE)
     motor_torque_resolution_Nm: NonNegative | None = Field(None, description=_STEP)
     motor_torque_offset_Nm: Finite = Field(0.0, description="what the motor torque reads without load")
+
+
+class Remainder(Frozen):
+    """What this joint, as it stands here, is known to leave of what was recorded (RMS on data left out).
+
+    Written by the diagnosis that made the joint, where structure stayed beside what it named. A later diagnosis names
+    what stands out of it, and calls a mismatch of that size this joint's usual one; absent = whatever stands out of
+    the noise.
+    """
+
+    joint_position_rad: NonNegative | None = Field(None, description=_LEFT)
+    motor_torque_Nm: NonNegative | None = Field(None, description=_LEFT)
+    tension_h_N: NonNegative | None = Field(None, description=_LEFT)
+    tension_l_N: NonNegative | None = Field(None, description=_LEFT)
 
 
 class EffectEntry(Frozen):

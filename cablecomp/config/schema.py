@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, ValidationError, field_validator, m
 
 from cablecomp.config.base import Frozen, Listed, NonNegative, Text, listed
 from cablecomp.config.drive import Drive, Stage
-from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Sensors
+from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Remainder, Sensors
 from cablecomp.config.sessions import ZEROS, Depends, Empirical, Session, as_tables, check_names
 
 PARAMETERS: Final = (*Stage.model_fields, *Sensors.model_fields)
@@ -40,6 +40,7 @@ class JointConfig(Frozen):
         description="name -> channel that tells how the drive stood (slow in a recording)",
     )
     depends: Annotated[tuple[Depends, ...], listed(16)] = ()
+    remainder: Remainder = Remainder()
 
     @property
     def motor_zero_Nm(self) -> float:

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic import ValidationError
+
 from cablecomp.config.drive import Stage
 from cablecomp.config.options import Sensors
 from cablecomp.config.schema import JointConfig
@@ -22,8 +24,8 @@ SENSOR_KEYS: Final = tuple(Sensors.model_fields)
 
 
 def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig:
-    """The configuration with these values in place of its own (`offset[k]` of single recordings is left
-    out)."""
+    """The configuration with these values in place of its own (`offset[k]` of single recordings is left out); raises
+    InputError for one that no drive can have."""
     stages = [stage.model_dump() for stage in config.drive.stage]
     sensors: dict[str, Any] = {}
     effects = [(e.id, dict(e.parameters)) for e in config.effect]
@@ -40,7 +42,14 @@ def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig
             stages[places[0]][key] = value
         elif name in SENSOR_KEYS:
             sensors[name] = value
-    drive = config.drive.model_copy(update={"stage": tuple(Stage(**s) for s in stages)})
+    try:
+        drive = config.drive.model_copy(update={"stage": tuple(Stage(**s) for s in stages)})
+    except ValidationError as error:
+        first = error.errors()[0]
+        key, value = first["loc"][0], first["input"]
+        raise InputError(
+            f"{config.name}: `{key}` would come to {value:.4g}: {first['msg'].lower()}"
+        ) from None
     changed = {
         "drive": drive,
         "sensors": config.sensors.model_copy(update=sensors),

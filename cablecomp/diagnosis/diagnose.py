@@ -18,6 +18,7 @@ from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_histo
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.search import Search, done_without, search, without_effects
+from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.explain.weighing import Weighed, weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
@@ -25,7 +26,7 @@ from cablecomp.diagnosis.outcome import Case, Outcome, Remainder
 from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Diagnosis
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parallel import algebra_in_one_thread
 
@@ -130,7 +131,9 @@ def _judged(
     laws = empirical_laws(final, found.groups) if named else []
     told = kept.fit.problem.left(kept.fit.x) if named else None
     repeated_rad = repeatability(drive.fit.problem.evidence, case.covariates, told)
-    structured = is_structured(remainder.location, remainder.series, repeated_rad, bool(named))
+    structured = is_structured(
+        remainder.location, remainder.series, repeated_rad, usual_of(case.config, JOINT), bool(named)
+    )
     pace.tell("counting errors on data left out", 0.95)
     if kept is not final or laws:
         again = [f.law for f in laws]

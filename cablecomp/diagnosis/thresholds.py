@@ -160,6 +160,9 @@ class Thresholds:
     """Effects, best first, that are tried with a pretension of each session's own where neither helps alone."""
     conditions: int = 3
     """Values of a condition from which a gain by it may be asked for: two tell a line from nothing else."""
+    of_each: int = 2
+    """Recordings of each value from which fewer are enough: with one left out, the others of its value still tell
+    whether the parameter differs (a sheath at two bends, twice each: wires were to break at the first turn)."""
 
     # --- what data left out demand
     quiet: float = 1.15
@@ -249,6 +252,10 @@ class Thresholds:
     were wrong, above it 115 of 898; and late channels in pieces of the jaw's `L_4` in which nothing was concealed)."""
     little_told: float = 0.45
     """Confidence at most in one that takes off less (6 of these 13 were right)."""
+    usual: float = 0.25
+    """Mean square that an effect has to take off over that of what the joint is known to leave (`[remainder]`): half
+    of it, as RMS (pieces of the jaw's `L_4`, seeds 76 to 79: what had been concealed took 0.4 and more, gravity and
+    delays named in twins up to 0.15)."""
     wider: float = 1.6
     """How many times as wide as the likelihood says a stated deviation or interval is: with late channels, coloured
     noise and small companions that nobody names, 95 % of true values lie within 1.96 of these (trials seeds 618, 619,

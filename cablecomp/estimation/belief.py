@@ -63,7 +63,10 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
         return tuple(found)
     view = View(config, rows, load)
     fits = _angles(view)
-    if any(f.kind == "unit" for f in fits):  # all else would be told in that unit
+    fits += _slack(view)
+    if any(
+        f.kind == "unit" or "pretension_bears_Nm" in f.numbers for f in fits
+    ):  # it would spoil all that follows
         return (*found, *fits)
     fits += _torques(view)
     if found:
@@ -129,8 +132,25 @@ def _reach(view: View) -> Iterator[Suspicion]:
         yield Suspicion("unit", JOINT, words, {"reach_rad": reach, "allowed_rad": most})
 
 
+def _slack(view: View) -> Iterator[Suspicion]:
+    """An open circuit whose cable the load lets go slack, and would pull were all signs the other way."""
+    last = view.config.drive.stage[-1]
+    if view.channel is None or view.config.drive.circuit != "open":
+        return
+    holds = last.output_radius_m * last.pretension_N
+    least, most = (float(v) for v in np.percentile(view.M, (1.0, 99.0)))
+    if least < -holds < -most:
+        words = (
+            f"{view.channel} lets the one cable of this open circuit go slack (a load of {least:.3g} N m, its "
+            f"pretension bears {-holds:.3g}); a load that pulls the cable is positive: turn the signs of both angles "
+            "and of all torques"
+        )
+        yield Suspicion("sign", view.channel, words, {"load_Nm": least, "pretension_bears_Nm": -holds})
+
+
 def _torques(view: View) -> list[Suspicion]:
-    """Sign and unit of the load."""
+    """Sign and unit of the load, where another one would leave less: of a joint held by a spring the load follows the
+    angle, and the line says nothing of the drive."""
     if view.channel is None or not np.ptp(view.M) > 0.0:
         return []
     seen, sure = partial(view.y, view.M, view.q)
@@ -139,21 +159,23 @@ def _torques(view: View) -> list[Suspicion]:
     factor = seen / view.compliance
     ratio = view.slope if abs(view.sure) > SURE else view.ratio
     found = []
-    if factor < 0.0:
+    turned = view.left(-1.0, ratio)
+    if factor < 0.0 and turned < view.left(ratio=ratio):
         line = rms(view.y - ratio * view.q - seen * view.M)
         words = (
             f"{view.channel} seems to have the opposite sign: RMS {mrad(view.left(ratio=ratio))}, "
-            f"{mrad(view.left(-1.0, ratio))} with it turned; a straight line leaves {mrad(line)}"
+            f"{mrad(turned)} with it turned; a straight line leaves {mrad(line)}"
         )
         found.append(Suspicion("sign", view.channel, words, {"compliance_over_nominal": factor}))
     off = abs(factor)
     most = SCALE_OFF * (8.0 if _loose(view.config, "EA_N") else 1.0)
-    if not 1.0 / most < off < most:
+    scaled = view.left(np.sign(factor), ratio, off)
+    if not 1.0 / most < off < most and scaled < view.left(ratio=ratio):
         unit = min(_TORQUES, key=lambda f: abs(log(off / f)))
         near = f" (in {_TORQUES[unit]}?)" if abs(log(off / unit)) < 0.5 else ""
         words = (
             f"{view.channel} moves the joint {off:.3g} times as far as the drive allows{near}: RMS "
-            f"{mrad(view.left(ratio=ratio))} as it is, {mrad(view.left(np.sign(factor), ratio, off))} scaled so"
+            f"{mrad(view.left(ratio=ratio))} as it is, {mrad(scaled)} scaled so"
         )
         found.append(Suspicion("scale", view.channel, words, {"compliance_over_nominal": factor}))
     return found

@@ -183,3 +183,26 @@ def test_at_one_speed_a_turned_load_a_scale_and_a_ratio_are_no_delay(
 
 def test_a_motor_torque_that_was_never_read_says_nothing() -> None:
     assert kinds(motor_torque_Nm=np.full(len(COLUMNS["time_s"]), np.nan)) == []
+
+
+def test_a_joint_held_by_a_spring_is_no_load_of_the_opposite_sign() -> None:
+    """Its load follows its angle: beside that, the motor's says little, and the line through both has any slope."""
+    q = COLUMNS["motor_position_rad"]
+    lost = np.zeros_like(q)  # motion lost in a sheath, from side to side
+    for k in range(1, len(q)):
+        lost[k] = np.clip(lost[k - 1] + 0.1 * (q[k] - q[k - 1]), -0.01, 0.01)
+    angle = 0.5 * (JOINT.drive.ratio * q - lost)
+    assert kinds(joint_position_rad=angle, joint_torque_Nm=-3.0 * angle) == []
+
+
+def test_a_load_that_lets_an_open_circuit_slacken_is_one_of_the_other_sign() -> None:
+    one = JOINT.model_copy(update={"drive": JOINT.drive.model_copy(update={"circuit": "open"})})
+    stage = one.drive.stage[-1]
+    holds = stage.output_radius_m * stage.pretension_N
+    pulls = holds * (2.0 + np.sin(COLUMNS["time_s"]))
+    angle = one.drive.ratio * COLUMNS["motor_position_rad"]
+    for turn in (1.0, -1.0):
+        load = turn * pulls
+        said = suspicions(one, {**COLUMNS, "joint_position_rad": angle, "joint_torque_Nm": load})
+        slack = [s for s in said if "go slack" in s.text]
+        assert [s.kind for s in slack] == ([] if turn > 0.0 else ["sign"])

@@ -89,6 +89,18 @@ def test_beyond_what_told_a_law_it_is_held_and_said() -> None:
         as_it_stood(joint, Path("new.csv"), dict)
 
 
+def test_a_gain_that_leaves_the_cable_no_tension_is_one_line() -> None:
+    """In a fit that asks for it (of no drive that can be), and in a recording that no session claims."""
+    tension = JOINT.drive.stage[0].pretension_N
+    e = gather(JOINT, "one", recorded(), "all", fine_rows=400, judged_rows=60)
+    with pytest.raises(InputError, match=f"`pretension_N` would come to -{tension:g}"):
+        standing(JOINT, {"pretension_N~bend_rad": -tension}, replace(e, condition={"bend_rad": 2.0}))
+    law = {"parameter": "pretension_N", "on": "bend_rad", "per_unit": -tension, "at": 0.0, "seen": [0.0, 2.0]}
+    joint = parse_joint({**PLAIN, **BENT, "depends": [law]}, "bent")
+    with pytest.raises(InputError, match="greater than 0"):
+        as_it_stood(joint, Path("new.csv"), lambda: bent(2.0))
+
+
 def standing_apart(config: JointConfig, values: dict[str, float], stated: dict[str, float]) -> JointConfig:
     """The joint with these common values in a recording of which its configuration states others."""
     e = gather(config, "one", recorded(), "all", fine_rows=400, judged_rows=60)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, Remainder
 from cablecomp.diagnosis.answer.augmented import (
     augmented_joint,
     told_by,
@@ -80,7 +80,19 @@ def _augmented(case: Case, outcome: Outcome) -> JointConfig:
     model = outcome.kept
     joint = augmented_joint(case.config, model, outcome.empirical, case.body.whole_for_the_end)
     joint = with_tolerances(joint, model.fit, told_by(model.fit, case.config.tolerance))
-    return with_tolerances_of(joint, model)
+    joint = with_tolerances_of(joint, model)
+    if outcome.verdict != "partly explained":
+        return joint
+    return joint.model_copy(update={"remainder": _remainder(outcome)})
+
+
+def _remainder(outcome: Outcome) -> Remainder:
+    """What the joint leaves of each channel, for later diagnoses: of the joint's angle on data left out, of the others
+    where it was fitted; zeros of the recordings apart."""
+    fit = outcome.kept.fit
+    left = {c: rms_left(fit, c) for c in fit.problem.channels}
+    left[JOINT] = outcome.augmented.heldout_own_zero_rmse_rad
+    return Remainder(**{c: float(f"{v:.3g}") for c, v in left.items()})
 
 
 def _channels(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:

@@ -17,6 +17,7 @@ from cablecomp.diagnosis.explain.experiment import best_experiment
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection
 from cablecomp.diagnosis.explain.unseen import Hidden
+from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.explain.weighing import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates, join
 from cablecomp.diagnosis.locate.remainders import sensitivities
@@ -226,6 +227,11 @@ def notes(case: Case) -> tuple[str, ...]:
     body, drive = case.body, case.drive
     load = load_channel(case.config, body.used[0].columns)
     found = [f"load from {load}" if load else "no load channel: the joint is taken as free"]
+    usual = usual_of(case.config, JOINT)
+    if usual:
+        found.append(
+            f"this joint is known to leave {usual:.3g} rad of its angle ([remainder]): what stands out of that is named"
+        )
     if drive.lost_rows:
         total = sum(len(e.rows) for e in body.used)
         found.append(f"{drive.lost_rows} of {total} rows given up to the history before the first sample")

@@ -46,10 +46,12 @@ def predicts(
     return any(rms_left(after.fit, c) < LIMITS.followed * rms_left(before, c) for c in others)
 
 
-def is_structured(found: Location, series: Series, repeated_rad: float | None, named: bool) -> bool:
-    """Whether what is left is more than noise and follows something; beside a name, far more than noise is enough."""
-    noise = float(np.mean(series.sigma))
-    yardstick = noise if repeated_rad is None else max(repeated_rad, noise)
+def is_structured(
+    found: Location, series: Series, repeated_rad: float | None, usual_rad: float, named: bool
+) -> bool:
+    """Whether what is left is more than noise, than what repeats, and than what the joint is known to leave, and
+    follows something; beside a name, far more than that is enough."""
+    yardstick = max(float(np.mean(series.sigma)), repeated_rad or 0.0, usual_rad)
     ratio = float(np.mean(series.residual**2)) / yardstick**2
     follows = bool(found.significant(LIMITS.p_structured))
     beyond = LIMITS.beyond_noise if named else LIMITS.far_beyond_noise

@@ -109,6 +109,12 @@ def ask_dependences(fit: Fit, terms: Sequence[Any], by: str) -> list[tuple[Depen
     return [f for f in found if 2.0 * f[1] < LIMITS.dependence * energy][: LIMITS.dependences]
 
 
+def tell_a_gain(values: Sequence[float]) -> bool:
+    """Whether a gain by a condition may be asked of recordings with these values of it."""
+    counts = np.unique(values, return_counts=True)[1]
+    return len(counts) >= LIMITS.conditions or (len(counts) > 1 and min(counts) >= LIMITS.of_each)
+
+
 def _ways(
     problem: Problem, p: Parameter, column: FloatArray, owners: FloatArray, by: str
 ) -> list[tuple[Dependence, list[FloatArray], Problem]]:
@@ -126,10 +132,10 @@ def _ways(
         free = (*problem.parameters[:place], *own, *problem.parameters[place + 1 :])
         ways.append((Dependence(p.name, "session"), cut, replace(problem, parameters=free)))
     for condition in problem.evidence[0].condition:
-        values = np.array([e.condition[condition] for e in problem.evidence])
-        if len(np.unique(values)) < LIMITS.conditions or not may_depend(p.base, condition):
+        values = [e.condition[condition] for e in problem.evidence]
+        if not tell_a_gain(values) or not may_depend(p.base, condition):
             continue
-        centred = values - values.mean()
+        centred = np.array(values) - np.mean(values)
         weight = np.where(owners >= 0, centred[np.maximum(owners, 0).astype(np.int64)], 0.0)
         gain = by_condition(p, condition, float(np.ptp(values)))
         free = (*problem.parameters, gain)

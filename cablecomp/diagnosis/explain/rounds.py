@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend
+from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, in_no_recording, runs_away
 from cablecomp.diagnosis.explain.model import (
     Model,
@@ -295,7 +295,7 @@ def _by_conditions(begun: Begun) -> list[Begun]:
     found: list[Begun] = []
     for condition in problem.evidence[0].condition:
         values = [e.condition[condition] for e in problem.evidence]
-        if len(set(values)) < LIMITS.conditions:
+        if not tell_a_gain(values):
             continue
         name = term.key(term.amount.name)
         amount = next((p for p in problem.parameters if p.name == name), None)

@@ -33,6 +33,7 @@ from cablecomp.diagnosis.explain.ties import (
     with_the_first,
     worth_its_terms,
 )
+from cablecomp.diagnosis.explain.usual import least_square
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -149,10 +150,14 @@ def _dethrones(model: Model, best: Model, baseline: Model, groups: Groups) -> bo
 
 
 def quiet(fit: Fit) -> bool:
-    """Whether all that is left of every channel is its sensor's noise."""
+    """Whether all that is left of every channel is its sensor's noise, or too little to stand out of what the joint is
+    known to leave."""
     problem = fit.problem
-    most = np.sqrt(LIMITS.quiet)
-    return not any(rms_left(fit, c) > most * noise_rms(problem.evidence, c) for c in problem.channels)
+    return all(
+        rms_left(fit, c) ** 2
+        <= max(LIMITS.quiet * noise_rms(problem.evidence, c) ** 2, least_square(problem.config, c))
+        for c in problem.channels
+    )
 
 
 def _pruned(model: Model, groups: Groups) -> Model:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved,
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
+from cablecomp.diagnosis.explain.usual import lost_in_usual
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -81,6 +82,8 @@ def _weighed(
         own = score_difference(having, lacking, groups)
         instead = rivals(final, term, bare, pool, groups, rng)
     nearest = min(instead.differences.values(), key=lambda v: v.z, default=NO_RIVAL)
+    # as the last to come, and alone: of which it takes off more
+    ways = [_gone(selection, bare, final), *_alone(selection, term)]
     evidence = features(
         gain=own.gain,
         z=own.z,
@@ -89,7 +92,7 @@ def _weighed(
         margin_gain=nearest.gain,
         margin_z=nearest.z,
         share_left=share_left,
-        share_total=_share_of_baseline(selection, bare, final),
+        share_total=_share(selection, ways[0]),
         rivals=len(instead.effects),
         follows=_follows(term, left),
         unsteady=_unsteady(final, term, groups),
@@ -102,10 +105,13 @@ def _weighed(
     if amount_resolved(final.fit, term):
         confidence = learnt().probability(evidence)
         why_not = _against((*instead.effects, *instead.plain), own, evidence)
-    removes = max(evidence["share_total"], _alone(selection, term))
+    most = max(ways, key=lambda gone: _share(selection, gone))
+    removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif little := _too_little(removes, share_left * _beyond_noise(final.fit)):
+    elif little := (
+        _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
+    ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes)
@@ -149,29 +155,41 @@ def _selected(selection: Selection, term: Hypothesis) -> float:
     return max(shares, default=0.0)
 
 
-def _share_of_baseline(selection: Selection, bare: Model | None, final: Model) -> float:
-    """Share of the calibrated drive's mean square on data left out that goes with the effect, in the channel in
-    which it shows most; single rows far off the rest count as at most `LIMITS.tail` deviations."""
-    if bare is None:
-        return 1.0
-    return _gone(selection, bare, final)
-
-
-def _alone(selection: Selection, term: Hypothesis) -> float:
-    """The same for the effect alone beside the calibrated drive; 0 where it was not fitted so."""
+def _alone(selection: Selection, term: Hypothesis) -> Iterator[FloatArray]:
+    """As `_gone`, of the effect alone beside the calibrated drive, where it was fitted so."""
     first = selection.rounds[0].tried if selection.rounds else ()
-    models = [t.model for t in first if t.term.name == term.name]
-    return max((_gone(selection, selection.baseline, m) for m in models), default=0.0)
+    yield from (_gone(selection, selection.baseline, t.model) for t in first if t.term.name == term.name)
 
 
-def _gone(selection: Selection, before: Model, after: Model) -> float:
+def _gone(selection: Selection, before: Model | None, after: Model) -> FloatArray:
+    """Mean square on data left out that goes from one model to another, of each channel; all there is where the drive
+    cannot be followed before."""
     whole = _mean_squares(selection.baseline, selection.groups)
-    gone = _mean_squares(before, selection.groups) - _mean_squares(after, selection.groups)
-    return float(np.clip(np.max(gone / np.maximum(whole, 1e-300)), 0.0, 1.0))
+    if before is None:
+        return whole
+    return _mean_squares(before, selection.groups) - _mean_squares(after, selection.groups)
+
+
+def _shares(selection: Selection, gone: FloatArray) -> FloatArray:
+    """The same as shares of what the calibrated drive leaves of each channel."""
+    return gone / np.maximum(_mean_squares(selection.baseline, selection.groups), 1e-300)
+
+
+def _share(selection: Selection, gone: FloatArray) -> float:
+    """The share of the channel in which the effect shows most."""
+    return float(np.clip(np.max(_shares(selection, gone)), 0.0, 1.0))
+
+
+def _beside_usual(selection: Selection, gone: FloatArray) -> str:
+    """What is to be said of an effect that does not stand out of what the joint is known to leave of that channel."""
+    problem = selection.baseline.fit.problem
+    k = int(np.argmax(_shares(selection, gone)))
+    return lost_in_usual(problem.config, list(problem.spans())[k], float(gone[k]))
 
 
 def _mean_squares(model: Model, groups: Groups) -> FloatArray:
-    """Mean square left out of each channel, in its own unit."""
+    """Mean square left out of each channel, in its own unit squared; single rows far off the rest count as at most
+    `LIMITS.tail` deviations."""
     bound = LIMITS.tail * scales(model.left_out, groups)
     problem = model.fit.problem
     return np.array([
