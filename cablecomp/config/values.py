@@ -46,9 +46,9 @@ def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig
         drive = config.drive.model_copy(update={"stage": tuple(Stage(**s) for s in stages)})
     except ValidationError as error:
         first = error.errors()[0]
-        key, value = first["loc"][0], first["input"]
+        where, value = first["loc"][0], first["input"]
         raise InputError(
-            f"{config.name}: `{key}` would come to {value:.4g}: {first['msg'].lower()}"
+            f"{config.name}: `{where}` would come to {value:.4g}: {first['msg'].lower()}"
         ) from None
     changed = {
         "drive": drive,

@@ -17,7 +17,7 @@ from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.search import Search, done_without, search, without_effects
+from cablecomp.diagnosis.explain.search import Search, done_without, exchanged, search, without_effects
 from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.explain.weighing import Weighed, weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
@@ -91,10 +91,18 @@ def _weighed(
     case: Case, found: Search, rng: np.random.Generator
 ) -> tuple[Search, Remainder, Sequence[Weighed]]:
     """The search's model, what it leaves, its effects weighed. Where none of them is sure, without those that are not
-    missed beside the others, weakest first: of three that trade places none is missed while the others are there."""
+    missed beside the others, weakest first: of three that trade places none is missed while the others are there. Where
+    another effect in the place of one predicts better, with that."""
+    exchanges = 0
     while True:
         after = case.remainder_of(found.final.fit, rng)
         weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
+        better = sorted((w.difference.z, k, w.better) for k, w in enumerate(weighed) if w.better is not None)
+        more = better and exchanges < LIMITS.exchanges
+        if more and (other := exchanged(found, better[0][2], case.drive)) is not None:
+            exchanges += 1
+            found = other
+            continue
         needless = [w for w in weighed if w.evidence["z"] < LIMITS.z_missed and w.depends is None]
         sure = any(w.confidence >= LIMITS.name for w in weighed)
         if sure or not needless or len(weighed) < 2:

@@ -208,6 +208,12 @@ class Thresholds:
     seed 616, among 0.03 to 0.5: of 194 effects in 83 of them a confidence without it named 33 wrong and 131 right ones,
     with it 25 and 133, on laws left out)."""
 
+    steps: int = 16
+    """Instants from which on an event may do more or less where it is held against an event of another kind: what
+    slips or breaks does so at once, little by little, at every peak of the load, and no law knows when."""
+    course: float = 0.5
+    """By how much of itself, one standard deviation, at each of them."""
+
     # --- verdict and names
     followed: float = 0.9
     """What the final model leaves of a further channel, or of the angle with each recording's own zero taken off, over
@@ -252,6 +258,15 @@ class Thresholds:
     were wrong, above it 115 of 898; and late channels in pieces of the jaw's `L_4` in which nothing was concealed)."""
     little_told: float = 0.45
     """Confidence at most in one that takes off less (6 of these 13 were right)."""
+    beaten_told: float = 0.2
+    """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
+    801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""
+    rival_alone: float = 0.25
+    """Share of what an effect takes off alone that such another one has to take off alone (the jaw's `L_4/13`: its path
+    alone explains most by far, and in its place another friction takes up what the motor's leaves)."""
+    exchanges: int = 2
+    """Effects of the final model in whose place such another one is put, if that model then predicts better: the search
+    met them with other effects beside, or fitted them worse."""
     usual: float = 0.25
     """Mean square that an effect has to take off over that of what the joint is known to leave (`[remainder]`): half
     of it, as RMS (pieces of the jaw's `L_4`, seeds 76 to 79: what had been concealed took 0.4 and more, gravity and

@@ -18,6 +18,7 @@ from cablecomp.config_text import joint_text
 from cablecomp.diagnosis import diagnose as diagnose_module
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import Diagnosis, report_json
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
@@ -209,7 +210,11 @@ def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_fi
         alone = len(names) == 1 and len(z) > 1
         return [
             SimpleNamespace(
-                term=n, depends=None, confidence=surest, evidence={"z": 5.0 if alone else shown[n]}
+                term=n,
+                depends=None,
+                confidence=surest,
+                evidence={"z": 5.0 if alone else shown[n]},
+                better=None,
             )
             for n in names
         ]
@@ -228,3 +233,32 @@ def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_fi
     assert [w.term for w in last] == list(found.final.fit)
     strongest = max(shown, key=lambda n: shown[n])
     assert strongest in [w.term for w in last]
+
+
+@pytest.mark.parametrize(("follows", "came_to"), [(True, 1 + LIMITS.exchanges), (False, 1)])
+def test_what_predicts_better_in_the_place_of_an_effect_is_put_there_a_few_times_at_most(
+    monkeypatch: pytest.MonkeyPatch, follows: bool, came_to: int
+) -> None:
+    """Of two in whose place another is better, the one that is beaten by more goes first; where the drive cannot follow
+    with it, the model stays as it was."""
+
+    def weighed(found: Any, *_: Any) -> list[Any]:
+        return [
+            SimpleNamespace(
+                term=f"{k}", depends=None, confidence=0.9, evidence={"z": 5.0},
+                difference=SimpleNamespace(z=-float(k)), better=(*found.final.fit, f"in place of {k}"),
+            )
+            for k in range(3)
+        ]  # fmt: skip
+
+    def exchanged(found: Any, model: Any, drive: Any) -> Any:
+        return SimpleNamespace(final=SimpleNamespace(fit=model)) if follows else None
+
+    case: Any = SimpleNamespace(remainder_of=lambda fit, rng: SimpleNamespace(location=None), drive=None)
+    monkeypatch.setattr(diagnose_module, "weigh", weighed)
+    monkeypatch.setattr(diagnose_module, "share_left", lambda drive, final: 0.0)
+    monkeypatch.setattr(diagnose_module, "exchanged", exchanged)
+    begin: Any = SimpleNamespace(final=SimpleNamespace(fit=("begun",)))
+    found, _, last = diagnose_module._weighed(case, begin, np.random.default_rng(0))
+    assert found.final.fit == ("begun", *["in place of 2"] * (came_to - 1))
+    assert len(last) == 3

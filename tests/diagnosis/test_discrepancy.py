@@ -100,3 +100,23 @@ def test_beside_no_other_law_nothing_changes() -> None:
     found = model(LAW, {FRICTION: LAW})
     assert left_out_with_discrepancy(found, set(), GROUPS) is found.left_out
     assert left_out_with_discrepancy(found, {"gravity_load"}, GROUPS) is found.left_out
+
+
+def test_events_of_two_kinds_are_told_apart_by_what_they_do_whatever_their_course(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three steps of which either law knows one: what moves the zero does not grow with the load (seed 4)."""
+    steps = [(t <= TIME).astype(np.float64) for t in (12.0, 30.0, 48.0)]
+    does = {"clamp_slip": np.ones(COUNT), "strand_break": 1.0 + 0.1 * LOAD}
+    y = sum(steps) * does["clamp_slip"] + 0.1 * np.random.default_rng(4).standard_normal(COUNT)
+    amount = {"clamp_slip": "slip_m", "strand_break": "fraction"}
+    models = {name: model(y, {f"{name}.{amount[name]}": own * steps[1]}) for name, own in does.items()}
+    instants = np.linspace(2.0, 58.0, LIMITS.steps)
+    monkeypatch.setattr(
+        "cablecomp.diagnosis.explain.discrepancy._courses",
+        lambda fit, event: [does[event] * (t <= TIME) for t in instants],
+    )
+    as_they_are = score_difference(models["clamp_slip"].left_out, models["strand_break"].left_out, GROUPS)
+    events: Any = does
+    free = [left_out_with_discrepancy(models[e], set(), GROUPS, event=e) for e in events]
+    assert score_difference(*free, GROUPS).gain > 0.3 > 3.0 * as_they_are.gain

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from cablecomp.diagnosis.explain import rounds
+from cablecomp.diagnosis.explain.dependence import tell_a_gain
 from cablecomp.diagnosis.thresholds import LIMITS
 
 
@@ -43,3 +44,19 @@ def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_
     at.groups = SimpleNamespace(by="block")
     rounds._begun(at, answers)
     assert sorted(tried) == [*plain[: LIMITS.tried_later], *trading[:further]]
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ([0.0, 1.0, 2.0], True),
+        ([0.0, 0.0, 1.0, 1.0], True),
+        ([0.0, 0.0, 1.0], False),
+        ([1.0, 1.0], False),
+        ([1.0], False),
+    ],
+)
+def test_a_gain_by_a_condition_wants_three_values_or_two_of_two_recordings_each(
+    values: list[float], told: bool
+) -> None:
+    assert tell_a_gain(values) is told

@@ -8,6 +8,7 @@ from typing import Any, cast
 import pytest
 
 from cablecomp.diagnosis.answer import entries
+from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, _too_little
@@ -17,6 +18,8 @@ from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, 
     ("effect", "bounds", "held"),
     [
         ("routing_friction", (), False),
+        ("clamp_slip", ("effect.clamp_slip.time_s", "effect.clamp_slip.duration_s"), False),
+        ("clamp_slip", ("effect.clamp_slip.slip_m",), True),
         ("routing_friction", ("effect.routing_friction.arc_length_m",), False),
         ("routing_friction", ("effect.routing_friction.mu_angle",), True),
         ("routing_friction", ("effect.routing_friction.mu_angle@Tool_4.2",), True),
@@ -93,3 +96,26 @@ def test_what_trials_say_not_to_exclude_is_told_where_nothing_has_a_name(
     found: Any = [SimpleNamespace(confidence=confidence, rivals=())]
     told = [names for names, _ in entries.tied_of(found, selection)]
     assert told == ([("gravity_load", "pulley_runout")] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("alone", "scores", "by"),
+    [
+        ({"a": 0.6, "b": 0.5}, {"b": -0.1}, "b"),
+        ({"a": 0.6, "b": 0.5}, {"b": 0.1}, ""),
+        ({"a": 0.6, "b": 0.1}, {"b": -0.1}, ""),  # what explains most by far alone stands
+        ({"a": 0.0}, {"b": -0.1}, "b"),  # what nobody tried alone does not
+        ({"a": 0.6, "b": 0.5, "c": 0.5}, {"b": -0.1, "c": -0.4}, "c"),
+    ],
+)
+def test_an_effect_in_whose_place_another_predicts_better_is_beaten_by_it(
+    monkeypatch: pytest.MonkeyPatch, alone: dict[str, float], scores: dict[str, float], by: str
+) -> None:
+    def tried_alone(selection: Any, name: str) -> Any:
+        return iter([alone[name]] if name in alone else [])
+
+    monkeypatch.setattr(weighing, "_alone", tried_alone)
+    monkeypatch.setattr(weighing, "_share", lambda selection, gone: gone)
+    term = cast(Hypothesis, SimpleNamespace(name="a"))
+    differences = {name: ScoreDifference(gain, 10.0 * gain, 0.0) for name, gain in scores.items()}
+    assert weighing._beaten(cast(Any, None), term, differences) == by

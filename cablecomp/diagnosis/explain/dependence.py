@@ -112,7 +112,7 @@ def ask_dependences(fit: Fit, terms: Sequence[Any], by: str) -> list[tuple[Depen
 def tell_a_gain(values: Sequence[float]) -> bool:
     """Whether a gain by a condition may be asked of recordings with these values of it."""
     counts = np.unique(values, return_counts=True)[1]
-    return len(counts) >= LIMITS.conditions or (len(counts) > 1 and min(counts) >= LIMITS.of_each)
+    return len(counts) >= LIMITS.conditions or (len(counts) > 1 and int(min(counts)) >= LIMITS.of_each)
 
 
 def _ways(

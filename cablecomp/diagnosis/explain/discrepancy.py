@@ -10,40 +10,69 @@ M. Plumlee, Bayesian calibration of inexact computer models, J. Am. Stat. Assoc.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
 from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
 
 
-def left_out_with_discrepancy(model: Model, laws: Collection[str], groups: Groups) -> FloatArray:
+def left_out_with_discrepancy(
+    model: Model, laws: Collection[str], groups: Groups, event: Hypothesis | None = None
+) -> FloatArray:
     """Weighted residual of every data row with its fold left out, where these laws of the model (effects' ids) may have
-    other forms; as `left_out` where there are none."""
+    other forms, and an `event` of it another course; as `left_out` where there is neither."""
     fit, n = model.fit, len(groups.fold)
     columns = [
         fit.J[:n, k]
         for k, p in enumerate(fit.problem.parameters)
         if _law_of(p.name) in laws and role_of(p.base) not in ("instant", "duration")
     ]
-    if not columns:
+    forms = _forms(fit.problem) if columns else []
+    free = [(c * f, LIMITS.form) for c in columns for f in forms]
+    if event is not None:
+        free += [(c, LIMITS.course) for c in _courses(fit, event)]
+    if not free:
         return model.left_out
-    forms = _forms(fit.problem)
-    D = np.stack([c * f for c in columns for f in forms], axis=1)
+    D = np.stack([c[:n] for c, _ in free], axis=1)
     J = fit.J[:, movable(fit)]
     A = np.zeros((len(J) + D.shape[1], J.shape[1] + D.shape[1]))
     A[: len(J), : J.shape[1]], A[:n, J.shape[1] :] = J, D
-    A[len(J) :, J.shape[1] :] = np.eye(D.shape[1]) / LIMITS.form
+    A[len(J) :, J.shape[1] :] = np.diag([1.0 / sd for _, sd in free])
     r = np.concatenate([fit.residual, np.zeros(D.shape[1])])
     return left_out_linearly(r + A @ np.linalg.lstsq(A, -r, rcond=None)[0], A, groups)
+
+
+def _courses(fit: Fit, event: Hypothesis) -> list[FloatArray]:
+    """What an event does to the residual from each of some instants on, had it been over before the first sample: with
+    these as its steps it may go on, stop, come again. Events of another kind differ by what they do, not by when."""
+    problem = fit.problem
+    x = fit.x.copy()
+    for k, p in enumerate(problem.parameters):
+        if p.name == event.key(event.instant):
+            x[k] = p.x(min(float(e.columns["time_s"][0]) for e in problem.evidence) - 1.0)
+        elif p.name == event.key(event.duration):
+            x[k] = p.x(0.0)
+    without = x.copy()
+    place = [p.name for p in problem.parameters].index(event.key(event.amount.name))
+    without[place] = problem.parameters[place].x(event.amount.neutral)
+    over, none = problem.followed(x), problem.followed(without)
+    if over is None or none is None:
+        return []
+    time = _on_rows(problem, lambda e: e.at_rows("time_s")[None])[0]
+    instants = np.nanquantile(time, np.arange(1, LIMITS.steps + 1) / (LIMITS.steps + 1))
+    does = (over - none)[: len(time)]
+    return [np.where(time >= t, does, 0.0) for t in instants]
 
 
 def _law_of(parameter: str) -> str:
@@ -55,11 +84,7 @@ def _law_of(parameter: str) -> str:
 def _forms(problem: Problem) -> list[FloatArray]:
     """phi_j on the rows of a residual, none on penalty rows: Legendre's first two polynomials of load, motor angle and
     time over their ranges, tanh of the rates of load and motor, and of the motor's amount, over their medians."""
-    parts = []
-    for c in problem.channels:
-        parts += [_course(problem, e)[:, e.counted[c]] for e in problem.evidence if c in e.counted]
-        parts.append(np.full((5, problem.bases[c].penalty_rows), np.nan))
-    load, angle, time, loading, speed = np.concatenate(parts, axis=1)
+    load, angle, time, loading, speed = _on_rows(problem, lambda e: _course(problem, e))
     forms: list[FloatArray] = []
     for course in (load, angle, time):
         low, high = np.nanmin(course), np.nanmax(course)
@@ -71,6 +96,15 @@ def _forms(problem: Problem) -> list[FloatArray]:
         if len(moving):
             forms.append(np.tanh(rate / np.median(moving)))
     return [np.nan_to_num(f) for f in forms]
+
+
+def _on_rows(problem: Problem, of: Callable[[Evidence], FloatArray]) -> FloatArray:
+    """Courses (each a row) of the recordings on the rows of a residual, NaN on penalty rows."""
+    parts: list[FloatArray] = []
+    for c in problem.channels:
+        mine = [of(e)[:, e.counted[c]] for e in problem.evidence if c in e.counted]
+        parts += [*mine, np.full((len(mine[0]), problem.bases[c].penalty_rows), np.nan)]
+    return np.concatenate(parts, axis=1)
 
 
 def _course(problem: Problem, e: Evidence) -> FloatArray:

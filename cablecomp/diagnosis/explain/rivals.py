@@ -21,6 +21,7 @@ from cablecomp.diagnosis.explain.scores import (
     model_confidence_set,
     scales,
     score_difference,
+    selected_in,
 )
 from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
 from cablecomp.diagnosis.folds import Groups
@@ -41,6 +42,13 @@ class Rivals(NamedTuple):
     """What is no effect and explains as much: a step of a zero, a drive mounted anew."""
     differences: Mapping[str, ScoreDifference] = MappingProxyType({})
     """The term's score against each that was tried."""
+    models: Mapping[str, Model] = MappingProxyType({})
+    """The model with each effect that was tried in its place."""
+    lesser: tuple[str, ...] = ()
+    """Those of them that claim more than the term and predict no better: a slip is a plain step of the reading, and an
+    event that does no better than a step stands in for none."""
+    selected_in: float = 1.0
+    """Share of resampled data in which the term is the best of these."""
 
 
 def rivals(
@@ -72,19 +80,33 @@ def rivals(
     size = scales(mine, groups)
     losses = {term.name: block_losses(mine, size, groups)}
     differences: dict[str, ScoreDifference] = {}
+    models: dict[str, Model] = {}
     chosen = roughs[: LIMITS.promising // 2]
     fits = side_by_side(lambda p: _tried(p[0]), chosen)
     for fit, (_, a) in zip(fits, chosen, strict=True):
         if fit is None:
             continue
-        other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
+        models[a.hypothesis.name] = other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         theirs = left_out_with_discrepancy(other, ids, groups)
         differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
         losses[a.hypothesis.name] = block_losses(theirs, size, groups)
+        if term.has_instant and a.hypothesis.has_instant:
+            own, its = (
+                left_out_with_discrepancy(m, ids, groups, event=t)
+                for m, t in ((model, term), (other, a.hypothesis))
+            )
+            step = score_difference(own, its, groups)
+            if step.z > differences[a.hypothesis.name].z:  # told apart where either way tells
+                differences[a.hypothesis.name] = step
+                behind = block_losses(its, size, groups) - block_losses(own, size, groups)
+                losses[a.hypothesis.name] = losses[term.name] + behind
     kept = model_confidence_set(losses, rng)
     plain = _plain(model, base, term, groups)
     effects = tuple(n for n in kept if n != term.name)
-    return Rivals(effects, tuple(plain), {**differences, **plain})
+    best = selected_in(losses, rng)
+    events = [h.name for h in others if h.has_instant and not h.effect.steps] if term.effect.steps else []
+    lesser = tuple(n for n in events if n in differences and differences[n].gain >= -LIMITS.tie)
+    return Rivals(effects, tuple(plain), {**differences, **plain}, models, lesser, best[term.name])
 
 
 class Plain(NamedTuple):

@@ -11,7 +11,16 @@ from cablecomp.diagnosis.body import spread
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Selection, Term, placed, stripped, without
+from cablecomp.diagnosis.explain.model import (
+    Model,
+    Selection,
+    Term,
+    common,
+    loss,
+    placed,
+    stripped,
+    without,
+)
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.folds import Groups, make_groups
@@ -27,7 +36,8 @@ class Search:
     """What a search came to.
 
     `pool`: every hypothesis asked. `selection`: its rounds and its model, about the recordings searched. `final`: that
-    model about all recordings; `groups`: what of these is left out in turn. `cut_short`: the time was up.
+    model about all recordings; `groups`: what of these is left out in turn. `cut_short`: the time was up. `put_in`:
+    names of terms that no round chose, put in the place of others afterwards.
     """
 
     pool: Sequence[Hypothesis]
@@ -35,6 +45,7 @@ class Search:
     final: Model
     groups: Groups
     cut_short: bool
+    put_in: frozenset[str] = frozenset()
 
 
 def search(drive: Calibrated, pool: Sequence[Hypothesis], rng: np.random.Generator, pace: Pace) -> Search:
@@ -67,6 +78,20 @@ def done_without(found: Search, term: Term, drive: Calibrated) -> Search | None:
     if about is None:
         return None
     return replace(found, final=final, selection=replace(found.selection, final=about))
+
+
+def exchanged(found: Search, model: Model, drive: Calibrated) -> Search | None:
+    """The search with another model about its recordings, with the weights of its own; None where that predicts no
+    better."""
+    before, groups = found.selection.final, found.selection.groups
+    size = common([before], groups)
+    if loss(model, size, groups) >= loss(before, size, groups):
+        return None
+    about = _settled(model.terms, model.fit, drive, groups)
+    whole = before is found.final
+    final = about if whole else _about_all(about, drive, found.groups)
+    put_in = found.put_in | ({t.name for t in model.terms} - {t.name for t in before.terms})
+    return replace(found, final=final, selection=replace(found.selection, final=about), put_in=put_in)
 
 
 def _about(fit: Fit, some: Sequence[Evidence]) -> Fit:

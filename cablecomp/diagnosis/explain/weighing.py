@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -31,6 +32,9 @@ ALONE = ScoreDifference(1.0, 99.0, 10.0)
 NO_RIVAL = ScoreDifference(1.0, 10.0, 10.0)
 """Of an effect in whose place nothing could be tried."""
 
+NO_SIZE: Final = ("length", "instant", "duration")
+"""Roles of parameters whose bounds are no sign against an effect."""
+
 
 @dataclass(frozen=True)
 class Weighed:
@@ -39,7 +43,8 @@ class Weighed:
 
     `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the
     last to come, whichever is more: effects that trade places take off little as the last, what others hide
-    takes off little alone.
+    takes off little alone. `better`: the model with the rival in its place that predicts data left out better, by more
+    than a tie; None where there is none.
     """
 
     term: Hypothesis
@@ -50,6 +55,7 @@ class Weighed:
     difference: ScoreDifference
     why_not: str
     removes: float
+    better: Model | None = None
 
 
 def weigh(found: Search, left: Location, share_left: float, rng: np.random.Generator) -> list[Weighed]:
@@ -60,12 +66,12 @@ def weigh(found: Search, left: Location, share_left: float, rng: np.random.Gener
     able = {t.term.name for r in selection.rounds for t in r.tried if t.difference.gain > 0.0}
     pool = [h for h in found.pool if h.name in able]
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
-    weighed = [_weighed(selection, t, pool, left, share_left, rng) for t in terms]
+    weighed = [_weighed(found, t, pool, left, share_left, rng) for t in terms]
     return sorted(weighed, key=lambda w: -w.confidence)
 
 
 def _weighed(
-    selection: Selection,
+    found: Search,
     term: Hypothesis,
     pool: Sequence[Hypothesis],
     left: Location,
@@ -73,6 +79,7 @@ def _weighed(
     rng: np.random.Generator,
 ) -> Weighed:
     """One effect of the final model, `pool`: what may stand in for it."""
+    selection = found.selection
     final, groups = selection.final, selection.groups
     bare = without(final, term, groups)
     own, instead = ALONE, Rivals()
@@ -81,19 +88,20 @@ def _weighed(
         having, lacking = (left_out_with_discrepancy(m, laws, groups) for m in (final, bare))
         own = score_difference(having, lacking, groups)
         instead = rivals(final, term, bare, pool, groups, rng)
-    nearest = min(instead.differences.values(), key=lambda v: v.z, default=NO_RIVAL)
+    against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
+    nearest = min(against.values(), key=lambda v: v.z, default=NO_RIVAL)
     # as the last to come, and alone: of which it takes off more
-    ways = [_gone(selection, bare, final), *_alone(selection, term)]
+    ways = [_gone(selection, bare, final), *_alone(selection, term.name)]
     evidence = features(
         gain=own.gain,
         z=own.z,
         z_blocks=own.z_blocks,
-        selected_in=_selected(selection, term),
+        selected_in=instead.selected_in if term.name in found.put_in else _selected(selection, term),
         margin_gain=nearest.gain,
         margin_z=nearest.z,
         share_left=share_left,
         share_total=_share(selection, ways[0]),
-        rivals=len(instead.effects),
+        rivals=len(set(instead.effects) - set(instead.lesser)),
         follows=_follows(term, left),
         unsteady=_unsteady(final, term, groups),
         at_bound=_at_bound(final, term),
@@ -113,8 +121,14 @@ def _weighed(
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
+    better = None
+    beaten_by = _beaten(selection, term, against)
+    if beaten_by:
+        confidence = min(confidence, LIMITS.beaten_told)
+        if against[beaten_by].gain < -LIMITS.tie:
+            better = instead.models.get(beaten_by)
     said = {**evidence, "z": own.z, "gain": own.gain}
-    return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes)
+    return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
 
 
 def _too_little(removes: float, left: float) -> str:
@@ -133,10 +147,10 @@ def _beyond_noise(fit: Fit) -> float:
 
 def _at_bound(model: Model, term: Hypothesis) -> bool:
     """Whether a parameter of the effect ended on a bound; that all of a cable lies on its guides is an answer, as that
-    none does, or that all of a slip is taken up."""
+    none does, that all of a slip is taken up, or that an event begins or ends with what was recorded."""
     names = (name.partition("@")[0].partition("~")[0] for name in model.fit.at_bound())
     found = (parameter_of(n) for n in names if n.startswith(f"effect.{term.effect.id}."))
-    return any(p is not None and p.role != "length" and not _is_share(p) for p in found)
+    return any(p is not None and p.role not in NO_SIZE and not _is_share(p) for p in found)
 
 
 def _is_share(p: Parameter) -> bool:
@@ -155,10 +169,23 @@ def _selected(selection: Selection, term: Hypothesis) -> float:
     return max(shares, default=0.0)
 
 
-def _alone(selection: Selection, term: Hypothesis) -> Iterator[FloatArray]:
-    """As `_gone`, of the effect alone beside the calibrated drive, where it was fitted so."""
+def _beaten(selection: Selection, term: Hypothesis, differences: Mapping[str, ScoreDifference]) -> str:
+    """What predicts data left out better in the effect's place, by most standard errors, of what alone takes off a part
+    of what the effect does; "" where nothing does: what explains by far the most alone stands, though what is left
+    beside it goes to another."""
+
+    def alone(name: str) -> float:
+        return max((_share(selection, gone) for gone in _alone(selection, name)), default=0.0)
+
+    least = LIMITS.rival_alone * alone(term.name)
+    ahead = [name for name, d in differences.items() if d.gain < 0.0 and alone(name) >= least]
+    return min(ahead, key=lambda name: differences[name].z, default="")
+
+
+def _alone(selection: Selection, name: str) -> Iterator[FloatArray]:
+    """As `_gone`, of an effect alone beside the calibrated drive, where it was fitted so."""
     first = selection.rounds[0].tried if selection.rounds else ()
-    yield from (_gone(selection, selection.baseline, t.model) for t in first if t.term.name == term.name)
+    yield from (_gone(selection, selection.baseline, t.model) for t in first if t.term.name == name)
 
 
 def _gone(selection: Selection, before: Model | None, after: Model) -> FloatArray:
