@@ -150,6 +150,7 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
         "verdict": d.verdict,
         "noise_floor_rad": d.noise_floor_rad,
         "repeatability_rad": d.repeatability_rad,
+        "usual_rad": d.config.remainder.joint_position_rad,
         "nominal": {"rmse_rad": d.nominal_rmse_rad},
         "baseline": _errors(d.baseline),
         "augmented": _errors(d.augmented),

@@ -14,9 +14,9 @@ from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report import page
 from cablecomp.report.diagnosis_tables import angle, known
 from cablecomp.report.diagnosis_words import (
-    ANSWERS,
     dependences,
     depends,
+    in_a_sentence,
     number,
     plain,
     repeats_limit,
@@ -36,7 +36,7 @@ _MOST_OLD: Final = 8
 def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     """The answer: names or new values on the left, measured, before and after on the right, numbers below."""
     words = f'<p class="verdict {_TONES[d.verdict]}">{escape(sentence(d.verdict))}</p>'
-    words += page.paragraph(ANSWERS[d.verdict])
+    words += page.paragraph(in_a_sentence(result))
     words += "".join(_missing(m, bool(result["channels"])) for m in result["missing_physics"])
     words += "".join(_law(law) for law in dependences(result) if not _of_a_name(law, result))
     if not result["missing_physics"]:

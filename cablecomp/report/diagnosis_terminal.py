@@ -11,9 +11,9 @@ from rich.text import Text
 
 from cablecomp.report.diagnosis_tables import unit_for
 from cablecomp.report.diagnosis_words import (
-    ANSWERS,
     dependences,
     depends,
+    in_a_sentence,
     plain,
     repeats_limit,
     values_of,
@@ -34,7 +34,7 @@ def diagnosis_summary(result: Mapping[str, Any]) -> RenderableType:
     names = " and ".join(plain(m["effect"]) for m in result["missing_physics"])
     head = f"{verdict}: {names}" if names else verdict
     parts: list[RenderableType] = [Text(head.upper()[:1] + head[1:], style=f"bold {_COLOUR[verdict]}")]
-    parts += [Text(ANSWERS[verdict]), ""]
+    parts += [Text(in_a_sentence(result)), ""]
     if result["missing_physics"]:
         parts += [_missing(result), ""]
     parts += [_errors(result), ""]

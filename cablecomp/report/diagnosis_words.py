@@ -14,6 +14,10 @@ ANSWERS: Final[Mapping[str, str]] = {
     "unexplained": "There is structure, and no known effect that deserves its name.",
 }
 """One sentence for each verdict."""
+_AS_USUAL: Final = (
+    "The drive's known physics account for these data; what is left beyond noise is no more than this joint is known "
+    "to leave."
+)
 _COVARIATES: Final[Mapping[str, str]] = {
     "load_direction": "direction of the load",
     "load_rate": "rate of the load",
@@ -86,6 +90,12 @@ def dependences(result: Mapping[str, Any]) -> list[dict[str, Any]]:
             law = found.setdefault((base, "session"), {"parameter": base, "on": "session", "values": {}})
             law["values"][session] = entry["value"]
     return list(found.values())
+
+
+def in_a_sentence(result: Mapping[str, Any]) -> str:
+    """The verdict in one sentence."""
+    as_usual = result["verdict"] == "consistent" and result["usual_rad"] is not None
+    return _AS_USUAL if as_usual else ANSWERS[result["verdict"]]
 
 
 def repeats_limit(result: Mapping[str, Any]) -> bool:

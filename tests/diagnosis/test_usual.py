@@ -13,8 +13,9 @@ from cablecomp.config import JointConfig, Remainder, parse_joint
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.explain.usual import lost_in_usual
-from cablecomp.diagnosis.result import Diagnosis
+from cablecomp.diagnosis.result import Diagnosis, report_json
 from cablecomp.errors import InputError
+from cablecomp.report.diagnosis_words import in_a_sentence
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
@@ -76,6 +77,8 @@ def test_a_joint_whose_diagnosis_left_structure_knows_it_and_is_consistent_with_
     assert left == pytest.approx(first.augmented.heldout_own_zero_rmse_rad, rel=0.01)
     again = diagnose(joint, columns)
     assert (again.verdict, named(again)) == ("consistent", [])
+    assert "no more than this joint is known to leave" in in_a_sentence(report_json(again))
+    assert "known to leave" not in in_a_sentence(report_json(first))
     late = {**columns["small/1"]}
     late["joint_position_rad"] = np.interp(late["time_s"] - 0.05, late["time_s"], late["joint_position_rad"])
     assert named(diagnose(joint, {"small/1": late}))[0] == "clock_skew"
