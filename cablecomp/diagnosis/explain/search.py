@@ -10,11 +10,13 @@ import numpy as np
 from cablecomp.diagnosis.body import spread
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, in_no_recording, runs_away
 from cablecomp.diagnosis.explain.model import (
     Model,
     Selection,
     Term,
+    amount_resolved,
+    bears,
     common,
     loss,
     placed,
@@ -23,6 +25,7 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
+from cablecomp.diagnosis.explain.ties import implausible
 from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -82,10 +85,14 @@ def done_without(found: Search, term: Term, drive: Calibrated) -> Search | None:
 
 def exchanged(found: Search, model: Model, drive: Calibrated) -> Search | None:
     """The search with another model about its recordings, with the weights of its own; None where that predicts no
-    better."""
+    better, or is no answer."""
     before, groups = found.selection.final, found.selection.groups
     size = common([before], groups)
-    if loss(model, size, groups) >= loss(before, size, groups):
+    effects = [t for t in model.terms if isinstance(t, Hypothesis)]
+    lost = any(runs_away(model.fit, h) or in_no_recording(model.fit, h) for h in effects)
+    answers = bears(model.fit) and all(amount_resolved(model.fit, h) for h in effects) and not lost
+    plausible = implausible(model) <= implausible(before)
+    if not (answers and plausible and loss(model, size, groups) < loss(before, size, groups)):
         return None
     about = _settled(model.terms, model.fit, drive, groups)
     whole = before is found.final

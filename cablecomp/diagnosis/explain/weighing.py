@@ -125,7 +125,7 @@ def _weighed(
     beaten_by = _beaten(selection, term, against)
     if beaten_by:
         confidence = min(confidence, LIMITS.beaten_told)
-        if against[beaten_by].gain < -LIMITS.tie:
+        if depends is None and against[beaten_by].gain < -LIMITS.tie:
             better = instead.models.get(beaten_by)
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
