@@ -107,7 +107,11 @@ def test_the_share_left_is_all_of_it_where_nothing_was_won_and_none_where_noise_
 
 
 def structured(
-    times_noise: float, follows: bool, repeated_rad: float | None = None, named: bool = False
+    times_noise: float,
+    follows: bool,
+    repeated_rad: float | None = None,
+    usual_rad: float = 0.0,
+    named: bool = False,
 ) -> bool:
     rng = np.random.default_rng(1)
     residual = rng.standard_normal(4_000)
@@ -115,7 +119,7 @@ def structured(
         residual=times_noise * NOISE * residual / np.sqrt(np.mean(residual**2)), sigma=np.full(4_000, NOISE)
     )
     location: Any = SimpleNamespace(significant=lambda level: ("time",) if follows else ())
-    return is_structured(location, series, repeated_rad, named)
+    return is_structured(location, series, repeated_rad, usual_rad, named)
 
 
 def test_what_follows_something_is_structured_sooner_than_what_follows_nothing() -> None:
@@ -132,3 +136,9 @@ def test_what_the_machine_itself_does_not_repeat_is_no_structure() -> None:
     assert structured(6.0, follows=True)
     assert not structured(6.0, follows=True, repeated_rad=6.0 * NOISE)
     assert structured(6.0, follows=True, repeated_rad=0.1 * NOISE)
+
+
+def test_what_the_joint_is_known_to_leave_is_no_structure() -> None:
+    assert not structured(6.0, follows=True, usual_rad=6.0 * NOISE)
+    assert not structured(6.0, follows=True, repeated_rad=0.1 * NOISE, usual_rad=6.0 * NOISE)
+    assert structured(6.0, follows=True, usual_rad=0.1 * NOISE)
