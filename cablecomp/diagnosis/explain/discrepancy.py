@@ -44,7 +44,7 @@ def left_out_with_discrepancy(
         free += [(c, LIMITS.course) for c in _courses(fit, event)]
     if not free:
         return model.left_out
-    D = np.stack([c[:n] for c, _ in free], axis=1)
+    D = np.stack([c for c, _ in free], axis=1)
     J = fit.J[:, movable(fit)]
     A = np.zeros((len(J) + D.shape[1], J.shape[1] + D.shape[1]))
     A[: len(J), : J.shape[1]], A[:n, J.shape[1] :] = J, D
