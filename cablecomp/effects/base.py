@@ -50,7 +50,8 @@ class Parameter:
     configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
     the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
     that it leaves out at first (a duration's are in units of the recordings', a begin's count
-    from the first of all samples, others' are in units of `scale(config)`).
+    from the first of all samples, others' are in units of `scale(config)`). `reach`: times by which a fit of
+    a log-spaced shape may leave low..high; beyond, another effect is the better word.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Parameter:
     of_load: bool = False
     of: str = ""
     tries: tuple[float, ...] = ()
+    reach: float = 30.0
 
     @property
     def shape(self) -> bool:
@@ -187,6 +189,8 @@ class Effect:
     """Where it has a reference: the same law with this one."""
     steps: bool = False
     """Among its shapes is a plain step of the joint, which a step of the encoder's zero cannot be told from."""
+    tries: tuple[Mapping[str, float], ...] = ()
+    """Shapes that a diagnosis leaves out at first and asks for together, in units of their `scale(config)`."""
     flag: str = ""
     """What a joint does that has it, in a list of many joints, where that changes from night to night."""
     rank: int = 0

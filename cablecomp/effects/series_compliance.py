@@ -1,30 +1,69 @@
-"""Series compliance: torque sensor, coupling and mount give way with the load, or more one way."""
+"""Series compliance: torque sensor, coupling and mount give way with the load, more one way, less as they are loaded
+more, or in their own time."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term, wrap_compliance
+from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_compliance
 
 
-@term(parameters=("compliance", "skew"))
+@term(parameters=("compliance", "skew", "stiffening"))
 def _give_way(c: Any, p: Any, s: Any) -> None:
+    """p: compliance [rad/(N m)], skew, stiffening [1/(N m)]."""
     path = c.load - c.moment
-    c.reading += p.compliance * (path + p.skew * abs(path))
+    c.reading += (
+        p.compliance * (path + p.skew * abs(path)) / (1.0 + (p.stiffening * path) ** 2) ** (1.0 / 6.0)
+    )
+
+
+@term(parameters=("compliance", "lag"), state=("late", "path", "time"))
+def _give_way_late(c: Any, p: Any, s: Any) -> None:
+    """p: compliance [rad/(N m)], lag [s]; s: what has given way so far, as the moment that it would bear at rest, and
+    the moment and time of the sample before. The moment goes straight from sample to sample."""
+    path = c.load - c.moment
+    late = path
+    if not c.first:
+        passed = c.time - s.time
+        if passed > 0.0:
+            slope = (path - s.path) / passed
+            late = path - slope * p.lag + (s.late - s.path + slope * p.lag) * math.exp(-passed / p.lag)
+        else:
+            late = s.late
+    c.reading += p.compliance * late
+    if c.commit:
+        s.late, s.path, s.time = late, path, c.time
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_give_way(compliance=values["compliance_rad_per_Nm"], skew=values["skew"]))
+    elastic = _give_way(
+        compliance=values["compliance_rad_per_Nm"],
+        skew=values["skew"],
+        stiffening=values["stiffening_per_Nm"],
+    )
+    if values["late_rad_per_Nm"] == 0.0:
+        return Change(terms=elastic)
+    late = _give_way_late(compliance=values["late_rad_per_Nm"], lag=values["lag_s"])
+    return Change(terms=(*elastic, *late) if values["compliance_rad_per_Nm"] else late)
+
+
+def _per_moment(config: JointConfig) -> float:
+    """1/(R T0) [1/(N m)]."""
+    return 1.0 / pretension_moment(config)
 
 
 EFFECT = Effect(
     id="series_compliance",
-    statement="Something in series with the joint (torque sensor, coupling, mount) yields in proportion to "
-    "the load.",
-    equation="q_out = q_drive + c_s (M + s |M|), M the moment in the load path, -1 <= s <= 1",
-    source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1)",
+    statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
+    "stiffen as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
+    equation="q_out = q_drive + c_s (M + s |M|)/(1 + (g M)^2)^(1/6) + c_l y, t_l dy/dt = M - y, M the moment in the "
+    "load path, -1 <= s <= 1",
+    source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
+    "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; delayed "
+    "elasticity: C. Zener, Elasticity and Anelasticity of Metals, 1948",
     parameters=(
         Parameter(
             "compliance_rad_per_Nm",
@@ -36,6 +75,7 @@ EFFECT = Effect(
             log=True,
             scale=wrap_compliance,
             minimum=0.0,
+            omitted=0.0,
         ),
         Parameter(
             "skew",
@@ -49,9 +89,51 @@ EFFECT = Effect(
             minimum=-1.0,
             maximum=1.0,
             tries=(-0.7, 0.7),
+            of="compliance_rad_per_Nm",
+        ),
+        Parameter(
+            "stiffening_per_Nm",
+            "1/(N m)",
+            0.0,
+            0.3,
+            20.0,
+            "g, one over the moment from which it yields by the load's 2/3 power; 0: it yields in proportion",
+            log=True,
+            role="shape",
+            scale=_per_moment,
+            omitted=0.0,
+            minimum=0.0,
+            tries=(2.0, 7.0),
+            reach=1.0,
+            of="compliance_rad_per_Nm",
+        ),
+        Parameter(
+            "late_rad_per_Nm",
+            "rad/(N m)",
+            0.0,
+            1e-4,
+            3.0,
+            "c_l, compliance that yields late",
+            log=True,
+            scale=wrap_compliance,
+            minimum=0.0,
+            omitted=0.0,
+        ),
+        Parameter(
+            "lag_s",
+            "s",
+            0.0,
+            0.02,
+            5.0,
+            "t_l, how late: to 63 % of it after a step of the load",
+            log=True,
+            role="shape",
+            omitted=0.3,
+            minimum=1e-6,
+            of="late_rad_per_Nm",
         ),
     ),
-    acts_through=("load",),
+    acts_through=("load", "load_rate"),
     bounded=True,
     change=_change,
     rank=5,

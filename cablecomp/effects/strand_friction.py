@@ -9,14 +9,17 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(play_share=values["fraction"], play_yield_N=values["yield_N"])
+    return Change(
+        play_share=values["fraction"], play_yield_N=values["yield_N"], play_time_s=values["yields_in_s"]
+    )
 
 
 EFFECT = Effect(
     id="strand_friction",
     statement="Wires rub inside the cable: part of its stretch follows the tension only after a change has "
     "overcome their grip.",
-    equation="free span's stretch = L/EA (T - T0 + s P_y[T - T0]), P_y the play operator of radius y",
+    equation="free span's stretch = L/EA (T - T0 + s p), p = P_y[T - T0], the play operator of radius y; greased, it "
+    "yields in its own time: t_y dp/dt = P_y[T - T0] - p",
     source="bending and axial hysteresis of spiral strands by interwire friction: K. O. Papailiou, On the "
     "bending stiffness of transmission line conductors, IEEE Trans. Power Delivery 12 (1997); play "
     "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989",
@@ -26,7 +29,7 @@ EFFECT = Effect(
             "-",
             0.0,
             1e-3,
-            1.0,
+            3.0,
             "s, stretch behind the play over the elastic one",
             log=True,
             minimum=0.0,
@@ -43,6 +46,19 @@ EFFECT = Effect(
             role="shape",
             scale=pretension,
             minimum=1e-9,
+        ),
+        Parameter(
+            "yields_in_s",
+            "s",
+            0.0,
+            0.02,
+            2.0,
+            "t_y, time in which greased wires follow a change that has overcome their grip; 0: at once",
+            log=True,
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.1, 0.4),
         ),
     ),
     acts_through=("load_direction", "reversal", "load"),

@@ -1,4 +1,5 @@
-"""Termination backlash: clearance at a hub key or crimp, taken up to either side by the sign of the load."""
+"""Termination backlash: clearance at a hub key or crimp, taken up to either side by the sign of the load, or bit by bit
+where springs or several gaps share it."""
 
 from __future__ import annotations
 
@@ -8,15 +9,16 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_deflection
+from cablecomp.errors import InputError
 
 # Moment, as a share of R T0, within which the clearance is crossed: a step that is smooth can be fitted.
 TRANSITION = 0.0005
 
 
-@term(parameters=("gap", "width"))
+@term(parameters=("gap", "width", "middle"))
 def _cross(c: Any, p: Any, s: Any) -> None:
-    """p: gap [rad], width of the transition [N m]."""
-    c.reading += 0.5 * p.gap * math.tanh((c.load - c.moment) / p.width)
+    """p: gap [rad], width of the transition [N m], moment amid it [N m]."""
+    c.reading += 0.5 * p.gap * math.tanh((c.load - c.moment - p.middle) / p.width)
 
 
 @term(parameters=("gap", "impulse", "drag"), state=("place", "time", "path", "pulley"))
@@ -39,18 +41,25 @@ def _cross_slowly(c: Any, p: Any, s: Any) -> None:
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     gap, impulse, drag = values["gap_rad"], values["impulse_Nms"], values["drag_Nm"]
+    closes, preload = values["closes_Nm"], values["preload_Nm"]
     if impulse > 0.0 or drag > 0.0:
+        if closes or preload:
+            raise InputError(
+                f"{config.name}: effect `termination_backlash` has `impulse_Nms` or `drag_Nm`, and `closes_Nm` or "
+                "`preload_Nm`; one law is accepted: leave out either"
+            )
         return Change(terms=_cross_slowly(gap=gap, impulse=impulse, drag=drag))
-    return Change(terms=_cross(gap=gap, width=TRANSITION * pretension_moment(config)))
+    width = closes or TRANSITION * pretension_moment(config)
+    return Change(terms=_cross(gap=gap, width=width, middle=preload))
 
 
 EFFECT = Effect(
     id="termination_backlash",
     statement="A hub key, pin or crimp has clearance: the joint falls from one flank to the other where "
-    "the load changes sign.",
-    equation="q_out = q_drive + (b/2) tanh(M/(0.0005 R T0)), M the moment in the load path: sgn M with a "
-    "narrow transition; greased, the gap is crossed at the speed b M/J; a link that drags stands still in space while "
-    "|M| is less than its friction M_f, and the pulley turns under it",
+    "the load changes sign; bit by bit where springs hold it amid the gap, or several gaps open one by one.",
+    equation="q_out = q_drive + (b/2) tanh((M - M_0)/M_c), M the moment in the load path, M_c = 0.0005 R T0 where it "
+    "is not given: sgn M with a narrow transition; greased, the gap is crossed at the speed b M/J; a link that drags "
+    "stands still in space while |M| is less than its friction M_f, and the pulley turns under it",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",
     parameters=(
@@ -94,9 +103,36 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(0.03, 0.1),
         ),
+        Parameter(
+            "closes_Nm",
+            "N m",
+            0.0,
+            0.01,
+            0.15,
+            "M_c, moment that closes three quarters of the gap to either side: of springs that hold a key, or of gaps "
+            "that open one by one; 0: it closes at once",
+            log=True,
+            role="shape",
+            scale=pretension_moment,
+            omitted=0.0,
+            minimum=0.0,
+            reach=1.0,
+        ),
+        Parameter(
+            "preload_Nm",
+            "N m",
+            0.0,
+            -0.5,
+            0.5,
+            "M_0, moment amid the gap: of a spring washer",
+            role="shape",
+            scale=pretension_moment,
+            omitted=0.0,
+        ),
     ),
     acts_through=("load", "load_direction"),
     bounded=True,
     change=_change,
+    tries=tuple({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),
     rank=5,
 )

@@ -172,7 +172,7 @@ def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig)
     if p.role == "duration":
         return Parameter(name, value, 0.0, max(p.maximum, 3.0 * value), False, INSTANT_STEP_S / STEP)
     if p.shape and p.log:
-        return Parameter(name, value, max(low / 30.0, p.minimum, 1e-12), min(high * 30.0, p.maximum), True, 1.0,
+        return Parameter(name, value, max(low / p.reach, p.minimum, 1e-12), min(high * p.reach, p.maximum), True, 1.0,
                          (low * high) ** 0.5, 1.5 * DECADE)  # fmt: skip
     if p.shape:
         return Parameter(name, value, max(low, p.minimum), min(high, p.maximum), False, max(span, 1e-12))

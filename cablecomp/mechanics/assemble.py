@@ -181,6 +181,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             guide_length=extra.guide_length_m,
             play_share=extra.play_share,
             play_yield=extra.play_yield_N,
+            play_time=extra.play_time_s,
             viscous=extra.viscous_Ns_per_m_rad,
             merge=config.observer.merge_tolerance,
             per_breaking=0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N,

@@ -3,6 +3,7 @@ tension."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from cablecomp.mechanics.drive import Drive
@@ -72,6 +73,10 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
             ends = 1
         else:
             play, d_play = span_play(cable.play_yield, state.play, tension - t0)
+            if cable.play_time > 0.0 and not d.context.first:
+                # so much of the way to where it would rest, within a sample
+                part = -math.expm1(-d.context.dt / cable.play_time)
+                play, d_play = state.play + part * (play - state.play), part * d_play
             state.play_try = play
             total = length * cable.play_share * play / t0
             slope = length * cable.play_share * d_play

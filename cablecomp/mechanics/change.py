@@ -52,6 +52,7 @@ class Change:
     """Free cable beyond the stage's own free length."""
     play_share: float = 0.0
     play_yield_N: float = 0.0
+    play_time_s: float = 0.0
     viscous_Ns_per_m_rad: float = 0.0
     moves_pretension: bool = False
     """Set where a term writes the pretension factors: what lies on the drums then has to follow."""
@@ -71,6 +72,7 @@ def together(changes: Sequence[Change]) -> Change:
         extra_length_m=sum(c.extra_length_m for c in changes),
         play_share=sum(c.play_share for c in changes),
         play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
+        play_time_s=max((c.play_time_s for c in changes), default=0.0),
         viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
         moves_pretension=any(c.moves_pretension for c in changes),
     )

@@ -77,6 +77,7 @@ CABLE = record(
         ("guide_length", "f8"),
         ("play_share", "f8"),  # of the span's compliance that follows through a play
         ("play_yield", "f8"),  # radius of that play, N
+        ("play_time", "f8"),  # in which it yields, s
         ("viscous", "f8"),  # N s/m per rad
         ("merge", "f8"),  # error of v that merging of pieces may leave
         ("per_breaking", "f8"),  # 1/breaking force, 0 where none is stated

@@ -61,6 +61,12 @@ def _rubber(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"compliance_rad_per_Nm": 1.0}, first, 100.0 * first)
 
 
+def _bushing(rng: np.random.Generator, scene: Scene) -> Shape:
+    first = scene.plain.loop_rad / scene.plain.load_rms
+    fixed = {"share": float(rng.uniform(0.3, 0.8)), "lag_s": log_uniform(rng, 0.03, 0.3)}
+    return Shape(fixed, {"compliance_rad_per_Nm": 1.0}, first, 100.0 * first)
+
+
 def _greased_gap(rng: np.random.Generator, scene: Scene) -> Shape:
     gap = 2.0 * scene.plain.loop_rad
     damping = log_uniform(rng, 0.03, 0.4) * scene.plain.load_rms / gap  # so long does it take to cross
@@ -75,6 +81,11 @@ def _dragging(rng: np.random.Generator, scene: Scene) -> Shape:
 def _sprung_key(rng: np.random.Generator, scene: Scene) -> Shape:
     closes = float(rng.uniform(0.05, 0.3)) * scene.joint.load_Nm
     return Shape({"closes_Nm": closes}, {"gap_rad": 1.0}, 2.0 * scene.plain.loop_rad, 0.2)
+
+
+def _wedging_key(rng: np.random.Generator, scene: Scene) -> Shape:
+    holds = float(rng.uniform(0.03, 0.2)) * scene.joint.load_Nm
+    return Shape({"holds_Nm": holds}, {"gap_rad": 1.0}, 2.0 * scene.plain.loop_rad, 0.2)
 
 
 def _two_gaps(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -197,10 +208,12 @@ JOINT = (
     Suspect("series_compliance:stiffening", ANY, _stiffening),
     Suspect("series_compliance:one_way", ANY, _one_way, two_sided=True),
     Suspect("series_compliance:rubber", ANY, _rubber),
+    Suspect("series_compliance:bushing", ANY, _bushing),
     Suspect("termination_backlash:greased", ANY, _greased_gap, two_sided=True),
     Suspect("termination_backlash:dragging_link", ANY, _dragging, two_sided=True),
     Suspect("termination_backlash:two_clearances", ANY, _two_gaps, two_sided=True),
     Suspect("termination_backlash:sprung", ANY, _sprung_key, two_sided=True),
+    Suspect("termination_backlash:wedged", ANY, _wedging_key, two_sided=True),
     Suspect("pulley_runout:oval", TURNING, _eccentric),
     Suspect("pulley_runout:input_pulley", TURNING, _eccentric),
     Suspect("pulley_runout:encoder_disc", TURNING, _disc),

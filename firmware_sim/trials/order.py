@@ -29,7 +29,8 @@ IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:other_cable", "strand_break:fraying", "strand_break:other_cable",
     "position_dependent_friction:input_drum", "routing_friction:unlike_paths", "series_compliance:one_way",
-    "termination_backlash:greased", "termination_backlash:dragging_link", "thermal_pretension:lagged",
+    "series_compliance:rubber", "termination_backlash:greased", "termination_backlash:dragging_link",
+    "strand_friction:rate_dependent", "termination_backlash:sprung", "thermal_pretension:lagged",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
 FORMS = (*FRICTION, *CABLE, *JOINT)

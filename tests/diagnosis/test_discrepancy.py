@@ -118,5 +118,5 @@ def test_events_of_two_kinds_are_told_apart_by_what_they_do_whatever_their_cours
     )
     as_they_are = score_difference(models["clamp_slip"].left_out, models["strand_break"].left_out, GROUPS)
     events: Any = does
-    free = [left_out_with_discrepancy(models[e], set(), GROUPS, event=e) for e in events]
+    free = [left_out_with_discrepancy(models[e], set(), GROUPS, [e]) for e in events]
     assert score_difference(*free, GROUPS).gain > 0.3 > 3.0 * as_they_are.gain

@@ -10,7 +10,13 @@ from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.hypotheses import hypotheses, in_no_recording, instants
+from cablecomp.diagnosis.explain.hypotheses import (
+    Hypothesis,
+    better_word,
+    hypotheses,
+    in_no_recording,
+    instants,
+)
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive
@@ -73,3 +79,39 @@ def test_every_hypothesis_is_free_in_its_amount() -> None:
     for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used):
         free = [p.name for p in h.free(h.starts[0].values, JOINT)]
         assert f"effect.{h.effect.id}.{h.amount.name}" in free, h.name
+
+
+def _of(effect: str, name: str) -> Hypothesis:
+    body = gather_body(JOINT, {"a/1": recorded()})
+    return next(h for h in hypotheses(JOINT, body.used) if h.effect.id == effect and h.name == name)
+
+
+def test_shapes_that_belong_together_are_asked_for_together() -> None:
+    """Springs that close a gap, and the moment amid it; what yields late goes with what yields at once."""
+    gap = _of("termination_backlash", "termination_backlash")
+    assert set(gap.starts[0].values) == {"gap_rad"}
+    together = [v for v in gap.further if "closes_Nm" in v]
+    assert len(together) >= 4
+    assert all(set(v) == {"closes_Nm", "preload_Nm"} for v in together)
+    assert any(v["preload_Nm"] < 0.0 for v in together)
+    coupling = _of("series_compliance", "series_compliance")
+    assert set(coupling.starts[0].values) == {"compliance_rad_per_Nm"}
+    assert {k for v in coupling.further for k in v} == {"skew", "stiffening_per_Nm"}
+    rubber = _of("series_compliance", "series_compliance:late_rad_per_Nm")
+    assert set(rubber.starts[0].values) == {"late_rad_per_Nm", "lag_s", "compliance_rad_per_Nm"}
+    assert not rubber.further
+
+
+def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -> None:
+    gap = _of("termination_backlash", "termination_backlash")
+    free = {
+        p.base.rpartition(".")[2]: p for p in gap.free(dict.fromkeys(("gap_rad", "closes_Nm"), 0.1), JOINT)
+    }
+    most = free["closes_Nm"].high
+
+    def word(on_bound: str) -> str:
+        return better_word(cast("Fit", SimpleNamespace(at_bound=lambda: (gap.key(on_bound),))), gap)
+
+    assert most == gap.effect.parameter("closes_Nm").bounds(JOINT)[1]
+    assert word("closes_Nm") == "closes_Nm"
+    assert word("gap_rad") == ""

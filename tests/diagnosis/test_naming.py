@@ -97,6 +97,37 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             assert low < high
 
 
+@pytest.mark.parametrize(
+    ("effect", "case", "told"),
+    [
+        (
+            "series_compliance",
+            Case({"compliance_rad_per_Nm": 8e-3, "knee_Nm": 0.15}, form=":stiffening"),
+            "stiffening_per_Nm",
+        ),
+        (
+            "series_compliance",
+            Case({"compliance_rad_per_Nm": 4e-3, "share": 0.6, "lag_s": 0.4}, form=":rubber"),
+            "late_rad_per_Nm",
+        ),
+        (
+            "termination_backlash",
+            Case({"gap_rad": 2e-3, "share": 0.4, "preload_Nm": 0.15}, form=":two_clearances"),
+            "preload_Nm",
+        ),
+    ],
+    ids=["stiffens", "rubber", "two gaps"],
+)
+def test_couplings_and_gaps_of_other_kinds_are_named_for_what_they_are(
+    effect: str, case: Case, told: str
+) -> None:
+    found = diagnose(TOLERANT, {"small/1": recording(effect, case)})
+    assert [named.effect for named in found.named] == [effect]
+    shape = found.named[0].parameters[told]
+    assert isinstance(shape, Value)
+    assert shape.value > 0.0
+
+
 def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> None:
     """The torque sensor's filter lags by 60 ms; the encoders are on time."""
     columns = recording("clock_skew", Case({"delay_s": 0.0}, seconds=30.0))

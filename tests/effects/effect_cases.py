@@ -22,6 +22,8 @@ CONFIGS = Path(__file__).parents[2] / "configs" / "joints"
 
 IN_TWO_SECONDS = {"time_s": 0.7, "duration_s": 0.4, "began_s": -1.0, "lag_s": 0.3}
 """Times at which something happens while the excitation lasts."""
+OTHER_LAW = {"closes_Nm": 0.0, "preload_Nm": 0.0}
+"""Values of a law that an effect may have in the place of another of its own."""
 
 
 def joint(name: str = "snow-closed-rig", **stage: float) -> JointConfig:
@@ -41,7 +43,8 @@ def typical(name: str, config: JointConfig) -> dict[str, Any]:
         low, high = parameter.bounds(config)
         values[parameter.name] = np.sqrt(low * high) if parameter.log else 0.25 * low + 0.75 * high
         values[parameter.name] = IN_TWO_SECONDS.get(parameter.name, values[parameter.name])
-    return values | dict.fromkeys(effect.texts, "other_neighbour_Nm")
+    other = {k: v for k, v in OTHER_LAW.items() if k in values}
+    return values | other | dict.fromkeys(effect.texts, "other_neighbour_Nm")
 
 
 def neutral(name: str) -> dict[str, Any]:

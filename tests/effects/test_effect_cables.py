@@ -281,6 +281,24 @@ def test_strand_friction_is_a_play_in_the_tension(radius: float) -> None:
     assert extra == pytest.approx(expected, abs=1e-6 * np.ptp(expected))
 
 
+def test_greased_strands_follow_a_step_of_tension_in_their_own_time() -> None:
+    """Up, to x - y, and half the way down: they stay until the step has left their grip."""
+    config = joint("snow-open-rig", EA_N=1e8, free_length_m=3.0)
+    stage = config.drive.stage[0]
+    time = np.linspace(0.0, 4.0, 801)
+    newton = np.where(time < 0.5, 0.0, np.where(time < 2.5, 10.0, 5.0))
+    columns = still(time, newton * stage.output_radius_m)
+    strands = ("strand_friction", {"fraction": 0.7, "yield_N": 4.0, "yields_in_s": 0.2})
+    extra = (run(config, columns, strands)["deflection_rad"] - run(config, columns)["deflection_rad"]) / (
+        0.7 * 3.0 / 1e8 / stage.output_radius_m
+    )
+    step = time[1] - time[0]
+    up = time >= 0.5
+    assert extra[~up] == pytest.approx(0.0, abs=1e-6)
+    expected = 6.0 * (1.0 - np.exp(-(time[up] - time[up][0] + step) / 0.2))  # a step comes with its sample
+    assert extra[up] == pytest.approx(expected, abs=0.01)
+
+
 def test_strand_friction_makes_a_loop_where_the_wraps_cannot_slip() -> None:
     config = joint("tendon-finger", mu_output=80.0, mu_input=80.0)
     time = np.linspace(0.0, 2.0, 400)

@@ -7,6 +7,7 @@ import pytest
 from effect_cases import excitation, joint, run, still
 
 from cablecomp.effects import with_effects
+from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
 
@@ -32,6 +33,34 @@ def test_a_mount_that_rests_on_a_stop_yields_one_way() -> None:
         mount = ("series_compliance", {"compliance_rad_per_Nm": 3e-3, "skew": skew})
         gave = run(config, columns, mount)["deflection_rad"] - plain
         assert gave == pytest.approx(3e-3 * np.where(load > 0.0, soft, hard) * load, abs=1e-12)
+
+
+def test_a_coupling_stiffens_from_its_own_slope_to_a_contacts() -> None:
+    """In proportion to small loads, as their 2/3 power (Hertz) to large ones."""
+    config = joint()
+    columns = excitation(config)
+    load, plain = columns["joint_torque_Nm"], run(config, columns)["deflection_rad"]
+    for stiffening, expected in (
+        (1e-6, 3e-3 * load),
+        (1e6, 3e-3 * np.cbrt(load * load / 1e6) * np.sign(load)),
+    ):
+        mount = ("series_compliance", {"compliance_rad_per_Nm": 3e-3, "stiffening_per_Nm": stiffening})
+        gave = run(config, columns, mount)["deflection_rad"] - plain
+        assert gave == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_rubber_gives_way_exponentially_to_a_step_of_load_and_lags_a_ramp() -> None:
+    config, lag = joint(), 0.3
+    time = np.linspace(0.0, 3.0, 601)
+    mount = ("series_compliance", {"late_rad_per_Nm": 2e-3, "lag_s": lag})
+    for load, expected in (
+        (np.where(time > 0.5, 0.4, 0.0), 0.4 * (1.0 - np.exp(-np.maximum(time - 0.5, 0.0) / lag))),
+        (0.1 * time, 0.1 * (time - lag * (1.0 - np.exp(-time / lag)))),
+    ):
+        columns = still(time, load)
+        late_by = run(config, columns, mount)["deflection_rad"] - run(config, columns)["deflection_rad"]
+        step = load[1] - load[0] == 0.0
+        assert late_by == pytest.approx(2e-3 * expected, abs=2e-3 * (0.4 * 0.005 / lag if step else 1e-9))
 
 
 def test_compliance_and_clearance_see_what_passes_the_load_path() -> None:
@@ -61,6 +90,24 @@ def test_backlash_jumps_by_its_gap_at_zero_load() -> None:
     assert step[load > 0.02 * unit] == pytest.approx(2.5e-4, rel=1e-6)
     assert step[load < -0.02 * unit] == pytest.approx(-2.5e-4, rel=1e-6)
     assert np.all(np.diff(step[np.argsort(load)]) >= -1e-15)
+
+
+def test_springs_close_a_gap_bit_by_bit_about_their_preload() -> None:
+    config = joint()
+    time = np.linspace(0.0, 1.0, 801)
+    columns = still(time, 0.6 * np.sin(12.0 * time))
+    key = ("termination_backlash", {"gap_rad": 5e-4, "closes_Nm": 0.1, "preload_Nm": 0.2})
+    step = run(config, columns, key)["deflection_rad"] - run(config, columns)["deflection_rad"]
+    expected = 2.5e-4 * np.tanh((columns["joint_torque_Nm"] - 0.2) / 0.1)
+    assert step == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_gap_has_one_law() -> None:
+    both = with_effects(
+        joint(), [("termination_backlash", {"gap_rad": 1e-3, "drag_Nm": 0.1, "closes_Nm": 0.1})]
+    )
+    with pytest.raises(InputError, match="leave out either"):
+        Observer(both)
 
 
 def test_a_greased_gap_is_crossed_at_the_loads_speed() -> None:

@@ -96,6 +96,18 @@ def test_rubber_gives_way_exponentially_to_a_step_of_load() -> None:
     np.testing.assert_allclose(late[100:], 0.4 * 0.5 * np.exp(-since / 0.3), rtol=0.03, atol=2e-4)
 
 
+def test_a_bushing_gives_way_over_decades_of_time() -> None:
+    load, still = np.full(600, 0.5), np.zeros(600)
+    load[:100] = 0.0
+    config, law = joint(), {"compliance_rad_per_Nm": 2e-2, "share": 0.6, "lag_s": 0.05}
+    run = simulate(config, clock(load), still, load, effects=(EffectSpec("series_compliance:bushing", law),))
+    gave = (run.joint_position_rad - simulate(config, clock(load), still, load).joint_position_rad) / 2e-2
+    since, rise = clock(load)[100:] - clock(load)[99], clock(load)[100] - clock(load)[99]
+    lags = np.array([[0.05], [0.35], [2.45]])  # the load rises over one sample
+    left = np.mean(lags / rise * np.expm1(rise / lags) * np.exp(-since / lags), axis=0)
+    np.testing.assert_allclose(gave[100:], 0.5 * (0.4 + 0.6 * (1.0 - left)), rtol=1e-3)
+
+
 def _crossing(form: str, load: np.ndarray, motor: np.ndarray, **parameters: float) -> np.ndarray:
     """What a form of backlash adds to the joint's angle."""
     config = joint()
@@ -117,6 +129,14 @@ def test_a_key_on_springs_follows_the_load_until_its_gap_is_closed() -> None:
     load = course(-0.6, 0.6, points=120)
     added = _crossing("sprung", load, 0 * load, gap_rad=2e-3, closes_Nm=0.2)
     np.testing.assert_allclose(added, 1e-3 * np.clip(load / 0.2, -1.0, 1.0), atol=1e-12)
+
+
+def test_a_wedged_key_changes_its_flank_only_when_pulled_over() -> None:
+    load = np.concatenate([course(0.3, -0.6, points=120), course(-0.6, 0.6, points=160)])
+    added = _crossing("wedged", load, 0 * load, gap_rad=2e-3, holds_Nm=0.2)
+    falling, rising = added[:120], added[120:]
+    np.testing.assert_allclose(falling, 1e-3 * np.where(load[:120] < -0.2, -1.0, 1.0), atol=1e-12)
+    np.testing.assert_allclose(rising, 1e-3 * np.where(load[120:] > 0.2, 1.0, -1.0), atol=1e-12)
 
 
 def test_a_dragging_link_stands_still_while_it_is_not_loaded() -> None:

@@ -10,7 +10,7 @@ M. Plumlee, Bayesian calibration of inexact computer models, J. Am. Stat. Assoc.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -28,10 +28,10 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 def left_out_with_discrepancy(
-    model: Model, laws: Collection[str], groups: Groups, event: Hypothesis | None = None
+    model: Model, laws: Collection[str], groups: Groups, events: Sequence[Hypothesis] = ()
 ) -> FloatArray:
     """Weighted residual of every data row with its fold left out, where these laws of the model (effects' ids) may have
-    other forms, and an `event` of it another course; as `left_out` where there is neither."""
+    other forms, and these `events` of it another course; as `left_out` where there is neither."""
     fit, n = model.fit, len(groups.fold)
     columns = [
         fit.J[:n, k]
@@ -40,8 +40,7 @@ def left_out_with_discrepancy(
     ]
     forms = _forms(fit.problem) if columns else []
     free = [(c * f, LIMITS.form) for c in columns for f in forms]
-    if event is not None:
-        free += [(c, LIMITS.course) for c in _courses(fit, event)]
+    free += [(c, LIMITS.course) for event in events for c in _courses(fit, event)]
     if not free:
         return model.left_out
     D = np.stack([c for c, _ in free], axis=1)

@@ -144,9 +144,11 @@ def _by_amount(
     effect: Effect, amount: Parameter, channel: str, config: JointConfig, evidence: Sequence[Evidence]
 ) -> Hypothesis:
     own = [p for p in effect.parameters if p.of in ("", amount.name)]
-    shapes = [p for p in own if p.shape and not p.tries]
-    shaped = {p.of for p in effect.parameters}  # an amount with a shape of its own is a hypothesis of its own
-    further = [p for p in own if not p.shape and p is not amount and not {p.name, amount.name} & shaped]
+    together = {name for values in effect.tries for name in values}
+    shapes = [p for p in own if p.shape and not p.tries and p.name not in together]
+    # an amount with a shape of its own is a hypothesis of its own
+    shaped = {p.of for p in effect.parameters if not p.tries}
+    further = [p for p in own if not p.shape and p is not amount and p.name not in shaped]
     low, high = amount.bounds(config)
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0
@@ -165,8 +167,12 @@ def _by_amount(
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
-    tried = tuple({p.name: _absolute(p, v, config, evidence)} for p in own for v in p.tries)
-    return Hypothesis(effect, name, amount, starts, two_sided, channel, tried)
+    tried = [{p.name: v} for p in own for v in p.tries] + [dict(values) for values in effect.tries]
+    asked = tuple(
+        {n: _absolute(effect.parameter(n), v, config, evidence) for n, v in values.items()}
+        for values in tried
+    )
+    return Hypothesis(effect, name, amount, starts, two_sided, channel, asked)
 
 
 def _absolute(p: Parameter, tried: float, config: JointConfig, evidence: Sequence[Evidence]) -> float:
@@ -298,6 +304,13 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
     found = amount_of(fit, h)
     joint = fit.problem.joint(fit.x, fit.problem.evidence[0])
     return 0.0 if found is None else abs(found[1]) / _most(h, joint, fit)
+
+
+def better_word(fit: Fit, h: Hypothesis) -> str:
+    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on a bound
+    of what is plausible; "" where none does."""
+    strict = {h.key(p.name): p.name for p in h.effect.parameters if p.reach <= 1.0}
+    return next((strict[name] for name in fit.at_bound() if name in strict), "")
 
 
 def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:

@@ -62,7 +62,8 @@ def rivals(
     """Every effect that promises something, and for an event what is none, fitted in a term's place: beside `base`,
     the model without it."""
     here = anchor(base.fit)
-    ids = {t.effect.id for t in base.terms if isinstance(t, Hypothesis)}
+    beside = [t for t in base.terms if isinstance(t, Hypothesis)]
+    ids, events = {t.effect.id for t in beside}, [t for t in beside if t.has_instant]
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
     others = [
         h
@@ -76,7 +77,7 @@ def rivals(
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )
-    mine = left_out_with_discrepancy(model, ids, groups)
+    mine = left_out_with_discrepancy(model, ids, groups, events)
     size = scales(mine, groups)
     losses = {term.name: block_losses(mine, size, groups)}
     differences: dict[str, ScoreDifference] = {}
@@ -87,12 +88,12 @@ def rivals(
         if fit is None:
             continue
         models[a.hypothesis.name] = other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
-        theirs = left_out_with_discrepancy(other, ids, groups)
+        theirs = left_out_with_discrepancy(other, ids, groups, events)
         differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
         losses[a.hypothesis.name] = block_losses(theirs, size, groups)
         if term.has_instant and a.hypothesis.has_instant:
             own, its = (
-                left_out_with_discrepancy(m, ids, groups, event=t)
+                left_out_with_discrepancy(m, ids, groups, [*events, t])
                 for m, t in ((model, term), (other, a.hypothesis))
             )
             step = score_difference(own, its, groups)
@@ -104,8 +105,8 @@ def rivals(
     plain = _plain(model, base, term, groups)
     effects = tuple(n for n in kept if n != term.name)
     best = selected_in(losses, rng)
-    events = [h.name for h in others if h.has_instant and not h.effect.steps] if term.effect.steps else []
-    lesser = tuple(n for n in events if n in differences and differences[n].gain >= -LIMITS.tie)
+    stepped = [h.name for h in others if h.has_instant and not h.effect.steps] if term.effect.steps else []
+    lesser = tuple(n for n in stepped if n in differences and differences[n].gain >= -LIMITS.tie)
     return Rivals(effects, tuple(plain), {**differences, **plain}, models, lesser, best[term.name])
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, over_plausible, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word, over_plausible, runs_away
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
@@ -74,9 +74,10 @@ def outdoes(model: Model, than: Model, groups: Groups) -> bool:
 
 
 def implausible(model: Model) -> int:
-    """How many of its effects have amounts far beyond what is plausible for the drive as fitted."""
-    effects = [t for t in model.terms if isinstance(t, Hypothesis)]
-    return sum(over_plausible(model.fit, h) > LIMITS.beyond_plausible for h in effects)
+    """How many of its effects have amounts far beyond what is plausible for the drive as fitted, or a shape on a bound
+    beyond which another effect is the better word."""
+    fit, effects = model.fit, [t for t in model.terms if isinstance(t, Hypothesis)]
+    return sum(over_plausible(fit, h) > LIMITS.beyond_plausible or better_word(fit, h) != "" for h in effects)
 
 
 def with_the_first(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:

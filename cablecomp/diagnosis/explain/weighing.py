@@ -12,7 +12,7 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word
 from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
@@ -84,8 +84,9 @@ def _weighed(
     bare = without(final, term, groups)
     own, instead = ALONE, Rivals()
     if bare is not None:
-        laws = {t.effect.id for t in bare.terms if isinstance(t, Hypothesis)}
-        having, lacking = (left_out_with_discrepancy(m, laws, groups) for m in (final, bare))
+        others = [t for t in bare.terms if isinstance(t, Hypothesis)]
+        laws, events = {t.effect.id for t in others}, [t for t in others if t.has_instant]
+        having, lacking = (left_out_with_discrepancy(m, laws, groups, events) for m in (final, bare))
         own = score_difference(having, lacking, groups)
         instead = rivals(final, term, bare, pool, groups, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
@@ -117,6 +118,9 @@ def _weighed(
     removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
+    elif stretched := better_word(final.fit, term):
+        confidence = min(confidence, LIMITS.beaten_told)
+        why_not = f"`{stretched}` is on the bound beyond which another effect is the better word"
     elif little := (
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):

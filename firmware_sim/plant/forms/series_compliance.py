@@ -1,4 +1,5 @@
-"""Series compliance in other forms: a coupling that stiffens, one that is softer one way, one of rubber."""
+"""Series compliance in other forms: a coupling that stiffens, one that is softer one way, one of rubber, a bushing
+that creeps over decades of time."""
 
 from __future__ import annotations
 
@@ -75,4 +76,30 @@ RUBBER = form(
     _rubber,
 )
 
-KINDS: tuple[EffectKind, ...] = (STIFFENING, ONE_WAY, RUBBER)
+_DECADES = (1.0, 7.0, 49.0)
+
+
+def _bushing(build: Build, p: Mapping[str, float]) -> None:
+    def yields(inputs: Floats, outputs: Floats) -> None:
+        path, time = outputs[:, PATH], inputs[:, TIME]
+        slow = np.mean([low_passed(path, time, k * p["lag_s"]) for k in _DECADES], axis=0)
+        outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * ((1.0 - p["share"]) * path + p["share"] * slow)
+
+    build.mounts.append(yields)
+
+
+BUSHING = form(
+    "series_compliance",
+    "bushing",
+    "A bushing of plastic that creeps: part of it gives way at once, + c (1 − s) M, the rest over decades of time, "
+    "+ c s (y_1 + y_2 + y_3)/3 with t_k ẏ_k = M − y_k, t_k = t_1, 7 t_1, 49 t_1.",
+    (
+        _SOFT,
+        Parameter("share", "s, of what gives way late", 0.5, 0.0, 1.0),
+        Parameter("lag_s", "t_1", 0.1, 0.0),
+    ),
+    ("load", "load_rate"),
+    _bushing,
+)
+
+KINDS: tuple[EffectKind, ...] = (STIFFENING, ONE_WAY, RUBBER, BUSHING)

@@ -1,4 +1,5 @@
-"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, a key on springs."""
+"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, a key on springs, one that
+wedges in its taper."""
 
 from __future__ import annotations
 
@@ -113,4 +114,33 @@ SPRUNG = form(
     _sprung,
 )
 
-KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, SPRUNG)
+
+def wedged(path: Floats, holds: float) -> Floats:
+    """The flank (1, -1) on which a key lies that wedges: it comes loose where the moment pulls it by more than `holds`
+    the other way."""
+    result = np.empty_like(path)
+    flank = 1.0 if path[0] > 0.0 else -1.0
+    for k, m in enumerate(path.tolist()):
+        if flank * m < -holds:
+            flank = -flank
+        result[k] = flank
+    return result
+
+
+def _wedging(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * wedged(outputs[:, PATH], p["holds_Nm"])
+
+    build.mounts.append(shift)
+
+
+WEDGED = form(
+    "termination_backlash",
+    "wedged",
+    "A key that wedges in its taper: it lies on a flank until the moment has turned over and exceeds M_w.",
+    (_GAP, Parameter("holds_Nm", "M_w", low=0.0)),
+    ("load", "load_direction"),
+    _wedging,
+)
+
+KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, SPRUNG, WEDGED)
