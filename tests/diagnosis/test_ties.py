@@ -16,7 +16,7 @@ from cablecomp.diagnosis.folds import Groups
 
 def model(more: float, *names: str, parameters: int = 2) -> Model:
     """A model with these terms that leaves noise of deviation one and a wave of this size."""
-    terms: Any = tuple(SimpleNamespace(name=n) for n in names)
+    terms: Any = tuple(SimpleNamespace(name=n, effect=SimpleNamespace(id=n.partition(":")[0])) for n in names)
     fit: Any = SimpleNamespace(problem=SimpleNamespace(parameters=range(parameters)), values={})
     return Model(terms, fit, NOISE + more * WAVE)
 
@@ -48,6 +48,11 @@ def rounds(*alone: tuple[str, float]) -> list[Round]:
     large = ScoreDifference(0.9, 20.0, 10.0)
     tried = [Tried(m.terms[0], m, large, share) for name, share in alone if (m := model(1.0, name))]
     return [Round(model(5.0), tuple(tried), tried[0])]
+
+
+def test_one_effect_is_not_put_beside_itself_by_another_of_its_amounts() -> None:
+    found = model(0.02, "path:late", "motor")
+    assert ties.with_the_first(found, rounds(("path", 0.9), ("motor", 0.1)), GROUPS) is found
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,7 @@ def with_the_first(model: Model, rounds: Sequence[Round], groups: Groups) -> Mod
     if first is None or keeps(model, first.model) or not demanded(first.difference, first=True):
         return model
     term, values, others = first.term, first.model.fit.values, {t.term.name for t in alone}
-    if not isinstance(term, Hypothesis):
+    if not isinstance(term, Hypothesis) or any(_of_one_effect(t, term) for t in model.terms):
         return model
     swapped = [_in_its_place(model, t, term, values, groups) for t in model.terms if t.name in others]
     as_well = [m for m in swapped if m is not None and not outdoes(model, m, groups)]
@@ -112,6 +112,11 @@ def _in_its_place(
     if runs_away(fit, other) or not amount_resolved(fit, other) or not bears(fit):
         return None
     return Model((*base.terms, other), fit, left_out(fit, groups))
+
+
+def _of_one_effect(term: Term, other: Hypothesis) -> bool:
+    """Whether both ask for one effect, by two amounts of it: a model has an effect once."""
+    return isinstance(term, Hypothesis) and term.effect.id == other.effect.id
 
 
 def keeps(model: Model, before: Model) -> bool:
