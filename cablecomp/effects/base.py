@@ -51,7 +51,7 @@ class Parameter:
     the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
     that it leaves out at first (a duration's are in units of the recordings', a begin's count
     from the first of all samples, others' are in units of `scale(config)`). `reach`: times by which a fit of
-    a log-spaced shape may leave low..high; beyond, another effect is the better word.
+    a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
     """
 
     name: str

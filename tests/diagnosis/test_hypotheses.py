@@ -109,9 +109,14 @@ def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -
     }
     most = free["closes_Nm"].high
 
-    def word(on_bound: str) -> str:
-        return better_word(cast("Fit", SimpleNamespace(at_bound=lambda: (gap.key(on_bound),))), gap)
+    def word(gap_rad: float, closes_Nm: float) -> str:
+        ends = [free["gap_rad"], free["closes_Nm"]]
+        low, high = (np.array([p.x(getattr(p, end)) for p in ends]) for end in ("low", "high"))
+        problem = SimpleNamespace(parameters=ends, bounds=lambda: (low, high))
+        x = np.array([p.x(v) for p, v in zip(ends, (gap_rad, closes_Nm), strict=True)])
+        return better_word(cast("Fit", SimpleNamespace(problem=problem, x=x)), gap)
 
     assert most == gap.effect.parameter("closes_Nm").bounds(JOINT)[1]
-    assert word("closes_Nm") == "closes_Nm"
-    assert word("gap_rad") == ""
+    assert word(0.1, most) == "closes_Nm"
+    assert word(0.1, free["closes_Nm"].low) == ""  # a gap that closes at once is one
+    assert word(free["gap_rad"].high, 0.5 * most) == ""

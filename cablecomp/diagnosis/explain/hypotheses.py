@@ -307,10 +307,13 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
 
 
 def better_word(fit: Fit, h: Hypothesis) -> str:
-    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on a bound
-    of what is plausible; "" where none does."""
+    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on the most
+    that is plausible; "" where none does. The least is the plain law."""
     strict = {h.key(p.name): p.name for p in h.effect.parameters if p.reach <= 1.0}
-    return next((strict[name] for name in fit.at_bound() if name in strict), "")
+    low, high = fit.problem.bounds()
+    most = fit.x > high - 1e-3 * (high - low)
+    at_most = (p.base for p, there in zip(fit.problem.parameters, most, strict=True) if there)
+    return next((strict[name] for name in at_most if name in strict), "")
 
 
 def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:

@@ -74,7 +74,7 @@ def outdoes(model: Model, than: Model, groups: Groups) -> bool:
 
 
 def implausible(model: Model) -> int:
-    """How many of its effects have amounts far beyond what is plausible for the drive as fitted, or a shape on a bound
+    """How many of its effects have amounts far beyond what is plausible for the drive as fitted, or a shape
     beyond which another effect is the better word."""
     fit, effects = model.fit, [t for t in model.terms if isinstance(t, Hypothesis)]
     return sum(over_plausible(fit, h) > LIMITS.beyond_plausible or better_word(fit, h) != "" for h in effects)
