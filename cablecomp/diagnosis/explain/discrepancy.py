@@ -10,7 +10,7 @@ M. Plumlee, Bayesian calibration of inexact computer models, J. Am. Stat. Assoc.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -28,11 +28,13 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 def left_out_with_discrepancy(
-    model: Model, laws: Collection[str], groups: Groups, events: Sequence[Hypothesis] = ()
+    model: Model, beside: Sequence[Hypothesis], groups: Groups, event: Hypothesis | None = None
 ) -> FloatArray:
-    """Weighted residual of every data row with its fold left out, where these laws of the model (effects' ids) may have
-    other forms, and these `events` of it another course; as `left_out` where there is neither."""
+    """Weighted residual of every data row with its fold left out, where these effects of the model may have other forms
+    (an event among them another course), and one further `event` of it another course; as `left_out` where there is
+    nothing of these."""
     fit, n = model.fit, len(groups.fold)
+    laws = {h.effect.id for h in beside}
     columns = [
         fit.J[:n, k]
         for k, p in enumerate(fit.problem.parameters)
@@ -40,7 +42,8 @@ def left_out_with_discrepancy(
     ]
     forms = _forms(fit.problem) if columns else []
     free = [(c * f, LIMITS.form) for c in columns for f in forms]
-    free += [(c, LIMITS.course) for event in events for c in _courses(fit, event)]
+    events = [h for h in (*beside, event) if h is not None and h.has_instant]
+    free += [(c, LIMITS.course) for h in events for c in _courses(fit, h)]
     if not free:
         return model.left_out
     D = np.stack([c for c, _ in free], axis=1)

@@ -307,8 +307,8 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
 
 
 def better_word(fit: Fit, h: Hypothesis) -> str:
-    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on the most
-    that is plausible; "" where none does. The least is the plain law."""
+    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on the
+    most that is plausible; "" where none does. The least is the plain law."""
     strict = {h.key(p.name): p.name for p in h.effect.parameters if p.reach <= 1.0}
     low, high = fit.problem.bounds()
     most = fit.x > high - 1e-3 * (high - low)

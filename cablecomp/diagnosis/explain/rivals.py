@@ -63,7 +63,7 @@ def rivals(
     the model without it."""
     here = anchor(base.fit)
     beside = [t for t in base.terms if isinstance(t, Hypothesis)]
-    ids, events = {t.effect.id for t in beside}, [t for t in beside if t.has_instant]
+    ids = {t.effect.id for t in beside}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
     others = [
         h
@@ -77,7 +77,7 @@ def rivals(
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )
-    mine = left_out_with_discrepancy(model, ids, groups, events)
+    mine = left_out_with_discrepancy(model, beside, groups)
     size = scales(mine, groups)
     losses = {term.name: block_losses(mine, size, groups)}
     differences: dict[str, ScoreDifference] = {}
@@ -88,12 +88,12 @@ def rivals(
         if fit is None:
             continue
         models[a.hypothesis.name] = other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
-        theirs = left_out_with_discrepancy(other, ids, groups, events)
+        theirs = left_out_with_discrepancy(other, beside, groups)
         differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
         losses[a.hypothesis.name] = block_losses(theirs, size, groups)
         if term.has_instant and a.hypothesis.has_instant:
             own, its = (
-                left_out_with_discrepancy(m, ids, groups, [*events, t])
+                left_out_with_discrepancy(m, beside, groups, t)
                 for m, t in ((model, term), (other, a.hypothesis))
             )
             step = score_difference(own, its, groups)

@@ -85,8 +85,7 @@ def _weighed(
     own, instead = ALONE, Rivals()
     if bare is not None:
         others = [t for t in bare.terms if isinstance(t, Hypothesis)]
-        laws, events = {t.effect.id for t in others}, [t for t in others if t.has_instant]
-        having, lacking = (left_out_with_discrepancy(m, laws, groups, events) for m in (final, bare))
+        having, lacking = (left_out_with_discrepancy(m, others, groups) for m in (final, bare))
         own = score_difference(having, lacking, groups)
         instead = rivals(final, term, bare, pool, groups, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}

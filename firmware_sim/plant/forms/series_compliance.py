@@ -53,13 +53,19 @@ ONE_WAY = form(
 )
 
 
-def _rubber(build: Build, p: Mapping[str, float]) -> None:
+def _late(build: Build, p: Mapping[str, float], *times: float) -> None:
+    """A share gives way late, in equal parts with these many times the lag."""
+
     def yields(inputs: Floats, outputs: Floats) -> None:
-        path = outputs[:, PATH]
-        slow = low_passed(path, inputs[:, TIME], p["lag_s"])
+        path, time = outputs[:, PATH], inputs[:, TIME]
+        slow = np.mean([low_passed(path, time, k * p["lag_s"]) for k in times], axis=0)
         outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * ((1.0 - p["share"]) * path + p["share"] * slow)
 
     build.mounts.append(yields)
+
+
+def _rubber(build: Build, p: Mapping[str, float]) -> None:
+    _late(build, p, 1.0)
 
 
 RUBBER = form(
@@ -76,16 +82,9 @@ RUBBER = form(
     _rubber,
 )
 
-_DECADES = (1.0, 7.0, 49.0)
-
 
 def _bushing(build: Build, p: Mapping[str, float]) -> None:
-    def yields(inputs: Floats, outputs: Floats) -> None:
-        path, time = outputs[:, PATH], inputs[:, TIME]
-        slow = np.mean([low_passed(path, time, k * p["lag_s"]) for k in _DECADES], axis=0)
-        outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * ((1.0 - p["share"]) * path + p["share"] * slow)
-
-    build.mounts.append(yields)
+    _late(build, p, 1.0, 7.0, 49.0)
 
 
 BUSHING = form(
