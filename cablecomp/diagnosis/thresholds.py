@@ -150,6 +150,16 @@ class Thresholds:
     without it."""
     instants: int = 24
     """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
+    course_instants: int = 160
+    """Instants between which an event that takes its time is looked for, by what it does from each of them on."""
+    briefest: float = 0.03
+    """Duration of the shortest such course over the span of the recordings; below it the event is at once."""
+    durations: int = 16
+    """Durations that are looked at, from that one to the whole span, evenly by their logarithm."""
+    in_steps: tuple[int, ...] = (2, 3, 4, 5)
+    """Equal steps in which an event may go: of more, evenly says as much."""
+    courses: int = 5
+    """Courses that are then run, best first by what they promise."""
     edge: float = 0.06
     """Share of a recording at either end within which an event has no before or no after that would show it."""
     dependence: float = 0.97

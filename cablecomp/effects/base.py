@@ -32,11 +32,23 @@ TermFunction = Callable[[Any, Any, Any], None]
 Names = Sequence[str | tuple[str, int]]
 """Names of numbers; a name with a length is an array."""
 Role = Literal[
-    "amount", "shape", "phase", "instant", "duration", "begin", "reference", "length", "presliding"
+    "amount",
+    "shape",
+    "phase",
+    "instant",
+    "duration",
+    "steps",
+    "begin",
+    "reference",
+    "length",
+    "presliding",
+    "place",
+    "tilt",
 ]
-"""An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s] and how
-long it takes [s]; when a slow course began [s]; the reference of what the law reads; the length of cable in a path [m];
-the turn in which friction builds up [rad]; any other shape."""
+"""An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s], how
+long it takes [s] and in how many steps; when a slow course began [s]; the reference of what the law reads; the length
+of cable in a path [m]; the turn in which friction builds up [rad]; a place on a drum [rad]; by how
+much another channel turns the joint; any other shape."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +61,8 @@ class Parameter:
     the parameter's unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a
     configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
     the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
-    that it leaves out at first (a duration's are in units of the recordings', a begin's count
-    from the first of all samples, others' are in units of `scale(config)`). `reach`: times by which a fit of
+    that it leaves out at first (a begin's count from the first of all samples, others' are in units of
+    `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of
     a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
     """
 
@@ -85,22 +97,6 @@ class Parameter:
         """Prior range (low, high) for this joint, in the parameter's unit."""
         unit = 1.0 if self.scale is None else self.scale(config)
         return self.low * unit, self.high * unit
-
-
-DURATION = Parameter(
-    "duration_s",
-    "s",
-    0.0,
-    0.0,
-    3600.0,
-    "d, how long the event takes, evenly; 0: all at once",
-    role="duration",
-    omitted=0.0,
-    minimum=0.0,
-    maximum=3600.0,
-    tries=(0.1, 0.3, 0.6, 1.0),
-)
-"""How long an event takes."""
 
 
 LEAST_PRETENSION = 0.05
@@ -177,6 +173,8 @@ class Effect:
     change: Callable[[Mapping[str, float], JointConfig], Change]
     texts: tuple[str, ...] = field(default=())
     """Names of parameters that are text, such as the channel that loads the cable."""
+    texts_optional: bool = False
+    """They may be left out, and parameters of the role `tilt` then say nothing."""
     needs: tuple[str, ...] = field(default=())
     """Channels without which no recording tells it: an output that has to be measured, an input that has to change."""
     rates: bool = False
@@ -202,8 +200,9 @@ class Effect:
 
     def covariates(self, channel: str) -> tuple[str, ...]:
         """`acts_through` with the channel that it reads in place of `other`, as `other:<name>`."""
-        other = f"other:{channel.removeprefix('other_')}"
-        return tuple(other if name == "other" else name for name in self.acts_through)
+        other = f"other:{channel.removeprefix('other_')}" if channel else ""
+        named = (other if name == "other" else name for name in self.acts_through)
+        return tuple(name for name in named if name)
 
     def of_role(self, role: Role) -> Parameter | None:
         """Its first parameter of that role, if any."""

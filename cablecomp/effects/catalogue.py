@@ -158,6 +158,8 @@ def _values(effect: Effect, entry: EffectEntry, config: JointConfig) -> dict[str
             values[key] = float(_place(str(value), config))
         else:
             values[key] = _number(value, effect.parameter(key), config)
+    if effect.texts_optional:
+        values |= {key: -1.0 for key in effect.texts if key not in values}
     missing = [name for name in sorted(allowed) if name not in values]
     if missing:
         raise InputError(f"{config.name}: effect `{effect.id}` lacks key `{missing[0]}`; add it")

@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import DURATION, Change, Effect, Parameter, drum_radius, term, wrap_deflection
+from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, term, wrap_deflection
+from cablecomp.effects.course import COURSE, DURATION, STEPS, course, gone
 
 
-@term(parameters=("slip", "instant", "duration", "taken_up"))
+@term(parameters=("slip", "instant", "duration", "steps", "taken_up"))
 def _slip(c: Any, p: Any, s: Any) -> None:
-    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s], share that the other takes up."""
+    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s], in how many
+    steps, share that the other takes up."""
     since = c.time - p.instant
     if since >= 0.0:
-        done = since / p.duration if since < p.duration else 1.0
+        done = gone(since, p.duration, p.steps)
         if p.slip > 0.0:
             c.length_h -= p.slip * done
             c.length_l += p.slip * done * p.taken_up
@@ -24,12 +26,7 @@ def _slip(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    slip = _slip(
-        slip=values["slip_m"],
-        instant=values["time_s"],
-        duration=values["duration_s"],
-        taken_up=values["taken_up"],
-    )
+    slip = _slip(slip=values["slip_m"], taken_up=values["taken_up"], **course(values))
     return Change(terms=slip)
 
 
@@ -40,11 +37,11 @@ def _loop_arc(config: JointConfig) -> float:
 
 EFFECT = Effect(
     id="clamp_slip",
-    statement="A clamp or termination slipped, at once or little by little (of cable h where the length is "
+    statement="A clamp or termination slipped, at once, in steps or little by little (of cable h where the length is "
     "positive, of l where it is negative): the joint stands off from then on, and the pretension is lower; "
     "or it is kept, where a drum, the link or its encoder slipped on the shaft (taken_up near 1).",
     equation="length of cable h + g s, of cable l - g k s, s > 0; of cable l + g |s|, of cable h - g k |s|, s < 0; "
-    "g = (t - t*)/d within 0..1, d = 0: a step; k = taken_up",
+    f"{COURSE}; k = taken_up",
     source="kinematics; in a closed circuit the joint moves by about s (1 + k)/(2R), and both tensions fall as 1 - k",
     parameters=(
         Parameter(
@@ -60,6 +57,7 @@ EFFECT = Effect(
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
         DURATION,
+        STEPS,
         Parameter(
             "taken_up",
             "-",

@@ -12,6 +12,25 @@ from cablecomp.effects.base import Change, Effect, Floats, Parameter
 from cablecomp.mechanics.change import Factor
 
 
+def _groove(values: Mapping[str, float]) -> Factor | None:
+    """Of the output drum: the wave, and the patch."""
+    wave = _wave(values["amplitude"], values["phase_rad"])
+    height, place, width = values["patch"], values["place_rad"], values["width_rad"]
+    if height == 0.0:
+        return wave
+
+    def factor(angle: Floats) -> Floats:
+        rough = 1.0 + height / (1.0 + ((angle - place) / width) ** 4)
+        return np.asarray(rough if wave is None else rough * wave(angle), dtype=np.float64)
+
+    return factor
+
+
+def _reach(config: JointConfig) -> float:
+    """Wrap of the output drum [rad]: the groove that the cable leaves and takes up."""
+    return config.drive.stage[-1].wrap_output_rad
+
+
 def _wave(amplitude: float, phase_rad: float) -> Factor | None:
     def factor(angle: Floats) -> Floats:
         return np.asarray(1.0 + amplitude * np.cos(angle - phase_rad), dtype=np.float64)
@@ -21,7 +40,7 @@ def _wave(amplitude: float, phase_rad: float) -> Factor | None:
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(
-        joint_angle_factor=_wave(values["amplitude"], values["phase_rad"]),
+        joint_angle_factor=_groove(values),
         motor_angle_factor=_wave(values["input_amplitude"], values["input_phase_rad"]),
     )
 
@@ -31,7 +50,8 @@ EFFECT = Effect(
     statement="A drum's groove is rougher in one place than in another, so that friction depends "
     "on where the joint stands.",
     equation="output drum: mu = mu0 (1 + a cos(q - φ)) for the place of the groove that the cable leaves when the "
-    "joint stands at q; input drum: the same with a_in, φ_in and the motor's angle",
+    "joint stands at q, beside it 1 + h/(1 + ((q - p)/w)^4) for a patch; input drum: 1 + a_in cos(q_m - φ_in), q_m "
+    "the motor's angle",
     source="first harmonic of a friction coefficient that varies along the groove; position-dependent "
     "friction of joints: B. Armstrong-Hélouvry, Control of Machines with Friction, 1991",
     parameters=(
@@ -80,6 +100,41 @@ EFFECT = Effect(
             role="phase",
             omitted=0.0,
             of="input_amplitude",
+        ),
+        Parameter(
+            "patch",
+            "-",
+            0.0,
+            -0.8,
+            4.0,
+            "h, how much more friction amid a patch of the output drum's groove (below 0: less)",
+            minimum=-0.95,
+            maximum=20.0,
+            omitted=0.0,
+        ),
+        Parameter(
+            "place_rad",
+            "rad",
+            0.0,
+            -math.pi,
+            math.pi,
+            "p, joint angle at which the cable leaves the groove in the middle of the patch",
+            role="place",
+            omitted=0.0,
+            of="patch",
+        ),
+        Parameter(
+            "width_rad",
+            "rad",
+            0.2,
+            0.1,
+            1.5,
+            "w, half width of the patch",
+            log=True,
+            role="shape",
+            omitted=0.3,
+            minimum=0.05,
+            of="patch",
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

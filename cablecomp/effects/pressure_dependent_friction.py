@@ -1,34 +1,41 @@
-"""Pressure-dependent friction: the coefficient falls as the cable is pressed harder against the pulley."""
+"""Pressure-dependent friction: the coefficient falls as the cable is pressed harder against the pulley, by a power, or
+where a coat is pressed through."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Floats, Parameter, Restated
 
+SUDDEN: Final = 10.0
+"""Power of the pressure by which a coat gives way: from a tenth to nine tenths of it within a factor of 1.55."""
+
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    exponent = values["exponent"]
+    exponent, lost, place = values["exponent"], values["lost"], values["place"]
 
     def factor(tau: Floats) -> Floats:
-        return np.asarray(tau**-exponent, dtype=np.float64)
+        by_power = tau**-exponent
+        return np.asarray(by_power * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
 
     return Change(tension_factor=factor)
 
 
 def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
-    """mu0 (T/T0)^-n keeps its values: mu0 -> mu0 t^-n, t = T0'/T0."""
-    return Restated(values, mu=factor ** -values["exponent"])
+    """mu0 (T/T0)^-n keeps its values: mu0 -> mu0 t^-n, t = T0'/T0; a place in T/T0 is t times as near."""
+    moved = {**values, "place": values["place"] / factor} if "place" in values else values
+    return Restated(moved, mu=factor ** -values.get("exponent", 0.0))
 
 
 EFFECT = Effect(
     id="pressure_dependent_friction",
     statement="The coefficient of friction falls (or rises) with the pressure between cable and pulley, as "
-    "polymer coats do.",
-    equation="mu = mu0 (T/T0)^-n at every place; pressure goes with T/R",
+    "polymer coats do; or it is another one beyond a pressure at which a coat or a film of grease is pressed through.",
+    equation="mu = mu0 (T/T0)^-n (1 - w/(1 + (T0 u/T)^10)) at every place; pressure goes with T/R",
     source="n = 1/3 for elastic contact of a soft coat (F. P. Bowden and D. Tabor, The Friction and "
     "Lubrication of Solids, 1950); capstans with mu as a power of pressure: H. G. Howell, J. "
     "Textile Inst. 44 (1953)",
@@ -42,6 +49,32 @@ EFFECT = Effect(
             "n, 1/3 for elastic contact",
             minimum=-0.9,
             maximum=0.9,
+            omitted=0.0,
+        ),
+        Parameter(
+            "lost",
+            "-",
+            0.0,
+            -1.0,
+            0.8,
+            "w, share of mu that is lost where it is pressed through (below 0: gained)",
+            minimum=-3.0,
+            maximum=0.95,
+            omitted=0.0,
+        ),
+        Parameter(
+            "place",
+            "-",
+            1.0,
+            0.4,
+            2.5,
+            "u, tension over T0 where half of that is lost",
+            log=True,
+            role="shape",
+            minimum=0.05,
+            maximum=20.0,
+            omitted=1.0,
+            of="lost",
         ),
     ),
     acts_through=("load", "load_direction", "reversal"),

@@ -20,22 +20,24 @@ def _give_way(c: Any, p: Any, s: Any) -> None:
     )
 
 
-@term(parameters=("compliance", "lag"), state=("late", "path", "time"))
+@term(parameters=("compliance", "lag", "decades"), state=(("late", 3), "path", "time"))
 def _give_way_late(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], lag [s]; s: what has given way so far, as the moment that it would bear at rest, and
-    the moment and time of the sample before. The moment goes straight from sample to sample."""
+    """p: compliance [rad/(N m)], shortest lag [s], decades from it to the longest; s: what has given way so far of each
+    third, as the moment that it would bear at rest, and the moment and time of the sample before. The moment goes
+    straight from sample to sample."""
     path = c.load - c.moment
-    late = path
-    if not c.first:
-        passed = c.time - s.time
+    passed = 0.0 if c.first else c.time - s.time
+    slope = (path - s.path) / passed if passed > 0.0 else 0.0
+    for k in range(3 if p.decades > 0.0 else 1):
+        lag = p.lag * 10.0 ** (0.5 * p.decades * k)
+        late = path if c.first else s.late[k]
         if passed > 0.0:
-            slope = (path - s.path) / passed
-            late = path - slope * p.lag + (s.late - s.path + slope * p.lag) * math.exp(-passed / p.lag)
-        else:
-            late = s.late
-    c.reading += p.compliance * late
+            late = path - slope * lag + (late - s.path + slope * lag) * math.exp(-passed / lag)
+        c.reading += p.compliance * (late / 3.0 if p.decades > 0.0 else late)
+        if c.commit:
+            s.late[k] = late
     if c.commit:
-        s.late, s.path, s.time = late, path, c.time
+        s.path, s.time = path, c.time
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -46,7 +48,9 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)
-    late = _give_way_late(compliance=values["late_rad_per_Nm"], lag=values["lag_s"])
+    late = _give_way_late(
+        compliance=values["late_rad_per_Nm"], lag=values["lag_s"], decades=values["decades"]
+    )
     return Change(terms=(*elastic, *late) if values["compliance_rad_per_Nm"] else late)
 
 
@@ -60,7 +64,7 @@ EFFECT = Effect(
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
     "stiffen as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
     equation="q_out = q_drive + c_s (M + s |M|)/(1 + (g M)^2)^(1/6) + c_l y, t_l dy/dt = M - y, M the moment in the "
-    "load path, -1 <= s <= 1",
+    "load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l, t_l 10^(d/2), t_l 10^d",
     source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
     "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; delayed "
     "elasticity: C. Zener, Elasticity and Anelasticity of Metals, 1948",
@@ -130,6 +134,20 @@ EFFECT = Effect(
             role="shape",
             omitted=0.3,
             minimum=1e-6,
+            of="late_rad_per_Nm",
+        ),
+        Parameter(
+            "decades",
+            "-",
+            0.0,
+            0.0,
+            4.0,
+            "d, decades of time over which it goes on yielding, as plastics do; 0: all with the one lag",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=6.0,
+            tries=(2.0,),
             of="late_rad_per_Nm",
         ),
     ),

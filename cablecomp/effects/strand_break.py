@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import DURATION, Change, Effect, Parameter, term
+from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.course import COURSE, DURATION, STEPS, course, gone
 
 
-@term(parameters=("fraction", "instant", "duration"))
+@term(parameters=("fraction", "instant", "duration", "steps"))
 def _break(c: Any, p: Any, s: Any) -> None:
-    """p: share of EA lost (below 0: by cable l), instant [s], how long it takes [s]."""
+    """p: share of EA lost (below 0: by cable l), instant [s], how long it takes [s], in how many
+    steps."""
     since = c.time - p.instant
     if since >= 0.0:
-        done = since / p.duration if since < p.duration else 1.0
+        done = gone(since, p.duration, p.steps)
         if p.fraction > 0.0:
             c.stiffness_h *= 1.0 - p.fraction * done
         else:
@@ -22,8 +24,7 @@ def _break(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    broken = _break(fraction=values["fraction"], instant=values["time_s"], duration=values["duration_s"])
-    return Change(terms=broken)
+    return Change(terms=_break(fraction=values["fraction"], **course(values)))
 
 
 EFFECT = Effect(
@@ -31,8 +32,7 @@ EFFECT = Effect(
     statement="Wires of one cable broke (of h where the share is positive, of "
     "l where it is negative), at once or one after another: from then "
     "on it is softer, and at the same stretch it pulls less.",
-    equation="EA_h -> EA_h (1 - g f), f > 0; EA_l -> EA_l (1 - g |f|), f < 0; g = (t - t*)/d within 0..1, d = 0: a "
-    "step; stretch unchanged",
+    equation=f"EA_h -> EA_h (1 - g f), f > 0; EA_l -> EA_l (1 - g |f|), f < 0; stretch unchanged; {COURSE}",
     source="EA is modulus times metallic area; a broken wire carries nothing (G. A. Costello, Theory of "
     "Wire Rope, 1990)",
     parameters=(
@@ -48,6 +48,7 @@ EFFECT = Effect(
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
         DURATION,
+        STEPS,
     ),
     acts_through=("time", "load"),
     bounded=True,

@@ -171,8 +171,11 @@ class Problem:
             return None
 
     def _projected(self, x: FloatArray, misfits: Mapping[str, list[FloatArray]]) -> FloatArray:
-        parts = [self.bases[c].project(self._rows(c, misfits[c])) for c in self.channels]
-        return np.concatenate([*parts, self.prior(x)])
+        return np.concatenate([self.rows(misfits), self.prior(x)])
+
+    def rows(self, misfits: Mapping[str, list[FloatArray]]) -> FloatArray:
+        """Data rows of a residual that has these misfits: weighted, zeros taken off, channel by channel."""
+        return np.concatenate([self.bases[c].project(self._rows(c, misfits[c])) for c in self.channels])
 
     def prior(self, x: FloatArray) -> FloatArray:
         """Departures from the priors' centres over their sds (0 where there is none)."""

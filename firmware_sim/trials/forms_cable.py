@@ -119,6 +119,20 @@ def _letting_go(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**_while(rng, scene), "steps": steps}, {"slip_m": 1.0}, *_slip(scene))
 
 
+def _unequally(rng: np.random.Generator) -> dict[str, float]:
+    """Two to five steps, each up to 2.5 times as large as the last, or as much smaller, waited for as unequally."""
+    unequal = {k: log_uniform(rng, 0.4, 2.5) for k in ("growth", "wait")}
+    return {"steps": float(rng.integers(2, 6)), **unequal}
+
+
+def _letting_go_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape({**_while(rng, scene), **_unequally(rng)}, {"slip_m": 1.0}, *_slip(scene))
+
+
+def _breaking_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape({**_while(rng, scene), **_unequally(rng)}, {"fraction": 1.0}, 0.5, 0.7)
+
+
 def _at_once(rng: np.random.Generator, scene: Scene) -> dict[str, float]:
     time = scene.course.time_s
     return {"time_s": float(round(time[0] + rng.uniform(0.25, 0.75) * (time[-1] - time[0]), 2))}
@@ -164,9 +178,11 @@ CABLE = (
     Suspect("strand_friction:proportional", ANY, _pressed_strands),
     Suspect("clamp_slip:gradual", ANY, _sliding),
     Suspect("clamp_slip:in_steps", ANY, _letting_go),
+    Suspect("clamp_slip:unequal_steps", ANY, _letting_go_unequally),
     Suspect("clamp_slip:other_cable", ANY, _other_slip, closed=True),
     Suspect("clamp_slip:overload", ANY, _overload),
     Suspect("strand_break:in_steps", ANY, _breaking),
+    Suspect("strand_break:unequal_steps", ANY, _breaking_unequally),
     Suspect("strand_break:fraying", ANY, _fraying),
     Suspect("strand_break:accelerating", ANY, _fraying),
     Suspect("strand_break:other_cable", ANY, _other_break, closed=True),

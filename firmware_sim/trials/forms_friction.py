@@ -89,6 +89,11 @@ def _input_drum(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"phase_rad": angle(rng)}, {"amplitude": 1.0}, 1.5, 0.9)
 
 
+def _threaded(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {"order": float(rng.uniform(2.5, 8.0)), "phase_rad": angle(rng)}
+    return Shape(fixed, {"amplitude": 1.0}, 1.5, 0.9)
+
+
 def _burr(rng: np.random.Generator, scene: Scene) -> Shape:
     shape = _patch(rng, scene)
     grain = sign(rng) * float(rng.uniform(0.4, 0.9))
@@ -106,6 +111,7 @@ FRICTION = (
     Suspect("pressure_dependent_friction:exponential", ANY, _exponential),
     Suspect("pressure_dependent_friction:worn_through", ANY, _worn_through),
     Suspect("position_dependent_friction:patch", TURNING, _patch),
+    Suspect("position_dependent_friction:threaded", TURNING, _threaded),
     Suspect("position_dependent_friction:input_drum", TURNING, _input_drum),
     Suspect("position_dependent_friction:burr", TURNING, _burr),
 )

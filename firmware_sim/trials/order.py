@@ -27,9 +27,12 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 """What a trial holds; `motor`: an effect that shows in the motor's torque alone."""
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
-    "clamp_slip:gradual", "clamp_slip:other_cable", "strand_break:fraying", "strand_break:other_cable",
-    "position_dependent_friction:input_drum", "routing_friction:unlike_paths", "series_compliance:one_way",
-    "series_compliance:rubber", "termination_backlash:greased", "termination_backlash:dragging_link",
+    "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "strand_break:fraying",
+    "strand_break:in_steps", "strand_break:other_cable",
+    "gravity_load:tilting_base", "position_dependent_friction:input_drum", "position_dependent_friction:patch",
+    "pressure_dependent_friction:worn_through", "routing_friction:unlike_paths", "series_compliance:bushing",
+    "series_compliance:one_way", "series_compliance:rubber", "termination_backlash:greased",
+    "termination_backlash:dragging_link",
     "strand_friction:rate_dependent", "termination_backlash:sprung", "thermal_pretension:lagged",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""

@@ -12,10 +12,26 @@ import pytest
 from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.effects.catalogue import catalogue
+from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import DECADE, Parameter
 
 SLIP_M = 1e-4
 REACH_S = 6.0
+
+
+def fitted(parameters: tuple[Parameter, ...], J: Any) -> Any:
+    """A fit of a recording of 60 s: these parameters, a step of each over its scale, the derivative by it."""
+    low, high = (
+        np.array([-1e4, *(p.low for p in parameters[1:])]),
+        np.array([1e4, *(p.high for p in parameters[1:])]),
+    )
+    problem: Any = SimpleNamespace(
+        parameters=parameters,
+        bounds=lambda: (low, high),
+        values=lambda x: {p.name: p.value(v) for p, v in zip(parameters, x, strict=True)},
+        evidence=[SimpleNamespace(columns={"time_s": np.array([0.0, 60.0])})],
+    )
+    return Fit(problem, np.array([1.0, *(p.start for p in parameters[1:])]), np.zeros(0), J)
 
 
 def slip(size_sd: float, instant_sd: float) -> tuple[Any, Any]:
@@ -23,16 +39,12 @@ def slip(size_sd: float, instant_sd: float) -> tuple[Any, Any]:
     its instant [s]; and the hypothesis."""
     size = Parameter("effect.clamp_slip.slip_m", 0.0, -1.0, 1.0, False, SLIP_M)
     when = Parameter("effect.clamp_slip.time_s", 40.0, 40.0 - REACH_S / 2, 40.0 + REACH_S / 2, False)
-    problem = SimpleNamespace(
-        parameters=(size, when),
-        bounds=lambda: (np.array([-1e4, when.low]), np.array([1e4, when.high])),
-    )
-    J = np.diag([1.0 / size_sd, 1.0 / instant_sd if instant_sd < REACH_S else 0.0])
-    fit = SimpleNamespace(problem=problem, x=np.array([1.0, 40.0]), J=J)
+    fit = fitted((size, when), np.diag([1.0 / size_sd, 1.0 / instant_sd if instant_sd < REACH_S else 0.0]))
     effect = catalogue()["clamp_slip"]
     term = SimpleNamespace(
         has_instant=True,
         instant="time_s",
+        duration="duration_s",
         amount=effect.parameter("slip_m"),
         key=lambda k: f"effect.clamp_slip.{k}",
     )
@@ -63,14 +75,19 @@ def test_a_size_that_trades_places_with_a_vague_drive_is_not_held_against_it() -
     own = Parameter("mu_output", 0.1, 1e-3, 10.0, True, centre=0.1, sd=DECADE)
     shape = replace(own, name="effect.thermal_pretension.lag_s")
     for beside, said in ((own, False), (shape, True)):
-        also = slip(0.5, REACH_S)[0]
-        also.problem.parameters = (*fit.problem.parameters, beside)
-        also.problem.bounds = lambda: (np.array([-1e4, 37.0, -7.0]), np.array([1e4, 43.0, 3.0]))
-        also.x, also.J = (
-            np.append(fit.x, -2.0),
-            np.pad(fit.J, ((0, 1), (0, 1)), constant_values=0.0) + np.diag([0, 0, 9.0]),
-        )
+        J = np.pad(fit.J, ((0, 1), (0, 1)), constant_values=0.0) + np.diag([0, 0, 9.0])
+        also = fitted((*fit.problem.parameters, beside), J)
         assert bool(untold(also, term, 0.0)) is said
+
+
+@pytest.mark.parametrize("lasts_s", [15.0, 45.0])
+def test_a_slip_that_still_goes_on_is_judged_by_how_fast_it_goes(lasts_s: float) -> None:
+    """Begun at 40 s, of a recording of 60 s: what shows of one that lasts for 45 s is its rate, size over duration."""
+    (size, when), term = slip(0.05, 0.1)[0].problem.parameters, slip(0.05, 0.1)[1]
+    lasts = Parameter("effect.clamp_slip.duration_s", lasts_s, 0.0, 3600.0, False, 50.0)
+    rate = np.array([[20.0, 0.0, -20.0 / lasts_s * 50.0], [0.0, 10.0, 0.0]])
+    fit = replace(fitted((size, when, lasts), rate), x=np.array([1.0, 40.0, lasts_s / 50.0]))
+    assert bool(untold(fit, term, 0.1)) is (lasts_s < 20.0)
 
 
 def test_what_is_no_event_has_nothing_to_place() -> None:

@@ -99,7 +99,7 @@ def test_shapes_that_belong_together_are_asked_for_together() -> None:
     assert {k for v in coupling.further for k in v} == {"skew", "stiffening_per_Nm"}
     rubber = _of("series_compliance", "series_compliance:late_rad_per_Nm")
     assert set(rubber.starts[0].values) == {"late_rad_per_Nm", "lag_s", "compliance_rad_per_Nm"}
-    assert not rubber.further
+    assert rubber.further == ({"decades": 2.0},)
 
 
 def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -> None:

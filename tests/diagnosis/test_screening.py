@@ -6,7 +6,8 @@ import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.screening import anchor, ask
+from cablecomp.diagnosis.explain.linear import anchor
+from cablecomp.diagnosis.explain.screening import ask
 from firmware_sim.plant import EffectSpec
 
 EVENT_S = 11.0

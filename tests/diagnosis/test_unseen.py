@@ -13,7 +13,7 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.screening import anchor, contribution
+from cablecomp.diagnosis.explain.linear import anchor, contribution
 from cablecomp.diagnosis.explain.unseen import _bound_of_phase, _likeliest, could_be_unseen
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT as ANGLE

@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 Columns = dict[str, Floats]
 CONFIGS = Path(__file__).parents[2] / "configs" / "joints"
 
-IN_TWO_SECONDS = {"time_s": 0.7, "duration_s": 0.4, "began_s": -1.0, "lag_s": 0.3}
-"""Times at which something happens while the excitation lasts."""
+IN_TWO_SECONDS = {"time_s": 0.7, "duration_s": 0.4, "steps": 3.0, "began_s": -1.0, "lag_s": 0.3}
+"""Times at which something happens while the excitation lasts, in how many steps."""
 OTHER_LAW = {"closes_Nm": 0.0, "preload_Nm": 0.0}
 """Values of a law that an effect may have in the place of another of its own."""
 

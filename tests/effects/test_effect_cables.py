@@ -11,6 +11,7 @@ from effect_cases import Floats, excitation, joint, run, still
 from scipy.integrate import quad
 
 from cablecomp.config import JointConfig
+from cablecomp.errors import InputError
 
 LONG = 400.0  # m of free span: the wraps hardly matter beside it
 
@@ -211,6 +212,31 @@ def test_an_event_that_takes_its_time_goes_evenly(effect: str, amount: dict[str,
         assert slowly[k] == pytest.approx(once[k], rel=1e-3)
         assert abs(once[k]) > 1e-3
     assert slowly[time < 1.0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount"), [("clamp_slip", {"slip_m": 2e-3}), ("strand_break", {"fraction": 0.3})]
+)
+def test_an_event_in_steps_is_as_many_sudden_ones(effect: str, amount: dict[str, float]) -> None:
+    """Three steps, at 1, 2 and 3 s: between them the joint stands where so many thirds at once leave it."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 4.0, 81) + 0.01
+    columns = still(time, np.full(81, 0.4))
+    plain = run(config, columns)["deflection_rad"]
+    course = {"time_s": 1.0, "duration_s": 2.0, "steps": 3.0}
+    steps = run(config, columns, (effect, {**amount, **course}))["deflection_rad"] - plain
+    for first, last, share in ((0.0, 1.0, 0.0), (1.0, 2.0, 1 / 3), (2.0, 3.0, 2 / 3), (3.0, 4.0, 1.0)):
+        part = {name: share * value for name, value in amount.items()}
+        once = run(config, columns, (effect, {**part, "time_s": first}))["deflection_rad"] - plain
+        here = (time > first) & (time < last)
+        assert steps[here] == pytest.approx(once[here], rel=1e-3, abs=1e-12)
+
+
+@pytest.mark.parametrize("steps", [1.0, 2.5])
+def test_a_part_of_a_step_is_refused_in_one_line(steps: float) -> None:
+    config = joint()
+    with pytest.raises(InputError, match=r"steps = .* a whole number from 2 to 50 is accepted, or 0"):
+        run(config, resting(np.zeros(3)), ("strand_break", {"fraction": 0.1, "time_s": 0.0, "steps": steps}))
 
 
 def test_clamp_slip_in_an_open_circuit_is_a_lasting_step() -> None:

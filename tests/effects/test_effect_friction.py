@@ -64,6 +64,30 @@ def test_friction_that_falls_with_pressure(exponent: float) -> None:
         assert found[k] == pytest.approx(expected, rel=1e-7)
 
 
+@pytest.mark.parametrize(("lost", "exponent"), [(0.7, 0.0), (-0.5, 0.2)])
+def test_a_coat_that_is_pressed_through_loses_its_friction_there(lost: float, exponent: float) -> None:
+    """Half of what is lost where T = 0.8 T0; a tenth and nine tenths of it a factor of 1.25 to either side."""
+    config = joint("snow-open-rig")
+    stage = config.drive.stage[0]
+    columns = unloading(config)
+    values = {"exponent": exponent, "lost": lost, "place": 0.8}
+    found = run(config, columns, ("pressure_dependent_friction", values))["deflection_rad"]
+
+    def factor(tau: float) -> float:
+        return float(tau**-exponent * (1.0 - lost * tau**10 / (tau**10 + 0.8**10)))
+
+    assert factor(0.8) * 0.8**exponent == pytest.approx(1.0 - 0.5 * lost)
+    assert factor(1.0) * 1.0 == pytest.approx(1.0 - 0.903 * lost, abs=1e-3)
+    for k in (20, 50, 79):
+        expected = expected_deflection(
+            config,
+            columns["joint_torque_Nm"][k],
+            lambda tau, _: stage.mu_output * factor(tau),
+            lambda tau, _: stage.mu_input * factor(tau),
+        )
+        assert found[k] == pytest.approx(expected, rel=1e-6)
+
+
 def test_pressure_dependence_in_a_full_loop_against_a_grid() -> None:
     """Nested reversals on one pulley: grid points that slip in turn, mu by their own tension."""
     config = joint("snow-open-rig", input_radius_m=1e-6, free_length_m=1e-6, wrap_output_rad=9.0)
@@ -104,6 +128,32 @@ def test_friction_that_depends_on_the_place_in_the_groove() -> None:
             lambda *_: stage.mu_input,
         )
         assert found[k] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_patch_of_the_groove_counts_where_the_cable_lies_on_it() -> None:
+    """A patch 0.4 rad wide about the place that the cable leaves at joint angle -0.3: rough for what lies about
+    0.3 rad from where the cable departs, and nowhere else; on a wavy groove both factors multiply."""
+    config = joint("snow-open-rig", wrap_output_rad=25.0)
+    stage = config.drive.stage[0]
+    columns = unloading(config)
+    patch = {"patch": 3.0, "place_rad": -0.3, "width_rad": 0.2}
+    for values, wave in ((patch, 0.0), ({**patch, "amplitude": 0.4, "phase_rad": 0.9}, 0.4)):
+        found = run(config, columns, ("position_dependent_friction", values))["deflection_rad"]
+        for k in (20, 50, 79):
+            place = found[k]
+
+            def rough(_: float, s: float, place: float = place, wave: float = wave) -> float:
+                away = (place - s + 0.3) / 0.2
+                return (
+                    stage.mu_output * (1.0 + 3.0 / (1.0 + away**4)) * (1.0 + wave * math.cos(place - s - 0.9))
+                )
+
+            expected = expected_deflection(
+                config, columns["joint_torque_Nm"][k], rough, lambda *_: stage.mu_input
+            )
+            assert found[k] == pytest.approx(expected, rel=1e-5)
+    plain = run(config, columns)["deflection_rad"]
+    assert abs(found[79] / plain[79]) < 0.9
 
 
 @pytest.mark.parametrize("guide", [0.0, 0.2])

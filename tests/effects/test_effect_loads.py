@@ -66,6 +66,21 @@ def test_gravity_turns_with_the_joint(name: str) -> None:
     assert found == pytest.approx(expected, abs=1e-10)
 
 
+def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
+    """As the same weight at the phase that the other joint's angle makes of it; where that is not read, as untilted."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    roll = 0.8 * np.sin(3.0 * columns["time_s"])
+    roll[50:60] = np.nan
+    columns["other_roll_rad"] = roll
+    weight = 0.4 * unit(config)
+    values = {"moment_Nm": weight, "phase_rad": 0.7, "tilt_rad_per_unit": -0.9, "channel": "other_roll_rad"}
+    found = run(config, columns, ("gravity_load", values))["joint_position_rad"]
+    turned = found + 0.7 - 0.9 * np.nan_to_num(roll)
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] - weight * np.sin(turned))
+    assert found == pytest.approx(expected, abs=1e-10)
+
+
 @pytest.mark.parametrize("name", JOINTS)
 def test_inertia_takes_mass_times_acceleration(name: str) -> None:
     config = joint(name)

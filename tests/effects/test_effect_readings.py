@@ -63,6 +63,19 @@ def test_rubber_gives_way_exponentially_to_a_step_of_load_and_lags_a_ramp() -> N
         assert late_by == pytest.approx(2e-3 * expected, abs=2e-3 * (0.4 * 0.005 / lag if step else 1e-9))
 
 
+def test_plastic_goes_on_giving_way_over_decades() -> None:
+    """Two decades from 0.05 s: a third each with 0.05, 0.5 and 5 s."""
+    config = joint()
+    time = np.linspace(0.0, 20.0, 2001)
+    columns = still(time, np.where(time > 0.5, 0.4, 0.0))
+    mount = ("series_compliance", {"late_rad_per_Nm": 2e-3, "lag_s": 0.05, "decades": 2.0})
+    late_by = run(config, columns, mount)["deflection_rad"] - run(config, columns)["deflection_rad"]
+    since = np.maximum(time - 0.505, 0.0)
+    expected = np.mean([1.0 - np.exp(-since / lag) for lag in (0.05, 0.5, 5.0)], axis=0)
+    assert late_by == pytest.approx(8e-4 * expected, abs=8e-4 * 0.035)
+    assert late_by[-1] == pytest.approx(8e-4 * expected[-1], rel=1e-3)
+
+
 def test_compliance_and_clearance_see_what_passes_the_load_path() -> None:
     """A moment that enters beside the torque channel bends the mount as well."""
     config = joint()

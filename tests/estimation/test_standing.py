@@ -19,9 +19,15 @@ from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.standing import apart_of, as_it_stood, at_pretension, standing, value_of
 from cablecomp.signal.smoothing import FloatArray
 
-BOTH = with_effects(
-    JOINT, [("nonlinear_cable", {"stiffening": 0.3}), ("pressure_dependent_friction", {"exponent": 0.25})]
-)
+
+def both(**coat: float) -> JointConfig:
+    """The joint with a cable that stiffens and a coat."""
+    by_pressure = {"exponent": 0.25, **coat}
+    return with_effects(
+        JOINT, [("nonlinear_cable", {"stiffening": 0.3}), ("pressure_dependent_friction", by_pressure)]
+    )
+
+
 TENSIONS = np.linspace(20.0, 120.0, 11)
 
 
@@ -33,19 +39,23 @@ def stiffness(config: JointConfig) -> np.ndarray:
 
 
 def friction(config: JointConfig, key: str) -> np.ndarray:
-    """mu(T) = mu0 (T/T0)^-n."""
+    """mu(T) = mu0 (T/T0)^-n, less where T is far above T0 u."""
     stage = config.drive.stage[0]
-    (n,) = [float(e.parameters["exponent"]) for e in config.effect if e.id == "pressure_dependent_friction"]
-    return np.asarray(getattr(stage, key) * (TENSIONS / stage.pretension_N) ** -n)
+    (coat,) = [e.parameters for e in config.effect if e.id == "pressure_dependent_friction"]
+    tau = TENSIONS / stage.pretension_N
+    n, lost, place = (float(coat.get(k, v)) for k, v in (("exponent", 0.0), ("lost", 0.0), ("place", 1.0)))
+    return np.asarray(getattr(stage, key) * tau**-n * (1.0 - lost * tau**10 / (tau**10 + place**10)))
 
 
+@pytest.mark.parametrize("coat", [{}, {"lost": 0.6, "place": 1.3}])
 @pytest.mark.parametrize("factor", [0.7, 1.0, 1.6])
-def test_another_pretension_keeps_the_laws_of_cable_and_coat(factor: float) -> None:
-    there = at_pretension(BOTH, factor * BOTH.drive.stage[0].pretension_N)
-    assert there.drive.stage[0].pretension_N == pytest.approx(factor * BOTH.drive.stage[0].pretension_N)
-    np.testing.assert_allclose(stiffness(there), stiffness(BOTH), rtol=1e-12)
+def test_another_pretension_keeps_the_laws_of_cable_and_coat(factor: float, coat: dict[str, float]) -> None:
+    here = both(**coat)
+    there = at_pretension(here, factor * here.drive.stage[0].pretension_N)
+    assert there.drive.stage[0].pretension_N == pytest.approx(factor * here.drive.stage[0].pretension_N)
+    np.testing.assert_allclose(stiffness(there), stiffness(here), rtol=1e-12)
     for key in ("mu_output", "mu_input"):
-        np.testing.assert_allclose(friction(there, key), friction(BOTH, key), rtol=1e-12)
+        np.testing.assert_allclose(friction(there, key), friction(here, key), rtol=1e-12)
 
 
 def test_a_plain_cable_changes_its_pretension_alone() -> None:

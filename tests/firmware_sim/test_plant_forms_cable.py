@@ -175,6 +175,11 @@ def test_a_clamp_slides_in_steps_or_for_a_while() -> None:
     moved = (steps.joint_position_rad - steps.joint_position_rad[0]) * radius
     for at, share in ((0.98, 0.0), (1.2, 1 / 3), (1.7, 2 / 3), (2.2, 1.0)):
         assert moved[round(at * 100)] == pytest.approx(3e-4 * share, abs=2e-8)
+    values = {"slip_m": 7e-4, "time_s": 0.5, "duration_s": 1.5, "steps": 3.0, "growth": 2.0, "wait": 0.5}
+    unequal = _alone(EffectSpec("clamp_slip:unequal_steps", values))
+    moved = (unequal.joint_position_rad - unequal.joint_position_rad[0]) * radius
+    for at, gone in ((0.48, 0.0), (0.52, 1e-4), (1.48, 1e-4), (1.52, 3e-4), (1.98, 3e-4), (2.02, 7e-4)):
+        assert moved[round(at * 100)] == pytest.approx(gone, abs=2e-8)
 
 
 @pytest.mark.parametrize("effect", ["clamp_slip", "strand_break"])
@@ -197,7 +202,12 @@ def test_a_clamp_that_is_pulled_too_hard_creeps_by_the_excess() -> None:
 
 def test_wires_that_fray_or_break_in_steps_end_where_they_break_at_once() -> None:
     once = _alone(EffectSpec("strand_break", {"fraction": 0.4, "time_s": 1.0}))
-    for form, more in (("fraying", {}), ("accelerating", {}), ("in_steps", {"steps": 4.0})):
+    for form, more in (
+        ("fraying", {}),
+        ("accelerating", {}),
+        ("in_steps", {"steps": 4.0}),
+        ("unequal_steps", {"growth": 0.5}),
+    ):
         run = _alone(
             EffectSpec(f"strand_break:{form}", {"fraction": 0.4, "time_s": 1.0, "duration_s": 2.0, **more})
         )

@@ -194,6 +194,18 @@ def test_a_patch_of_the_groove_is_met_where_the_joint_stands(place: float) -> No
     assert left == pytest.approx(_left_over(s, mu, 0.25, 1.0), rel=0.02)
 
 
+@pytest.mark.parametrize("place", [-0.4, 0.4, 1.2])
+def test_a_rippled_groove_is_met_where_the_joint_stands(place: float) -> None:
+    law = {"amplitude": 0.7, "order": 4.0, "phase_rad": 0.5}
+    effect = EffectSpec("position_dependent_friction:threaded", law)
+    left, s = _small_loop(effect, place / 0.5, mu_output=0.3, mu_input=STICKS)
+
+    def mu(depth: np.ndarray) -> np.ndarray:
+        return np.asarray(0.3 * (1.0 + 0.7 * np.cos(4.0 * (place - depth) - 0.5)))
+
+    assert left == pytest.approx(_left_over(s, mu, 0.25, 1.0), rel=0.02)
+
+
 @pytest.mark.parametrize("place", [-1.0, 0.5, 2.0])
 def test_the_input_drums_groove_is_met_where_the_motor_stands(place: float) -> None:
     def left(amplitude: float) -> tuple[float, StageConfig]:

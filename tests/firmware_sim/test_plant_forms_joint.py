@@ -76,6 +76,10 @@ def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:
     path = plain.load_path_Nm
     cases = {
         "stiffening": ({"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4}, 4e-4 * np.arcsinh(path / 0.4)),
+        "softening": (
+            {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4},
+            1e-3 * path + 2.5e-3 * path * np.abs(path),
+        ),
         "one_way": ({"compliance_rad_per_Nm": 1e-3, "skew": 1.0}, 2e-3 * np.maximum(path, 0.0)),
         "rubber": ({"compliance_rad_per_Nm": 1e-3, "share": 0.5, "lag_s": 0.0}, 1e-3 * path),
     }

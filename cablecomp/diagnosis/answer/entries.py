@@ -44,6 +44,7 @@ def named_of(w: Weighed, final: Model) -> Named:
         values = [replace(v, interval_95=i) for v, i in zip(values, found, strict=True)]
     values, recording = _in_its_recording(values, w.term, final.fit)
     parameters: dict[str, Value | str] = {v.name.removeprefix(mine): v for v in values}
+    parameters |= _steps(w.term, final.fit)
     if recording:
         parameters["recording"] = recording
     if w.term.channel:
@@ -60,6 +61,14 @@ def named_of(w: Weighed, final: Model) -> Named:
         w.term.acts_through,
         "" if w.confidence >= LIMITS.name else w.why_not,
     )
+
+
+def _steps(h: Hypothesis, fit: Fit) -> dict[str, Value]:
+    """In how many steps an event goes, where it does: a number that was chosen, not fitted."""
+    steps = h.effect.of_role("steps")
+    entry = next((e for e in fit.problem.config.effect if e.id == h.effect.id), None)
+    count = 0.0 if steps is None or entry is None else float(entry.parameters.get(steps.name, 0.0))
+    return {steps.name: Value(h.key(steps.name), count, 0.0)} if steps is not None and count else {}
 
 
 def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.screening import anchor
+from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 from cablecomp.estimation.least_squares import Fit

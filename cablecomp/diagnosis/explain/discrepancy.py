@@ -14,12 +14,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
+from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
@@ -56,25 +58,22 @@ def left_out_with_discrepancy(
 
 
 def _courses(fit: Fit, event: Hypothesis) -> list[FloatArray]:
-    """What an event does to the residual from each of some instants on, had it been over before the first sample: with
-    these as its steps it may go on, stop, come again. Events of another kind differ by what they do, not by when."""
+    """What an event takes off the residual from each of some instants on (`courses`). Events of another kind differ by
+    what they do, not by when."""
     problem = fit.problem
-    x = fit.x.copy()
+    over, none = fit.x.copy(), fit.x.copy()
     for k, p in enumerate(problem.parameters):
         if p.name == event.key(event.instant):
-            x[k] = p.x(min(float(e.columns["time_s"][0]) for e in problem.evidence) - 1.0)
+            over[k] = before_all(problem) / p.scale  # beyond how far a fit moves it
         elif p.name == event.key(event.duration):
-            x[k] = p.x(0.0)
-    without = x.copy()
-    place = [p.name for p in problem.parameters].index(event.key(event.amount.name))
-    without[place] = problem.parameters[place].x(event.amount.neutral)
-    over, none = problem.followed(x), problem.followed(without)
-    if over is None or none is None:
+            over[k] = p.x(0.0)
+        elif p.name == event.key(event.amount.name):
+            none[k] = p.x(event.amount.neutral)
+    try:
+        does, does_not = problem.misfits(over), problem.misfits(none)
+    except InputError:
         return []
-    time = _on_rows(problem, lambda e: e.at_rows("time_s")[None])[0]
-    instants = np.nanquantile(time, np.arange(1, LIMITS.steps + 1) / (LIMITS.steps + 1))
-    does = (over - none)[: len(time)]
-    return [np.where(time >= t, does, 0.0) for t in instants]
+    return list(from_each(problem, does, does_not, instants_of(problem, LIMITS.steps)).T)
 
 
 def _law_of(parameter: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
@@ -15,14 +17,15 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     says little.
 
     Its size has to stand out of none by `LIMITS.event_size` stated deviations (noise has its best of many instants,
-    too). Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated
-    drive's mean square (`removes`)."""
+    too); of one that still goes on when the last recording ends, that is how fast it goes: how long it would have gone
+    on is nobody's. Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the
+    calibrated drive's mean square (`removes`)."""
     found = amount_of(fit, term)
     loosely = any(p.vague and not p.of_effect for p in fit.problem.parameters)
     if not term.has_instant or found is None or loosely:
         return ""
     amount, value = found
-    sd = np.sqrt(np.maximum(np.diag(covariance(fit)), 0.0))
+    sd = np.sqrt(np.maximum(np.diag(covariance(_as_fast(fit, term))), 0.0))
     place = {p.name: k for k, p in enumerate(fit.problem.parameters)}
     k = place[amount.name]
     own = LIMITS.wider * float(sd[k]) * abs(amount.slope(float(fit.x[k])))
@@ -35,3 +38,14 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     if float(sd[when]) < LIMITS.event_placed * float(high[when] - low[when]):
         return ""
     return f"these data do not tell when it happened, and it takes off {removes:.0%} alone"
+
+
+def _as_fast(fit: Fit, term: Hypothesis) -> Fit:
+    """The fit with the event's duration as it is, where it lasts beyond the last sample."""
+    values, lasts = fit.values, term.key(term.duration)
+    last_s = max(float(e.columns["time_s"][-1]) for e in fit.problem.evidence)
+    if values[term.key(term.instant)] + values.get(lasts, 0.0) <= last_s:
+        return fit
+    J = fit.J.copy()
+    J[:, [p.name == lasts for p in fit.problem.parameters]] = 0.0
+    return replace(fit, J=J)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
+from cablecomp.diagnosis.explain.courses import EVENLY, Course
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
@@ -42,6 +43,11 @@ class Hypothesis:
     two_sided: bool
     channel: str = ""
     further: tuple[Mapping[str, float], ...] = ()
+
+    def same_as(self, other: Hypothesis) -> bool:
+        """Whether both are one physics, of one channel where they have to read one."""
+        channels = self.channel == other.channel or self.effect.texts_optional
+        return self.effect.id == other.effect.id and channels
 
     @property
     def acts_through(self) -> tuple[str, ...]:
@@ -81,6 +87,12 @@ class Hypothesis:
         """The name of how long the event takes."""
         found = self.effect.of_role("duration")
         return found.name if found else ""
+
+    def course(self, c: Course) -> dict[str, float]:
+        """The values of an event that goes like this."""
+        found = {self.instant: c.instant_s, self.duration: c.duration_s}
+        steps = self.effect.of_role("steps")
+        return found if steps is None or c.steps == EVENLY else {**found, steps.name: float(c.steps)}
 
     @property
     def trades(self) -> bool:
@@ -131,9 +143,9 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
 def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
     if not all(_tells(evidence, channel) for channel in effect.needs):
         return []
-    channels = [""]
+    channels = [""] if not effect.texts or effect.texts_optional else []
     if effect.texts:
-        channels = [n for n in _others(evidence) if n not in config.condition.values()]
+        channels += [n for n in _others(evidence) if n not in config.condition.values()]
     if not loaded(config, evidence):
         effect = replace(effect, parameters=tuple(p for p in effect.parameters if not p.of_load))
     amounts = [p for p in effect.parameters if not p.shape and not p.held]
@@ -145,7 +157,9 @@ def _by_amount(
 ) -> Hypothesis:
     own = [p for p in effect.parameters if p.of in ("", amount.name)]
     together = {name for values in effect.tries for name in values}
-    shapes = [p for p in own if p.shape and not p.tries and p.name not in together]
+    # of an event, asked for by itself; of a channel that is not read
+    aside = ("duration", "steps") if channel else ("duration", "steps", "tilt")
+    shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
     shaped = {p.of for p in effect.parameters if not p.tries}
     further = [p for p in own if not p.shape and p is not amount and p.name not in shaped]
@@ -153,7 +167,7 @@ def _by_amount(
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0
     texts: dict[str, float | str] = {effect.texts[0]: channel} if channel else {}
-    grids = [_grid(p, config, evidence) for p in shapes]
+    grids = [_grid(p, config, evidence, channel) for p in shapes]
     starts = tuple(
         Start(
             {
@@ -177,15 +191,21 @@ def _by_amount(
 
 def _absolute(p: Parameter, tried: float, config: JointConfig, evidence: Sequence[Evidence]) -> float:
     """A value to try in the parameter's unit."""
-    if p.role == "duration":
-        return tried * float(np.median([np.ptp(e.columns["time_s"]) for e in evidence]))
     if p.role == "begin":
         return tried + min(float(e.columns["time_s"][0]) for e in evidence)
     return tried if p.scale is None else tried * p.scale(config)
 
 
-def _grid(p: Parameter, config: JointConfig, evidence: Sequence[Evidence]) -> tuple[float, ...]:
+def _grid(
+    p: Parameter, config: JointConfig, evidence: Sequence[Evidence], channel: str = ""
+) -> tuple[float, ...]:
     low, high = p.bounds(config)
+    if p.role == "place":
+        stood = np.concatenate([e.columns[JOINT] for e in evidence])
+        return tuple(float(v) for v in np.nanquantile(stood, (0.1, 0.3, 0.5, 0.7, 0.9)))
+    if p.role == "tilt":
+        width = max(float(np.nanmax(np.abs(e.columns[channel]))) for e in evidence)
+        return tuple(turn / width for turn in (-1.2, -0.4, 0.4, 1.2))
     if p.role == "phase":
         return (0.0, 0.5 * math.pi)
     if p.role == "instant":

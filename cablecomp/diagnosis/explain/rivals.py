@@ -11,7 +11,8 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word
+from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import Model, placed
 from cablecomp.diagnosis.explain.scores import (
     ScoreDifference,
@@ -23,7 +24,7 @@ from cablecomp.diagnosis.explain.scores import (
     score_difference,
     selected_in,
 )
-from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
+from cablecomp.diagnosis.explain.screening import ask_all, rough
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -65,11 +66,7 @@ def rivals(
     beside = [t for t in base.terms if isinstance(t, Hypothesis)]
     ids = {t.effect.id for t in beside}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
-    others = [
-        h
-        for h in pool
-        if h.effect.id not in ids and (h.effect.id, h.channel) != (term.effect.id, term.channel)
-    ]
+    others = [h for h in pool if h.effect.id not in ids and not h.same_as(term)]
     asked = side_by_side(lambda h: ask_all([here], h), others)
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]
@@ -85,7 +82,8 @@ def rivals(
     chosen = roughs[: LIMITS.promising // 2]
     fits = side_by_side(lambda p: _tried(p[0]), chosen)
     for fit, (_, a) in zip(fits, chosen, strict=True):
-        if fit is None:
+        # what only its most extreme shape fits is another effect's to explain
+        if fit is None or better_word(fit, a.hypothesis):
             continue
         models[a.hypothesis.name] = other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         theirs = left_out_with_discrepancy(other, beside, groups)

@@ -13,6 +13,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, in_no_recording, runs_away
+from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
@@ -35,7 +36,7 @@ from cablecomp.diagnosis.explain.scores import (
     score_difference,
     selected_in,
 )
-from cablecomp.diagnosis.explain.screening import Answer, anchor, ask_all, rough
+from cablecomp.diagnosis.explain.screening import Answer, ask_all, rough
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS

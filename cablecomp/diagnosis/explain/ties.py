@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word, over_plausible, runs_away
+from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
@@ -19,7 +20,7 @@ from cablecomp.diagnosis.explain.model import (
     without,
 )
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
-from cablecomp.diagnosis.explain.screening import anchor, ask_all, rough
+from cablecomp.diagnosis.explain.screening import ask_all, rough
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError

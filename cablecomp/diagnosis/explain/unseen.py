@@ -10,7 +10,8 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.screening import Anchor, anchor, contribution, with_entry
+from cablecomp.diagnosis.explain.linear import Anchor, anchor, contribution
+from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.signal.smoothing import FloatArray

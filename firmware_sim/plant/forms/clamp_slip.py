@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import RELEASED_H, RELEASED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import ramp, schedule, stairs
+from firmware_sim.plant.forms.courses import UNEQUAL, ramp, schedule, stairs, unequal_stairs
 
 _SLIP = Parameter("slip_m", "length released in all", low=0.0, high=0.1, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -52,6 +52,27 @@ IN_STEPS = form(
 )
 
 
+def _unequal(build: Build, p: Mapping[str, float]) -> None:
+    schedule(build, _column(p), p["slip_m"], lambda t: unequal_stairs(t, p))
+
+
+UNEQUAL_STEPS = form(
+    "clamp_slip",
+    "unequal_steps",
+    "A clamp lets go again and again, each time by more or less than the last, after a longer or a shorter wait.",
+    (
+        _SLIP,
+        _TIME,
+        Parameter("duration_s", "from the first step to the last", 15.0, 0.0),
+        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        *UNEQUAL,
+        _WHICH,
+    ),
+    ("time",),
+    _unequal,
+)
+
+
 def _other(build: Build, p: Mapping[str, float]) -> None:
     schedule(build, RELEASED_L, p["slip_m"], lambda t: ramp(t, p["time_s"], 0.0))
 
@@ -83,4 +104,4 @@ OVERLOAD = form(
     _overload,
 )
 
-KINDS: tuple[EffectKind, ...] = (GRADUAL, IN_STEPS, OTHER_CABLE, OVERLOAD)
+KINDS: tuple[EffectKind, ...] = (GRADUAL, IN_STEPS, UNEQUAL_STEPS, OTHER_CABLE, OVERLOAD)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import TIME
+from firmware_sim.plant.effects.base import Parameter
 from firmware_sim.plant.records import Floats
 
 
@@ -35,11 +36,28 @@ def ramp(time_s: Floats, start_s: float, duration_s: float) -> Floats:
     return np.clip((time_s - start_s) / duration_s, 0.0, 1.0)
 
 
-def stairs(time_s: Floats, start_s: float, duration_s: float, steps: float) -> Floats:
-    """From 0 to 1 in equal steps, the first at `start_s`, the last `duration_s` after it."""
+def stairs(
+    time_s: Floats, start_s: float, duration_s: float, steps: float, growth: float = 1.0, wait: float = 1.0
+) -> Floats:
+    """From 0 to 1 in steps, the first at `start_s`, the last `duration_s` after it: each `growth` times as large as the
+    one before, and waited for `wait` times as long."""
     count = max(round(steps), 1)
-    at = start_s + duration_s * np.arange(count) / max(count - 1, 1)
-    return np.searchsorted(at, time_s, side="right") / count
+    waits, sizes = wait ** np.arange(count - 1), growth ** np.arange(count)
+    at = start_s + duration_s * np.concatenate([[0.0], np.cumsum(waits) / max(np.sum(waits), 1e-300)])
+    gone = np.concatenate([[0.0], np.cumsum(sizes) / np.sum(sizes)])
+    return gone[np.searchsorted(at, time_s, side="right")]
+
+
+UNEQUAL = (
+    Parameter("growth", "of each step over the last", 1.0, 0.05, 20.0),
+    Parameter("wait", "for each step over that for the last", 1.0, 0.05, 20.0),
+)
+"""What steps that are not equal have beside their number and time."""
+
+
+def unequal_stairs(time_s: Floats, p: Mapping[str, float]) -> Floats:
+    """`stairs` of an effect's parameters."""
+    return stairs(time_s, p["time_s"], p["duration_s"], p["steps"], p["growth"], p["wait"])
 
 
 def schedule(build: Build, column: int, size: float, course: Callable[[Floats], Floats]) -> None:

@@ -1,4 +1,5 @@
-"""A groove that is rough in places, in other forms: a patch, the input drum's groove, a burr."""
+"""A groove that is rough in places, in other forms: a patch, ripples, the input drum's groove,
+a burr."""
 
 from __future__ import annotations
 
@@ -35,6 +36,27 @@ PATCH = form(
 )
 
 
+def _threaded(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["grooved"] = 1
+    for k in range(len(build.cables)):
+        if build.cables[k]["shaft_out"] == build.output:
+            build.grooves[2 * k] = 1.0 + p["amplitude"] * np.cos(p["order"] * _ANGLES - p["phase_rad"])
+
+
+THREADED = form(
+    "position_dependent_friction",
+    "threaded",
+    "A groove that is rough again and again, as a tool's chatter leaves it: mu (1 + a cos(k q − φ)).",
+    (
+        Parameter("amplitude", "a", low=-0.95, high=0.95, neutral=0.0),
+        Parameter("order", "k", 4.0, 0.0, 50.0),
+        Parameter("phase_rad", "φ", 0.0),
+    ),
+    _ACTS,
+    _threaded,
+)
+
+
 def _input(build: Build, p: Mapping[str, float]) -> None:
     build.cables["grooved"] = 1
     for k in range(len(build.cables)):
@@ -67,4 +89,4 @@ BURR = form(
     _burr,
 )
 
-KINDS: tuple[EffectKind, ...] = (PATCH, INPUT_DRUM, BURR)
+KINDS: tuple[EffectKind, ...] = (PATCH, THREADED, INPUT_DRUM, BURR)

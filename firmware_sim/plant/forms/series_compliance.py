@@ -1,5 +1,5 @@
-"""Series compliance in other forms: a coupling that stiffens, one that is softer one way, one of rubber, a bushing
-that creeps over decades of time."""
+"""Series compliance in other forms: a coupling that stiffens, one that softens, one that is softer one
+way, one of rubber, a bushing that creeps over decades of time."""
 
 from __future__ import annotations
 
@@ -31,6 +31,24 @@ STIFFENING = form(
     (_SOFT, Parameter("knee_Nm", "M_k", low=1e-9)),
     ("load",),
     _stiffening,
+)
+
+
+def _softening(build: Build, p: Mapping[str, float]) -> None:
+    def yields(inputs: Floats, outputs: Floats) -> None:
+        path = outputs[:, PATH]
+        outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * path * (1.0 + np.abs(path) / p["knee_Nm"])
+
+    build.mounts.append(yields)
+
+
+SOFTENING = form(
+    "series_compliance",
+    "softening",
+    "A clamped seat that opens as it is loaded: + c M (1 + |M|/M_k), ever softer.",
+    (_SOFT, Parameter("knee_Nm", "M_k", low=1e-9)),
+    ("load",),
+    _softening,
 )
 
 
@@ -101,4 +119,4 @@ BUSHING = form(
     _bushing,
 )
 
-KINDS: tuple[EffectKind, ...] = (STIFFENING, ONE_WAY, RUBBER, BUSHING)
+KINDS: tuple[EffectKind, ...] = (STIFFENING, SOFTENING, ONE_WAY, RUBBER, BUSHING)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import ramp, schedule, stairs
+from firmware_sim.plant.forms.courses import UNEQUAL, ramp, schedule, stairs, unequal_stairs
 
 _LOST = Parameter("fraction", "share of EA lost in the end", low=0.0, high=0.95, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -35,6 +35,27 @@ IN_STEPS = form(
     ),
     ("time", "load"),
     _stepwise,
+)
+
+
+def _unequal(build: Build, p: Mapping[str, float]) -> None:
+    schedule(build, _column(p), p["fraction"], lambda t: unequal_stairs(t, p))
+
+
+UNEQUAL_STEPS = form(
+    "strand_break",
+    "unequal_steps",
+    "Wires break one after another, each time more or fewer than the last, and after a longer or a shorter wait.",
+    (
+        _LOST,
+        _TIME,
+        Parameter("duration_s", "from the first to the last", 15.0, 0.0),
+        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        *UNEQUAL,
+        _WHICH,
+    ),
+    ("time", "load"),
+    _unequal,
 )
 
 
@@ -79,4 +100,4 @@ OTHER_CABLE = form(
     _other,
 )
 
-KINDS: tuple[EffectKind, ...] = (IN_STEPS, FRAYING, OTHER_CABLE, ACCELERATING)
+KINDS: tuple[EffectKind, ...] = (IN_STEPS, UNEQUAL_STEPS, FRAYING, OTHER_CABLE, ACCELERATING)

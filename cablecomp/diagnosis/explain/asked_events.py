@@ -1,0 +1,92 @@
+"""When an event happened, asked beside a fitted model: at once, at the best of many instants; in the likely courses of
+one that takes its time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.courses import Course, before_all, from_each, instants_of, likely
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
+from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+
+
+def best_event(here: Anchor, h: Hypothesis) -> Best | None:
+    """The best linear answer over the instants of an event, looked for more closely about the best of them."""
+    best = best_start(here, h)
+    if best is None:
+        return None
+    t = float(best[1][h.instant])
+    times = sorted(float(s.values[h.instant]) for s in h.starts)
+    width = times[1] - times[0]
+    for _ in range(2 if here.fit.problem.fine else 4):
+        width *= 0.5
+        closer = best_start(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
+        if closer is not None and closer[0] < best[0]:
+            best = closer
+            t = float(best[1][h.instant])
+    if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
+        mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
+        other = best_start(here, mirrored)
+        # what one cable promises by the opposite of what it does is the other's
+        opposite = float(best[1][h.amount.name]) * best[3] < 0.0
+        if other is not None and (opposite or other[0] < best[0]):
+            best = other
+    return best
+
+
+def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
+    """The best linear answer over the likely courses of an event of this shape, of either cable."""
+    values, size = best[1], best[3]
+    sizes = (size, -size) if h.two_sided else (size,)
+    starts = [
+        Start({**values, h.amount.name: s, **h.course(c)}) for s in sizes for c in _likely(here, h, values, s)
+    ]
+    found = (best_start(here, replace(h, starts=(s,))) for s in starts)
+    first = min((f for f in found if f is not None), key=lambda f: f[0], default=None)
+    return None if first is None else _stepped(here, h, first)
+
+
+def _stepped(here: Anchor, h: Hypothesis, best: Best) -> Best:
+    """The same with its steps where they are best: between two rows no derivative tells where one is."""
+    steps = h.effect.of_role("steps")
+    if steps is None or steps.name not in best[1]:
+        return best
+    width = 0.08 * float(best[1][h.duration])
+    for _ in range(4):
+        begins, lasts = float(best[1][h.instant]), float(best[1][h.duration])
+        moved = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1))
+        near = tuple(
+            Start({**best[1], h.instant: begins + a * width, h.duration: lasts + b * width}) for a, b in moved
+        )
+        closer = best_start(here, replace(h, starts=near))
+        if closer is not None and closer[0] < best[0]:
+            best = closer
+        else:
+            width *= 0.4
+    return best
+
+
+def _likely(here: Anchor, h: Hypothesis, values: Mapping[str, float | str], size: float) -> list[Course]:
+    """The courses that promise most, of an event of this size, were it over before the first sample."""
+    problem = here.fit.problem
+    over = h.entry({**values, h.amount.name: size, h.instant: before_all(problem)})
+    joint = problem.config.model_copy(update={"effect": (*problem.config.effect, over)})
+    try:
+        does, does_not = replace(problem, config=joint).misfits(here.fit.x), here.misfits
+    except InputError:
+        return []
+    instants = instants_of(problem, LIMITS.course_instants)
+    rows = from_each(problem, does, does_not, instants)
+    beyond = here.beyond(np.concatenate([rows, np.zeros((len(problem.parameters), len(instants)))]))
+    return likely(instants, beyond.T @ beyond, beyond.T @ here.beyond(here.fit.residual))[: LIMITS.courses]
+
+
+def _turned(h: Hypothesis, t: float) -> Start:
+    """The event at t with the other sign."""
+    base = h.starts[0].values
+    return Start({**base, h.instant: t, h.amount.name: -float(base[h.amount.name])})

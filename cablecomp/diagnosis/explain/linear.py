@@ -1,0 +1,136 @@
+"""What a fitted model says of an effect by a straight line: what the effect adds at a size worth seeing, and what of
+that no step of the model's own parameters can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.signal.smoothing import FloatArray
+
+Best = tuple[float, dict[str, float | str], FloatArray, float]
+"""Of the best start: cost, values with the linear amount, contribution of the size asked, that size."""
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A point to ask from: a fit of the model so far, and an orthonormal basis of what its parameters can do.
+
+    Below the residual's rows stands one for each parameter, what a step in it costs: far steps are beyond what a
+    straight line tells, and a promise that rests on them is none.
+    """
+
+    fit: Fit
+    Q: FloatArray
+    J: FloatArray
+
+    @cached_property
+    def rated(self) -> FloatArray | None:
+        """The residual with the drive run on every sample; None where it cannot be followed so."""
+        return self.fit.problem.finely().followed(self.fit.x)
+
+    @cached_property
+    def misfits(self) -> dict[str, list[FloatArray]]:
+        """What the drive leaves as it stands here."""
+        return self.fit.problem.misfits(self.fit.x)
+
+    def step(self, v: FloatArray) -> FloatArray:
+        """Where the anchor's parameters go, by a linear step, to make up for a residual v."""
+        scale = np.sqrt(np.maximum(np.sum(self.J**2, axis=0), 1e-300))
+        return np.asarray(-np.linalg.lstsq(self.J / scale, self._below(v))[0] / scale, dtype=np.float64)
+
+    def beyond(self, v: FloatArray) -> FloatArray:
+        """What the anchor's parameters cannot do of v."""
+        whole = self._below(v)
+        return np.asarray(whole - self.Q @ (self.Q.T @ whole), dtype=np.float64)
+
+    def _below(self, v: FloatArray) -> FloatArray:
+        return np.concatenate([v, np.zeros((self.J.shape[1], *v.shape[1:]))])
+
+
+def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
+    """An anchor at a fit (or any evaluated point); `reach`: share of the cost that a step by one in a parameter
+    costs."""
+    count = fit.J.shape[1]
+    cost = np.sqrt(reach * 2.0 * fit.cost) * np.eye(count)
+    J = np.concatenate([fit.J, cost])
+    if not count:
+        return Anchor(fit, np.empty((len(J), 0)), J)
+    scale = np.sqrt(np.maximum(np.sum(J**2, axis=0), 1e-300))
+    u, s, _ = np.linalg.svd(J / scale, full_matrices=False)
+    return Anchor(fit, u[:, s > 1e-6], J)
+
+
+def best_start(here: Anchor, h: Hypothesis) -> Best | None:
+    """The best linear answer over the hypothesis's starts."""
+    left = here.beyond(here.fit.residual)
+    energy = float(left @ left)
+    best = None
+    size = None  # what was worth seeing at one start is about that at the next
+    # an event's instants are looked at coarsely where every run is dear
+    for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
+        found = contribution(here, h, start, size)
+        if found is None:
+            continue
+        d, size = found
+        own = here.beyond(d)
+        square = float(own @ own)
+        if square <= 1e-12 * energy:
+            continue
+        factor = float(left @ own) / square
+        if not h.two_sided:
+            factor = max(factor, 0.0)
+        # a mirrored event's size is negative
+        low, high = sorted((h.amount.minimum / size, h.amount.maximum / size))
+        factor = min(max(factor, low), high)
+        cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
+        values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
+        if best is None or cost < best[0]:
+            best = (cost, values, d, size)
+    return best
+
+
+def contribution(
+    here: Anchor, h: Hypothesis, start: Start, about: float | None = None
+) -> tuple[FloatArray, float] | None:
+    """What the effect adds to the prediction (weighted) at a size that is about as large as the residual, looked for
+    from `about` on, or from the start's own."""
+    wanted = max(float(np.linalg.norm(here.fit.residual)), 1.0)
+    size = float(start.values[h.amount.name]) if about is None else about
+    low, high = h.amount.minimum, h.amount.maximum
+    result = None
+    for _ in range(4):
+        size = min(max(size, low), high) if size else size
+        d = difference(here, h, {**start.values, h.amount.name: size})
+        if d is None:
+            size *= 0.1
+            continue
+        result = (d, size)
+        length = float(np.linalg.norm(here.beyond(d))) + 0.1 * float(np.linalg.norm(d))
+        ratio = wanted / max(length, 1e-9 * wanted)
+        if 0.4 < ratio < 2.5 or abs(size * ratio) >= high * 3.0:
+            break
+        size *= float(np.clip(ratio, 1e-3, 1e3))
+    return result
+
+
+def difference(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> FloatArray | None:
+    """What the effect adds at these values. A law with rates is run on every sample, with it and without: rows thinned
+    by travel know no acceleration."""
+    problem, before = here.fit.problem, here.fit.residual
+    if h.effect.rates and not problem.fine:
+        if here.rated is None:
+            return None
+        problem, before = problem.finely(), here.rated
+    joint = problem.config.model_copy(update={"effect": (*problem.config.effect, h.entry(values))})
+    try:
+        found = replace(problem, config=joint).followed(here.fit.x)
+    except InputError:
+        return None
+    return None if found is None else before - found

@@ -1,0 +1,72 @@
+"""When an event happened: at once, evenly, in steps; found from what it does once it is over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_drive import TOLERANT, calibrated, recorded
+
+from cablecomp.diagnosis.explain.courses import EVENLY, Course, likely
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.linear import anchor
+from cablecomp.diagnosis.explain.screening import ask
+from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import EffectSpec
+
+TIME = np.linspace(0.0, 60.0, 900)
+DOES = 1.0 + 0.4 * np.sin(1.3 * TIME)
+"""What an event does once it is over, growing and falling with the load."""
+NOISE = 0.02 * np.random.default_rng(7).standard_normal(len(TIME))
+
+
+def gone(course: Course) -> FloatArray:
+    """How far an event has gone, told step by step or as a ramp."""
+    if course.steps == EVENLY:
+        return np.interp(TIME, [course.instant_s, course.instant_s + course.duration_s], [0.0, 1.0])
+    at = np.linspace(course.instant_s, course.instant_s + course.duration_s, course.steps)
+    return np.mean([t <= TIME for t in at], axis=0)
+
+
+@pytest.mark.parametrize(
+    "true",
+    [Course(11.0, 23.0, 2), Course(20.0, 9.0, 3), Course(8.0, 40.0, 5), Course(17.0, 21.0, EVENLY)],
+    ids=lambda c: f"{c.steps} steps",
+)
+def test_the_course_is_found_that_takes_off_most(true: Course) -> None:
+    """Seed 7; a straight line beside it is nobody's: what other parameters do is taken off before."""
+    instants = np.linspace(0.5, 59.5, 160)
+    columns = np.stack([DOES * (t <= TIME) for t in instants], axis=1)
+    left = DOES * gone(true) + NOISE
+    line = np.stack([np.ones_like(TIME), TIME], axis=1)
+    q = np.linalg.qr(line)[0]
+    columns, left = columns - q @ (q.T @ columns), left - q @ (q.T @ left)
+    first = likely(instants, columns.T @ columns, columns.T @ left)[0]
+    assert first.steps == true.steps
+    assert first.instant_s == pytest.approx(true.instant_s, abs=0.6)
+    assert first.duration_s == pytest.approx(true.duration_s, abs=0.9)
+    turned = likely(instants, columns.T @ columns, -columns.T @ left)
+    assert first not in turned
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount", "size"), [("clamp_slip", "slip_m", 1e-4), ("strand_break", "fraction", 0.3)]
+)
+def test_an_event_in_steps_is_promised_with_them(effect: str, amount: str, size: float) -> None:
+    """The plant's clamp lets go three times (its wires break so): each event as the other's explains far less."""
+    course = {"time_s": 12.0, "duration_s": 16.0, "steps": 3.0}
+    body, drive = calibrated(recorded([EffectSpec(f"{effect}:in_steps", {amount: size, **course})], 45.0))
+    promised = {}
+    for h in hypotheses(TOLERANT, body.used):
+        if h.has_instant:
+            answer = ask(anchor(drive.fit), h)
+            assert answer is not None
+            promised[h.name] = answer
+    right = promised.pop(effect)
+    values = right.problem.config.effect[-1].parameters
+    assert values["steps"] == 3.0
+    assert values["time_s"] == pytest.approx(12.0, abs=0.3)
+    assert values["duration_s"] == pytest.approx(16.0, abs=0.6)
+    assert right.plain is not None
+    assert right.cost < 0.1 * right.plain.cost
+    (wrong,) = promised.values()
+    assert right.cost < 0.5 * wrong.cost
