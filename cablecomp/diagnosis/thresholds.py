@@ -158,6 +158,9 @@ class Thresholds:
     """Durations that are looked at, from that one to the whole span, evenly by their logarithm."""
     in_steps: tuple[int, ...] = (2, 3, 4, 5)
     """Equal steps in which an event may go: of more, evenly says as much."""
+    stepped: float = 0.6
+    """Share of what an event at once, or an even one, would leave, below which it is said to go in steps: of five
+    numbers of steps at any instants, one fits some of whatever is left."""
     courses: int = 5
     """Courses that are then run, best first by what they promise."""
     edge: float = 0.06

@@ -22,14 +22,14 @@ def _give_way(c: Any, p: Any, s: Any) -> None:
 
 @term(parameters=("compliance", "lag", "decades"), state=(("late", 3), "path", "time"))
 def _give_way_late(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], shortest lag [s], decades from it to the longest; s: what has given way so far of each
+    """p: compliance [rad/(N m)], lag [s], decades from the shortest to the longest; s: what has given way so far of each
     third, as the moment that it would bear at rest, and the moment and time of the sample before. The moment goes
     straight from sample to sample."""
     path = c.load - c.moment
     passed = 0.0 if c.first else c.time - s.time
     slope = (path - s.path) / passed if passed > 0.0 else 0.0
     for k in range(3 if p.decades > 0.0 else 1):
-        lag = p.lag * 10.0 ** (0.5 * p.decades * k)
+        lag = p.lag * 10.0 ** (0.5 * p.decades * (k - 1)) if p.decades > 0.0 else p.lag
         late = path if c.first else s.late[k]
         if passed > 0.0:
             late = path - slope * lag + (late - s.path + slope * lag) * math.exp(-passed / lag)
@@ -64,7 +64,7 @@ EFFECT = Effect(
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
     "stiffen as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
     equation="q_out = q_drive + c_s (M + s |M|)/(1 + (g M)^2)^(1/6) + c_l y, t_l dy/dt = M - y, M the moment in the "
-    "load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l, t_l 10^(d/2), t_l 10^d",
+    "load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l 10^(-d/2), t_l, t_l 10^(d/2)",
     source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
     "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; delayed "
     "elasticity: C. Zener, Elasticity and Anelasticity of Metals, 1948",
@@ -129,7 +129,7 @@ EFFECT = Effect(
             0.0,
             0.02,
             5.0,
-            "t_l, how late: to 63 % of it after a step of the load",
+            "t_l, how late: to 63 % of it after a step of the load (the middle one of three)",
             log=True,
             role="shape",
             omitted=0.3,

@@ -151,7 +151,7 @@ def test_a_patch_of_the_groove_counts_where_the_cable_lies_on_it() -> None:
             expected = expected_deflection(
                 config, columns["joint_torque_Nm"][k], rough, lambda *_: stage.mu_input
             )
-            assert found[k] == pytest.approx(expected, rel=1e-5)
+            assert found[k] == pytest.approx(expected, rel=3e-4)  # the table has a step of 0.02 rad
     plain = run(config, columns)["deflection_rad"]
     assert abs(found[79] / plain[79]) < 0.9
 
@@ -179,7 +179,7 @@ def test_friction_that_depends_on_the_place_in_the_input_drums_groove(guide: flo
         tau = (1.0 + load / (stage.output_radius_m * stage.pretension_N)) * math.exp(guide)
         even = stretch(lambda *_: stage.mu_input, tau, stage.wrap_input_rad)
         expected = unit * (stretch(groove, tau, stage.wrap_input_rad) - even)
-        assert found[k] - plain[k] == pytest.approx(expected, rel=1e-5)
+        assert found[k] - plain[k] == pytest.approx(expected, rel=3e-4)  # the table has a step of 0.02 rad
         assert abs(expected) > 1e-6
 
 

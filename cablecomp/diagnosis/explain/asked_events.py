@@ -46,16 +46,21 @@ def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     starts = [
         Start({**values, h.amount.name: s, **h.course(c)}) for s in sizes for c in _likely(here, h, values, s)
     ]
-    found = (best_start(here, replace(h, starts=(s,))) for s in starts)
-    first = min((f for f in found if f is not None), key=lambda f: f[0], default=None)
-    return None if first is None else _stepped(here, h, first)
+    asked = (best_start(here, replace(h, starts=(s,))) for s in starts)
+    found = sorted((f for f in asked if f is not None), key=lambda f: f[0])
+    steps = h.effect.of_role("steps")
+    if steps is None:
+        return next(iter(found), None)
+    evenly = next((f for f in found if steps.name not in f[1]), None)
+    stepped = next((_stepped(here, h, f) for f in found if steps.name in f[1]), None)
+    if stepped is None:
+        return evenly
+    otherwise = min(best[0], best[0] if evenly is None else evenly[0])
+    return stepped if stepped[0] < LIMITS.stepped * otherwise else evenly
 
 
 def _stepped(here: Anchor, h: Hypothesis, best: Best) -> Best:
-    """The same with its steps where they are best: between two rows no derivative tells where one is."""
-    steps = h.effect.of_role("steps")
-    if steps is None or steps.name not in best[1]:
-        return best
+    """An event in steps with these where they are best: between two rows no derivative tells where one is."""
     width = 0.08 * float(best[1][h.duration])
     for _ in range(4):
         begins, lasts = float(best[1][h.instant]), float(best[1][h.duration])
