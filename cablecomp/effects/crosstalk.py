@@ -10,25 +10,46 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
 
 
-@term(parameters=("load_coefficient", "channel"))
+@term(parameters=("load_coefficient", "growth", "channel"))
 def _leak(c: Any, p: Any, s: Any) -> None:
-    """p: load coefficient [N m per unit of the channel], place of the channel among the others."""
+    """p: load coefficient [N m per unit of the channel], its growth with the joint's angle [1/rad], place of the
+    channel among the others."""
     other = c.other[int(p.channel)]
     if not math.isnan(other):
-        c.moment -= p.load_coefficient * other
+        c.moment -= p.load_coefficient * (1.0 + p.growth * c.joint) * other
+        c.moment_slope -= p.load_coefficient * p.growth * other
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_leak(load_coefficient=values["load_coefficient"], channel=values["channel"]))
+    leak = _leak(
+        load_coefficient=values["load_coefficient"],
+        growth=values["growth_per_rad"],
+        channel=values["channel"],
+    )
+    return Change(terms=leak)
 
 
 EFFECT = Effect(
     id="crosstalk",
     statement="A neighbouring joint loads this joint's cables: what the other does appears here.",
-    equation="M_cable = M + k other(t)",
-    source="cables routed past or over a neighbouring axis carry part of its load; linear as first order",
+    equation="M_cable = M + k (1 + p q_out) other(t)",
+    source="cables routed past or over a neighbouring axis carry part of its load; linear as first order, in the "
+    "joint's angle too, with which the lever arm changes",
     parameters=(
         Parameter("load_coefficient", "N m/unit", 0.0, -1.0, 1.0, "k, moment per unit of the other channel"),
+        Parameter(
+            "growth_per_rad",
+            "1/rad",
+            0.0,
+            -5.0,
+            5.0,
+            "p, share by which that grows per radian of the joint",
+            role="shape",
+            omitted=0.0,
+            minimum=-20.0,
+            maximum=20.0,
+            tries=(-1.0, 1.0),
+        ),
     ),
     acts_through=("other",),
     bounded=True,

@@ -22,8 +22,8 @@ def _give_way(c: Any, p: Any, s: Any) -> None:
 
 @term(parameters=("compliance", "lag", "decades"), state=(("late", 3), "path", "time"))
 def _give_way_late(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], lag [s], decades from the shortest to the longest; s: what has given way so far of each
-    third, as the moment that it would bear at rest, and the moment and time of the sample before. The moment goes
+    """p: compliance [rad/(N m)], lag [s], decades from the shortest to the longest; s: what has given way so far of
+    each third, as the moment that it would bear at rest, and the moment and time of the sample before. The moment goes
     straight from sample to sample."""
     path = c.load - c.moment
     passed = 0.0 if c.first else c.time - s.time

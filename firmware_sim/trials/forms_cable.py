@@ -129,6 +129,11 @@ def _letting_go_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**_while(rng, scene), **_unequally(rng)}, {"slip_m": 1.0}, *_slip(scene))
 
 
+def _biting_again(rng: np.random.Generator, scene: Scene) -> Shape:
+    when = _while(rng, scene)
+    return Shape({**when, "lag_s": when.pop("duration_s")}, {"slip_m": 1.0}, *_slip(scene))
+
+
 def _breaking_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**_while(rng, scene), **_unequally(rng)}, {"fraction": 1.0}, 0.5, 0.7)
 
@@ -179,6 +184,7 @@ CABLE = (
     Suspect("clamp_slip:gradual", ANY, _sliding),
     Suspect("clamp_slip:in_steps", ANY, _letting_go),
     Suspect("clamp_slip:unequal_steps", ANY, _letting_go_unequally),
+    Suspect("clamp_slip:settling", ANY, _biting_again),
     Suspect("clamp_slip:other_cable", ANY, _other_slip, closed=True),
     Suspect("clamp_slip:overload", ANY, _overload),
     Suspect("strand_break:in_steps", ANY, _breaking),

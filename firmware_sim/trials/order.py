@@ -27,7 +27,8 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 """What a trial holds; `motor`: an effect that shows in the motor's torque alone."""
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
-    "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "strand_break:fraying",
+    "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
+    "crosstalk:posed", "strand_break:fraying",
     "strand_break:in_steps", "strand_break:other_cable",
     "gravity_load:tilting_base", "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "pressure_dependent_friction:worn_through", "routing_friction:unlike_paths", "series_compliance:bushing",

@@ -66,6 +66,17 @@ def test_gravity_turns_with_the_joint(name: str) -> None:
     assert found == pytest.approx(expected, abs=1e-10)
 
 
+def test_a_neighbours_load_counts_by_the_pose() -> None:
+    """At each angle of the joint as a coefficient of its own: k (1 + p q)."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    other = columns["other_neighbour_Nm"]
+    values = {"channel": "other_neighbour_Nm", "load_coefficient": 0.4, "growth_per_rad": 0.8}
+    found = run(config, columns, ("crosstalk", values))["joint_position_rad"]
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] + 0.4 * (1.0 + 0.8 * found) * other)
+    assert found == pytest.approx(expected, abs=1e-10)
+
+
 def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
     """As the same weight at the phase that the other joint's angle makes of it; where that is not read, as untilted."""
     config = joint(JOINTS[0])

@@ -69,6 +69,7 @@ SIZES = {
     "clamp_slip:gradual": {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 2.0},
     "clamp_slip:in_steps": {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 2.0, "cable_l": 1.0},
     "clamp_slip:unequal_steps": {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 2.0, "growth": 2.0},
+    "clamp_slip:settling": {"slip_m": 2e-4, "time_s": 1.0, "lag_s": 0.5},
     "clamp_slip:other_cable": {"slip_m": 2e-4, "time_s": 1.0},
     "clamp_slip:overload": {"rate_m_per_Ns": 1e-5, "holds_N": 60.0},
     "strand_break:in_steps": {"fraction": 0.3, "time_s": 1.0, "duration_s": 2.0},

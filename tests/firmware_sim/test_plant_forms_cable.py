@@ -175,6 +175,9 @@ def test_a_clamp_slides_in_steps_or_for_a_while() -> None:
     moved = (steps.joint_position_rad - steps.joint_position_rad[0]) * radius
     for at, share in ((0.98, 0.0), (1.2, 1 / 3), (1.7, 2 / 3), (2.2, 1.0)):
         assert moved[round(at * 100)] == pytest.approx(3e-4 * share, abs=2e-8)
+    bites = _alone(EffectSpec("clamp_slip:settling", {"slip_m": 2e-4, "time_s": 1.0, "lag_s": 0.5}))
+    moved = (bites.joint_position_rad - bites.joint_position_rad[0]) * radius
+    np.testing.assert_allclose(moved, 2e-4 * (1.0 - np.exp(-np.maximum(T - 1.0, 0.0) / 0.5)), atol=2e-8)
     values = {"slip_m": 7e-4, "time_s": 0.5, "duration_s": 1.5, "steps": 3.0, "growth": 2.0, "wait": 0.5}
     unequal = _alone(EffectSpec("clamp_slip:unequal_steps", values))
     moved = (unequal.joint_position_rad - unequal.joint_position_rad[0]) * radius

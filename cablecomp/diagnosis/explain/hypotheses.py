@@ -13,6 +13,7 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import EVENLY, Course
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
+from cablecomp.effects.base import Role
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter as Free
@@ -61,7 +62,7 @@ class Hypothesis:
     @property
     def has_instant(self) -> bool:
         """Whether it is an event."""
-        return self.effect.of_role("instant") is not None
+        return self.instant != ""
 
     @property
     def has_phase(self) -> bool:
@@ -71,28 +72,28 @@ class Hypothesis:
     @property
     def instant(self) -> str:
         """The name of the event's instant."""
-        found = self.effect.of_role("instant")
-        return found.name if found else ""
+        return self._of_role("instant")
 
     @property
     def phase(self) -> str:
         """The name of its phase."""
-        return next(
-            (p.name for p in self.effect.parameters if p.role == "phase" and p.of in ("", self.amount.name)),
-            "",
-        )
+        return self._of_role("phase")
 
     @property
     def duration(self) -> str:
         """The name of how long the event takes."""
-        found = self.effect.of_role("duration")
-        return found.name if found else ""
+        return self._of_role("duration")
 
     def course(self, c: Course) -> dict[str, float]:
         """The values of an event that goes like this."""
         found = {self.instant: c.instant_s, self.duration: c.duration_s}
         steps = self.effect.of_role("steps")
         return found if steps is None or c.steps == EVENLY else {**found, steps.name: float(c.steps)}
+
+    def _of_role(self, role: Role) -> str:
+        """The name of the parameter of that role that goes with the amount; "" where there is none."""
+        own = (p for p in self.effect.parameters if p.of in ("", self.amount.name))
+        return next((p.name for p in own if p.role == role), "")
 
     @property
     def trades(self) -> bool:

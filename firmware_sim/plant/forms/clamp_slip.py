@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import RELEASED_H, RELEASED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import UNEQUAL, ramp, schedule, stairs, unequal_stairs
+from firmware_sim.plant.forms.courses import UNEQUAL, ramp, schedule, settling, stairs, unequal_stairs
 
 _SLIP = Parameter("slip_m", "length released in all", low=0.0, high=0.1, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -73,6 +73,20 @@ UNEQUAL_STEPS = form(
 )
 
 
+def _settles(build: Build, p: Mapping[str, float]) -> None:
+    schedule(build, _column(p), p["slip_m"], lambda t: settling(t, p["time_s"], p["lag_s"]))
+
+
+SETTLING = form(
+    "clamp_slip",
+    "settling",
+    "A clamp that gives way and bites again: one cable gains length fast at first and ever more slowly.",
+    (_SLIP, _TIME, Parameter("lag_s", "until 63 % of it is gone", 5.0, 0.0), _WHICH),
+    ("time",),
+    _settles,
+)
+
+
 def _other(build: Build, p: Mapping[str, float]) -> None:
     schedule(build, RELEASED_L, p["slip_m"], lambda t: ramp(t, p["time_s"], 0.0))
 
@@ -104,4 +118,4 @@ OVERLOAD = form(
     _overload,
 )
 
-KINDS: tuple[EffectKind, ...] = (GRADUAL, IN_STEPS, UNEQUAL_STEPS, OTHER_CABLE, OVERLOAD)
+KINDS: tuple[EffectKind, ...] = (GRADUAL, IN_STEPS, UNEQUAL_STEPS, SETTLING, OTHER_CABLE, OVERLOAD)

@@ -36,6 +36,11 @@ def ramp(time_s: Floats, start_s: float, duration_s: float) -> Floats:
     return np.clip((time_s - start_s) / duration_s, 0.0, 1.0)
 
 
+def settling(time_s: Floats, start_s: float, lag_s: float) -> Floats:
+    """From 0 towards 1, ever more slowly: 1 − e^(−t/lag) from `start_s` on."""
+    return -np.expm1(-np.maximum(time_s - start_s, 0.0) / max(lag_s, 1e-9))
+
+
 def stairs(
     time_s: Floats, start_s: float, duration_s: float, steps: float, growth: float = 1.0, wait: float = 1.0
 ) -> Floats:
