@@ -131,7 +131,8 @@ def _letting_go_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
 
 def _biting_again(rng: np.random.Generator, scene: Scene) -> Shape:
     when = _while(rng, scene)
-    return Shape({**when, "lag_s": when.pop("duration_s")}, {"slip_m": 1.0}, *_slip(scene))
+    lag = {"lag_s": 0.5 * when.pop("duration_s")}
+    return Shape({**when, **lag}, {"slip_m": 1.0}, *_slip(scene))
 
 
 def _breaking_unequally(rng: np.random.Generator, scene: Scene) -> Shape:

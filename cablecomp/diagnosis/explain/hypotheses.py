@@ -100,7 +100,8 @@ class Hypothesis:
         """Whether it trades places with calibration and other effects of its kind: friction and stiffness in
         the load's path."""
         plain = not (self.has_instant or self.has_phase or self.effect.texts or self.effect.rates)
-        return plain and bool({"load", "reversal"} & set(self.effect.acts_through)) and not self.groove
+        through = set(self.effect.acts_through)
+        return plain and bool({"load", "reversal"} & through) and "time" not in through and not self.groove
 
     @property
     def groove(self) -> bool:

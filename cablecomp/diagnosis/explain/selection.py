@@ -126,14 +126,13 @@ def _reigning(
         return carried[0]
     rival = reweighed(best, sharper, groups)
     base: Model | None = None
-    for m in carried:
-        if not worth_its_terms(m, rival, groups):
-            continue
+    worth = [m for m in carried if worth_its_terms(m, rival, groups)]
+    for m in worth:
         if keeps(m, best):
             return m
         base = base or reweighed(baseline, sharper, groups)
         if _dethrones(m, rival, base, groups):
-            return next((k for k in carried if keeps(k, best) and not outdoes(m, k, groups)), m)
+            return next((k for k in worth if keeps(k, best) and not outdoes(m, k, groups)), m)
     return best
 
 
