@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
-from cablecomp.diagnosis.explain.courses import EVENLY, Course, likely
+from cablecomp.diagnosis.explain.courses import EVENLY, Course, instants_of, likely
+from cablecomp.diagnosis.explain.discrepancy import _courses
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.screening import ask
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.least_squares import Fit
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec
 
@@ -46,6 +50,24 @@ def test_the_course_is_found_that_takes_off_most(true: Course) -> None:
     assert first.duration_s == pytest.approx(true.duration_s, abs=0.9)
     turned = likely(instants, columns.T @ columns, -columns.T @ left)
     assert first not in turned
+
+
+def test_what_an_event_does_is_known_from_before_the_first_sample() -> None:
+    """A slip fitted at 30 s, of which a fit's reach is three seconds: from the first of the instants on it does what it
+    does from its own on."""
+    course = {"slip_m": 1e-4, "time_s": 30.0}
+    body, drive = calibrated(recorded([EffectSpec("clamp_slip", course)], 45.0))
+    slip = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "clamp_slip")
+    answer = ask(anchor(drive.fit), slip)
+    assert answer is not None
+    problem = answer.problem
+    fit = Fit(problem, problem.start, problem.residual(problem.start), problem.jacobian(problem.start))
+    time = problem.evidence[0].at_rows("time_s")[problem.evidence[0].counted[JOINT]]
+    does = _courses(fit, slip)[0][problem.spans()[JOINT]][: len(time)]
+    before = does[time < instants_of(problem, LIMITS.steps)[0]].mean()
+    early, late = (does[(a < time) & (time < a + 8.0)].mean() - before for a in (15.0, 33.0))
+    assert abs(late) > 0.5 * np.ptp(does)
+    assert early == pytest.approx(late, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,40 @@ def test_shapes_that_belong_together_are_asked_for_together() -> None:
     assert rubber.further == ({"decades": 2.0},)
 
 
+def test_a_slip_of_any_kind_trades_no_places_with_friction_and_stiffness() -> None:
+    """What is tried beyond what promises most are laws of the load's path: slips had crowded out a stiffening cable."""
+    assert _of("nonlinear_cable", "nonlinear_cable").trades
+    for slip in ("clamp_slip", "clamp_slip:creep_m_per_Ns", "clamp_slip:creep_l_m_per_Ns"):
+        assert not _of("clamp_slip", slip).trades
+
+
+def test_a_clamp_that_creeps_has_no_instant() -> None:
+    slip, creep = (_of("clamp_slip", f"clamp_slip{more}") for more in ("", ":creep_m_per_Ns"))
+    assert slip.has_instant
+    assert set(slip.starts[0].values) == {"slip_m", "time_s"}
+    assert not creep.has_instant
+    assert set(creep.starts[0].values) == {"creep_m_per_Ns", "holds_N"}
+
+
+def test_a_weight_is_asked_for_on_a_base_that_each_further_channel_turns() -> None:
+    rng = np.random.default_rng(5)
+    columns = recorded()
+    rolled = {**columns, "other_roll_rad": rng.uniform(-0.8, 0.8, len(columns["time_s"]))}
+    body = gather_body(JOINT, {"a/1": rolled})
+    found = {h.name: h for h in hypotheses(JOINT, body.used) if h.effect.id == "gravity_load"}
+    assert set(found) == {"gravity_load", "gravity_load:other_roll_rad"}
+    plain, tilted = found.values()
+    assert set(plain.starts[0].values) == {"moment_Nm", "phase_rad"}
+    turns = {float(s.values["tilt_rad_per_unit"]) for s in tilted.starts}
+    assert len(turns) == 4
+    assert min(turns) < 0.0 < max(turns)
+    assert tilted.same_as(plain)
+    leaks = [h for h in hypotheses(JOINT, body.used) if h.effect.id == "crosstalk"]
+    assert not any(h.same_as(plain) for h in leaks)
+    assert "other:roll_rad" in tilted.acts_through
+    assert not any(name.startswith("other") for name in plain.acts_through)
+
+
 def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -> None:
     gap = _of("termination_backlash", "termination_backlash")
     free = {

@@ -66,6 +66,18 @@ def test_two_others_reign_where_they_predict_clearly_better_than_one_that_adds_t
     assert reigning(model(1.0, "a"), others, keeping) == reigns
 
 
+def test_what_adds_nothing_to_the_best_does_not_keep_two_others_from_its_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The two leave little more than half, with an amount that is not plausible: not far enough ahead of the one that
+    keeps the best, which itself is no better than that."""
+    monkeypatch.setattr(ties, "implausible", lambda m: sum(t.name == "b" for t in m.terms))
+    keeping = model(0.999, "a", "c")
+    assert not ties.outdoes(model(0.75, "b", "c"), keeping, GROUPS)
+    assert reigning(model(1.0, "a"), model(0.75, "b", "c"), keeping) == "b + c"
+    assert reigning(model(1.0, "a"), model(0.75, "b", "c"), model(0.9, "a", "c")) == "a + c"
+
+
 def test_what_predicts_no_better_does_not() -> None:
     assert reigning(model(1.0, "a"), model(1.0, "a", "b")) == "a"
 
