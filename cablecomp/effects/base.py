@@ -173,6 +173,8 @@ class Effect:
     change: Callable[[Mapping[str, float], JointConfig], Change]
     texts: tuple[str, ...] = field(default=())
     """Names of parameters that are text, such as the channel that loads the cable."""
+    unbounded_by: tuple[str, ...] = ()
+    """Parameters with which, other than neutral, it does not preserve that order all the same."""
     texts_optional: bool = False
     """They may be left out, and parameters of the role `tilt` then say nothing."""
     needs: tuple[str, ...] = field(default=())

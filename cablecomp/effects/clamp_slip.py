@@ -50,15 +50,19 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     terms: list[Term] = []
     if values["slip_m"] != 0.0:
         if math.isnan(values["time_s"]):
-            raise InputError(
-                f"{config.name}: effect `clamp_slip` lacks key `time_s`, when it slipped [s]; add it"
-            )
+            raise _lacks("time_s", "when it slipped [s]", config)
         terms += _slip(slip=values["slip_m"], taken_up=values["taken_up"], **course(values))
     for of_l, cable in enumerate(("", "_l")):
         rate, holds = values[f"creep{cable}_m_per_Ns"], values[f"holds{cable}_N"]
         if rate != 0.0:
+            if math.isnan(holds):
+                raise _lacks(f"holds{cable}_N", "the tension that the clamp holds [N]", config)
             terms += _creep(rate=rate, holds=holds, of_l=float(of_l))
     return Change(terms=tuple(terms))
+
+
+def _lacks(key: str, what: str, config: JointConfig) -> InputError:
+    return InputError(f"{config.name}: effect `clamp_slip` lacks key `{key}`, {what}; add it")
 
 
 def _arc_per_pull(config: JointConfig) -> float:
@@ -99,7 +103,7 @@ def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
             role="shape",
             scale=pretension,
             minimum=0.0,
-            omitted=0.0,
+            omitted=math.nan,
             of=rate,
         ),
     )
@@ -159,6 +163,7 @@ EFFECT = Effect(
     ),
     acts_through=("time", "load"),
     bounded=True,
+    unbounded_by=("creep_m_per_Ns", "creep_l_m_per_Ns"),  # they go by the tension that is solved for
     change=_change,
     steps=True,
     flag="slips",

@@ -53,6 +53,7 @@ EFFECT = Effect(
     ),
     acts_through=("other",),
     bounded=True,
+    unbounded_by=("growth_per_rad",),  # the moment then goes by the angle that is solved for
     change=_change,
     texts=("channel",),
 )

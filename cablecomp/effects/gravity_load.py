@@ -8,6 +8,7 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
+from cablecomp.errors import InputError
 
 
 @term(parameters=("moment", "phase", "tilt", "channel"))
@@ -24,6 +25,11 @@ def _weigh(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
+    if values["tilt_rad_per_unit"] != 0.0 and values["channel"] < 0.0:
+        raise InputError(
+            f"{config.name}: effect `gravity_load` lacks key `channel`, what turns the joint's base by "
+            "`tilt_rad_per_unit`: a channel `other_<name>`; add it"
+        )
     weight = _weigh(
         moment=values["moment_Nm"],
         phase=values["phase_rad"],

@@ -37,6 +37,12 @@ def test_an_unknown_or_missing_key_is_named() -> None:
     )
 
 
+def test_what_a_law_needs_beside_its_amount_is_named() -> None:
+    weight = {"moment_Nm": 0.1, "phase_rad": 0.0, "tilt_rad_per_unit": 0.5}
+    assert "lacks key `channel`, what turns the joint's base" in refusal(("gravity_load", weight))
+    assert "lacks key `holds_l_N`, the tension" in refusal(("clamp_slip", {"creep_l_m_per_Ns": 1e-6}))
+
+
 def test_an_effect_has_to_say_how_much_even_where_each_of_its_amounts_may_be_left_out() -> None:
     """A groove may be rough on either drum alone, so neither amplitude is asked for by itself."""
     text = refusal(("position_dependent_friction", {"phase_rad": 0.5}))
@@ -138,6 +144,13 @@ def test_bounds_are_promised_only_where_order_is_preserved() -> None:
     config = joint()
     assert is_bounded(with_effects(config, [("series_compliance", {"compliance_rad_per_Nm": 1e-3})]))
     assert not is_bounded(with_effects(config, [("bearing_friction", BEARING)]))
+    # by which parameters, where it depends on these
+    for effect, plain, further in (
+        ("clamp_slip", {"slip_m": 1e-4, "time_s": 1.0}, {"creep_m_per_Ns": 1e-6, "holds_N": 60.0}),
+        ("crosstalk", LEAK, {"growth_per_rad": 0.3}),
+    ):
+        assert is_bounded(with_effects(config, [(effect, plain)]))
+        assert not is_bounded(with_effects(config, [(effect, {**plain, **further})]))
 
 
 @pytest.mark.parametrize("name", sorted(set(catalogue()) - {"routing_friction", "viscous_slip"}))

@@ -73,7 +73,8 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     if h.has_instant:
         everywhere = (replace(h, starts=tuple(Start({**s.values, **f}) for s in h.starts)) for f in h.further)
         otherwise = [best_event(here, e) for e in everywhere]
-        courses = [best_course(here, h, e) for e in (best, *otherwise) if e is not None]
+        lasting = (best, *otherwise) if h.duration else ()
+        courses = [best_course(here, h, e) for e in lasting if e is not None]
         shaped = otherwise + courses
     else:
         shaped = [best_start(here, replace(h, starts=tuple(Start({**best[1], **s}) for s in h.further)))]
