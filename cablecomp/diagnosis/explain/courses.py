@@ -22,6 +22,7 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 Misfits = dict[str, list[FloatArray]]
 
 EVENLY: Final = 0
+"""Number of steps of a course that has none."""
 
 
 class Course(NamedTuple):
