@@ -89,6 +89,9 @@ def test_every_effect_of_the_catalogue_has_its_case() -> None:
 def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
     found = diagnose(TOLERANT, {"small/1": recording(effect, CASES[effect])})
     assert [named.effect for named in found.named] == [effect]
+    lasts = found.named[0].parameters.get("duration_s")
+    # the last step lies between two of the recording's samples, and no closer
+    assert not isinstance(lasts, Value) or lasts.sd >= STEP_S / 12.0**0.5
     for value in found.named[0].parameters.values():
         if isinstance(value, Value) and value.sd > 0.0:  # the number of steps is chosen, not fitted
             assert value.interval_95 is not None

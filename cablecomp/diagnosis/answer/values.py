@@ -44,8 +44,9 @@ def _parameters(fit: Fit, mine: Sequence[int], config: JointConfig | None = None
         if config is not None and not p.condition:
             nominal = value_of(_stated(fit, config, p.session), p.base)
         value, own = p.value(x), float(sd[k] * abs(p.slope(x)))
-        if role_of(p.base) == "instant":
-            own = reading_sigma(own, _gap_around(fit, value))  # between two rows no fit can tell where
+        when = _when(fit, p.base, value)
+        if when is not None:
+            own = reading_sigma(own, _gap_around(fit, when))  # between two rows no fit can tell where
         found.append(Value(p.name, value, own, nominal, p.session))
     return tuple(found)
 
@@ -54,6 +55,15 @@ def _stated(fit: Fit, config: JointConfig, session: str | None) -> JointConfig:
     """The joint as the configuration has it in a session; without one, in general."""
     recording = next((e for e in fit.problem.evidence if e.session == session), None)
     return config if recording is None else in_its_place(config, recording)
+
+
+def _when(fit: Fit, name: str, value: float) -> float | None:
+    """The instant that an event's parameter tells: its own, or, of how long it takes, the end; None of any other."""
+    role, effect = role_of(name), name.rpartition(".")[0]
+    if role != "duration":
+        return value if role == "instant" else None
+    begins = (v for k, v in fit.values.items() if k.startswith(f"{effect}.") and role_of(k) == "instant")
+    return next((b + value for b in begins), None)
 
 
 def _gap_around(fit: Fit, instant_s: float) -> float:
