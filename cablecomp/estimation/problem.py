@@ -151,9 +151,8 @@ class Problem:
 
     def stand_key(self, r: Evidence) -> Any:
         """The same for recordings in which the joint stands alike, wherever x is."""
-        own = any(p.session for p in self.parameters)
         return (
-            r.session if own else None,
+            r.session if any(p.session for p in self.parameters) else None,
             *r.apart.items(),
             *(r.condition[p.condition] for p in self.parameters if p.condition),
         )

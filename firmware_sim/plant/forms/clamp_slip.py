@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import RELEASED_H, RELEASED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import UNEQUAL, ramp, schedule, settling, stairs, unequal_stairs
+from firmware_sim.plant.forms.courses import STEPS, UNEQUAL, ramp, schedule, settling, stairs, unequal_stairs
 
 _SLIP = Parameter("slip_m", "length released in all", low=0.0, high=0.1, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -43,8 +43,7 @@ IN_STEPS = form(
     (
         _SLIP,
         _TIME,
-        Parameter("duration_s", "from the first step to the last", 15.0, 0.0),
-        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        *STEPS,
         _WHICH,
     ),
     ("time",),
@@ -63,8 +62,7 @@ UNEQUAL_STEPS = form(
     (
         _SLIP,
         _TIME,
-        Parameter("duration_s", "from the first step to the last", 15.0, 0.0),
-        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        *STEPS,
         *UNEQUAL,
         _WHICH,
     ),

@@ -53,6 +53,11 @@ def stairs(
     return gone[np.searchsorted(at, time_s, side="right")]
 
 
+STEPS = (
+    Parameter("duration_s", "from the first step to the last", 15.0, 0.0),
+    Parameter("steps", "how many", 3.0, 2.0, 20.0),
+)
+"""What steps have beside their size and the instant of the first."""
 UNEQUAL = (
     Parameter("growth", "of each step over the last", 1.0, 0.05, 20.0),
     Parameter("wait", "for each step over that for the last", 1.0, 0.05, 20.0),

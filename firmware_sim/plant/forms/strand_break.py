@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import UNEQUAL, ramp, schedule, stairs, unequal_stairs
+from firmware_sim.plant.forms.courses import STEPS, UNEQUAL, ramp, schedule, stairs, unequal_stairs
 
 _LOST = Parameter("fraction", "share of EA lost in the end", low=0.0, high=0.95, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -29,8 +29,7 @@ IN_STEPS = form(
     (
         _LOST,
         _TIME,
-        Parameter("duration_s", "from the first to the last", 15.0, 0.0),
-        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        *STEPS,
         _WHICH,
     ),
     ("time", "load"),
@@ -49,8 +48,7 @@ UNEQUAL_STEPS = form(
     (
         _LOST,
         _TIME,
-        Parameter("duration_s", "from the first to the last", 15.0, 0.0),
-        Parameter("steps", "how many", 3.0, 2.0, 20.0),
+        *STEPS,
         *UNEQUAL,
         _WHICH,
     ),

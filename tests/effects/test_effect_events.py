@@ -1,0 +1,94 @@
+"""How slips and breaks go: at once, evenly, in steps, by what exceeds a clamp's hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import joint, run, still
+
+from cablecomp.errors import InputError
+
+LONG = 400.0  # m of free span: the wraps hardly matter beside it
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount"), [("clamp_slip", {"slip_m": 2e-3}), ("strand_break", {"fraction": 0.3})]
+)
+def test_an_event_that_takes_its_time_goes_evenly(effect: str, amount: dict[str, float]) -> None:
+    """Slowly means the same as ever so many sudden ones: after a share of the time the joint stands where that share of
+    the amount at once leaves it, while load and motor rest."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 4.0, 81)
+    columns = still(time, np.full(81, 0.4))
+    plain = run(config, columns)["deflection_rad"]
+    slowly = (
+        run(config, columns, (effect, {**amount, "time_s": 1.0, "duration_s": 2.0}))["deflection_rad"] - plain
+    )
+    for at, share in ((1.5, 0.25), (2.5, 0.75), (3.5, 1.0)):
+        part = {name: share * value for name, value in amount.items()}
+        once = run(config, columns, (effect, {**part, "time_s": at}))["deflection_rad"] - plain
+        k = int(np.argmin(np.abs(time - at)))
+        assert slowly[k] == pytest.approx(once[k], rel=1e-3)
+        assert abs(once[k]) > 1e-3
+    assert slowly[time < 1.0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount"), [("clamp_slip", {"slip_m": 2e-3}), ("strand_break", {"fraction": 0.3})]
+)
+def test_an_event_in_steps_is_as_many_sudden_ones(effect: str, amount: dict[str, float]) -> None:
+    """Three steps, at 1, 2 and 3 s: between them the joint stands where so many thirds at once leave it."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 4.0, 81) + 0.01
+    columns = still(time, np.full(81, 0.4))
+    plain = run(config, columns)["deflection_rad"]
+    course = {"time_s": 1.0, "duration_s": 2.0, "steps": 3.0}
+    steps = run(config, columns, (effect, {**amount, **course}))["deflection_rad"] - plain
+    for first, last, share in ((0.0, 1.0, 0.0), (1.0, 2.0, 1 / 3), (2.0, 3.0, 2 / 3), (3.0, 4.0, 1.0)):
+        part = {name: share * value for name, value in amount.items()}
+        once = run(config, columns, (effect, {**part, "time_s": first}))["deflection_rad"] - plain
+        here = (time > first) & (time < last)
+        assert steps[here] == pytest.approx(once[here], rel=1e-3, abs=1e-12)
+
+
+@pytest.mark.parametrize("cable", ["", "_l"])
+def test_a_clamp_that_holds_so_much_creeps_by_the_excess(cable: str) -> None:
+    """Closed circuit with so long a free span that what is let go is cable: under a steady load ds/dt = r (T - T_c),
+    with the tension falling by ds EA/L; nothing while T < T_c."""
+    config = joint(free_length_m=LONG)
+    stage = config.drive.stage[0]
+    time = np.linspace(0.0, 20.0, 2001)
+    way = 1.0 if cable == "" else -1.0
+    unit = stage.output_radius_m * stage.pretension_N
+    holds, rate = 1.1 * stage.pretension_N, 2e-3
+    columns = still(time, np.full(len(time), way * 0.6 * unit))
+    found = run(config, columns, ("clamp_slip", {f"creep{cable}_m_per_Ns": rate, f"holds{cable}_N": holds}))
+    tension = found["tension_h_N" if cable == "" else "tension_l_N"]
+    over = tension - holds
+    assert over[0] > 0.15 * stage.pretension_N
+    assert over[-1] < 0.5 * over[0]
+    # both cables share what one lets go: each loses half of it as stretch
+    lost = rate * np.concatenate([[0.0], np.cumsum(0.5 * (over[1:] + over[:-1]) * np.diff(time))])
+    stiffness = stage.EA_N / (
+        LONG + stage.output_radius_m / stage.mu_output + stage.input_radius_m / stage.mu_input
+    )
+    assert tension[0] - tension == pytest.approx(0.5 * lost * stiffness, rel=0.02, abs=1e-6)
+    other = ("clamp_slip", {f"creep{cable}_m_per_Ns": rate, f"holds{cable}_N": 2.0 * stage.pretension_N})
+    plain = run(config, columns)["deflection_rad"]
+    assert run(config, columns, other)["deflection_rad"] == pytest.approx(plain, abs=1e-15)
+
+
+def test_a_slip_without_an_instant_is_refused_in_one_line() -> None:
+    with pytest.raises(InputError, match="`clamp_slip` lacks key `time_s`, when it slipped"):
+        run(joint(), still(np.zeros(3), np.zeros(3)), ("clamp_slip", {"slip_m": 1e-4}))
+
+
+@pytest.mark.parametrize("steps", [1.0, 2.5])
+def test_a_part_of_a_step_is_refused_in_one_line(steps: float) -> None:
+    config = joint()
+    with pytest.raises(InputError, match=r"steps = .* a whole number from 2 to 50 is accepted, or 0"):
+        run(
+            config,
+            still(np.zeros(3), np.zeros(3)),
+            ("strand_break", {"fraction": 0.1, "time_s": 0.0, "steps": steps}),
+        )
