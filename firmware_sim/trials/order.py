@@ -30,7 +30,7 @@ ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
     "crosstalk:posed", "strand_break:fraying",
     "strand_break:in_steps", "strand_break:other_cable",
-    "gravity_load:tilting_base", "position_dependent_friction:input_drum", "position_dependent_friction:patch",
+    "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "pressure_dependent_friction:worn_through", "routing_friction:unlike_paths", "series_compliance:bushing",
     "series_compliance:one_way", "series_compliance:rubber", "termination_backlash:greased",
     "termination_backlash:dragging_link",

@@ -134,15 +134,6 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ("place_rad", 0.2, 0.4),
         ),
         (
-            "gravity_load",
-            Case(
-                {"moment_Nm": 0.15, "phase_rad": 0.4, "tilt_rad_per_unit": 0.7},
-                ("other_1",),
-                form=":tilting_base",
-            ),
-            ("tilt_rad_per_unit", 0.6, 0.8),
-        ),
-        (
             "strand_break",
             Case(
                 {"fraction": 0.2, "time_s": 9.0, "duration_s": 6.0, "steps": 3.0, "growth": 1.5},
@@ -151,7 +142,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ("fraction", 0.16, 0.24),
         ),
     ],
-    ids=["stiffens", "rubber", "two gaps", "creeps", "pressed through", "patch", "tilts", "unequal steps"],
+    ids=["stiffens", "rubber", "two gaps", "creeps", "pressed through", "patch", "unequal steps"],
 )
 def test_couplings_and_gaps_of_other_kinds_are_named_for_what_they_are(
     effect: str, case: Case, told: tuple[str, float, float]
@@ -164,6 +155,20 @@ def test_couplings_and_gaps_of_other_kinds_are_named_for_what_they_are(
     shape = found.named[0].parameters[name]
     assert isinstance(shape, Value)
     assert low < shape.value < high
+
+
+def test_a_weight_turns_with_the_joint_that_carries_the_base_where_that_is_an_angle() -> None:
+    """The same channel without a unit may be a neighbour's load, and turns nothing."""
+    law = {"moment_Nm": 0.15, "phase_rad": 0.4, "tilt_rad_per_unit": 0.7}
+    columns = recording("gravity_load", Case(law, ("other_1",), form=":tilting_base"))
+    rolled = {"other_roll_rad" if k == "other_1" else k: v for k, v in columns.items()}
+    (weight,) = diagnose(TOLERANT, {"small/1": rolled}).named
+    tilt = weight.parameters["tilt_rad_per_unit"]
+    assert (weight.effect, weight.parameters["channel"]) == ("gravity_load", "other_roll_rad")
+    assert isinstance(tilt, Value)
+    assert tilt.value == pytest.approx(0.7, abs=0.1)
+    found = diagnose(TOLERANT, {"small/1": columns})
+    assert not any("channel" in n.parameters for n in found.named if n.effect == "gravity_load")
 
 
 def test_a_torque_that_comes_late_is_a_clock_and_no_coupling_that_yields() -> None:

@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 
 from cablecomp.diagnosis.explain import rounds
-from cablecomp.diagnosis.explain.dependence import tell_a_gain
+from cablecomp.diagnosis.explain.dependence import Dependence, tell_a_gain
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects import catalogue
 
 
 def beginning(sessions: int, **further: Any) -> Any:
@@ -44,6 +46,20 @@ def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_
     at.groups = SimpleNamespace(by="block")
     rounds._begun(at, answers)
     assert sorted(tried) == [*plain[: LIMITS.tried_later], *trading[:further]]
+
+
+def test_an_effect_that_is_asked_for_by_several_amounts_takes_one_place() -> None:
+    """A coat by its power and where it is pressed through had taken two of three from a stiffening cable."""
+    law = catalogue()["pressure_dependent_friction"]
+    amounts = [Hypothesis(law, name, law.parameter("exponent"), (), True) for name in ("a", "b")]
+    cable = catalogue()["nonlinear_cable"]
+    others: list[Any] = [
+        Dependence("pretension_N", "session"),
+        Hypothesis(cable, "c", cable.parameters[0], (), True),
+    ]
+    begun: list[Any] = [SimpleNamespace(terms=(t,)) for t in (*amounts, *others)]
+    assert [c.terms[0].name for c in rounds._of_so_many(begun, 2)] == ["a", "b", others[0].name]
+    assert len(rounds._of_so_many(begun, 3)) == 4
 
 
 @pytest.mark.parametrize(

@@ -198,9 +198,26 @@ def _chosen(first: Sequence[Begun], second: Sequence[Begun], at: Beginning) -> l
     """What is fitted to the end. What lies lower need not predict better: of two valleys both are."""
     promising = max(LIMITS.promising - 2 * at.number, LIMITS.promising // 2)
     most = LIMITS.hopeless * (first[0].cost if first else 0.0)
-    chosen = [c for k, c in enumerate(first[:promising]) if c.cost < at.cost and (k < 2 or c.cost < most)]
+    nearest = _of_so_many(first, promising)
+    chosen = [c for k, c in enumerate(nearest) if c.cost < at.cost and (k < 2 or c.cost < most)]
     taken = [c.terms[0].name for c in chosen]
     return chosen + [c for c in second if c.terms[0].name in taken and c.cost < most]
+
+
+def _of_so_many(begun: Sequence[Begun], most: int) -> list[Begun]:
+    """Those that come first, of so many terms: an effect that is asked for by several amounts takes one place."""
+    found: list[Begun] = []
+    for c in begun:
+        seen = {_place(b) for b in found}
+        if _place(c) not in seen and len(seen) >= most:
+            break
+        found.append(c)
+    return found
+
+
+def _place(c: Begun) -> str:
+    term = c.terms[0]
+    return term.effect.id if isinstance(term, Hypothesis) else term.name
 
 
 def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
