@@ -11,6 +11,8 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Floats, Parameter, Restated
 
+NEUTRAL_PLACE: Final = 1.0
+"""Tension over T0 at which it gives way, where none is given."""
 SUDDEN: Final = 10.0
 """Power of the pressure by which a coat gives way: from a tenth to nine tenths of it within a factor of 1.55."""
 
@@ -27,8 +29,8 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
     """mu0 (T/T0)^-n keeps its values: mu0 -> mu0 t^-n, t = T0'/T0; a place in T/T0 is t times as near."""
-    moved = {**values, "place": values["place"] / factor} if "place" in values else values
-    return Restated(moved, mu=factor ** -values.get("exponent", 0.0))
+    place = {"place": values.get("place", NEUTRAL_PLACE) / factor} if "lost" in values else {}
+    return Restated({**values, **place}, mu=factor ** -values.get("exponent", 0.0))
 
 
 EFFECT = Effect(
@@ -65,7 +67,7 @@ EFFECT = Effect(
         Parameter(
             "place",
             "-",
-            1.0,
+            NEUTRAL_PLACE,
             0.4,
             2.5,
             "u, tension over T0 where half of that is lost",
@@ -73,7 +75,7 @@ EFFECT = Effect(
             role="shape",
             minimum=0.05,
             maximum=20.0,
-            omitted=1.0,
+            omitted=NEUTRAL_PLACE,
             of="lost",
         ),
     ),

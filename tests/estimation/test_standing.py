@@ -47,7 +47,7 @@ def friction(config: JointConfig, key: str) -> np.ndarray:
     return np.asarray(getattr(stage, key) * tau**-n * (1.0 - lost * tau**10 / (tau**10 + place**10)))
 
 
-@pytest.mark.parametrize("coat", [{}, {"lost": 0.6, "place": 1.3}])
+@pytest.mark.parametrize("coat", [{}, {"lost": 0.6, "place": 1.3}, {"lost": -0.4}])
 @pytest.mark.parametrize("factor", [0.7, 1.0, 1.6])
 def test_another_pretension_keeps_the_laws_of_cable_and_coat(factor: float, coat: dict[str, float]) -> None:
     here = both(**coat)
