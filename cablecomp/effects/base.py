@@ -177,6 +177,8 @@ class Effect:
     """Parameters with which, other than neutral, it does not preserve that order all the same."""
     texts_optional: bool = False
     """They may be left out, and parameters of the role `tilt` then say nothing."""
+    channel_ends: str = ""
+    """How names of channels end of which a diagnosis asks it: their unit, where it reads no other."""
     needs: tuple[str, ...] = field(default=())
     """Channels without which no recording tells it: an output that has to be measured, an input that has to change."""
     rates: bool = False

@@ -51,7 +51,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     if values["slip_m"] != 0.0:
         if math.isnan(values["time_s"]):
             raise _lacks("time_s", "when it slipped [s]", config)
-        terms += _slip(slip=values["slip_m"], taken_up=values["taken_up"], **course(values))
+        terms += _slip(slip=values["slip_m"], taken_up=values["taken_up"], **course(values, config))
     for of_l, cable in enumerate(("", "_l")):
         rate, holds = values[f"creep{cable}_m_per_Ns"], values[f"holds{cable}_N"]
         if rate != 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from cablecomp.config import JointConfig
 from cablecomp.effects.base import Parameter
 from cablecomp.errors import InputError
 from cablecomp.mechanics.jit import njit
@@ -57,12 +58,12 @@ def gone(since_s: Any, duration_s: Any, steps: Any) -> Any:
     return (1.0 + int((steps - 1.0) * share)) / steps
 
 
-def course(values: Mapping[str, float]) -> dict[str, float]:
+def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]:
     """Instant, duration and steps as an event's term takes them; raises InputError for a part of a step."""
     steps = values["steps"]
     if steps != int(steps) or steps == 1.0:
         raise InputError(
-            f"steps = {steps:g} of an event: a whole number from 2 to {MOST_STEPS} is accepted, or 0 where it goes "
-            "evenly (or at once: duration_s = 0)"
+            f"{config.name}: key `effect.steps` is {steps:g}; a whole number from 2 to {MOST_STEPS} is accepted, or 0 "
+            "where it goes evenly (or at once: duration_s = 0)"
         )
     return {"instant": values["time_s"], "duration": values["duration_s"], "steps": steps}

@@ -71,6 +71,7 @@ EFFECT = Effect(
     acts_through=("joint_angle", "motor_angle", "other"),
     texts=("channel",),
     texts_optional=True,
+    channel_ends="_rad",  # a base is turned by an angle: what may be anything else is a neighbour's load
     bounded=False,
     change=_change,
 )

@@ -26,11 +26,6 @@ def _groove(values: Mapping[str, float]) -> Factor | None:
     return factor
 
 
-def _reach(config: JointConfig) -> float:
-    """Wrap of the output drum [rad]: the groove that the cable leaves and takes up."""
-    return config.drive.stage[-1].wrap_output_rad
-
-
 def _wave(amplitude: float, phase_rad: float) -> Factor | None:
     def factor(angle: Floats) -> Floats:
         return np.asarray(1.0 + amplitude * np.cos(angle - phase_rad), dtype=np.float64)

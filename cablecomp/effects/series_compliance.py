@@ -28,12 +28,13 @@ def _give_way_late(c: Any, p: Any, s: Any) -> None:
     path = c.load - c.moment
     passed = 0.0 if c.first else c.time - s.time
     slope = (path - s.path) / passed if passed > 0.0 else 0.0
-    for k in range(3 if p.decades > 0.0 else 1):
-        lag = p.lag * 10.0 ** (0.5 * p.decades * (k - 1)) if p.decades > 0.0 else p.lag
+    parts = 3 if p.decades > 0.0 else 1
+    for k in range(parts):
+        lag = p.lag * 10.0 ** (0.5 * p.decades * (k - 1))
         late = path if c.first else s.late[k]
         if passed > 0.0:
             late = path - slope * lag + (late - s.path + slope * lag) * math.exp(-passed / lag)
-        c.reading += p.compliance * (late / 3.0 if p.decades > 0.0 else late)
+        c.reading += p.compliance * late / parts
         if c.commit:
             s.late[k] = late
     if c.commit:

@@ -24,7 +24,7 @@ def _break(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_break(fraction=values["fraction"], **course(values)))
+    return Change(terms=_break(fraction=values["fraction"], **course(values, config)))
 
 
 EFFECT = Effect(

@@ -86,7 +86,9 @@ def test_a_slip_without_an_instant_is_refused_in_one_line() -> None:
 @pytest.mark.parametrize("steps", [1.0, 2.5])
 def test_a_part_of_a_step_is_refused_in_one_line(steps: float) -> None:
     config = joint()
-    with pytest.raises(InputError, match=r"steps = .* a whole number from 2 to 50 is accepted, or 0"):
+    with pytest.raises(
+        InputError, match=r"`effect.steps` is .*; a whole number from 2 to 50 is accepted, or 0"
+    ):
         run(
             config,
             still(np.zeros(3), np.zeros(3)),

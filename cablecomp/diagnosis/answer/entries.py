@@ -65,10 +65,9 @@ def named_of(w: Weighed, final: Model) -> Named:
 
 def _steps(h: Hypothesis, fit: Fit) -> dict[str, Value]:
     """In how many steps an event goes, where it does: a number that was chosen, not fitted."""
-    steps = h.effect.of_role("steps")
-    entry = next((e for e in fit.problem.config.effect if e.id == h.effect.id), None)
-    count = 0.0 if steps is None or entry is None else float(entry.parameters.get(steps.name, 0.0))
-    return {steps.name: Value(h.key(steps.name), count, 0.0)} if steps is not None and count else {}
+    given = next(e.parameters for e in fit.problem.config.effect if e.id == h.effect.id)
+    chosen = (p.name for p in h.effect.parameters if p.role == "steps" and given.get(p.name))
+    return {name: Value(h.key(name), float(given[name]), 0.0) for name in chosen}
 
 
 def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:

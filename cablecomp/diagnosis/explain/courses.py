@@ -9,7 +9,6 @@ products of these columns alone, without a run of the drive for each.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -138,5 +137,5 @@ def _between(instants: FloatArray) -> FloatArray:
     return np.concatenate([[2.0 * instants[0] - middle[0]], middle, [2.0 * instants[-1] - middle[-1]]])
 
 
-def _nearest(instants: FloatArray, at: Sequence[float] | FloatArray) -> IntArray:
-    return np.asarray(np.argmin(np.abs(instants - np.asarray(at)[:, None]), axis=1))
+def _nearest(instants: FloatArray, at: FloatArray) -> IntArray:
+    return np.asarray(np.argmin(np.abs(instants - at[:, None]), axis=1))

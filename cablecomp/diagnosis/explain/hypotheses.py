@@ -147,9 +147,8 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
         return []
     channels = [""] if not effect.texts or effect.texts_optional else []
     if effect.texts:
-        read = [n for n in _others(evidence) if n not in config.condition.values()]
-        # a base is turned by an angle: what may be anything else is a neighbour's load
-        channels += [n for n in read if n.endswith("_rad")] if effect.texts_optional else read
+        others = (n for n in _others(evidence) if n.endswith(effect.channel_ends))
+        channels += [n for n in others if n not in config.condition.values()]
     if not loaded(config, evidence):
         effect = replace(effect, parameters=tuple(p for p in effect.parameters if not p.of_load))
     amounts = [p for p in effect.parameters if not p.shape and not p.held]

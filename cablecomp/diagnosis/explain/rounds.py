@@ -216,6 +216,7 @@ def _of_so_many(begun: Sequence[Begun], most: int) -> list[Begun]:
 
 
 def _place(c: Begun) -> str:
+    """Whose place it takes: its effect's, or a dependence's own."""
     term = c.terms[0]
     return term.effect.id if isinstance(term, Hypothesis) else term.name
 
