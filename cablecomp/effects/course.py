@@ -59,11 +59,17 @@ def gone(since_s: Any, duration_s: Any, steps: Any) -> Any:
 
 
 def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]:
-    """Instant, duration and steps as an event's term takes them; raises InputError for a part of a step."""
+    """Instant, duration and steps as an event's term takes them; raises InputError for a part of a step, and for
+    several at once."""
     steps = values["steps"]
     if steps != int(steps) or steps == 1.0:
         raise InputError(
             f"{config.name}: key `effect.steps` is {steps:g}; a whole number from 2 to {MOST_STEPS} is accepted, or 0 "
             "where it goes evenly (or at once: duration_s = 0)"
+        )
+    if steps and values["duration_s"] == 0.0:
+        raise InputError(
+            f"{config.name}: key `effect.steps` is {steps:g}, and `effect.duration_s`, from first step to last, "
+            "is 0; give it above 0 [s], or leave the steps out where all happens at once"
         )
     return {"instant": values["time_s"], "duration": values["duration_s"], "steps": steps}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
-from cablecomp.diagnosis.explain.courses import EVENLY, Course, instants_of, likely
+from cablecomp.diagnosis.explain.courses import EVENLY, Course, how_far, instants_of, likely
 from cablecomp.diagnosis.explain.discrepancy import _courses
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
@@ -31,9 +31,19 @@ def gone(course: Course) -> FloatArray:
     return np.mean([t <= TIME for t in at], axis=0)
 
 
+COURSES = [Course(11.0, 23.0, 2), Course(20.0, 9.0, 3), Course(8.0, 40.0, 5), Course(17.0, 21.0, EVENLY)]
+
+
+@pytest.mark.parametrize("course", COURSES, ids=lambda c: f"{c.steps} steps")
+def test_a_course_is_as_it_is_told(course: Course) -> None:
+    assert how_far(course, TIME) == pytest.approx(gone(course), abs=1e-12)
+    at_once = how_far(course._replace(duration_s=0.0, steps=EVENLY), TIME)
+    assert at_once == pytest.approx(1.0 * (course.instant_s <= TIME))
+
+
 @pytest.mark.parametrize(
     "true",
-    [Course(11.0, 23.0, 2), Course(20.0, 9.0, 3), Course(8.0, 40.0, 5), Course(17.0, 21.0, EVENLY)],
+    COURSES,
     ids=lambda c: f"{c.steps} steps",
 )
 def test_the_course_is_found_that_takes_off_most(true: Course) -> None:

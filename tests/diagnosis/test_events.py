@@ -26,6 +26,7 @@ def fitted(parameters: tuple[Parameter, ...], J: Any) -> Any:
         np.array([1e4, *(p.high for p in parameters[1:])]),
     )
     problem: Any = SimpleNamespace(
+        config=SimpleNamespace(effect=()),
         parameters=parameters,
         bounds=lambda: (low, high),
         values=lambda x: {p.name: p.value(v) for p, v in zip(parameters, x, strict=True)},
@@ -43,6 +44,7 @@ def slip(size_sd: float, instant_sd: float) -> tuple[Any, Any]:
     effect = catalogue()["clamp_slip"]
     term = SimpleNamespace(
         has_instant=True,
+        effect=effect,
         instant="time_s",
         duration="duration_s",
         amount=effect.parameter("slip_m"),

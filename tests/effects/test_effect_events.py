@@ -94,3 +94,9 @@ def test_a_part_of_a_step_is_refused_in_one_line(steps: float) -> None:
             still(np.zeros(3), np.zeros(3)),
             ("strand_break", {"fraction": 0.1, "time_s": 0.0, "steps": steps}),
         )
+
+
+def test_several_steps_at_once_are_refused_in_one_line() -> None:
+    several = {"fraction": 0.1, "time_s": 0.0, "steps": 3.0}
+    with pytest.raises(InputError, match=r"from first step to last, is 0; give it above 0"):
+        run(joint(), still(np.zeros(3), np.zeros(3)), ("strand_break", several))

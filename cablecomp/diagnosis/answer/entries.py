@@ -12,7 +12,9 @@ from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
+from cablecomp.diagnosis.explain.courses import EVENLY
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.experiment import best_experiment
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection
@@ -65,9 +67,9 @@ def named_of(w: Weighed, final: Model) -> Named:
 
 def _steps(h: Hypothesis, fit: Fit) -> dict[str, Value]:
     """In how many steps an event goes, where it does: a number that was chosen, not fitted."""
-    given = next(e.parameters for e in fit.problem.config.effect if e.id == h.effect.id)
-    chosen = (p.name for p in h.effect.parameters if p.role == "steps" and given.get(p.name))
-    return {name: Value(h.key(name), float(given[name]), 0.0) for name in chosen}
+    steps = h.effect.of_role("steps")
+    count = course_of(fit, h).steps if h.has_instant else EVENLY
+    return {} if steps is None or count == EVENLY else {steps.name: Value(h.key(steps.name), count, 0.0)}
 
 
 def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:

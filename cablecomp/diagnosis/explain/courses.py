@@ -16,7 +16,7 @@ import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.problem import Problem
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray
 
 Misfits = dict[str, list[FloatArray]]
 
@@ -25,11 +25,20 @@ EVENLY: Final = 0
 
 
 class Course(NamedTuple):
-    """How an event goes: from when [s], how long [s], in how many equal steps (0: evenly)."""
+    """How an event goes: from when [s], how long [s] (0: at once), in how many equal steps (0: evenly)."""
 
     instant_s: float
     duration_s: float
     steps: int
+
+
+def how_far(course: Course, time_s: FloatArray) -> FloatArray:
+    """g, how far an event has gone at these times, 0..1."""
+    since = time_s - course.instant_s
+    share = np.clip(since / course.duration_s, 0.0, 1.0) if course.duration_s > 0.0 else np.ones_like(since)
+    if course.steps != EVENLY:
+        share = (1.0 + np.floor((course.steps - 1) * share)) / course.steps
+    return np.where(since >= 0.0, share, 0.0)
 
 
 def before_all(problem: Problem) -> float:
@@ -122,20 +131,11 @@ def _inside(instants: FloatArray, c: Course) -> bool:
 
 
 def _rises(instants: FloatArray, course: Course) -> FloatArray:
-    w = np.zeros(len(instants))
-    if course.steps:
-        at = course.instant_s + course.duration_s * np.arange(course.steps) / (course.steps - 1)
-        np.add.at(w, _nearest(instants, at), 1.0 / course.steps)
-        return w
-    gone = np.clip((_between(instants) - course.instant_s) / course.duration_s, 0.0, 1.0)
-    return np.asarray(np.diff(gone), dtype=np.float64)
+    """How far a course rises about each of the instants."""
+    return np.asarray(np.diff(how_far(course, _between(instants))), dtype=np.float64)
 
 
 def _between(instants: FloatArray) -> FloatArray:
     """Edges halfway between the instants."""
     middle = 0.5 * (instants[1:] + instants[:-1])
     return np.concatenate([[2.0 * instants[0] - middle[0]], middle, [2.0 * instants[-1] - middle[-1]]])
-
-
-def _nearest(instants: FloatArray, at: FloatArray) -> IntArray:
-    return np.asarray(np.argmin(np.abs(instants - at[:, None]), axis=1))

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_of
+from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
@@ -64,9 +65,8 @@ def _courses(fit: Fit, event: Hypothesis) -> list[FloatArray]:
     over, none = fit.x.copy(), fit.x.copy()
     for k, p in enumerate(problem.parameters):
         if p.name == event.key(event.instant):
-            over[k] = before_all(problem) / p.scale  # beyond how far a fit moves it
-        elif p.name == event.key(event.duration):
-            over[k] = p.x(0.0)
+            # beyond how far a fit moves it, and before it has gone on for as long as it takes
+            over[k] = (before_all(problem) - course_of(fit, event).duration_s) / p.scale
         elif p.name == event.key(event.amount.name):
             none[k] = p.x(event.amount.neutral)
     try:

@@ -6,9 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.courses import EVENLY, Course
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, covariance
+
+
+def course_of(fit: Fit, term: Hypothesis) -> Course:
+    """How an event goes in a fit."""
+    steps = term.effect.of_role("steps")
+    entry = next((e for e in fit.problem.config.effect if e.id == term.effect.id), None)
+    count = 0.0 if steps is None or entry is None else float(entry.parameters.get(steps.name, EVENLY))
+    values = fit.values
+    return Course(values[term.key(term.instant)], values.get(term.key(term.duration), 0.0), int(count))
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
@@ -42,10 +52,10 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
 
 def _as_fast(fit: Fit, term: Hypothesis) -> Fit:
     """The fit with the event's duration as it is, where it lasts beyond the last sample."""
-    values, lasts = fit.values, term.key(term.duration)
+    course = course_of(fit, term)
     last_s = max(float(e.columns["time_s"][-1]) for e in fit.problem.evidence)
-    if values[term.key(term.instant)] + values.get(lasts, 0.0) <= last_s:
+    if course.instant_s + course.duration_s <= last_s:
         return fit
     J = fit.J.copy()
-    J[:, [p.name == lasts for p in fit.problem.parameters]] = 0.0
+    J[:, [p.name == term.key(term.duration) for p in fit.problem.parameters]] = 0.0
     return replace(fit, J=J)

@@ -9,8 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.courses import how_far
 from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
+from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import Model, placed
@@ -129,20 +131,15 @@ def _plain(model: Model, base: Model, term: Hypothesis, groups: Groups) -> dict[
 
 
 def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> Plain | None:
-    """A plain step, or creep, of the joint's zero in place of an event; none while a recording lasts for one that may
-    itself be such a step (nobody sets a zero then; between recordings it may be either)."""
+    """A plain step, or creep, of the joint's zero in place of an event, as that goes; none while a recording lasts for
+    one that may itself be such a step (nobody sets a zero then; between recordings it may be either)."""
     if not term.has_instant:
         return None
-    values = model.fit.values
-    instant_s, lasts_s = (
-        float(values[term.key(term.instant)]),
-        float(values.get(term.key(term.duration), 0.0)),
-    )
+    course = course_of(model.fit, term)
     fit, problem = base.fit, base.fit.problem
-    if term.effect.steps and any(_lasts_at(e, instant_s) for e in problem.evidence):
+    if term.effect.steps and any(_lasts_at(e, course.instant_s) for e in problem.evidence):
         return None
-    since = [e.at_rows("time_s") - instant_s for e in problem.evidence]
-    after = [np.clip(s / lasts_s, 0.0, 1.0) if lasts_s else (s >= 0.0).astype(np.float64) for s in since]
+    after = [how_far(course, e.at_rows("time_s")) for e in problem.evidence]
     struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)
     rows = [
         (e.weight * a * (e.session == struck))[e.counted[JOINT]] / problem.weighing.sigma[JOINT]
