@@ -44,11 +44,12 @@ Role = Literal[
     "presliding",
     "place",
     "tilt",
+    "bend",
 ]
 """An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s], how
 long it takes [s] and in how many steps; when a slow course began [s]; the reference of what the law reads; the length
 of cable in a path [m]; the turn in which friction builds up [rad]; a place on a drum [rad]; by how
-much another channel turns the joint; any other shape."""
+much another channel turns the joint; how much what is read grows with itself; any other shape."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,9 @@ class Parameter:
     the parameter's unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a
     configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
     the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
-    that it leaves out at first (a begin's count from the first of all samples, others' are in units of
-    `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of
-    a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
+    that it leaves out at first (a begin's count from the first of all samples, a bend's are over the channel's largest
+    reading, others' are in units of `scale(config)`); of an event's course it asks by itself. `reach`: times by which a
+    fit of a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
     """
 
     name: str

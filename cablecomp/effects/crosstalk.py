@@ -10,12 +10,13 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
 
 
-@term(parameters=("load_coefficient", "growth", "channel"))
+@term(parameters=("load_coefficient", "growth", "bend", "channel"))
 def _leak(c: Any, p: Any, s: Any) -> None:
-    """p: load coefficient [N m per unit of the channel], its growth with the joint's angle [1/rad], place of the
-    channel among the others."""
+    """p: load coefficient [N m per unit of the channel], its growth with the joint's angle [1/rad] and with the channel
+    itself [1/unit], place of the channel among the others."""
     other = c.other[int(p.channel)]
     if not math.isnan(other):
+        other *= 1.0 + p.bend * other
         c.moment -= p.load_coefficient * (1.0 + p.growth * c.joint) * other
         c.moment_slope -= p.load_coefficient * p.growth * other
 
@@ -24,6 +25,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     leak = _leak(
         load_coefficient=values["load_coefficient"],
         growth=values["growth_per_rad"],
+        bend=values["bend_per_unit"],
         channel=values["channel"],
     )
     return Change(terms=leak)
@@ -32,9 +34,9 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="crosstalk",
     statement="A neighbouring joint loads this joint's cables: what the other does appears here.",
-    equation="M_cable = M + k (1 + p q_out) other(t)",
+    equation="M_cable = M + k (1 + p q_out) (1 + b other(t)) other(t)",
     source="cables routed past or over a neighbouring axis carry part of its load; linear as first order, in the "
-    "joint's angle too, with which the lever arm changes",
+    "joint's angle too, with which the lever arm changes; quadratic where it counts more one way than the other",
     parameters=(
         Parameter("load_coefficient", "N m/unit", 0.0, -1.0, 1.0, "k, moment per unit of the other channel"),
         Parameter(
@@ -49,6 +51,17 @@ EFFECT = Effect(
             minimum=-20.0,
             maximum=20.0,
             tries=(-1.0, 1.0),
+        ),
+        Parameter(
+            "bend_per_unit",
+            "1/unit",
+            0.0,
+            -100.0,
+            100.0,
+            "b, share by which that grows per unit of the other channel",
+            role="bend",
+            omitted=0.0,
+            tries=(-0.6, 0.6),
         ),
     ),
     acts_through=("other",),

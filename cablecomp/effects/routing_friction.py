@@ -14,7 +14,13 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     angle, arc = values["mu_angle"], values["arc_length_m"]
     if angle < FRICTIONLESS:
         return Change(extra_length_m=arc)
-    return Change(guide_angle=angle, guide_length_m=arc, guide_skew=values["skew"])
+    return Change(
+        guide_angle=angle,
+        guide_length_m=arc,
+        guide_skew=values["skew"],
+        guide_place=values["place"],
+        guide_spread=values["spread"],
+    )
 
 
 EFFECT = Effect(
@@ -23,7 +29,7 @@ EFFECT = Effect(
     "pulleys; tension is lost over the bends in "
     "the direction of sliding, and motion is lost at each reversal until all of the path slides the other way.",
     equation="ln(T_out/T_in) = -+ mu Theta (1 + s) while sliding in cable h, (1 - s) in l; in between the guide's "
-    "tension profile sticks, clamped from both ends",
+    "tension profile sticks, clamped from both ends; cable on both sides of the path and between its guides yields",
     source="capstan law (Euler-Eytelwein); Kaneko et al. 1991; profile law of a doubly free arc",
     parameters=(
         Parameter(
@@ -58,6 +64,32 @@ EFFECT = Effect(
             minimum=-0.99,
             maximum=0.99,
             tries=(-0.6, 0.6),
+        ),
+        Parameter(
+            "place",
+            "-",
+            0.5,
+            0.02,
+            0.98,
+            "share of the free cable that lies between path and joint, the rest between path and motor",
+            role="shape",
+            omitted=0.5,
+            minimum=0.0,
+            maximum=1.0,
+            tries=(0.15, 0.85),
+        ),
+        Parameter(
+            "spread",
+            "-",
+            0.0,
+            0.0,
+            0.9,
+            "share of the free cable that lies between guides: they rub as one path that is so much longer",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+            tries=(0.5,),
         ),
     ),
     acts_through=("reversal", "load_direction", "velocity", "load"),

@@ -69,7 +69,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
             split = guide_split(d, laws, c, v, x_in, w_in)
             total, slope = split.stretch, split.slope * dv
             state.tension_in = split.tau_in * t0
-            length *= 0.5
+            length *= cable.guide_place
             ends = 1
         else:
             play, d_play = span_play(cable.play_yield, state.play, tension - t0)

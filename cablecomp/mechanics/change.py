@@ -44,10 +44,16 @@ class Change:
     motor_angle_factor: Factor | None = None
     """mu/mu0 of the input drum's groove, by the motor angle [rad] at which the cable departs there."""
     stiffening: float = 0.0
+    steady: float = 0.0
+    """Share of the cable's compliance at T0 that does not stiffen."""
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
     guide_skew: float = 0.0
     """The guide's angle counts (1 + skew) times in cable h, (1 - skew) times in l."""
+    guide_place: float = 0.5
+    """Share of the free cable between output drum and guide."""
+    guide_spread: float = 0.0
+    """Share of the stage's free length that lies between the guides of a row, and so within it."""
     extra_length_m: float = 0.0
     """Free cable beyond the stage's own free length."""
     play_share: float = 0.0
@@ -66,9 +72,12 @@ def together(changes: Sequence[Change]) -> Change:
         joint_angle_factor=_product([c.joint_angle_factor for c in changes]),
         motor_angle_factor=_product([c.motor_angle_factor for c in changes]),
         stiffening=sum(c.stiffening for c in changes),
+        steady=max((c.steady for c in changes), default=0.0),
         guide_angle=sum(c.guide_angle for c in changes),
         guide_length_m=sum(c.guide_length_m for c in changes),
         guide_skew=sum(c.guide_skew for c in changes),
+        guide_place=next((c.guide_place for c in changes if c.guide_angle > 0.0), 0.5),
+        guide_spread=max((c.guide_spread for c in changes), default=0.0),
         extra_length_m=sum(c.extra_length_m for c in changes),
         play_share=sum(c.play_share for c in changes),
         play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
@@ -102,13 +111,13 @@ def law_tables(change: Change, config: JointConfig) -> Floats | None:
     )
     if by_tension is None and by_joint is None and by_motor is None:
         if change.stiffening != 0.0:
-            return np.stack([stiffening_law(change.stiffening)] * LAWS)
+            return np.stack([stiffening_law(change.stiffening, change.steady)] * LAWS)
         inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
         return np.stack([plain_law()] * LAWS) if inside or change.moves_pretension else None
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
 
     def table(groove: Factor) -> Floats:
-        return law_table(by_tension or np.ones_like, groove, widest, change.stiffening)
+        return law_table(by_tension or np.ones_like, groove, widest, change.stiffening, change.steady)
 
     elsewhere = table(np.ones_like)
     laws = np.stack([elsewhere] * LAWS)

@@ -1,4 +1,4 @@
-"""A fixed guide, idler row or sheath in the middle of the free span: its cable rubs on both sides of what sticks.
+"""A fixed guide, idler row or sheath in the free span: its cable rubs on both sides of what sticks.
 
 While part of the cable on the guide sticks, it parts the cable into two sides that do not know of each other: the input
 side's stretch follows the input drum alone. When the whole guide slides, v_out - v_in = -+ mu Theta (the capstan ratio
@@ -20,7 +20,7 @@ from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, tau_of
 class Split(NamedTuple):
     """The cable from the guide's output end to the input drum."""
 
-    stretch: float  # of guide, input half of the free span and input drum, m at strain T0/EA
+    stretch: float  # of guide, input side of the free span and input drum, m at strain T0/EA
     slope: float  # its derivative by the end value
     tau_in: float  # T/T0 at the input drum
 
@@ -34,7 +34,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     cable, state = d.cables[c], d.states[c]
     width = cable.guide
     per_turn = cable.guide_length / width
-    span = 0.5 * cable.length
+    span = (1.0 - cable.guide_place) * cable.length
     radius = cable.radius[IN]
     arc = 2 * d.size.cables + c
     wrap = 2 * c + 1

@@ -16,6 +16,7 @@ from cablecomp.mechanics.tables import (
     LEAST_STIFFNESS,
     MODE,
     PLAIN,
+    STEADY,
     STIFF,
     STIFFENING,
     Floats,
@@ -62,7 +63,12 @@ def piece(
     if laws[0, HEAD, MODE] == PLAIN:
         return piece_plain(dy, d, tau1, tau2)
     if laws[0, HEAD, MODE] == STIFF:
-        return _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, tau1, v2, tau2)
+        total, slope = _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, tau1, v2, tau2)
+        steady = laws[law, HEAD, STEADY]
+        if steady == 0.0:
+            return total, slope
+        plain, plain_slope = piece_plain(dy, d, tau1, tau2)
+        return steady * plain + (1.0 - steady) * total, steady * plain_slope + (1.0 - steady) * slope
     return piece_table(laws, law, y1, v1, y2, v2)
 
 
@@ -78,8 +84,8 @@ def piece_plain(dy: float, d: float, tau1: float, tau2: float) -> tuple[float, f
 
 @inner_kernel
 def _piece_stiff(b: float, dy: float, v1: float, tau1: float, v2: float, tau2: float) -> tuple[float, float]:
-    """`piece` for a cable that stiffens under plain friction: in closed form, but for short pieces, where differences
-    would cancel, and where a cable softens beyond its law; these by Gauss-Legendre quadrature.
+    """`piece` for a cable all of which stiffens, under plain friction: in closed form, but for short pieces, where
+    differences would cancel, and where a cable softens beyond its law; these by Gauss-Legendre quadrature.
 
     e(v) = (ln(1 - b) + ln(1 + c exp v))/b with c = b/(1 - b); int ln(1 + c exp v) dv = -Li2(-c exp v).
     """
@@ -130,7 +136,7 @@ def _stiff_sums(x: Floats, weights: Floats, b: float, v1: float, d: float) -> tu
     total = slope = 0.0
     for j in range(len(x)):
         tau = math.exp(v1 + d * x[j])
-        e, de = stiffening_strain(b, tau)
+        e, de = stiffening_strain(b, 0.0, tau)
         total += weights[j] * e
         slope += weights[j] * de * tau
     return total, slope

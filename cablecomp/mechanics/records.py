@@ -75,6 +75,7 @@ CABLE = record(
         ("ratio", "f8"),  # r/R of its stage
         ("guide", "f8"),  # friction angle of a guide in the span, mu times wrap
         ("guide_length", "f8"),
+        ("guide_place", "f8"),  # share of the free span between output drum and guide
         ("play_share", "f8"),  # of the span's compliance that follows through a play
         ("play_yield", "f8"),  # radius of that play, N
         ("play_time", "f8"),  # in which it yields, s

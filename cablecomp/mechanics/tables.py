@@ -37,9 +37,9 @@ HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3
     V_LOW, V_STEP,  # grids: their first value, and from one to the next
     Y_LOW, Y_STEP,
     U_LOW, U_STEP,
-    STIFFENING,  # b in EA(T) = EA (1 + b (tau - 1))
+    STIFFENING, STEADY,  # b and w in EA(T) = EA/(w + (1 - w)/(1 + b (tau - 1)))
     GROOVED,  # 0 = g(y) is y itself
-) = range(9)  # fmt: skip
+) = range(10)  # fmt: skip
 
 
 def plain_law() -> Floats:
@@ -47,10 +47,11 @@ def plain_law() -> Floats:
     return np.zeros((4, 16))
 
 
-def stiffening_law(stiffening: float) -> Floats:
-    """Constant mu with the tangent stiffness EA (1 + stiffening (tau - 1)), in the form of a table."""
+def stiffening_law(stiffening: float, steady: float = 0.0) -> Floats:
+    """Constant mu with the tangent stiffness EA/(steady + (1 - steady)/(1 + stiffening (tau - 1))), in the form of a
+    table."""
     table = np.zeros((4, 16))
-    table[HEAD, MODE], table[HEAD, STIFFENING] = STIFF, stiffening
+    table[HEAD, MODE], table[HEAD, STIFFENING], table[HEAD, STEADY] = STIFF, stiffening, steady
     return table
 
 
@@ -59,9 +60,10 @@ def law_table(
     groove_factor: Callable[[Floats], Floats],
     wrap_max_rad: float,
     stiffening: float = 0.0,
+    steady: float = 0.0,
 ) -> Floats:
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
-    termination) and the tangent stiffness EA (1 + stiffening (tau - 1)); both factors are vectorised and positive."""
+    termination) and the tangent stiffness as `stiffening_law`; both factors are vectorised and positive."""
     table = np.zeros((4, SIZE))
     u = np.linspace(LEAST_U, MOST_U, SIZE)
     v = _integral(u, 1.0 / tension_factor(np.exp(u)))
@@ -73,7 +75,8 @@ def law_table(
     by_place = groove_factor(y)
     table[G_OF_Y] = _integral(y, by_place)
     head = table[HEAD]
-    head[MODE], head[STIFFENING], head[GROOVED] = TABLED, stiffening, float(np.any(by_place != 1.0))
+    head[MODE], head[STIFFENING], head[STEADY] = TABLED, stiffening, steady
+    head[GROOVED] = float(np.any(by_place != 1.0))
     head[V_LOW], head[V_STEP] = v[0], v_grid[1] - v_grid[0]
     head[Y_LOW], head[Y_STEP] = 0.0, y[1] - y[0]
     head[U_LOW], head[U_STEP] = LEAST_U, u[1] - u[0]
@@ -217,24 +220,26 @@ def tau_of_v(laws: Floats, law: int, v: float) -> float:
 
 @leaf_kernel
 def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
-    """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int d tau/(1 + b (tau - 1))."""
+    """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int w + (1 - w)/(1 + b (tau - 1)) d tau."""
     if laws is None:
         return tau - 1.0, 1.0
     if laws[0, HEAD, MODE] == PLAIN:
         return tau - 1.0, 1.0
-    return stiffening_strain(laws[law, HEAD, STIFFENING], tau)
+    return stiffening_strain(laws[law, HEAD, STIFFENING], laws[law, HEAD, STEADY], tau)
 
 
 @inner_kernel
-def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
-    """The same for the stiffening coefficient b."""
+def stiffening_strain(b: float, steady: float, tau: float) -> tuple[float, float]:
+    """The same for the stiffening coefficient b and the share w of the compliance at T0 that is steady."""
     if b == 0.0:
         return tau - 1.0, 1.0
+    rest = 1.0 - steady
     stiffness = 1.0 + b * (tau - 1.0)
     if stiffness < LEAST_STIFFNESS:  # the law makes no sense beyond; stay finite and monotone
         edge = (LEAST_STIFFNESS - 1.0) / b
-        return math.log(LEAST_STIFFNESS) / b + (tau - 1.0 - edge) / LEAST_STIFFNESS, 1.0 / LEAST_STIFFNESS
-    return math.log1p(b * (tau - 1.0)) / b, 1.0 / stiffness
+        yields = math.log(LEAST_STIFFNESS) / b + (tau - 1.0 - edge) / LEAST_STIFFNESS
+        return steady * (tau - 1.0) + rest * yields, steady + rest / LEAST_STIFFNESS
+    return steady * (tau - 1.0) + rest * math.log1p(b * (tau - 1.0)) / b, steady + rest / stiffness
 
 
 @inner_kernel
@@ -242,5 +247,5 @@ def strain(laws: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
     u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)
     tau = math.exp(u)
-    e, de = stiffening_strain(laws[law, HEAD, STIFFENING], tau)
+    e, de = stiffening_strain(laws[law, HEAD, STIFFENING], laws[law, HEAD, STEADY], tau)
     return e, de * tau * du

@@ -6,17 +6,13 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import pytest
 from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.hypotheses import (
-    Hypothesis,
-    better_word,
-    hypotheses,
-    in_no_recording,
-    instants,
-)
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses, instants
+from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive
@@ -132,6 +128,11 @@ def test_a_weight_is_asked_for_on_a_base_that_each_further_channel_turns() -> No
     assert tilted.same_as(plain)
     leaks = [h for h in hypotheses(JOINT, body.used) if h.effect.id == "crosstalk"]
     assert not any(h.same_as(plain) for h in leaks)
+    # a bend is asked for by what the channel reads at most
+    for leak in leaks:
+        (most,) = {float(np.max(np.abs(e.columns[leak.channel]))) for e in body.used}
+        bends = [v["bend_per_unit"] for v in leak.further if "bend_per_unit" in v]
+        assert bends == pytest.approx([-0.6 / most, 0.6 / most])
     assert "other:roll_rad" in tilted.acts_through
     assert not any(name.startswith("other") for name in plain.acts_through)
 

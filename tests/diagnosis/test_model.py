@@ -9,8 +9,9 @@ import pytest
 from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.model import amount_resolved, bears
+from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather

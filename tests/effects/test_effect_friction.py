@@ -275,16 +275,18 @@ def slid(tau: float, width: float, mu: float, exponent: float, stiffening: float
     return float(found.y[1, -1]), float(found.y[0, -1])
 
 
+@pytest.mark.parametrize("lies", [{}, {"place": 0.2}, {"place": 0.9, "spread": 0.4}])
 @pytest.mark.parametrize("mu_angle", [0.2, 1.5])  # slides through; holds
 @pytest.mark.parametrize(("exponent", "stiffening"), [(0.4, 0.0), (0.0, 0.6), (-0.3, 0.3)])
 def test_a_guide_where_friction_or_stiffness_depends_on_tension(
-    mu_angle: float, exponent: float, stiffening: float
+    mu_angle: float, exponent: float, stiffening: float, lies: dict[str, float]
 ) -> None:
-    """What lies on the guide obeys the cable's own laws; so does what its friction leaves to the input drum."""
+    """What lies on the guide obeys the cable's own laws; so does what its friction leaves to the input drum; wherever
+    in the free span it lies, and however much of that lies within it."""
     config = joint("snow-open-rig")
     stage = config.drive.stage[0]
     columns = unloading(config)
-    effects = [("routing_friction", {"mu_angle": mu_angle, "arc_length_m": 0.02})]
+    effects = [("routing_friction", {"mu_angle": mu_angle, "arc_length_m": 0.02, **lies})]
     effects += [("pressure_dependent_friction", {"exponent": exponent})] if exponent else []
     effects += [("nonlinear_cable", {"stiffening": stiffening})] if stiffening else []
     observer = Observer(with_effects(config, effects))
@@ -292,8 +294,10 @@ def test_a_guide_where_friction_or_stiffness_depends_on_tension(
     observer.check_state()
     tau = 0.5
     on_guide, tau_in = slid(tau, mu_angle, 1.0, exponent, stiffening)
-    total = 0.5 * stage.free_length_m * (strain(stiffening, tau) + strain(stiffening, tau_in))
-    total += on_guide * 0.02 / mu_angle
+    place, within = lies.get("place", 0.5), lies.get("spread", 0.0) * stage.free_length_m
+    span = stage.free_length_m - within
+    total = span * (place * strain(stiffening, tau) + (1.0 - place) * strain(stiffening, tau_in))
+    total += on_guide * (0.02 + within) / mu_angle
     for end, wrap, mu, radius in (
         (tau, stage.wrap_output_rad, stage.mu_output, stage.output_radius_m),
         (tau_in, stage.wrap_input_rad, stage.mu_input, stage.input_radius_m),

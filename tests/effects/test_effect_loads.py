@@ -77,6 +77,21 @@ def test_a_neighbours_load_counts_by_the_pose() -> None:
     assert found == pytest.approx(expected, abs=1e-10)
 
 
+def test_a_neighbours_load_may_count_more_one_way_than_the_other() -> None:
+    """k other (1 + b other), which is a channel like any other."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    other = columns["other_neighbour_Nm"]
+    values = {"channel": "other_neighbour_Nm", "load_coefficient": 0.4, "bend_per_unit": -0.7}
+    found = run(config, columns, ("crosstalk", values))["joint_position_rad"]
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] + 0.4 * other * (1.0 - 0.7 * other))
+    assert found == pytest.approx(expected, abs=1e-11)
+    straight = fed_with(config, columns, columns["joint_torque_Nm"] + 0.4 * other)
+    assert np.ptp(found - straight) > 0.1 * np.ptp(
+        straight - fed_with(config, columns, columns["joint_torque_Nm"])
+    )
+
+
 def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
     """As the same weight at the phase that the other joint's angle makes of it; where that is not read, as untilted."""
     config = joint(JOINTS[0])

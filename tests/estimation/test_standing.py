@@ -20,22 +20,22 @@ from cablecomp.estimation.standing import apart_of, as_it_stood, at_pretension, 
 from cablecomp.signal.smoothing import FloatArray
 
 
-def both(**coat: float) -> JointConfig:
+def both(steady: float = 0.0, **coat: float) -> JointConfig:
     """The joint with a cable that stiffens and a coat."""
     by_pressure = {"exponent": 0.25, **coat}
-    return with_effects(
-        JOINT, [("nonlinear_cable", {"stiffening": 0.3}), ("pressure_dependent_friction", by_pressure)]
-    )
+    by_pull = {"stiffening": 0.3, "steady": steady}
+    return with_effects(JOINT, [("nonlinear_cable", by_pull), ("pressure_dependent_friction", by_pressure)])
 
 
 TENSIONS = np.linspace(20.0, 120.0, 11)
 
 
 def stiffness(config: JointConfig) -> np.ndarray:
-    """EA(T) = EA (1 + b (T/T0 - 1)) [N]."""
+    """EA(T) = EA/(w + (1 - w)/(1 + b (T/T0 - 1))) [N]."""
     stage = config.drive.stage[0]
-    (b,) = [float(e.parameters["stiffening"]) for e in config.effect if e.id == "nonlinear_cable"]
-    return np.asarray(stage.EA_N * (1.0 + b * (TENSIONS / stage.pretension_N - 1.0)))
+    (cable,) = [e.parameters for e in config.effect if e.id == "nonlinear_cable"]
+    b, w = float(cable["stiffening"]), float(cable.get("steady", 0.0))
+    return np.asarray(stage.EA_N / (w + (1.0 - w) / (1.0 + b * (TENSIONS / stage.pretension_N - 1.0))))
 
 
 def friction(config: JointConfig, key: str) -> np.ndarray:
@@ -47,7 +47,7 @@ def friction(config: JointConfig, key: str) -> np.ndarray:
     return np.asarray(getattr(stage, key) * tau**-n * (1.0 - lost * tau**10 / (tau**10 + place**10)))
 
 
-@pytest.mark.parametrize("coat", [{}, {"lost": 0.6, "place": 1.3}, {"lost": -0.4}])
+@pytest.mark.parametrize("coat", [{}, {"steady": 0.4}, {"lost": 0.6, "place": 1.3}, {"lost": -0.4}])
 @pytest.mark.parametrize("factor", [0.7, 1.0, 1.6])
 def test_another_pretension_keeps_the_laws_of_cable_and_coat(factor: float, coat: dict[str, float]) -> None:
     here = both(**coat)

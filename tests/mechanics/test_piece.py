@@ -12,15 +12,19 @@ from cablecomp.mechanics.tables import LEAST_STIFFNESS, stiffening_law
 WIDTH_RAD = 2.0
 
 
+@pytest.mark.parametrize("steady", [0.0, 0.4])
 @pytest.mark.parametrize("stiffening", [-0.4, 1e-7, 2e-6, 0.02, 0.5, 0.95])
 @pytest.mark.parametrize("rise", [0.01, 0.049, 0.051, 0.2, 0.5, 2.0])
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_stiffening_piece_is_the_integral_of_its_strain(stiffening: float, rise: float, way: float) -> None:
-    """e(tau) = int_1^tau dt/(1 + b (t - 1)) = ln(1 + b (tau - 1))/b, tau = exp(v)."""
-    law = np.stack([stiffening_law(stiffening)])
+def test_a_stiffening_piece_is_the_integral_of_its_strain(
+    stiffening: float, rise: float, way: float, steady: float
+) -> None:
+    """e(tau) = int_1^tau w + (1 - w)/(1 + b (t - 1)) dt = w (tau - 1) + (1 - w) ln(1 + b (tau - 1))/b, tau = exp(v)."""
+    law = np.stack([stiffening_law(stiffening, steady)])
 
     def strain(v: float) -> float:
-        return float(np.log1p(stiffening * np.expm1(v)) / stiffening)
+        yields = np.log1p(stiffening * np.expm1(v)) / stiffening
+        return float(steady * np.expm1(v) + (1.0 - steady) * yields)
 
     for begin in (-2.5, -0.6, 0.0, 0.4):
         end = begin + way * rise

@@ -23,10 +23,12 @@ def one(values: np.ndarray) -> np.ndarray:
     return np.ones_like(values)
 
 
-@pytest.mark.parametrize("stiffening", [-0.4, 0.0, 0.3, 0.9])
-def test_a_stiffening_cable_without_a_table_is_the_tabled_law(stiffening: float) -> None:
-    short = np.stack([stiffening_law(stiffening)])
-    table = np.stack([law_table(one, one, WRAP, stiffening)])
+@pytest.mark.parametrize(
+    ("stiffening", "steady"), [(-0.4, 0.0), (0.0, 0.0), (0.3, 0.0), (0.9, 0.0), (0.9, 0.6)]
+)
+def test_a_stiffening_cable_without_a_table_is_the_tabled_law(stiffening: float, steady: float) -> None:
+    short = np.stack([stiffening_law(stiffening, steady)])
+    table = np.stack([law_table(one, one, WRAP, stiffening, steady)])
     for tau in np.geomspace(0.05, 8.0, 40):
         v = v_of_tau(short, 0, tau)
         assert v_of_tau(table, 0, tau) == pytest.approx(v, abs=1e-9)
@@ -36,14 +38,15 @@ def test_a_stiffening_cable_without_a_table_is_the_tabled_law(stiffening: float)
         assert groove(table, 0, y) == pytest.approx(groove(short, 0, y), abs=1e-9)
 
 
+@pytest.mark.parametrize("steady", [0.0, 0.7])
 @pytest.mark.parametrize("stiffening", [-0.4, 0.5])
-def test_strain_is_the_integral_of_the_stiffness_named(stiffening: float) -> None:
-    """de/dtau = 1/(1 + b (tau - 1)), e(1) = 0."""
-    law = np.stack([stiffening_law(stiffening)])
+def test_strain_is_the_integral_of_the_stiffness_named(stiffening: float, steady: float) -> None:
+    """de/dtau = w + (1 - w)/(1 + b (tau - 1)), e(1) = 0."""
+    law = np.stack([stiffening_law(stiffening, steady)])
     assert strain_of_tau(law, 0, 1.0)[0] == 0.0
     for tau in (0.5, 1.0, 1.7, 2.4):
         slope = (strain_of_tau(law, 0, tau + 1e-6)[0] - strain_of_tau(law, 0, tau - 1e-6)[0]) / 2e-6
-        assert slope == pytest.approx(1.0 / (1.0 + stiffening * (tau - 1.0)), rel=1e-6)
+        assert slope == pytest.approx(steady + (1.0 - steady) / (1.0 + stiffening * (tau - 1.0)), rel=1e-6)
         assert strain_of_tau(law, 0, tau)[1] == pytest.approx(slope, rel=1e-6)
 
 

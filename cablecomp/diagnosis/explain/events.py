@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.diagnosis.explain.courses import EVENLY, Course
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.plausible import amount_of
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, covariance
 

@@ -15,10 +15,8 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.effects.base import Role
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
-from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
-from cablecomp.estimation.simulate import load_of
 
 
 @dataclass(frozen=True)
@@ -170,7 +168,12 @@ def _by_amount(
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0
     texts: dict[str, float | str] = {effect.texts[0]: channel} if channel else {}
-    grids = [_grid(p, config, evidence, channel) for p in shapes]
+    grids = {p.name: _grid(p, config, evidence, channel) for p in shapes}
+    narrowed: list[dict[str, float]] = []
+    if any(p.role == "place" for p in shapes):  # first where, by a usual width; then how wide
+        widths = {p.name: grids[p.name] for p in shapes if p.role != "place"}
+        narrowed = [{name: v} for name, values in widths.items() for v in values]
+        grids |= {name: (values[len(values) // 2],) for name, values in widths.items()}
     starts = tuple(
         Start(
             {
@@ -180,20 +183,24 @@ def _by_amount(
                 **texts,
             }
         )
-        for point in itertools.product(*grids)
+        for point in itertools.product(*grids.values())
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
     tried = [{p.name: v} for p in own for v in p.tries] + [dict(values) for values in effect.tries]
     asked = tuple(
-        {n: _absolute(effect.parameter(n), v, config, evidence) for n, v in values.items()}
+        {n: _absolute(effect.parameter(n), v, config, evidence, channel) for n, v in values.items()}
         for values in tried
     )
-    return Hypothesis(effect, name, amount, starts, two_sided, channel, asked)
+    return Hypothesis(effect, name, amount, starts, two_sided, channel, (*narrowed, *asked))
 
 
-def _absolute(p: Parameter, tried: float, config: JointConfig, evidence: Sequence[Evidence]) -> float:
+def _absolute(
+    p: Parameter, tried: float, config: JointConfig, evidence: Sequence[Evidence], channel: str
+) -> float:
     """A value to try in the parameter's unit."""
+    if p.role == "bend":
+        return tried / _width(evidence, channel)
     if p.role == "begin":
         return tried + min(float(e.columns["time_s"][0]) for e in evidence)
     return tried if p.scale is None else tried * p.scale(config)
@@ -207,8 +214,7 @@ def _grid(
         stood = np.concatenate([e.columns[JOINT] for e in evidence])
         return tuple(float(v) for v in np.nanquantile(stood, (0.1, 0.3, 0.5, 0.7, 0.9)))
     if p.role == "tilt":
-        width = max(float(np.nanmax(np.abs(e.columns[channel]))) for e in evidence)
-        return tuple(turn / width for turn in (-1.2, -0.4, 0.4, 1.2))
+        return tuple(turn / _width(evidence, channel) for turn in (-1.2, -0.4, 0.4, 1.2))
     if p.role == "phase":
         return (0.0, 0.5 * math.pi)
     if p.role == "instant":
@@ -230,12 +236,17 @@ def _grid(
     return (0.5 * (low + high),)
 
 
+def _width(evidence: Sequence[Evidence], channel: str) -> float:
+    """The largest reading of a channel, of either sign."""
+    return max(float(np.nanmax(np.abs(e.columns[channel]))) for e in evidence)
+
+
 def instants(evidence: Sequence[Evidence], *, between: bool) -> tuple[float, ...]:
     """Times at which an event is asked for: even over what counts, well inside of a recording, and, if `between`,
     between recordings of one session; between sessions the joint was taken apart."""
     spans = []
     for k, e in enumerate(evidence):
-        spans.append(_inside(e))
+        spans.append(inside_of(e))
         if between and k and evidence[k - 1].session == e.session:
             last = float(evidence[k - 1].columns["time_s"][-1])
             spans.append((last, float(e.columns["time_s"][0])))
@@ -248,22 +259,11 @@ def instants(evidence: Sequence[Evidence], *, between: bool) -> tuple[float, ...
     return tuple(found)
 
 
-def _inside(e: Evidence) -> tuple[float, float]:
+def inside_of(e: Evidence) -> tuple[float, float]:
     """From when to when an event in a recording has a before and an after that show it [s]."""
     time = e.columns["time_s"][e.rows[e.counted[JOINT]]] if e.counted[JOINT].any() else e.columns["time_s"]
     margin = LIMITS.edge * float(time[-1] - time[0])
     return float(time[0]) + margin, float(time[-1]) - margin
-
-
-def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
-    """Whether an event has moved to where none of several recordings shows it, beside a drive known by order of
-    magnitude: recordings differ in load and order, and such a drive may differ from one to the next in many ways."""
-    several = len(fit.problem.evidence) > 1
-    if not (h.has_instant and several and vague_drive(fit.problem.parameters)):
-        return False
-    instant = fit.values[h.key(h.instant)]
-    middle = instant + 0.5 * fit.values.get(h.key(h.duration), 0.0)
-    return not any(a <= middle <= b for a, b in map(_inside, fit.problem.evidence))
 
 
 def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
@@ -295,55 +295,3 @@ def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
 def _others(evidence: Sequence[Evidence]) -> list[str]:
     names = [n for n in evidence[0].columns if n.startswith("other_")]
     return [n for n in names if _varies(evidence, n)]
-
-
-def amount_of(fit: Fit, h: Hypothesis) -> tuple[Free, float] | None:
-    """The free parameter that is an effect's own amount, and its value; None where there is none of it."""
-    name = h.key(h.amount.name)
-    for p, x in zip(fit.problem.parameters, fit.x, strict=True):
-        if p.name == name:
-            return p, p.value(float(x))
-    return None
-
-
-def runs_away(fit: Fit, h: Hypothesis) -> bool:
-    """Whether an effect's amount lies far beyond what is plausible, for the drive as configured and as fitted, and
-    nothing holds it: it is on its bound, or the drive is known by order of magnitude only (a pulley whose centre is a
-    third of its radius off bends a short stroke to anything)."""
-    found = amount_of(fit, h)
-    if found is None:
-        return False
-    p, value = found
-    configured = abs(value) / _most(h, fit.problem.config, fit)
-    if min(configured, over_plausible(fit, h)) <= LIMITS.beyond_plausible:
-        return False
-    return vague_drive(fit.problem.parameters) or abs(value) > LIMITS.on_bound * abs(
-        p.high if value > 0.0 else p.low
-    )
-
-
-def over_plausible(fit: Fit, h: Hypothesis) -> float:
-    """An effect's amount over the largest that is plausible for the drive as fitted; 0 where it has none."""
-    found = amount_of(fit, h)
-    joint = fit.problem.joint(fit.x, fit.problem.evidence[0])
-    return 0.0 if found is None else abs(found[1]) / _most(h, joint, fit)
-
-
-def better_word(fit: Fit, h: Hypothesis) -> str:
-    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on the
-    most that is plausible; "" where none does. The least is the plain law."""
-    strict = {h.key(p.name): p.name for p in h.effect.parameters if p.reach <= 1.0}
-    low, high = fit.problem.bounds()
-    most = fit.x > high - 1e-3 * (high - low)
-    at_most = (p.base for p, there in zip(fit.problem.parameters, most, strict=True) if there)
-    return next((strict[name] for name in at_most if name in strict), "")
-
-
-def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:
-    """The largest plausible amount of an effect; a load that its channel does not see may be as large as those that it
-    does."""
-    most = max(abs(b) for b in h.amount.bounds(joint))
-    if not (h.has_phase and h.amount.unit == "N m"):
-        return most
-    loads = (np.max(np.abs(load_of(joint, e.columns))) for e in fit.problem.evidence)
-    return max(most, *(float(load) for load in loads))

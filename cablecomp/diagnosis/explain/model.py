@@ -10,7 +10,8 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, amount_of
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.plausible import amount_of
 from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS

@@ -13,9 +13,10 @@ from cablecomp.diagnosis.explain.courses import how_far
 from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import course_of
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import Model, placed
+from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.scores import (
     ScoreDifference,
     block_losses,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, in_no_recording, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import (
     Model,
@@ -28,6 +28,7 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
+from cablecomp.diagnosis.explain.plausible import in_no_recording, runs_away
 from cablecomp.diagnosis.explain.scores import (
     block_losses,
     demanded,

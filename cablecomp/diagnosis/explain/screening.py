@@ -15,8 +15,9 @@ import numpy as np
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.asked_events import best_course, best_event
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start, contribution
+from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, approach, inside

@@ -10,7 +10,7 @@ import numpy as np
 from cablecomp.diagnosis.body import spread
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, in_no_recording, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
     Model,
     Selection,
@@ -23,6 +23,7 @@ from cablecomp.diagnosis.explain.model import (
     stripped,
     without,
 )
+from cablecomp.diagnosis.explain.plausible import in_no_recording, runs_away
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.explain.ties import implausible

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word, over_plausible, runs_away
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import (
     Model,
@@ -19,6 +19,7 @@ from cablecomp.diagnosis.explain.model import (
     ranked,
     without,
 )
+from cablecomp.diagnosis.explain.plausible import better_word, over_plausible, runs_away
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.screening import ask_all, rough
 from cablecomp.diagnosis.folds import Groups

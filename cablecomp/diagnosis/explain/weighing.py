@@ -12,8 +12,9 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, better_word
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
+from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search

@@ -1,0 +1,76 @@
+"""Whether an effect, as fitted, is what it stands for: an amount that is plausible, an instant in a recording, a shape
+that is its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, inside_of
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parameter import Parameter, vague_drive
+from cablecomp.estimation.simulate import load_of
+
+
+def amount_of(fit: Fit, h: Hypothesis) -> tuple[Parameter, float] | None:
+    """The free parameter that is an effect's own amount, and its value; None where there is none of it."""
+    name = h.key(h.amount.name)
+    for p, x in zip(fit.problem.parameters, fit.x, strict=True):
+        if p.name == name:
+            return p, p.value(float(x))
+    return None
+
+
+def runs_away(fit: Fit, h: Hypothesis) -> bool:
+    """Whether an effect's amount lies far beyond what is plausible, for the drive as configured and as fitted, and
+    nothing holds it: it is on its bound, or the drive is known by order of magnitude only (a pulley whose centre is a
+    third of its radius off bends a short stroke to anything)."""
+    found = amount_of(fit, h)
+    if found is None:
+        return False
+    p, value = found
+    configured = abs(value) / _most(h, fit.problem.config, fit)
+    if min(configured, over_plausible(fit, h)) <= LIMITS.beyond_plausible:
+        return False
+    return vague_drive(fit.problem.parameters) or abs(value) > LIMITS.on_bound * abs(
+        p.high if value > 0.0 else p.low
+    )
+
+
+def over_plausible(fit: Fit, h: Hypothesis) -> float:
+    """An effect's amount over the largest that is plausible for the drive as fitted; 0 where it has none."""
+    found = amount_of(fit, h)
+    joint = fit.problem.joint(fit.x, fit.problem.evidence[0])
+    return 0.0 if found is None else abs(found[1]) / _most(h, joint, fit)
+
+
+def better_word(fit: Fit, h: Hypothesis) -> str:
+    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on the
+    most that is plausible; "" where none does. The least is the plain law."""
+    strict = {h.key(p.name): p.name for p in h.effect.parameters if p.reach <= 1.0}
+    low, high = fit.problem.bounds()
+    most = fit.x > high - 1e-3 * (high - low)
+    at_most = (p.base for p, there in zip(fit.problem.parameters, most, strict=True) if there)
+    return next((strict[name] for name in at_most if name in strict), "")
+
+
+def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
+    """Whether an event has moved to where none of several recordings shows it, beside a drive known by order of
+    magnitude: recordings differ in load and order, and such a drive may differ from one to the next in many ways."""
+    several = len(fit.problem.evidence) > 1
+    if not (h.has_instant and several and vague_drive(fit.problem.parameters)):
+        return False
+    instant = fit.values[h.key(h.instant)]
+    middle = instant + 0.5 * fit.values.get(h.key(h.duration), 0.0)
+    return not any(a <= middle <= b for a, b in map(inside_of, fit.problem.evidence))
+
+
+def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:
+    """The largest plausible amount of an effect; a load that its channel does not see may be as large as those that it
+    does."""
+    most = max(abs(b) for b in h.amount.bounds(joint))
+    if not (h.has_phase and h.amount.unit == "N m"):
+        return most
+    loads = (np.max(np.abs(load_of(joint, e.columns))) for e in fit.problem.evidence)
+    return max(most, *(float(load) for load in loads))
