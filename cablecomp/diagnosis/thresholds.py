@@ -114,6 +114,9 @@ class Thresholds:
     pulley a third of its radius off its centre bent what was left of a short stroke."""
     on_bound: float = 0.98
     """Share of the bound from which an amount is on it."""
+    near_bound: float = 0.9
+    """Share of the most that is plausible of a shape, beyond which another effect is the better word: no fit tells such
+    a shape closer (a stiffening coupling of the plant's beside a gap at 0.98 of its bound)."""
     none: float = 2e-4
     """Share of the largest plausible amount up to which an effect's amount is none, and it is not that effect that
     helps (trials seed 602: a mount that yields one way was answered by a guide without friction)."""
@@ -280,6 +283,9 @@ class Thresholds:
     rival_alone: float = 0.25
     """Share of what an effect takes off alone that such another one has to take off alone (the jaw's `L_4/13`: its path
     alone explains most by far, and in its place another friction takes up what the motor's leaves)."""
+    by_far: float = 0.25
+    """Share of what the best other effect leaves alone, below which an effect with a shape on the bound beyond which
+    another would be the better word is that word itself (`649/66`, a key on springs: 0.15)."""
     exchanges: int = 2
     """Effects of the final model in whose place such another one is put, if that model then predicts better: the search
     met them with other effects beside, or fitted them worse."""

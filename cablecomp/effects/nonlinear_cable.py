@@ -51,7 +51,7 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             maximum=0.98,
-            tries=(0.5,),
+            tries=(0.4, 0.7),
         ),
     ),
     acts_through=("load",),

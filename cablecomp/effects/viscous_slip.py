@@ -9,7 +9,9 @@ from cablecomp.effects.base import Change, Effect, Parameter
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(viscous_Ns_per_m_rad=max(values["coefficient_Ns_per_m_rad"], 0.0))
+    return Change(
+        viscous_Ns_per_m_rad=max(values["coefficient_Ns_per_m_rad"], 0.0), viscous_skew=values["drum"]
+    )
 
 
 def _unit(config: JointConfig) -> float:
@@ -23,7 +25,8 @@ EFFECT = Effect(
     statement="Where cable slides on a pulley, friction grows with slip speed, so "
     "that deflection lags the load, creeps on "
     "while the load holds, and the drive is stiffer the faster it is loaded.",
-    equation="|dT/dtheta| = mu T + c v while sliding at speed v: the stretch diffuses through the sliding zone",
+    equation="|dT/dtheta| = mu T + c v while sliding at speed v: the stretch diffuses through the sliding zone; "
+    "c (1 + s) on output drums, c (1 - s) on input drums",
     source="Snow 1993, sections 3.3 and 4.3 (observed, unexplained)",
     parameters=(
         Parameter(
@@ -35,6 +38,19 @@ EFFECT = Effect(
             "viscous coefficient",
             log=True,
             scale=_unit,
+        ),
+        Parameter(
+            "drum",
+            "-",
+            0.0,
+            -1.0,
+            1.0,
+            "s, on which drums: 1 the output's alone, -1 the input's alone",
+            role="shape",
+            omitted=0.0,
+            minimum=-1.0,
+            maximum=1.0,
+            tries=(-1.0, 1.0),
         ),
     ),
     acts_through=("dwell", "load_rate", "load_direction", "velocity"),

@@ -184,6 +184,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             play_yield=extra.play_yield_N,
             play_time=extra.play_time_s,
             viscous=extra.viscous_Ns_per_m_rad,
+            viscous_on=(1.0 + extra.viscous_skew, 1.0 - extra.viscous_skew),
             merge=config.observer.merge_tolerance,
             per_breaking=0.0 if stage.breaking_force_N is None else 1.0 / stage.breaking_force_N,
         )

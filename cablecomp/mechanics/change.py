@@ -60,6 +60,8 @@ class Change:
     play_yield_N: float = 0.0
     play_time_s: float = 0.0
     viscous_Ns_per_m_rad: float = 0.0
+    viscous_skew: float = 0.0
+    """It counts (1 + skew) times on output drums, (1 - skew) times on input drums."""
     moves_pretension: bool = False
     """Set where a term writes the pretension factors: what lies on the drums then has to follow."""
 
@@ -83,6 +85,7 @@ def together(changes: Sequence[Change]) -> Change:
         play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
         play_time_s=max((c.play_time_s for c in changes), default=0.0),
         viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
+        viscous_skew=sum(c.viscous_skew for c in changes),
         moves_pretension=any(c.moves_pretension for c in changes),
     )
 

@@ -80,6 +80,7 @@ CABLE = record(
         ("play_yield", "f8"),  # radius of that play, N
         ("play_time", "f8"),  # in which it yields, s
         ("viscous", "f8"),  # N s/m per rad
+        ("viscous_on", "f8", (2,)),  # what of that each drum has
         ("merge", "f8"),  # error of v that merging of pieces may leave
         ("per_breaking", "f8"),  # 1/breaking force, 0 where none is stated
     ]

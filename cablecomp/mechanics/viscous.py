@@ -16,6 +16,7 @@ from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
 STIFFEST = 1e3  # diffusion number per step beyond which slip is as good as quasi-static
+LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 
 
 @inner_kernel
@@ -76,7 +77,8 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
         if not again:
             new[j] = old[j]
     dt = 1e9 if context.first else context.dt
-    rate = dt * cable.EA * state.stiffness / (cable.radius[end] * cable.viscous)
+    viscous = max(cable.viscous_on[end], LEAST_SHARE) * cable.viscous
+    rate = dt * cable.EA * state.stiffness / (cable.radius[end] * viscous)
     rate = min(rate, STIFFEST * h * h)
     last = (count - 1) * h
     slope = _relax(Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate))

@@ -141,10 +141,42 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ),
             ("fraction", 0.16, 0.24),
         ),
+        (
+            "nonlinear_cable",
+            Case({"softness": 0.9, "reach": 0.7}, loads=1.7, form=":saturating"),
+            ("steady", 0.5, 0.9),
+        ),
+        (
+            "crosstalk",
+            Case({"load_coefficient": 0.1, "bend_per_unit": 0.6}, ("other_1",), form=":quadratic"),
+            ("bend_per_unit", 0.5, 0.7),
+        ),
+        (
+            "viscous_slip",
+            Case({"coefficient_Ns_per_m_rad": 4e5, "on_input": 1.0}, form=":one_drum"),
+            ("drum", -1.0, -0.7),
+        ),
+        (
+            "routing_friction",
+            Case({"mu_angle": 0.4, "arc_length_m": 0.02, "count": 3.0, "first": 0.1}, form=":several_guides"),
+            ("spread", 0.6, 1.0),
+        ),
     ],
-    ids=["stiffens", "rubber", "two gaps", "creeps", "pressed through", "patch", "unequal steps"],
+    ids=[
+        "stiffens",
+        "rubber",
+        "two gaps",
+        "creeps",
+        "pressed through",
+        "patch",
+        "unequal steps",
+        "saturates",
+        "more one way",
+        "grease on one drum",
+        "guides in a row",
+    ],
 )
-def test_couplings_and_gaps_of_other_kinds_are_named_for_what_they_are(
+def test_what_goes_by_another_law_is_named_for_what_it_is(
     effect: str, case: Case, told: tuple[str, float, float]
 ) -> None:
     """The coupling of rubber has 0.6 of 4e-3 late; gaps open at 0 and 0.15 N m; arsinh(M/0.15) has no slope by a power,

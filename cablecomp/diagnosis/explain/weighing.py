@@ -118,7 +118,7 @@ def _weighed(
     removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif stretched := better_word(final.fit, term):
+    elif (stretched := better_word(final.fit, term)) and not _alone_by_far(selection, term):
         confidence = min(confidence, LIMITS.beaten_told)
         why_not = f"`{stretched}` is on the bound beyond which another effect is the better word"
     elif little := (
@@ -155,6 +155,15 @@ def _at_bound(model: Model, term: Hypothesis) -> bool:
     names = (name.partition("@")[0].partition("~")[0] for name in model.fit.at_bound())
     found = (parameter_of(n) for n in names if n.startswith(f"effect.{term.effect.id}."))
     return any(p is not None and p.role not in NO_SIZE and not _is_share(p) for p in found)
+
+
+def _alone_by_far(selection: Selection, term: Hypothesis) -> bool:
+    """Whether any other effect, beside the calibrated drive, leaves far more of the loss on data left out: no other is
+    the better word then."""
+    first = selection.rounds[0].tried
+    leaves = [(t.term, 1.0 - t.difference.gain) for t in first if isinstance(t.term, Hypothesis)]
+    own = min((left for h, left in leaves if h.name == term.name), default=1.0)
+    return own < LIMITS.by_far * min((left for h, left in leaves if not h.same_as(term)), default=1.0)
 
 
 def _is_share(p: Parameter) -> bool:
