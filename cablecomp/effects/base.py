@@ -90,6 +90,11 @@ class Parameter:
         """Whether it says how, not how much."""
         return self.role != "amount"
 
+    @property
+    def is_share(self) -> bool:
+        """Whether it is a shape that goes from none to all."""
+        return self.shape and self.unit == "-" and (self.minimum, self.maximum) == (0.0, 1.0)
+
     def middle(self) -> float:
         """Middle of low..high (geometric where `log`)."""
         return math.sqrt(self.low * self.high) if self.log else 0.5 * (self.low + self.high)

@@ -92,6 +92,18 @@ def test_a_slip_that_still_goes_on_is_judged_by_how_fast_it_goes(lasts_s: float)
     assert bool(untold(fit, term, 0.1)) is (lasts_s < 20.0)
 
 
+def test_a_share_that_trades_with_a_slips_size_is_not_held_against_it() -> None:
+    """The joint moves by s (1 + k)/2R: what of s the other cable takes up, k, is told by the tensions alone."""
+    (size, when), term = slip(0.05, 0.1)[0].problem.parameters, slip(0.05, 0.1)[1]
+    share = Parameter("effect.clamp_slip.taken_up", 0.5, 0.0, 1.0, False)
+    told = np.array([[20.0, 0.0, 13.0], [0.0, 10.0, 0.0], [1.0, 0.0, 0.0]])
+    fit = replace(fitted((size, when, share), told), x=np.array([1.0, 40.0, 0.5]))
+    assert untold(fit, term, 0.1) == ""
+    other = replace(share, name="effect.strand_break.fraction")
+    trades = replace(fitted((size, when, other), told), x=fit.x)
+    assert "of its own deviations" in untold(trades, term, 0.1)
+
+
 def test_what_is_no_event_has_nothing_to_place() -> None:
     fit, term = slip(0.5, REACH_S)
     term.has_instant = False

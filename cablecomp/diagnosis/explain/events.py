@@ -29,14 +29,14 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
 
     Its size has to stand out of none by `LIMITS.event_size` stated deviations (noise has its best of many instants,
     too); of one that still goes on when the last recording ends, that is how fast it goes: how long it would have gone
-    on is nobody's. Where its instant may be any within reach, it has to take off `LIMITS.event_anywhere` of the
-    calibrated drive's mean square (`removes`)."""
+    on is nobody's; nor is a share that trades with it (of a slip that the other cable takes up). Where its instant may
+    be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated drive's mean square, `removes`."""
     found = amount_of(fit, term)
     loosely = any(p.vague and not p.of_effect for p in fit.problem.parameters)
     if not term.has_instant or found is None or loosely:
         return ""
     amount, value = found
-    sd = np.sqrt(np.maximum(np.diag(covariance(_as_fast(fit, term))), 0.0))
+    sd = np.sqrt(np.maximum(np.diag(covariance(_held(fit, term))), 0.0))
     place = {p.name: k for k, p in enumerate(fit.problem.parameters)}
     k = place[amount.name]
     own = LIMITS.wider * float(sd[k]) * abs(amount.slope(float(fit.x[k])))
@@ -51,12 +51,13 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     return f"these data do not tell when it happened, and it takes off {removes:.0%} alone"
 
 
-def _as_fast(fit: Fit, term: Hypothesis) -> Fit:
-    """The fit with the event's duration as it is, where it lasts beyond the last sample."""
+def _held(fit: Fit, term: Hypothesis) -> Fit:
+    """The fit with the event's shares as they are, and its duration where it lasts beyond the last sample."""
     course = course_of(fit, term)
     last_s = max(float(e.columns["time_s"][-1]) for e in fit.problem.evidence)
-    if course.instant_s + course.duration_s <= last_s:
-        return fit
+    held = {term.key(p.name) for p in term.effect.parameters if p.is_share}
+    if course.instant_s + course.duration_s > last_s:
+        held.add(term.key(term.duration))
     J = fit.J.copy()
-    J[:, [p.name == term.key(term.duration) for p in fit.problem.parameters]] = 0.0
+    J[:, [p.name in held for p in fit.problem.parameters]] = 0.0
     return replace(fit, J=J)

@@ -22,7 +22,6 @@ from cablecomp.diagnosis.explain.usual import lost_in_usual
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.effects import Parameter
 from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
@@ -154,7 +153,7 @@ def _at_bound(model: Model, term: Hypothesis) -> bool:
     none does, that all of a slip is taken up, or that an event begins or ends with what was recorded."""
     names = (name.partition("@")[0].partition("~")[0] for name in model.fit.at_bound())
     found = (parameter_of(n) for n in names if n.startswith(f"effect.{term.effect.id}."))
-    return any(p is not None and p.role not in NO_SIZE and not _is_share(p) for p in found)
+    return any(p is not None and p.role not in NO_SIZE and not p.is_share for p in found)
 
 
 def _alone_by_far(selection: Selection, term: Hypothesis) -> bool:
@@ -164,11 +163,6 @@ def _alone_by_far(selection: Selection, term: Hypothesis) -> bool:
     leaves = [(t.term, 1.0 - t.difference.gain) for t in first if isinstance(t.term, Hypothesis)]
     own = min((left for h, left in leaves if h.name == term.name), default=1.0)
     return own < LIMITS.by_far * min((left for h, left in leaves if not h.same_as(term)), default=1.0)
-
-
-def _is_share(p: Parameter) -> bool:
-    """Whether a shape goes from none to all."""
-    return p.shape and p.unit == "-" and (p.minimum, p.maximum) == (0.0, 1.0)
 
 
 def _selected(selection: Selection, term: Hypothesis) -> float:
