@@ -203,6 +203,11 @@ def _bent_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"bend_per_unit": bend}, {"load_coefficient": sign(rng)}, _cross(scene), 0.3)
 
 
+def _touching_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
+    slack = float(rng.uniform(0.2, 0.6)) * _most(scene)
+    return Shape({"slack_units": slack}, {"load_coefficient": sign(rng)}, 1.5 * _cross(scene), 0.6)
+
+
 def _posed_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"phase_rad": angle(rng)}, {"load_coefficient": sign(rng)}, 1.5 * _cross(scene), 0.6)
 
@@ -236,5 +241,6 @@ JOINT = (
     Suspect("gravity_load:tilting_base", TURNING, _tilting, neighbour=True),
     Suspect("crosstalk:lagged", ANY, _late_neighbour, neighbour=True),
     Suspect("crosstalk:quadratic", ANY, _bent_neighbour, neighbour=True),
+    Suspect("crosstalk:touching", ANY, _touching_neighbour, neighbour=True),
     Suspect("crosstalk:posed", TURNING, _posed_neighbour, neighbour=True),
 )

@@ -28,12 +28,14 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
-    "crosstalk:posed", "position_dependent_friction:input_drum", "position_dependent_friction:patch",
+    "crosstalk:posed", "crosstalk:quadratic",
+    "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "pressure_dependent_friction:worn_through", "routing_friction:unlike_paths",
     "series_compliance:bushing", "series_compliance:one_way", "series_compliance:rubber",
     "strand_break:fraying", "strand_break:in_steps", "strand_break:other_cable",
     "strand_friction:rate_dependent", "termination_backlash:dragging_link",
     "termination_backlash:greased", "termination_backlash:sprung", "thermal_pretension:lagged",
+    "viscous_slip:one_drum",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's. (A base that tilts it
 knows by a channel in rad alone, and the trials' has no unit.)"""

@@ -79,6 +79,7 @@ SIZES = {
     "strand_break:other_cable": {"fraction": 0.3, "time_s": 1.0},
     "crosstalk:lagged": {"load_coefficient": 0.3},
     "crosstalk:quadratic": {"load_coefficient": 0.3, "bend_per_unit": 0.5},
+    "crosstalk:touching": {"load_coefficient": 0.3, "slack_units": 0.2},
     "crosstalk:posed": {"load_coefficient": 0.3},
     "motor_friction:lugre": {"torque_Nm": 0.02, "viscous_Nms_per_rad": 0.01},
     "motor_friction:gear": {"torque_Nm": 0.02, "share": 0.1},

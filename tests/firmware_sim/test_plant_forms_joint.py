@@ -275,6 +275,10 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
             {"load_coefficient": 0.3, "bend_per_unit": -0.5},
             0.3 * OTHER * (1 - 0.5 * OTHER),
         ),
+        "crosstalk:touching": (
+            {"load_coefficient": 0.3, "slack_units": 0.4},
+            0.3 * np.sign(OTHER) * np.maximum(np.abs(OTHER) - 0.4, 0.0),
+        ),
         "crosstalk:posed": ({"load_coefficient": 0.3, "phase_rad": 0.4}, 0.3 * OTHER * np.cos(pose + 0.4)),
     }
     for name, (parameters, expected) in cases.items():

@@ -1,4 +1,4 @@
-"""A neighbour's load in other forms: late, bent, and by the pose of this joint."""
+"""A neighbour's load in other forms: late, bent, beyond a slack, and by the pose of this joint."""
 
 from __future__ import annotations
 
@@ -57,6 +57,24 @@ QUADRATIC = form(
 )
 
 
+def _touching(build: Build, p: Mapping[str, float]) -> None:
+    def moment(inputs: Floats) -> Floats:
+        other, slack = inputs[:, OTHER], p["slack_units"]
+        return np.asarray(p["load_coefficient"] * (other - np.clip(other, -slack, slack)))
+
+    _loading(build, moment)
+
+
+TOUCHING = form(
+    "crosstalk",
+    "touching",
+    "The neighbour's cable touches this joint's beyond a slack alone: M + k (other_1 − clip(other_1, −d, d)).",
+    (_GAIN, Parameter("slack_units", "d", 0.0, 0.0)),
+    ("other:1",),
+    _touching,
+)
+
+
 def _posed(build: Build, p: Mapping[str, float]) -> None:
     ratio = build.config.ratio
 
@@ -76,4 +94,4 @@ POSED = form(
     _posed,
 )
 
-KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, POSED)
+KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TOUCHING, POSED)
