@@ -92,8 +92,8 @@ class Parameter:
 
     @property
     def is_share(self) -> bool:
-        """Whether it is a shape that goes from none to all."""
-        return self.shape and self.unit == "-" and (self.minimum, self.maximum) == (0.0, 1.0)
+        """Whether it is a shape that says what part of something, from none to all."""
+        return self.shape and self.unit == "-" and self.minimum >= 0.0 and self.maximum <= 1.0
 
     def middle(self) -> float:
         """Middle of low..high (geometric where `log`)."""

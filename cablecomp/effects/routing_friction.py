@@ -75,7 +75,7 @@ EFFECT = Effect(
             role="shape",
             omitted=0.5,
             minimum=0.0,
-            maximum=1.0,
+            maximum=0.98,
             tries=(0.15, 0.85),
         ),
         Parameter(
@@ -88,7 +88,7 @@ EFFECT = Effect(
             role="shape",
             omitted=0.0,
             minimum=0.0,
-            maximum=1.0,
+            maximum=0.98,
             tries=(0.5,),
         ),
     ),
