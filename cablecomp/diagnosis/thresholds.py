@@ -276,7 +276,8 @@ class Thresholds:
     machine has forms of its own, and a little of it fits any law (trials seeds 620 to 633, 911 names: below it 7 of 13
     were wrong, above it 115 of 898; and late channels in pieces of the jaw's `L_4` in which nothing was concealed)."""
     little_told: float = 0.45
-    """Confidence at most in one that takes off less (6 of these 13 were right)."""
+    """Confidence at most in one that takes off less (6 of these 13 were right), and in one that was put in another's
+    place and that data left out do not demand as they would of a further one."""
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""

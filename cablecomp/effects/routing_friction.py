@@ -77,6 +77,7 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=0.98,
             tries=(0.15, 0.85),
+            of_known_drive=True,  # of the jaw two of them took the place of what another posture needs
         ),
         Parameter(
             "spread",
@@ -90,6 +91,7 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=0.98,
             tries=(0.5,),
+            of_known_drive=True,
         ),
     ),
     acts_through=("reversal", "load_direction", "velocity", "load"),

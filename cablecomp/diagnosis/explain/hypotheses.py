@@ -187,7 +187,9 @@ def _by_amount(
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
-    tried = [{p.name: v} for p in own for v in p.tries] + [dict(values) for values in effect.tries]
+    vague = vague_drive(of_drive(config))
+    asked_for = [p for p in own if not (p.of_known_drive and vague)]
+    tried = [{p.name: v} for p in asked_for for v in p.tries] + [dict(values) for values in effect.tries]
     asked = tuple(
         {n: _absolute(effect.parameter(n), v, config, evidence, channel) for n, v in values.items()}
         for values in tried

@@ -16,7 +16,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.rivals import Rivals, rivals
-from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
+from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.usual import lost_in_usual
 from cablecomp.diagnosis.folds import Groups
@@ -124,6 +124,9 @@ def _weighed(
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
+    elif term.name in found.put_in and not demanded(own):
+        confidence = min(confidence, LIMITS.little_told)
+        why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
     better = None
     beaten_by = _beaten(selection, term, against)
     if beaten_by:
