@@ -147,8 +147,14 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
     if effect.texts:
         others = (n for n in _others(evidence) if n.endswith(effect.channel_ends))
         channels += [n for n in others if n not in config.condition.values()]
-    if not loaded(config, evidence):
-        effect = replace(effect, parameters=tuple(p for p in effect.parameters if not p.of_load))
+    told = loaded(config, evidence)
+    vague = vague_drive(of_drive(config))
+    effect = replace(
+        effect,
+        parameters=tuple(
+            p for p in effect.parameters if (told or not p.of_load) and not (vague and p.of_known_drive)
+        ),
+    )
     amounts = [p for p in effect.parameters if not p.shape and not p.held]
     return [_by_amount(effect, p, c, config, evidence) for p in amounts for c in channels]
 
@@ -187,9 +193,7 @@ def _by_amount(
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
-    vague = vague_drive(of_drive(config))
-    asked_for = [p for p in own if not (p.of_known_drive and vague)]
-    tried = [{p.name: v} for p in asked_for for v in p.tries] + [dict(values) for values in effect.tries]
+    tried = [{p.name: v} for p in own for v in p.tries] + [dict(values) for values in effect.tries]
     asked = tuple(
         {n: _absolute(effect.parameter(n), v, config, evidence, channel) for n, v in values.items()}
         for values in tried
