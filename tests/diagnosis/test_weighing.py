@@ -6,12 +6,14 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from turning import JOINT, recorded
 
 from cablecomp.diagnosis.answer import entries
+from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain import weighing
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, _too_little
+from cablecomp.diagnosis.explain.weighing import _against, _alone_by_far, _at_bound, _follows, _too_little
 
 
 @pytest.mark.parametrize(
@@ -119,3 +121,26 @@ def test_an_effect_in_whose_place_another_predicts_better_is_beaten_by_it(
     term = cast(Hypothesis, SimpleNamespace(name="a"))
     differences = {name: ScoreDifference(gain, 10.0 * gain, 0.0) for name, gain in scores.items()}
     assert weighing._beaten(cast(Any, None), term, differences) == by
+
+
+@pytest.mark.parametrize(
+    ("gap", "coupling", "by_far"), [(0.92, 0.47, True), (0.95, 0.97, False), (0.6, 0.5, False)]
+)
+def test_what_alone_explains_by_far_the_most_is_its_own_word(
+    gap: float, coupling: float, by_far: bool
+) -> None:
+    """Shares of the loss that a gap and a coupling take off alone; what is asked of one effect by two
+    amounts is one."""
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    gains = {
+        "termination_backlash": gap,
+        "series_compliance": coupling,
+        "series_compliance:late_rad_per_Nm": 0.3,
+    }
+    tried = [
+        SimpleNamespace(term=asked[name], difference=ScoreDifference(gain, 5.0, 5.0))
+        for name, gain in gains.items()
+    ]
+    selection: Any = SimpleNamespace(rounds=[SimpleNamespace(tried=tried)])
+    assert _alone_by_far(selection, asked["termination_backlash"]) is by_far
+    assert not _alone_by_far(selection, asked["series_compliance:late_rad_per_Nm"])
