@@ -152,12 +152,9 @@ class Thresholds:
     over that of the best without it, after a linear step (not of an event) and after a rough fit, above which it does
     without it."""
     instants: int = 24
-    """Instants of an event over all recordings: what an event promises is looked at no closer to another than half of
-    the time from one to the next."""
-    instants_run: int = 4
-    """Instants at which an event is then run, best first by what it promises from each on."""
+    """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
     course_instants: int = 160
-    """Instants at which, and between which, an event is looked for, by what it does from each of them on."""
+    """Instants between which an event that takes its time is looked for, by what it does from each of them on."""
     briefest: float = 0.03
     """Duration of the shortest such course over the span of the recordings; below it the event is at once."""
     durations: int = 16
