@@ -136,7 +136,7 @@ def _stiff_sums(x: Floats, weights: Floats, b: float, v1: float, d: float) -> tu
     total = slope = 0.0
     for j in range(len(x)):
         tau = math.exp(v1 + d * x[j])
-        e, de = stiffening_strain(b, 0.0, tau)
+        e, de = stiffening_strain(b, tau)
         total += weights[j] * e
         slope += weights[j] * de * tau
     return total, slope

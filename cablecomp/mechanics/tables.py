@@ -225,21 +225,27 @@ def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
         return tau - 1.0, 1.0
     if laws[0, HEAD, MODE] == PLAIN:
         return tau - 1.0, 1.0
-    return stiffening_strain(laws[law, HEAD, STIFFENING], laws[law, HEAD, STEADY], tau)
+    return _strain_in_part(laws, law, tau)
 
 
 @inner_kernel
-def stiffening_strain(b: float, steady: float, tau: float) -> tuple[float, float]:
-    """The same for the stiffening coefficient b and the share w of the compliance at T0 that is steady."""
+def _strain_in_part(laws: Floats, law: int, tau: float) -> tuple[float, float]:
+    """The same of a cable part of whose compliance is steady."""
+    e, de = stiffening_strain(laws[law, HEAD, STIFFENING], tau)
+    steady = laws[law, HEAD, STEADY]
+    return steady * (tau - 1.0) + (1.0 - steady) * e, steady + (1.0 - steady) * de
+
+
+@inner_kernel
+def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
+    """The same for the stiffening coefficient b, of a cable all of which stiffens."""
     if b == 0.0:
         return tau - 1.0, 1.0
-    rest = 1.0 - steady
     stiffness = 1.0 + b * (tau - 1.0)
     if stiffness < LEAST_STIFFNESS:  # the law makes no sense beyond; stay finite and monotone
         edge = (LEAST_STIFFNESS - 1.0) / b
-        yields = math.log(LEAST_STIFFNESS) / b + (tau - 1.0 - edge) / LEAST_STIFFNESS
-        return steady * (tau - 1.0) + rest * yields, steady + rest / LEAST_STIFFNESS
-    return steady * (tau - 1.0) + rest * math.log1p(b * (tau - 1.0)) / b, steady + rest / stiffness
+        return math.log(LEAST_STIFFNESS) / b + (tau - 1.0 - edge) / LEAST_STIFFNESS, 1.0 / LEAST_STIFFNESS
+    return math.log1p(b * (tau - 1.0)) / b, 1.0 / stiffness
 
 
 @inner_kernel
@@ -247,5 +253,5 @@ def strain(laws: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
     u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)
     tau = math.exp(u)
-    e, de = stiffening_strain(laws[law, HEAD, STIFFENING], laws[law, HEAD, STEADY], tau)
+    e, de = _strain_in_part(laws, law, tau)
     return e, de * tau * du

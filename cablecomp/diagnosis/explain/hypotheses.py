@@ -132,11 +132,13 @@ class Hypothesis:
 def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
     """All effects that the configuration does not hold yet and that these recordings could show."""
     held = {entry.id for entry in config.effect}
+    told, vague = loaded(config, evidence), vague_drive(of_drive(config))
     found = []
     for effect in catalogue().values():
         if effect.id in held:
             continue
-        found += _of_effect(effect, config, evidence)
+        asked = (p for p in effect.parameters if (told or not p.of_load) and not (vague and p.of_known_drive))
+        found += _of_effect(replace(effect, parameters=tuple(asked)), config, evidence)
     return found
 
 
@@ -147,14 +149,6 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
     if effect.texts:
         others = (n for n in _others(evidence) if n.endswith(effect.channel_ends))
         channels += [n for n in others if n not in config.condition.values()]
-    told = loaded(config, evidence)
-    vague = vague_drive(of_drive(config))
-    effect = replace(
-        effect,
-        parameters=tuple(
-            p for p in effect.parameters if (told or not p.of_load) and not (vague and p.of_known_drive)
-        ),
-    )
     amounts = [p for p in effect.parameters if not p.shape and not p.held]
     return [_by_amount(effect, p, c, config, evidence) for p in amounts for c in channels]
 
@@ -175,10 +169,9 @@ def _by_amount(
     two_sided = not amount.log and low < 0.0
     texts: dict[str, float | str] = {effect.texts[0]: channel} if channel else {}
     grids = {p.name: _grid(p, config, evidence, channel) for p in shapes}
-    narrowed: list[dict[str, float]] = []
+    widths: dict[str, tuple[float, ...]] = {}
     if any(p.role == "place" for p in shapes):  # first where, by a usual width; then how wide
         widths = {p.name: grids[p.name] for p in shapes if p.role != "place"}
-        narrowed = [{name: v} for name, values in widths.items() for v in values]
         grids |= {name: (values[len(values) // 2],) for name, values in widths.items()}
     starts = tuple(
         Start(
@@ -198,7 +191,8 @@ def _by_amount(
         {n: _absolute(effect.parameter(n), v, config, evidence, channel) for n, v in values.items()}
         for values in tried
     )
-    return Hypothesis(effect, name, amount, starts, two_sided, channel, (*narrowed, *asked))
+    other = ({n: v} for n, values in widths.items() for v in values if v not in grids[n])
+    return Hypothesis(effect, name, amount, starts, two_sided, channel, (*other, *asked))
 
 
 def _absolute(
