@@ -91,6 +91,7 @@ def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
             minimum=0.0,
             maximum=0.1,
             omitted=0.0,
+            of_known_drive=True,
         ),
         Parameter(
             f"holds{key}_N",
@@ -105,6 +106,7 @@ def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
             minimum=0.0,
             omitted=math.nan,
             of=rate,
+            of_known_drive=True,
         ),
     )
 

@@ -106,6 +106,7 @@ EFFECT = Effect(
             minimum=-0.95,
             maximum=20.0,
             omitted=0.0,
+            of_known_drive=True,
         ),
         Parameter(
             "place_rad",
@@ -117,6 +118,7 @@ EFFECT = Effect(
             role="place",
             omitted=0.0,
             of="patch",
+            of_known_drive=True,
         ),
         Parameter(
             "width_rad",
@@ -130,6 +132,7 @@ EFFECT = Effect(
             omitted=0.3,
             minimum=0.05,
             of="patch",
+            of_known_drive=True,
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

@@ -63,6 +63,7 @@ EFFECT = Effect(
             minimum=-3.0,
             maximum=0.95,
             omitted=0.0,
+            of_known_drive=True,
         ),
         Parameter(
             "place",
@@ -77,6 +78,7 @@ EFFECT = Effect(
             maximum=20.0,
             omitted=NEUTRAL_PLACE,
             of="lost",
+            of_known_drive=True,
         ),
     ),
     acts_through=("load", "load_direction", "reversal"),

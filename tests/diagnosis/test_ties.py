@@ -43,6 +43,18 @@ def test_no_second_effect_is_taken_for_being_plausible() -> None:
     assert ties._plausible_first(models, GROUPS)[0].name == "absurd"
 
 
+@pytest.mark.parametrize(
+    ("more", "parameters", "first"), [(0.25, 2, "sure"), (0.25, 3, "chance"), (0.7, 2, "chance")]
+)
+def test_what_resampled_data_choose_goes_before_what_ends_a_little_lower(
+    more: float, parameters: int, first: str
+) -> None:
+    """It leaves 3 % more, with as many parameters or one more, or a quarter more."""
+    models = [model(0.0, "chance"), model(more, "sure", parameters=parameters)]
+    shares = {frozenset({"chance"}): 0.2, frozenset({"sure"}): 0.7}
+    assert ties.in_order(models, GROUPS, shares)[0].name == first
+
+
 def rounds(*alone: tuple[str, float]) -> list[Round]:
     """A first round in which these effects were tried, each the best in so many resampled data."""
     large = ScoreDifference(0.9, 20.0, 10.0)

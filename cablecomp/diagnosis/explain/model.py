@@ -41,6 +41,11 @@ class Model:
         """Names of what was added, joined."""
         return " + ".join(t.name for t in self.terms) or "calibrated drive"
 
+    @property
+    def added(self) -> frozenset[str]:
+        """Names of what was added, in whatever order."""
+        return frozenset(t.name for t in self.terms)
+
 
 @dataclass(frozen=True)
 class Tried:
@@ -79,7 +84,7 @@ def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:
         return []
     size = common(models, groups)
     for m in sorted(models, key=lambda m: loss(m, size, groups)):
-        found.setdefault(frozenset(t.name for t in m.terms), m)
+        found.setdefault(m.added, m)
     return list(found.values())
 
 

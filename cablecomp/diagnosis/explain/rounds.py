@@ -270,11 +270,10 @@ def _further(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
     own, and an earlier model that has this one may have found it; what that model lacks begins at a part of its
     amount."""
     model, cold = at.model, at.cold
-    names = {t.name for t in model.terms}
-    having = [m for m in at.known if any(t.name == h.name for t in m.terms) and len(m.terms) <= len(names)]
+    having = [m for m in at.known if h.name in m.added and len(m.terms) <= len(model.terms)]
     if not having:
-        return [cold] if cold is not None and names else []
-    best = max(having, key=lambda m: len(names & {t.name for t in m.terms}))
+        return [cold] if cold is not None and model.terms else []
+    best = max(having, key=lambda m: len(model.added & m.added))
     values = dict(best.fit.values)
     amounts = {t.key(t.amount.name) for t in model.terms if isinstance(t, Hypothesis)}
     for name, value in model.fit.values.items():

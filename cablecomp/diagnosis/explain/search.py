@@ -98,7 +98,7 @@ def exchanged(found: Search, model: Model, drive: Calibrated) -> Search | None:
     about = _settled(model.terms, model.fit, drive, groups)
     whole = before is found.final
     final = about if whole else _about_all(about, drive, found.groups)
-    put_in = found.put_in | ({t.name for t in model.terms} - {t.name for t in before.terms})
+    put_in = found.put_in | (model.added - before.added)
     return replace(found, final=final, selection=replace(found.selection, final=about), put_in=put_in)
 
 

@@ -113,7 +113,8 @@ def _carried(
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
     if not carried:
         return None
-    return in_order(carried, groups), sharper
+    shares = {t.model.added: t.selected_in for t in sorted(tried, key=lambda t: t.selected_in)}
+    return in_order(carried, groups, shares), sharper
 
 
 def _reigning(
@@ -143,7 +144,7 @@ def _dethrones(model: Model, best: Model, baseline: Model, groups: Groups) -> bo
     left = loss(best, size, groups)
     gone = left - loss(model, size, groups)
     taken_off = loss(baseline, size, groups) - left
-    given_up = {t.name for t in best.terms} - {t.name for t in model.terms}
+    given_up = best.added - model.added
     part = len(given_up) / max(len(best.terms), 1)
     return gone > min(LIMITS.dethrone * taken_off, LIMITS.dethrone_left * part * left)
 

@@ -28,9 +28,26 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import solve
 
 
-def in_order(models: list[Model], groups: Groups) -> list[Model]:
-    """Models, best first, in the order in which a search takes them."""
-    return _plausible_first(_mounted_anew_first(simplest_first(models, groups), groups), groups)
+def in_order(models: list[Model], groups: Groups, selected_in: Mapping[frozenset[str], float]) -> list[Model]:
+    """Models, best first, in the order in which a search takes them; `selected_in`: share of resampled data in which
+    what each has added was the best of its round."""
+    surest = _surest_first(models, groups, selected_in)
+    return _plausible_first(_mounted_anew_first(simplest_first(surest, groups), groups), groups)
+
+
+def _surest_first(
+    models: list[Model], groups: Groups, selected_in: Mapping[frozenset[str], float]
+) -> list[Model]:
+    """Models, best first, but one that more resampled data choose, with no more parameters, before one that ends a
+    little lower: which of two does hangs on the weights that both are fitted with."""
+    size, best = common(models, groups), models[0]
+    most = (1.0 + LIMITS.close_call) * loss(best, size, groups)
+    parameters = len(best.fit.problem.parameters)
+    near = [
+        m for m in models if loss(m, size, groups) <= most and len(m.fit.problem.parameters) <= parameters
+    ]
+    first = max(near, key=lambda m: selected_in.get(m.added, 0.0))
+    return [first, *(m for m in models if m is not first)]
 
 
 def simplest_first(models: list[Model], groups: Groups) -> list[Model]:
@@ -123,7 +140,7 @@ def _of_one_effect(term: Term, other: Hypothesis) -> bool:
 
 def keeps(model: Model, before: Model) -> bool:
     """Whether a model has all that was added to an earlier one."""
-    return {t.name for t in before.terms} <= {t.name for t in model.terms}
+    return before.added <= model.added
 
 
 def worth_its_terms(model: Model, than: Model, groups: Groups) -> bool:
