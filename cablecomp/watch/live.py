@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from math import sqrt
+from math import hypot, sqrt
 from pathlib import Path
 from typing import Final
 
@@ -29,7 +29,8 @@ from cablecomp.watch.ring import Ring, locate_in_ring
 from cablecomp.watch.sequential import Alarm, WatchConfig, start, step
 
 FLOORS: Final = 3.0
-"""Noise floors that the residual may have from the start; a friction model fed with noisy signals shows up to 1.5."""
+"""Noise floors that the residual may have from the start, or times what the joint is known to leave: a friction model
+fed with noisy signals shows up to 1.5."""
 _MEASURED: Final = (
     "time_s",
     "motor_position_rad",
@@ -78,6 +79,7 @@ class LiveWatch:
         self._folder = folder
         self._offset = config.sensors.joint_position_offset_rad
         self._floor = _stated_floor(config)
+        self._known_rad = config.remainder.joint_position_rad or 0.0
         self._channels = (*_MEASURED, *other_channels(config))
         capacity = max(400, round(self.options.keep_s / period_s))
         self._ring = Ring((*self._channels, "load_Nm", "residual_rad"), capacity)
@@ -173,14 +175,14 @@ class LiveWatch:
         return self._from_the_start(float(block[-1, 0]))
 
     def _from_the_start(self, now_s: float) -> Alarm | None:
-        """Once learning is over: what is usual may be far from noise itself."""
+        """Once learning is over: what is usual may be far from noise, and from what the joint is known to leave."""
         usual = self._state.usual
         if usual is None or not self._first:
             return None
         self._first = False
         rms = sqrt(usual.rms**2 + usual.mean**2)
         columns = self._ring.columns()
-        floor = max(self._floor, channel_noise(columns["time_s"], columns["residual_rad"]).sigma)
+        floor = hypot(self._noise(columns), self._known_rad)
         if rms <= FLOORS * floor:
             return None
         since = now_s - self.options.learning_s
@@ -213,8 +215,7 @@ class LiveWatch:
         ring = Ring(tuple(asked), max(2, len(columns["time_s"])))
         ring.extend(np.column_stack(list(asked.values())))
         try:
-            floor = max(self._floor, channel_noise(columns["time_s"], columns["residual_rad"]).sigma)
-            found = locate_in_ring(ring, floor, np.random.default_rng(0))
+            found = locate_in_ring(ring, self._noise(columns), np.random.default_rng(0))
         except InputError as error:
             return None, f"not yet ({error})"
         first = found.significant()[:1]
@@ -222,6 +223,9 @@ class LiveWatch:
             return found, "nowhere in particular"
         m = first[0]
         return found, f"{m.covariate} (share {m.share:.2f}, p = {m.p_value:.3g}): {m.how}"
+
+    def _noise(self, columns: Mapping[str, FloatArray]) -> float:
+        return max(self._floor, channel_noise(columns["time_s"], columns["residual_rad"]).sigma)
 
 
 def _stated_floor(config: JointConfig) -> float:
@@ -232,7 +236,7 @@ def _stated_floor(config: JointConfig) -> float:
 def _words(alarm: Alarm) -> str:
     size = 1e3 * alarm.size_rad
     if alarm.kind == "from the start":
-        return f"residual {abs(size):.3g} mrad RMS since the start, {alarm.log_evidence:.1f} times its noise floor"
+        return f"residual {abs(size):.3g} mrad RMS since the start, {alarm.log_evidence:.1f} times what is expected"
     usual = f"usual RMS {1e3 * alarm.usual_rad:.3g} mrad"
     if alarm.kind == "wider":
         return f"residual spreads to {size:.3g} mrad since {alarm.since_s:.3f} s ({usual})"
