@@ -35,8 +35,10 @@ class Thresholds:
     folds: int = 6
     """Folds that the blocks of few recordings are dealt to in turn: each leaves out a sixth, all over the recording."""
     refits: int = 4
-    """Parts left out in turn where each is a fit done again: a drive known by order of magnitude, whose linear steps
-    tell nothing."""
+    """Parts of blocks left out in turn where each is a fit done again: a drive known by order of magnitude, whose
+    linear steps tell nothing. Recordings, up to `searched`, are left out one by one (jaw's pitches, four recordings
+    each: with two of a session left out, so was what tells its pretension, and of the laws at -60 degrees left out a
+    coupling and friction by pressure stood for motor, jaw and stiffening)."""
     crossfit: int = 5
     """Folds that blocks are dealt to in turn where a residual is regressed on a covariate."""
     parts: int = 5

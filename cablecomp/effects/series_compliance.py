@@ -123,6 +123,7 @@ EFFECT = Effect(
             scale=wrap_compliance,
             minimum=0.0,
             omitted=0.0,
+            of_known_drive=True,
         ),
         Parameter(
             "lag_s",
@@ -136,6 +137,7 @@ EFFECT = Effect(
             omitted=0.3,
             minimum=1e-6,
             of="late_rad_per_Nm",
+            of_known_drive=True,
         ),
         Parameter(
             "decades",
@@ -150,6 +152,7 @@ EFFECT = Effect(
             maximum=6.0,
             tries=(2.0,),
             of="late_rad_per_Nm",
+            of_known_drive=True,
         ),
     ),
     acts_through=("load", "load_rate"),

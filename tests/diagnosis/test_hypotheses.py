@@ -107,6 +107,7 @@ def test_beside_a_drive_known_by_order_of_magnitude_laws_are_asked_for_plainly()
         "clamp_slip:creep_l_m_per_Ns",
         "position_dependent_friction:patch",
         "pressure_dependent_friction:lost",
+        "series_compliance:late_rad_per_Nm",
     }
     assert {k for values in vague["routing_friction"].further for k in values} == {"skew"}
     assert {k for values in known["routing_friction"].further for k in values} == {"skew", "place", "spread"}

@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 from linear_fit import Linear
 
+from cablecomp.diagnosis.explain import scores
 from cablecomp.diagnosis.explain.scores import (
     huber,
     left_out,
+    left_out_exactly,
     model_confidence_set,
     score_difference,
     selected_in,
 )
 from cablecomp.diagnosis.folds import Groups
+from cablecomp.estimation.evidence import BoolArray
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.signal.smoothing import FloatArray
 
@@ -49,6 +52,33 @@ def test_leaving_a_fold_out_is_fitting_without_it() -> None:
         out = g.fold == fold
         without = linear(y[~out], A[~out], 1.5)
         np.testing.assert_allclose(found[out], y[out] - A[out] @ without.x, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("by", "folds", "parts"), [("recording", 5, 5), ("recording", 12, 9), ("block", 6, 4)]
+)
+def test_of_a_drive_known_by_order_of_magnitude_recordings_are_left_out_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, by: str, folds: int, parts: int
+) -> None:
+    """The last one, which alone shows its session, stays in; of more than a search looks at, some go together."""
+    fold = np.repeat(np.arange(folds + 1), ROWS)
+    fold[fold == folds] = -1
+    g = Groups(np.arange(len(fold)), fold, by, np.zeros_like(fold))
+    left: list[tuple[int, ...]] = []
+
+    def without(problem: object, out: BoolArray) -> list[object]:
+        left.append(tuple(np.unique(fold[out]).tolist()))
+        return []
+
+    monkeypatch.setattr(scores, "_kept", without)
+    monkeypatch.setattr(scores, "fitted_to_part", lambda fit, part, evaluations: fit)
+    ones = np.ones(len(fold))
+    problem = SimpleNamespace(followed=lambda x: 2.0 * ones)
+    fit = SimpleNamespace(residual=ones, problem=problem, x=np.empty(0))
+    found = left_out_exactly(fit, g)  # type: ignore[arg-type]  # a stand-in for a fit
+    assert len(left) == parts
+    assert sorted(f for some in left for f in some) == list(range(folds))
+    np.testing.assert_array_equal(found, np.where(fold >= 0, 2.0, 1.0))
 
 
 def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:

@@ -65,12 +65,16 @@ def left_out_linearly(residual: FloatArray, J: FloatArray, groups: Groups) -> Fl
 
 
 def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArray:
-    """As `left_out`, each of a few parts really left out and the rest fitted again: for drives known by order
-    of magnitude only, whose parameters trade places along bent valleys that no linear step follows."""
+    """As `left_out`, each part really left out and the rest fitted again: for drives known by order of magnitude only,
+    whose parameters trade places along bent valleys that no linear step follows. A part is some of the blocks, or a
+    recording where there are no more of them than a search looks at."""
     n = len(groups.fold)
     r = fit.residual[:n].copy()
-    for k in range(min(LIMITS.refits, groups.folds)):
-        out = (groups.fold >= 0) & (groups.fold % LIMITS.refits == k)
+    parts = min(groups.folds, LIMITS.searched if groups.by == "recording" else LIMITS.refits)
+    for k in range(parts):
+        out = (groups.fold >= 0) & (groups.fold % parts == k)
+        if not out.any():
+            continue
         try:
             again = fitted_to_part(fit, _kept(fit.problem, out), evaluations)
         except InputError:
