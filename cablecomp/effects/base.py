@@ -65,7 +65,7 @@ class Parameter:
     that it leaves out at first (a begin's count from the first of all samples, a bend's are over the channel's largest
     reading, others' are in units of `scale(config)`); of an event's course it asks by itself. `reach`: times by which a
     fit of a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
-    `of_known_drive`: beside a drive known by order of magnitude it is not asked for.
+    `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
     """
 
     name: str

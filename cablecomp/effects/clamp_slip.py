@@ -106,7 +106,6 @@ def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
             minimum=0.0,
             omitted=math.nan,
             of=rate,
-            of_known_drive=True,
         ),
     )
 

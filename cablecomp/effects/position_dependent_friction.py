@@ -118,7 +118,6 @@ EFFECT = Effect(
             role="place",
             omitted=0.0,
             of="patch",
-            of_known_drive=True,
         ),
         Parameter(
             "width_rad",
@@ -132,7 +131,6 @@ EFFECT = Effect(
             omitted=0.3,
             minimum=0.05,
             of="patch",
-            of_known_drive=True,
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

@@ -78,7 +78,6 @@ EFFECT = Effect(
             maximum=20.0,
             omitted=NEUTRAL_PLACE,
             of="lost",
-            of_known_drive=True,
         ),
     ),
     acts_through=("load", "load_direction", "reversal"),

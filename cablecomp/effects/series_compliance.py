@@ -137,7 +137,6 @@ EFFECT = Effect(
             omitted=0.3,
             minimum=1e-6,
             of="late_rad_per_Nm",
-            of_known_drive=True,
         ),
         Parameter(
             "decades",
@@ -152,7 +151,6 @@ EFFECT = Effect(
             maximum=6.0,
             tries=(2.0,),
             of="late_rad_per_Nm",
-            of_known_drive=True,
         ),
     ),
     acts_through=("load", "load_rate"),

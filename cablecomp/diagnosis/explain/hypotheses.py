@@ -137,8 +137,10 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
     for effect in catalogue().values():
         if effect.id in held:
             continue
-        asked = (p for p in effect.parameters if (told or not p.of_load) and not (vague and p.of_known_drive))
-        found += _of_effect(replace(effect, parameters=tuple(asked)), config, evidence)
+        mute = {p.name for p in effect.parameters if (p.of_load and not told) or (p.of_known_drive and vague)}
+        # a shape goes with its amount
+        asked = tuple(p for p in effect.parameters if not mute & {p.name, p.of})
+        found += _of_effect(replace(effect, parameters=asked), config, evidence)
     return found
 
 

@@ -113,6 +113,7 @@ def _carried(
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
     if not carried:
         return None
+    # of the same terms, put beside either model of the beam, the larger share stands
     shares = {t.model.added: t.selected_in for t in sorted(tried, key=lambda t: t.selected_in)}
     return in_order(carried, groups, shares), sharper
 
