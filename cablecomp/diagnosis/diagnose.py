@@ -22,6 +22,7 @@ from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.explain.weighing import Weighed, weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
+from cablecomp.diagnosis.locate.responses import left_on_every_row
 from cablecomp.diagnosis.outcome import Case, Outcome, Remainder
 from cablecomp.diagnosis.pace import Pace, Progress
 from cablecomp.diagnosis.result import Diagnosis
@@ -79,7 +80,9 @@ def _calibrated(
     pace.tell("calibrating the drive", 0.02)
     drive = calibrate_drive(config, body.used, rng)
     body = replace(body, final=_counted(body, drive.fit))
-    return Case(config, body, drive, tuple(covariates_of(config, e) for e in drive.fit.problem.evidence))
+    left = left_on_every_row(drive.fit)
+    seen = (covariates_of(config, e, m) for e, m in zip(drive.fit.problem.evidence, left, strict=True))
+    return Case(config, body, drive, tuple(seen))
 
 
 def _counted(body: Body, fit: Fit) -> tuple[Evidence, ...]:

@@ -43,7 +43,8 @@ class Case:
         """Where the calibrated drive's misfit lies, before any name: on every fine row, and by what the drive itself
         makes of laws that change."""
         fit = every_row(self.drive.fit)
-        seen = [covariates_of(self.config, e) for e in fit.problem.evidence]
+        left = fit.problem.left(fit.x)
+        seen = [covariates_of(self.config, e, m) for e, m in zip(fit.problem.evidence, left, strict=True)]
         series = series_of(fit, seen, self.drive.floor_rad)
         return locate(series, rng, sensitivities(fit), drive=responses(fit))
 

@@ -68,3 +68,27 @@ def test_joining_keeps_what_all_recordings_have() -> None:
 def test_a_missing_channel_is_named() -> None:
     with pytest.raises(InputError, match="joint_torque_Nm"):
         covariates({"time_s": np.arange(50.0), "motor_position_rad": np.zeros(50)})
+
+
+def test_noise_of_the_encoders_is_not_in_the_acceleration_that_a_residual_follows() -> None:
+    rng = np.random.default_rng(7)
+    time = np.arange(0.0, 40.0, 5e-3)
+    motion = 0.3 * np.sin(2.0 * np.pi * time / 20.0)
+    measured, predicted = (motion + sd * _slowly(rng, len(time)) for sd in (4e-4, 1e-4))
+    columns = {"time_s": time, "motor_position_rad": motion, "joint_torque_Nm": np.sin(time)}
+    columns["joint_position_rad"] = measured
+    left = measured - predicted
+
+    def goes_along(given: np.ndarray | None) -> float:
+        return float(np.corrcoef(covariates(columns, given).values["acceleration"], left)[0, 1])
+
+    assert goes_along(None) < -0.4  # by the joint's encoder alone
+    assert abs(goes_along(predicted)) < 0.1
+
+
+def _slowly(rng: np.random.Generator, samples: int) -> np.ndarray:
+    """Half of it white, half remembered for twenty samples."""
+    white = rng.standard_normal((2, samples))
+    for k in range(1, samples):
+        white[1, k] = 0.95 * white[1, k - 1] + np.sqrt(1.0 - 0.95**2) * white[1, k]
+    return np.asarray(white.sum(axis=0) / np.sqrt(2.0))

@@ -76,12 +76,13 @@ class Reversals(tuple[FloatArray, FloatArray]):
         return self[1]
 
 
-def covariates(columns: Mapping[str, FloatArray]) -> Covariates:
+def covariates(columns: Mapping[str, FloatArray], predicted: FloatArray | None = None) -> Covariates:
     """Work out the covariates of one recording from its canonical channels.
 
     Rates come from zero-phase local fits as wide as the channel's own noise allows; a reversal counts once
     the channel has turned back by more than six times what noise leaves after that fit, and by more than a
-    hundredth of the channel's span.
+    hundredth of the channel's span. `predicted`: the joint's angle [rad] as a fit has it; how the joint moves is then
+    told by both (`_by_both`), for noise that is in the residual would otherwise be in its acceleration too.
 
     Raises InputError if `time_s`, `joint_torque_Nm` or `motor_position_rad` is missing.
     """
@@ -95,7 +96,7 @@ def covariates(columns: Mapping[str, FloatArray]) -> Covariates:
     motor, motor_sigma = _smoothed(time, columns["motor_position_rad"])
     joint, joint_sigma = motor, motor_sigma
     if "joint_position_rad" in columns:
-        joint, joint_sigma = _smoothed(time, columns["joint_position_rad"])
+        joint, joint_sigma = _smoothed(time, _by_both(time, columns["joint_position_rad"], predicted))
     turn = reversals(load.value, _least_turn(load, load_sigma))
     motion = reversals(joint.value, _least_turn(joint, joint_sigma))
     still = _still(load, load_sigma)
@@ -142,6 +143,16 @@ def reversals(values: FloatArray, threshold: float) -> Reversals:
     reversal.
     """
     return Reversals(_reversals(np.asarray(values, dtype=np.float64), float(threshold)))
+
+
+def _by_both(time: FloatArray, measured: FloatArray, predicted: FloatArray | None) -> FloatArray:
+    """The joint's angle out of what is measured and what is predicted, each by the other's variance: the one mean of
+    them whose noise goes along with nothing of their difference, the residual."""
+    measured = _filled(time, measured)
+    if predicted is None:
+        return measured
+    own, other = (channel_noise(time, x).sigma ** 2 for x in (measured, predicted))
+    return measured if own + other == 0.0 else (other * measured + own * predicted) / (own + other)
 
 
 def _smoothed(time: FloatArray, channel: FloatArray) -> tuple[Smooth, float]:

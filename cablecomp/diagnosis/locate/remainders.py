@@ -15,13 +15,14 @@ from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
 
 
-def covariates_of(config: JointConfig, e: Evidence) -> Covariates:
-    """Covariates on the judged rows, out of the fine ones."""
+def covariates_of(config: JointConfig, e: Evidence, left: FloatArray | None = None) -> Covariates:
+    """Covariates on the judged rows, out of the fine ones; `left`: what a fit leaves of the joint's angle [rad] on
+    these."""
     columns = {k: v for k, v in e.columns.items() if k != "motor_torque_Nm"}
     columns["joint_torque_Nm"] = np.broadcast_to(
         np.asarray(load_of(config, e.columns), dtype=np.float64), columns["time_s"].shape
     ).copy()
-    whole = covariates(columns)
+    whole = covariates(columns, None if left is None else columns[JOINT] - left)
     return Covariates(
         {k: v[e.rows] for k, v in whole.values.items()},
         whole.motion_direction[e.rows],

@@ -63,6 +63,11 @@ def every_row(fit: Fit) -> Fit:
     return Fit(problem, fit.x, residual, problem.jacobian(fit.x, residual))
 
 
+def left_on_every_row(fit: Fit) -> list[FloatArray]:
+    """What a fit leaves of the joint's angle [rad] on all fine rows, recording after recording."""
+    return fit.problem.with_evidence([_on_every_row(e) for e in fit.problem.evidence]).left(fit.x)
+
+
 def responses(fit: Fit) -> Responses:
     """What changes of the drive along covariates make of the joint's angle [rad], on counted rows of the fit."""
     problem = fit.problem
