@@ -93,7 +93,7 @@ def _integrals(model: Model, law: int, y: Floats, v: Floats) -> Floats:
     """Integral of e over every piece: in closed form for the plain law, else by the kernel's own quadrature,
     which defines it."""
     dy, d = np.diff(y), np.diff(v)
-    if model.laws is None or model.laws[0, HEAD, MODE] == PLAIN:
+    if model.laws is None or model.laws[law, HEAD, MODE] == PLAIN:
         small = np.abs(d) < 1e-9
         mean = np.where(small, 1.0 - 0.5 * d, -np.expm1(-d) / np.where(small, 1.0, d))
         return np.asarray(dy * (np.exp(v[1:]) * mean - 1.0))

@@ -60,9 +60,9 @@ def piece(
     d = v2 - v1
     if laws is None:
         return piece_plain(dy, d, tau1, tau2)
-    if laws[0, HEAD, MODE] == PLAIN:
+    if laws[law, HEAD, MODE] == PLAIN:
         return piece_plain(dy, d, tau1, tau2)
-    if laws[0, HEAD, MODE] == STIFF:
+    if laws[law, HEAD, MODE] == STIFF:
         total, slope = _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, tau1, v2, tau2)
         steady = laws[law, HEAD, STEADY]
         if steady == 0.0:

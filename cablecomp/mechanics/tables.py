@@ -39,7 +39,8 @@ HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3
     U_LOW, U_STEP,
     STIFFENING, STEADY,  # b and w in EA(T) = EA/(w + (1 - w)/(1 + b (tau - 1)))
     GROOVED,  # 0 = g(y) is y itself
-) = range(10)  # fmt: skip
+    BY_TENSION,  # 0 = v is ln tau itself
+) = range(11)  # fmt: skip
 
 
 def plain_law() -> Floats:
@@ -75,8 +76,10 @@ def law_table(
     by_place = groove_factor(y)
     table[G_OF_Y] = _integral(y, by_place)
     head = table[HEAD]
-    head[MODE], head[STIFFENING], head[STEADY] = TABLED, stiffening, steady
-    head[GROOVED] = float(np.any(by_place != 1.0))
+    grooved, by_tension = np.any(by_place != 1.0), np.any(tension_factor(np.exp(u)) != 1.0)
+    head[MODE] = TABLED if grooved or by_tension else STIFF if stiffening != 0.0 else PLAIN
+    head[STIFFENING], head[STEADY] = stiffening, steady
+    head[GROOVED], head[BY_TENSION] = float(grooved), float(by_tension)
     head[V_LOW], head[V_STEP] = v[0], v_grid[1] - v_grid[0]
     head[Y_LOW], head[Y_STEP] = 0.0, y[1] - y[0]
     head[U_LOW], head[U_STEP] = LEAST_U, u[1] - u[0]
@@ -156,27 +159,29 @@ def between(laws: Floats, law: int, y_low: float, y_high: float, share: float) -
 
 @inner_kernel
 def groove_inverse(laws: Floats, law: int, g: float, y_low: float, y_high: float) -> float:
-    """The y between y_low and y_high with groove coordinate g (secant, then bisection where it leaves the bracket)."""
+    """The y between y_low and y_high with groove coordinate g (Newton's method, or a bisection where that leaves the
+    bracket)."""
     lo, hi = y_low, y_high
+    low, step = laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_STEP]
     g_lo, g_hi = groove(laws, law, lo), groove(laws, law, hi)
     y = lo
-    for _ in range(60):
-        if g_hi - g_lo <= 0.0:
-            return lo
+    if g_hi - g_lo > 0.0:
         y = lo + (hi - lo) * (g - g_lo) / (g_hi - g_lo)
-        found = groove(laws, law, y)
-        if abs(found - g) < 1e-14:
+    for _ in range(60):
+        found, slope = look_up_slope(laws, law, G_OF_Y, low, step, y)
+        off = found - g
+        if abs(off) < 1e-14 or hi - lo <= 0.0:
             return y
-        if found < g:
-            lo, g_lo = y, found
+        if off < 0.0:
+            lo = y
         else:
-            hi, g_hi = y, found
-        middle = 0.5 * (lo + hi)
-        found = groove(laws, law, middle)
-        if found < g:
-            lo, g_lo = middle, found
-        else:
-            hi, g_hi = middle, found
+            hi = y
+        nearer = y - off / slope
+        if not lo < nearer < hi:
+            nearer = 0.5 * (lo + hi)
+            if nearer in (lo, hi):
+                return y
+        y = nearer
     return y
 
 
@@ -186,7 +191,7 @@ def v_of_tau(laws: Floats, law: int, tau: float) -> float:
     u = math.log(tau)
     if laws is None:
         return u
-    if laws[0, HEAD, MODE] != TABLED:
+    if laws[law, HEAD, BY_TENSION] == 0.0:
         return u
     return look_up(laws, law, V_OF_U, laws[law, HEAD, U_LOW], laws[law, HEAD, U_STEP], u)
 
@@ -196,7 +201,7 @@ def dv_dtau(laws: Floats, law: int, tau: float, v: float) -> float:
     """Derivative of `v_of_tau`; 1/tau for the plain law."""
     if laws is None:
         return 1.0 / tau
-    if laws[0, HEAD, MODE] != TABLED:
+    if laws[law, HEAD, BY_TENSION] == 0.0:
         return 1.0 / tau
     return _slope_table(laws, law, tau, v)
 
@@ -213,7 +218,7 @@ def tau_of_v(laws: Floats, law: int, v: float) -> float:
     """Tension ratio of the profile variable."""
     if laws is None:
         return math.exp(v)
-    if laws[0, HEAD, MODE] != TABLED:
+    if laws[law, HEAD, BY_TENSION] == 0.0:
         return math.exp(v)
     return math.exp(look_up(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v))
 
@@ -223,7 +228,7 @@ def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
     """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int w + (1 - w)/(1 + b (tau - 1)) d tau."""
     if laws is None:
         return tau - 1.0, 1.0
-    if laws[0, HEAD, MODE] == PLAIN:
+    if laws[law, HEAD, MODE] == PLAIN:
         return tau - 1.0, 1.0
     return _strain_in_part(laws, law, tau)
 
@@ -251,7 +256,9 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
 @inner_kernel
 def strain(laws: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
-    u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)
+    u, du = v, 1.0
+    if laws[law, HEAD, BY_TENSION] != 0.0:
+        u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)
     tau = math.exp(u)
     e, de = _strain_in_part(laws, law, tau)
     return e, de * tau * du

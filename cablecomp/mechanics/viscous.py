@@ -63,47 +63,110 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
     count = _free_nodes(w, h)
     before = int(grid.count)
     y_last = (before - 1) * h
-    # a further evaluation within the same step starts from the last one's answer
-    again = grid.time_try == context.time and int(grid.count_try) == count
-    grid.time_try = context.time
-    for j in range(count):  # cable that arrived since: linear in between
-        if j >= before:
-            y = j * h
-            w_old, t_old = grid.angle, grid.end
-            if y <= w_old:
-                old[j] = old[before - 1] + (y - y_last) / (w_old - y_last) * (t_old - old[before - 1])
-            else:
-                old[j] = t_old + (y - w_old) / (w - w_old) * (tau - t_old)
-        if not again:
-            new[j] = old[j]
     dt = 1e9 if context.first else context.dt
     viscous = max(cable.viscous_on[end], LEAST_SHARE) * cable.viscous
     rate = dt * cable.EA * state.stiffness / (cable.radius[end] * viscous)
     rate = min(rate, STIFFEST * h * h)
+    # a further evaluation within the same step starts from the last one's answer
+    again = grid.time_try == context.time and int(grid.count_try) == count
+    alike = again and grid.rate_try == rate and count - before <= 1
+    grid.time_try, grid.rate_try = context.time, rate
+    for j in range(before, count):  # cable that arrived since: linear in between
+        y = j * h
+        w_old, t_old = grid.angle, grid.end
+        if y <= w_old:
+            old[j] = old[before - 1] + (y - y_last) / (w_old - y_last) * (t_old - old[before - 1])
+        else:
+            old[j] = t_old + (y - w_old) / (w - w_old) * (tau - t_old)
     last = (count - 1) * h
-    slope = _relax(Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate))
-    total = 0.0
-    for j in range(count - 1):
-        total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
-    total += 0.5 * (w - last) * (new[count - 1] + tau - 2.0)
+    slide = Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate)
+    moved = Moved(False, 0.0, 0.0)
+    if alike:
+        moved = _follow(slide, int(grid.first_try))
+        grid.total_try += moved.change
+    slope = moved.slope
+    if not moved.done:
+        if not again:
+            copy_floats(old, 0, new, 0, count)
+        first, slope = _relax(slide)
+        grid.first_try = first
+        total = 0.0
+        for j in range(count - 1):
+            total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
+        grid.total_try = total
     grid.count_try, grid.angle_try, grid.end_try = count, w, tau
+    total = grid.total_try + 0.5 * (w - last) * (new[count - 1] + tau - 2.0)
     return Wound(total, slope * tau, tau - 1.0)
 
 
+class Moved(NamedTuple):
+    """What a small change of the end made of a step that was solved."""
+
+    done: bool  # no face began or ceased to slip
+    slope: float  # derivative of the integral by the end value
+    change: float  # of the integral over the nodes
+
+
 @inner_kernel
-def _relax(s: Slide) -> float:
-    """Implicit step of all nodes; returns the derivative of the integral by the end value.
+def _follow(s: Slide, first: int) -> Moved:
+    """The solved step at another end value and wrap angle: but for the last node's equation all are as they were, so
+    the elimination that `upper` keeps still holds, as long as no face begins or ceases to slip."""
+    last = s.nodes - 1
+    per_h, per_gap = 1.0 / s.h, 1.0 / s.gap
+    if first > last:  # nothing moved
+        at_end = _side(s.new[last], s.tau, per_gap, s.mu)
+        return Moved(at_end == 0 and s.new[last] == s.old[last], 0.5 * s.gap, 0.0)
+    share = _share(s, last)
+    outer = _face(s.new[last], s.tau, per_gap, s.mu)
+    inner = Face(0.0, 0.0, 0.0)
+    own = 1.0 - share * outer.by_a
+    if last > 0:
+        inner = _face(s.new[last - 1], s.new[last], per_h, s.mu)
+        own += share * inner.by_b
+    if last > first:
+        own -= share * inner.by_a * s.upper[last - 1]
+    change = (share * (outer.slip - inner.slip) - (s.new[last] - s.old[last])) / own
+    by_end = share * outer.by_b / own
+    same = _side(s.new[last], s.tau, per_gap, s.mu) == _side(s.new[last] + change, s.tau, per_gap, s.mu)
+    slope = 0.5 * s.gap * (1.0 + by_end)
+    whole = 0.0
+    for j in range(last, first - 1, -1):
+        b = s.new[j]
+        moved = max(b + change, 1e-9)
+        inward = -s.upper[j - 1] if j > first else 0.0
+        if j > 0:
+            a = s.new[j - 1]
+            same = same and _side(a, b, per_h, s.mu) == _side(a + inward * change, moved, per_h, s.mu)
+            slope += 0.5 * s.h * by_end * (1.0 + inward)
+            whole += 0.5 * s.h * change * (1.0 + inward)
+        s.new[j] = moved
+        change *= inward
+        by_end *= inward
+    return Moved(same, slope, whole)
+
+
+@inner_kernel
+def _side(a: float, b: float, per_distance: float, mu: float) -> int:
+    """Which way the cable slips between two neighbours, b outside of a: what `_face` takes it for, to the last bit."""
+    steep = (b - a) * per_distance
+    limit = mu * 0.5 * (a + b)
+    return 1 if steep > limit else (-1 if steep < -limit else 0)
+
+
+@inner_kernel
+def _relax(s: Slide) -> tuple[int, float]:
+    """Implicit step of all nodes; returns the deepest that moved, and the derivative of the integral by the end value.
 
     The equations are linear as long as no face begins or ceases to slip: Newton's method is there after one step once
-    it knows which faces do.
+    it knows which faces do. One that only rounding moves may change its side for ever, so it is balance that counts.
     """
     first, by_end = s.nodes, 0.0
     for _ in range(60):
         first = _front(s)
         if first == s.nodes:
-            return 0.5 * s.gap
-        by_end = _newton(s, first)
-        if _unbalanced(s, max(first - 1, 0)) <= 1e-13:
+            return first, 0.5 * s.gap
+        by_end, same = _newton(s, first)
+        if same or _unbalanced(s, max(first - 1, 0)) <= 1e-13:
             break
     # only the last node feels the end itself; the others follow as the elimination says
     slope = 0.5 * s.gap * (1.0 + by_end)
@@ -113,7 +176,7 @@ def _relax(s: Slide) -> float:
         by_end = inward
     if first > 0:
         slope += 0.5 * s.h * by_end
-    return slope
+    return first, slope
 
 
 @inner_kernel
@@ -166,9 +229,9 @@ def _share(s: Slide, j: int) -> float:
 
 
 @inner_kernel
-def _newton(s: Slide, first: int) -> float:
+def _newton(s: Slide, first: int) -> tuple[float, bool]:
     """One Newton step for the nodes from `first` on (Thomas algorithm); returns the derivative of the last node by the
-    end value. `upper` keeps the elimination."""
+    end value, and whether no face began or ceased to slip. `upper` keeps the elimination."""
     per_h, per_gap = 1.0 / s.h, 1.0 / s.gap
     inside = s.rate * per_h
     inner = Face(0.0, 0.0, 0.0)
@@ -188,11 +251,18 @@ def _newton(s: Slide, first: int) -> float:
         s.right[j] = target * per_own
         inner = outer
     by_end = -s.upper[s.nodes - 1]
-    for j in range(s.nodes - 1, first - 1, -1):
-        if j < s.nodes - 1:
-            s.right[j] -= s.upper[j] * s.right[j + 1]
-        s.new[j] = max(s.new[j] + s.right[j], 1e-9)
-    return by_end
+    last = s.nodes - 1
+    change = s.right[last]
+    same = _side(s.new[last], s.tau, per_gap, s.mu) == _side(s.new[last] + change, s.tau, per_gap, s.mu)
+    for j in range(last, first - 1, -1):
+        b = s.new[j]
+        moved = max(b + change, 1e-9)
+        change = s.right[j - 1] - s.upper[j - 1] * change if j > first else 0.0
+        if j > 0:
+            a = s.new[j - 1]
+            same = same and _side(a, b, per_h, s.mu) == _side(a + change, moved, per_h, s.mu)
+        s.new[j] = moved
+    return by_end, same
 
 
 @inner_kernel

@@ -140,7 +140,7 @@ def bounds_numbers(model: Model, past_low: float, past_high: float) -> Floats:
 def steepest(laws: Floats | None) -> float:
     """Greatest factor by which a law table (None = plain) raises friction over mu, by place and by tension
     (e^-2..e^2)."""
-    if laws is None or laws[0, HEAD, MODE] != TABLED:
+    if laws is None or not np.any(laws[:, HEAD, MODE] == TABLED):
         return 1.0
     place = float(np.max(np.diff(laws[:, G_OF_Y]) / laws[:, HEAD, Y_STEP, None]))
     u = laws[0, U_OF_V]
