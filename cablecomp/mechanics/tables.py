@@ -25,7 +25,8 @@ Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
 LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften further
-LEAST_U, MOST_U = -7.0, 2.5
+LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
+TAU: Floats = np.exp(LN_TAU)
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
 # laws: of the joint's own drum in chain h and l, of all other places, of the motor's own drum in chain h and l
 ON_H, ON_L, ELSEWHERE, IN_H, IN_L = constant(0), constant(1), constant(2), constant(3), constant(4)
@@ -66,23 +67,28 @@ def law_table(
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination) and the tangent stiffness as `stiffening_law`; both factors are vectorised and positive."""
     table = np.zeros((4, SIZE))
-    u = np.linspace(LEAST_U, MOST_U, SIZE)
-    v = _integral(u, 1.0 / tension_factor(np.exp(u)))
-    v -= np.interp(0.0, u, v)
-    v_grid = np.linspace(v[0], v[-1], SIZE)
-    table[U_OF_V] = CubicHermiteSpline(v, u, tension_factor(np.exp(u)))(v_grid)
-    table[V_OF_U] = v
+    head = table[HEAD]
+    head[STIFFENING], head[STEADY] = stiffening, steady
+    by_tension = tension_factor(TAU)
+    if np.any(by_tension != 1.0):
+        v = _integral(LN_TAU, 1.0 / by_tension)
+        v -= np.interp(0.0, LN_TAU, v)
+        v_grid = np.linspace(v[0], v[-1], SIZE)
+        table[U_OF_V] = CubicHermiteSpline(v, LN_TAU, by_tension)(v_grid)
+        table[V_OF_U] = v
+        head[BY_TENSION] = 1.0
+        head[V_LOW], head[V_STEP] = v[0], v_grid[1] - v_grid[0]
+        head[U_LOW], head[U_STEP] = LN_TAU[0], LN_TAU[1] - LN_TAU[0]
     y = np.linspace(0.0, wrap_max_rad, SIZE)
     by_place = groove_factor(y)
-    table[G_OF_Y] = _integral(y, by_place)
-    head = table[HEAD]
-    grooved, by_tension = np.any(by_place != 1.0), np.any(tension_factor(np.exp(u)) != 1.0)
-    head[MODE] = TABLED if grooved or by_tension else STIFF if stiffening != 0.0 else PLAIN
-    head[STIFFENING], head[STEADY] = stiffening, steady
-    head[GROOVED], head[BY_TENSION] = float(grooved), float(by_tension)
-    head[V_LOW], head[V_STEP] = v[0], v_grid[1] - v_grid[0]
-    head[Y_LOW], head[Y_STEP] = 0.0, y[1] - y[0]
-    head[U_LOW], head[U_STEP] = LEAST_U, u[1] - u[0]
+    if np.any(by_place != 1.0):
+        table[G_OF_Y] = _integral(y, by_place)
+        head[GROOVED] = 1.0
+        head[Y_STEP] = y[1] - y[0]
+    if head[BY_TENSION] or head[GROOVED]:
+        head[MODE] = TABLED
+    else:
+        head[MODE] = STIFF if stiffening != 0.0 else PLAIN
     return table
 
 

@@ -27,11 +27,11 @@ from cablecomp.mechanics.profile import (
 )
 from cablecomp.mechanics.records import OUT, floats, record
 from cablecomp.mechanics.tables import (
+    BY_TENSION,
     ELSEWHERE,
     G_OF_Y,
+    GROOVED,
     HEAD,
-    MODE,
-    TABLED,
     U_OF_V,
     V_STEP,
     Y_STEP,
@@ -140,12 +140,18 @@ def bounds_numbers(model: Model, past_low: float, past_high: float) -> Floats:
 def steepest(laws: Floats | None) -> float:
     """Greatest factor by which a law table (None = plain) raises friction over mu, by place and by tension
     (e^-2..e^2)."""
-    if laws is None or not np.any(laws[:, HEAD, MODE] == TABLED):
+    if laws is None:
         return 1.0
-    place = float(np.max(np.diff(laws[:, G_OF_Y]) / laws[:, HEAD, Y_STEP, None]))
-    u = laws[0, U_OF_V]
-    tension = float(np.max((np.diff(u) / laws[0, HEAD, V_STEP])[np.abs(u[1:]) < 2.0]))
-    return max(place, 1.0) * max(tension, 1.0)
+    place = tension = 1.0
+    for law in laws:
+        head = law[HEAD]
+        if head[GROOVED]:
+            place = max(place, float(np.max(np.diff(law[G_OF_Y]) / head[Y_STEP])))
+        if head[BY_TENSION]:
+            u = law[U_OF_V]
+            steep = (np.diff(u) / head[V_STEP])[np.abs(u[1:]) < 2.0]
+            tension = max(tension, float(np.max(steep)))
+    return place * tension
 
 
 @kernel

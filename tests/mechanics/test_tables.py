@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 
 from cablecomp.mechanics.tables import (
+    G_OF_Y,
+    HEAD,
+    MODE,
+    TABLED,
+    U_OF_V,
     groove,
     law_table,
     plain_law,
@@ -18,9 +23,9 @@ from cablecomp.mechanics.tables import (
 WRAP = 12.0
 
 
-def one(values: np.ndarray) -> np.ndarray:
-    """Friction that neither tension nor place changes."""
-    return np.ones_like(values)
+def hardly(values: np.ndarray) -> np.ndarray:
+    """Friction that tension and place change, by so little that nothing shows: it has its tables all the same."""
+    return 1.0 + 1e-13 * values
 
 
 @pytest.mark.parametrize(
@@ -28,7 +33,9 @@ def one(values: np.ndarray) -> np.ndarray:
 )
 def test_a_stiffening_cable_without_a_table_is_the_tabled_law(stiffening: float, steady: float) -> None:
     short = np.stack([stiffening_law(stiffening, steady)])
-    table = np.stack([law_table(one, one, WRAP, stiffening, steady)])
+    table = np.stack([law_table(hardly, hardly, WRAP, stiffening, steady)])
+    assert table[0, HEAD, MODE] == TABLED
+    assert np.ptp(table[0, G_OF_Y]) > 0.0 < np.ptp(table[0, U_OF_V])
     for tau in np.geomspace(0.05, 8.0, 40):
         v = v_of_tau(short, 0, tau)
         assert v_of_tau(table, 0, tau) == pytest.approx(v, abs=1e-9)
