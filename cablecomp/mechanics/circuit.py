@@ -129,8 +129,7 @@ def circuit_solve(
         step = (off * by_shaft - gap * (on_h.by_shaft - 1.0)) * scale
         turn = (gap * on_h.compliance - off * by_tension) * scale
         by_h, by_l = weight_h * on_l.compliance * scale, -weight_l * on_h.compliance * scale
-        near = 1e-13 if laws is None and iteration < 8 else 1e-11
-        if abs(step) <= near * unit and abs(turn) <= 1e-11:
+        if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
             return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)
         if laws is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
             if abs(step) <= SMALL * min(tension, tension + pull):
