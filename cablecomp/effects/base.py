@@ -14,15 +14,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig, ratios_to_last
 from cablecomp.errors import InputError
 from cablecomp.mechanics.change import Change, Term
-from cablecomp.mechanics.jit import cached, njit
-from cablecomp.mechanics.pointer import TERM_SIGNATURE
+from cablecomp.mechanics.jit import njit
+from cablecomp.mechanics.pointer import term_address
 from cablecomp.mechanics.records import CONTEXT
 
 __all__ = ["Change", "CompiledTerm", "Effect", "Parameter", "Role", "term"]
@@ -243,19 +242,8 @@ class CompiledTerm:
     def address(self) -> int:
         """Address of the machine code (compiled or read from the cache on first use)."""
         if self._address is None:
-            inner = njit(self._function)
-            of_parameters, of_state = self._parameters, self._state
-
-            def entry(context: Any, parameters: Any, state: Any) -> None:
-                inner(
-                    numba.carray(context, 1, CONTEXT)[0],
-                    numba.carray(parameters, 1, of_parameters)[0],
-                    numba.carray(state, 1, of_state)[0],
-                )
-
-            compile_ = numba.cfunc(TERM_SIGNATURE)
-            self._entry = cached(lambda: compile_(entry))
-            self._address = int(self._entry.address)
+            self._entry = njit(self._function)
+            self._address = term_address(self._entry, CONTEXT, self._parameters, self._state)
         return self._address
 
     def __call__(self, **values: float | Sequence[float]) -> tuple[Term, ...]:

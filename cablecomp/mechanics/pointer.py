@@ -9,8 +9,6 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-TERM_SIGNATURE = types.void(types.voidptr, types.voidptr, types.voidptr)
-
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba is not typed
 def _call(typing: Any, address: Any, data: Any, parameters: Any, state: Any) -> Any:
@@ -91,3 +89,12 @@ def kernel_address(kernel: Any, *arguments: Any) -> int:
     kernel.compile(kinds)
     compiled = kernel.overloads[kinds]
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+
+
+def term_address(function: Any, *records: Any) -> int:
+    """Address of a compiled function's machine code as C calls it, for pointers to records of these dtypes; compiled or
+    read from the cache if need be."""
+    kinds = tuple(numba.from_dtype(record) for record in records)
+    function.compile(kinds)
+    compiled = function.overloads[kinds]
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
