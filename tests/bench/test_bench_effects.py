@@ -24,15 +24,23 @@ SAMPLES = 20_000
 
 def richer(name: str) -> JointConfig:
     config = load_joint(CONFIG)
-    if name == "plain":
-        return config
-    values: dict[str, Any] = dict.fromkeys(catalogue()[name].texts, "other_neighbour_Nm")
-    for parameter in catalogue()[name].parameters:
+    return config if name == "plain" else with_effects(config, [(name, sizeable(name, config))])
+
+
+def sizeable(name: str, config: JointConfig) -> dict[str, Any]:
+    """An effect worth its run: what it has to be given, or its first amount with the shapes of that; other shapes left
+    out."""
+    effect = catalogue()[name]
+    given = [p for p in effect.parameters if p.omitted is None]
+    first = next(p for p in effect.parameters if not p.shape)
+    values: dict[str, Any] = dict.fromkeys(effect.texts, "other_neighbour_Nm")
+    for parameter in given or [first]:
         low, high = parameter.bounds(config)
-        values[parameter.name] = np.sqrt(low * high) if parameter.log else 0.25 * low + 0.75 * high
-        if parameter.name == "time_s":
-            values[parameter.name] = 5.0
-    return with_effects(config, [(name, values)])
+        middle = 0.25 * low + 0.75 * high if low < 0.0 else 0.75 * low + 0.25 * high
+        values[parameter.name] = np.sqrt(low * high) if parameter.log else middle
+    if effect.of_role("instant"):
+        values["time_s"] = 5.0
+    return values
 
 
 @pytest.mark.benchmark(group="replay of 20 000 samples, both pulleys turning")
@@ -89,16 +97,7 @@ def steps_us(config: JointConfig, bounds: bool) -> np.ndarray:
 def test_steps_of_two_stages(benchmark: Any, names: tuple[str, ...], bounds: bool) -> None:
     """The dearest laws on the dearest joint that ships."""
     config = load_joint(CONFIG.with_name("two-stage-parallel.toml"))
-    middle = [
-        (
-            name,
-            {
-                p.name: 0.25 * p.bounds(config)[0] + 0.75 * p.bounds(config)[1]
-                for p in catalogue()[name].parameters
-            },
-        )
-        for name in names
-    ]
+    middle = [(name, sizeable(name, config)) for name in names]
     taken = benchmark.pedantic(lambda: steps_us(with_effects(config, middle), bounds), rounds=1)
     p50, p99 = np.percentile(taken, [50, 99])
     benchmark.extra_info.update(p50_us=p50, p99_us=p99)
