@@ -10,6 +10,7 @@ law of friction or the cable path itself. The kernel only sums them.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -227,6 +228,10 @@ class Effect:
         }
 
 
+_COMPILING = threading.Lock()
+"""Of threads that ask for an effect's term at a time, one compiles it: its code lives as long as what it kept of it."""
+
+
 class CompiledTerm:
     """A term function compiled to machine code when it is first used."""
 
@@ -241,10 +246,11 @@ class CompiledTerm:
     @property
     def address(self) -> int:
         """Address of the machine code (compiled or read from the cache on first use)."""
-        if self._address is None:
-            self._entry = njit(self._function)
-            self._address = term_address(self._entry, CONTEXT, self._parameters, self._state)
-        return self._address
+        with _COMPILING:
+            if self._address is None:
+                self._entry = njit(self._function)
+                self._address = term_address(self._entry, CONTEXT, self._parameters, self._state)
+            return self._address
 
     def __call__(self, **values: float | Sequence[float]) -> tuple[Term, ...]:
         """The term with these values of its parameters, as the `terms` of a `Change`; raises InputError for
