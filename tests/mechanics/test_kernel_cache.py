@@ -12,7 +12,12 @@ from pathlib import Path
 import numba
 import pytest
 
+from cablecomp.effects.base import CompiledTerm
+from cablecomp.effects.clock_skew import SLOTS
+from cablecomp.effects.clock_skew import _look_back as look_back
 from cablecomp.mechanics.jit import CACHE, cached, drop_cut_short
+
+STATE = ("count", "newest", "cursor", ("times", SLOTS), ("readings", SLOTS))
 
 MODULE = """
 from cablecomp.mechanics.jit import njit
@@ -63,3 +68,12 @@ def test_threads_that_compile_at_a_time_keep_their_code_in_one_folder() -> None:
         folders = [w.result() for w in [threads.submit(cached, decorate) for _ in range(8)]]
     assert set(folders) == {str(CACHE)}
     assert usual == numba.config.CACHE_DIR
+
+
+def test_the_term_of_an_effect_is_read_from_disk_once_it_is_compiled() -> None:
+    """Not compiled again by every process that has the effect."""
+    assert look_back.address
+    again = CompiledTerm(look_back._function, ("delay", "of_load"), STATE)
+    assert again.address != 0
+    assert sum(again._entry.stats.cache_hits.values()) == 1
+    assert not again._entry.stats.cache_misses
