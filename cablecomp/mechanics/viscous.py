@@ -100,9 +100,9 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
 
 
 class Moved(NamedTuple):
-    """What a small change of the end made of a step that was solved."""
+    """What a step of Newton's method did."""
 
-    done: bool  # no face began or ceased to slip
+    done: bool  # no face began or ceased to slip: the step is solved
     slope: float  # derivative of the integral by the end value
     change: float  # of the integral over the nodes
 
@@ -125,32 +125,8 @@ def _follow(s: Slide, first: int) -> Moved:
         own += share * inner.by_b
     if last > first:
         own -= share * inner.by_a * s.upper[last - 1]
-    change = (share * (outer.slip - inner.slip) - (s.new[last] - s.old[last])) / own
-    by_end = share * outer.by_b / own
-    same = _side(s.new[last], s.tau, per_gap, s.mu) == _side(s.new[last] + change, s.tau, per_gap, s.mu)
-    slope = 0.5 * s.gap * (1.0 + by_end)
-    whole = 0.0
-    for j in range(last, first - 1, -1):
-        b = s.new[j]
-        moved = max(b + change, 1e-9)
-        inward = -s.upper[j - 1] if j > first else 0.0
-        if j > 0:
-            a = s.new[j - 1]
-            same = same and _side(a, b, per_h, s.mu) == _side(a + inward * change, moved, per_h, s.mu)
-            slope += 0.5 * s.h * by_end * (1.0 + inward)
-            whole += 0.5 * s.h * change * (1.0 + inward)
-        s.new[j] = moved
-        change *= inward
-        by_end *= inward
-    return Moved(same, slope, whole)
-
-
-@inner_kernel
-def _side(a: float, b: float, per_distance: float, mu: float) -> int:
-    """Which way the cable slips between two neighbours, b outside of a: what `_face` takes it for, to the last bit."""
-    steep = (b - a) * per_distance
-    limit = mu * 0.5 * (a + b)
-    return 1 if steep > limit else (-1 if steep < -limit else 0)
+    s.right[last] = (share * (outer.slip - inner.slip) - (s.new[last] - s.old[last])) / own
+    return _substitute(s, first, share * outer.by_b / own)
 
 
 @inner_kernel
@@ -160,23 +136,15 @@ def _relax(s: Slide) -> tuple[int, float]:
     The equations are linear as long as no face begins or ceases to slip: Newton's method is there after one step once
     it knows which faces do. One that only rounding moves may change its side for ever, so it is balance that counts.
     """
-    first, by_end = s.nodes, 0.0
+    first, moved = s.nodes, Moved(False, 0.0, 0.0)
     for _ in range(60):
         first = _front(s)
         if first == s.nodes:
             return first, 0.5 * s.gap
-        by_end, same = _newton(s, first)
-        if same or _unbalanced(s, max(first - 1, 0)) <= 1e-13:
+        moved = _newton(s, first)
+        if moved.done or _unbalanced(s, max(first - 1, 0)) <= 1e-13:
             break
-    # only the last node feels the end itself; the others follow as the elimination says
-    slope = 0.5 * s.gap * (1.0 + by_end)
-    for j in range(s.nodes - 1, first, -1):
-        inward = -s.upper[j - 1] * by_end
-        slope += 0.5 * s.h * (by_end + inward)
-        by_end = inward
-    if first > 0:
-        slope += 0.5 * s.h * by_end
-    return first, slope
+    return first, moved.slope
 
 
 @inner_kernel
@@ -213,6 +181,14 @@ def _face(a: float, b: float, per_distance: float, mu: float) -> Face:
 
 
 @inner_kernel
+def _side(a: float, b: float, per_distance: float, mu: float) -> int:
+    """Which way the cable slips between two neighbours, b outside of a: what `_face` takes it for, to the last bit."""
+    steep = (b - a) * per_distance
+    limit = mu * 0.5 * (a + b)
+    return 1 if steep > limit else (-1 if steep < -limit else 0)
+
+
+@inner_kernel
 def _outward(s: Slide, j: int, per_h: float, per_gap: float) -> Face:
     """The face on the outer side of node j; beyond the last node lies the departure point."""
     if j == s.nodes - 1:
@@ -229,9 +205,8 @@ def _share(s: Slide, j: int) -> float:
 
 
 @inner_kernel
-def _newton(s: Slide, first: int) -> tuple[float, bool]:
-    """One Newton step for the nodes from `first` on (Thomas algorithm); returns the derivative of the last node by the
-    end value, and whether no face began or ceased to slip. `upper` keeps the elimination."""
+def _newton(s: Slide, first: int) -> Moved:
+    """One Newton step for the nodes from `first` on (Thomas algorithm); `upper` keeps the elimination."""
     per_h, per_gap = 1.0 / s.h, 1.0 / s.gap
     inside = s.rate * per_h
     inner = Face(0.0, 0.0, 0.0)
@@ -250,19 +225,32 @@ def _newton(s: Slide, first: int) -> tuple[float, bool]:
         s.upper[j] = -share * outer.by_b * per_own
         s.right[j] = target * per_own
         inner = outer
-    by_end = -s.upper[s.nodes - 1]
-    last = s.nodes - 1
+    return _substitute(s, first, -s.upper[s.nodes - 1])
+
+
+@inner_kernel
+def _substitute(s: Slide, first: int, by_end: float) -> Moved:
+    """Move the nodes from `first` on by the elimination in `upper` and `right`, which is left at 0; `by_end`:
+    derivative of the last node by the end value. That node alone feels the end, the others follow it."""
+    per_h, last = 1.0 / s.h, s.nodes - 1
+    per_gap = 1.0 / s.gap
     change = s.right[last]
     same = _side(s.new[last], s.tau, per_gap, s.mu) == _side(s.new[last] + change, s.tau, per_gap, s.mu)
+    slope, whole = 0.5 * s.gap * (1.0 + by_end), 0.0
     for j in range(last, first - 1, -1):
         b = s.new[j]
         moved = max(b + change, 1e-9)
-        change = s.right[j - 1] - s.upper[j - 1] * change if j > first else 0.0
+        inward = by_inward = 0.0
+        if j > first:
+            inward, by_inward = s.right[j - 1] - s.upper[j - 1] * change, -s.upper[j - 1] * by_end
         if j > 0:
             a = s.new[j - 1]
-            same = same and _side(a, b, per_h, s.mu) == _side(a + change, moved, per_h, s.mu)
-        s.new[j] = moved
-    return by_end, same
+            same = same and _side(a, b, per_h, s.mu) == _side(a + inward, moved, per_h, s.mu)
+            slope += 0.5 * s.h * (by_end + by_inward)
+            whole += 0.5 * s.h * (change + inward)
+        s.new[j], s.right[j] = moved, 0.0
+        change, by_end = inward, by_inward
+    return Moved(same, slope, whole)
 
 
 @inner_kernel
