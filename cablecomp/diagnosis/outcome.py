@@ -14,7 +14,7 @@ from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.weighing import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.diagnosis.locate.location import Location, locate
-from cablecomp.diagnosis.locate.remainders import covariates_of, sensitivities, series_of
+from cablecomp.diagnosis.locate.remainders import sensitivities, series_of
 from cablecomp.diagnosis.locate.responses import every_row, responses
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.result import Errors
@@ -32,20 +32,24 @@ class Remainder:
 @dataclass(frozen=True)
 class Case:
     """The joint as configured, its recordings, the drive calibrated on them, and the covariates of each recording
-    used."""
+    used, on all of its fine rows."""
 
     config: JointConfig
     body: Body
     drive: Calibrated
-    covariates: tuple[Covariates, ...]
+    on_every_row: tuple[Covariates, ...]
+
+    @property
+    def covariates(self) -> tuple[Covariates, ...]:
+        """The same on the judged rows."""
+        evidence = self.drive.fit.problem.evidence
+        return tuple(c.at(e.rows) for c, e in zip(self.on_every_row, evidence, strict=True))
 
     def located(self, rng: np.random.Generator) -> Location:
         """Where the calibrated drive's misfit lies, before any name: on every fine row, and by what the drive itself
         makes of laws that change."""
         fit = every_row(self.drive.fit)
-        left = fit.problem.left(fit.x)
-        seen = [covariates_of(self.config, e, m) for e, m in zip(fit.problem.evidence, left, strict=True)]
-        series = series_of(fit, seen, self.drive.floor_rad)
+        series = series_of(fit, self.on_every_row, self.drive.floor_rad)
         return locate(series, rng, sensitivities(fit), drive=responses(fit))
 
     def remainder_of(self, fit: Fit, rng: np.random.Generator) -> Remainder:

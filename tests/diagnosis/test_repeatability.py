@@ -29,7 +29,7 @@ def repeated(amplitudes: np.ndarray, compliance: float, sigma: float) -> float |
         "joint_position_rad": joint,
     }
     evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
-    return repeatability([evidence], [covariates_of(CONFIG, evidence)])
+    return repeatability([evidence], [covariates_of(CONFIG, evidence).at(evidence.rows)])
 
 
 @pytest.mark.parametrize("compliance", [0.0, 0.01])
@@ -55,7 +55,7 @@ def test_what_a_model_tells_apart_is_no_scatter() -> None:
     joint = motor - late + 1e-5 * rng.standard_normal(len(time))
     columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": joint}
     evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
-    seen = [covariates_of(CONFIG, evidence)]
+    seen = [covariates_of(CONFIG, evidence).at(evidence.rows)]
     known = np.interp(evidence.at_rows("time_s"), time, motor - late)
     without = repeatability([evidence], seen)
     told = repeatability([evidence], seen, [evidence.at_rows("joint_position_rad") - known])

@@ -8,7 +8,7 @@ import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
 from cablecomp.diagnosis.locate.remainders import covariates_of
-from cablecomp.diagnosis.locate.responses import Place, every_row, responses
+from cablecomp.diagnosis.locate.responses import Place, every_row, left_on_every_row, responses
 from cablecomp.diagnosis.outcome import Case
 from cablecomp.errors import SlackError
 from cablecomp.estimation.evidence import JOINT
@@ -31,8 +31,9 @@ LOCATED = {
 
 def case_of(effect: str, values: dict[str, float], loads: float, *, locked: bool = False) -> Case:
     body, drive = calibrated(recorded([EffectSpec(effect, values)], 90.0, loads, locked=locked))
-    seen = tuple(covariates_of(TOLERANT, e) for e in drive.fit.problem.evidence)
-    return Case(TOLERANT, body, drive, seen)
+    left = left_on_every_row(drive.fit)
+    seen = (covariates_of(TOLERANT, e, m) for e, m in zip(drive.fit.problem.evidence, left, strict=True))
+    return Case(TOLERANT, body, drive, tuple(seen))
 
 
 @pytest.mark.parametrize("effect", LOCATED)

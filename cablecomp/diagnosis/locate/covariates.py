@@ -6,10 +6,11 @@ Reversals are counted by own code: SciPy's peaks look at prominence, not at how 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cablecomp.errors import InputError
 from cablecomp.mechanics.jit import njit
@@ -54,6 +55,15 @@ class Covariates:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.values["time"])
+
+    def at(self, rows: NDArray[np.int64 | np.bool_]) -> Covariates:
+        """The same on some of the samples; `starts` stays that of all."""
+        return replace(
+            self,
+            values={k: v[rows] for k, v in self.values.items()},
+            motion_direction=self.motion_direction[rows],
+            motion_reversal=self.motion_reversal[rows],
+        )
 
     def unit(self, name: str) -> str:
         """Unit of a covariate, empty if it has none or it is not known."""

@@ -16,20 +16,12 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 def covariates_of(config: JointConfig, e: Evidence, left: FloatArray | None = None) -> Covariates:
-    """Covariates on the judged rows, out of the fine ones; `left`: what a fit leaves of the joint's angle [rad] on
-    these."""
+    """Covariates on all fine rows; `left`: what a fit leaves of the joint's angle [rad] there."""
     columns = {k: v for k, v in e.columns.items() if k != "motor_torque_Nm"}
     columns["joint_torque_Nm"] = np.broadcast_to(
         np.asarray(load_of(config, e.columns), dtype=np.float64), columns["time_s"].shape
     ).copy()
-    whole = covariates(columns, None if left is None else columns[JOINT] - left)
-    return Covariates(
-        {k: v[e.rows] for k, v in whole.values.items()},
-        whole.motion_direction[e.rows],
-        whole.motion_reversal[e.rows],
-        whole.starts,
-        whole.resting_share,
-    )
+    return covariates(columns, None if left is None else columns[JOINT] - left)
 
 
 def series_of(fit: Fit, seen: Sequence[Covariates], floor_rad: float) -> Series:
@@ -39,15 +31,7 @@ def series_of(fit: Fit, seen: Sequence[Covariates], floor_rad: float) -> Series:
     for e, left, c in zip(problem.evidence, problem.left(fit.x), seen, strict=True):
         here = e.counted[JOINT]
         parts.append(left[here])
-        kept.append(
-            Covariates(
-                {k: v[here] for k, v in c.values.items()},
-                c.motion_direction[here],
-                c.motion_reversal[here],
-                c.starts,
-                c.resting_share,
-            )
-        )
+        kept.append(c.at(here))
     return make_series(np.concatenate(parts), floor_rad, join(kept))
 
 

@@ -58,14 +58,14 @@ class Place(NamedTuple):
 
 def every_row(fit: Fit) -> Fit:
     """The fit, not made again, on all fine rows of its recordings: what rests while nothing travels is seen too."""
-    problem = fit.problem.with_evidence([_on_every_row(e) for e in fit.problem.evidence])
+    problem = _about_every_row(fit.problem)
     residual = problem.residual(fit.x)
     return Fit(problem, fit.x, residual, problem.jacobian(fit.x, residual))
 
 
 def left_on_every_row(fit: Fit) -> list[FloatArray]:
     """What a fit leaves of the joint's angle [rad] on all fine rows, recording after recording."""
-    return fit.problem.with_evidence([_on_every_row(e) for e in fit.problem.evidence]).left(fit.x)
+    return _about_every_row(fit.problem).left(fit.x)
 
 
 def responses(fit: Fit) -> Responses:
@@ -94,6 +94,10 @@ def _slow(fit: Fit) -> tuple[tuple[str, FloatArray], ...]:
         for name, words in _DRIVE.items()
         if name in bases
     )
+
+
+def _about_every_row(problem: Problem) -> Problem:
+    return problem.with_evidence([_on_every_row(e) for e in problem.evidence])
 
 
 def _on_every_row(e: Evidence) -> Evidence:
