@@ -7,6 +7,7 @@ from typing import Any
 
 from firmware_sim.plant.columns import (
     JOINT_TORQUE,
+    LEAN,
     MOTOR_TORQUE,
     MU_DRUMS,
     MU_GUIDE,
@@ -102,6 +103,7 @@ def apply_surroundings(drive: Drive, u: Floats) -> float:
     drive.shafts[p.load_shaft].external_Nm = u[JOINT_TORQUE]
     drive.shafts[p.output_shaft].external_Nm = p.crosstalk * u[OTHER] + u[UNSEEN_TORQUE]
     drive.shafts[p.output_shaft].tilt = u[TILT]
+    drive.shafts[p.output_shaft].lean = u[LEAN]
     if p.load_shaft == p.output_shaft:
         drive.shafts[p.load_shaft].external_Nm += u[JOINT_TORQUE]
     if drive.shafts[0].prescribed == 0:

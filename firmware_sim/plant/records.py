@@ -130,6 +130,7 @@ SHAFT = np.dtype(
         ("gravity_second", "f8"),  # second harmonic over the first
         ("gravity_second_phase", "f8"),
         ("tilt", "f8"),  # rad, turn of the weight's direction at present
+        ("lean", "f8"),  # share of the weight that does not turn the shaft at present
         ("inertia_swing", "f8"),  # J (1 + swing cos(q − phase))
         ("inertia_phase", "f8"),
         ("spring_Nm", "f8"),  # saturation torque of a parallel spring

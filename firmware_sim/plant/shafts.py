@@ -43,7 +43,7 @@ def shaft_torque(s: Any, preload_factor: float) -> float:
         place = s.q - s.inertia_phase
         swing = s.inertia * s.inertia_swing
         torque -= swing * (math.cos(place) * s.a - 0.5 * math.sin(place) * s.v * s.v)
-    torque -= s.gravity_Nm * math.sin(s.q + s.gravity_phase + s.tilt)
+    torque -= s.gravity_Nm * (1.0 - s.lean) * math.sin(s.q + s.gravity_phase + s.tilt)
     if s.gravity_second != 0.0:
         torque -= s.gravity_Nm * s.gravity_second * math.sin(2.0 * s.q + s.gravity_second_phase)
     if s.spring_Nm > 0.0:
@@ -63,7 +63,7 @@ def shaft_slope(s: Any, rate: float) -> float:
     """−dτ/dq of `shaft_torque`, with rate = dv/dq; gravity counts only where it stabilises."""
     inertia = s.inertia * (1.0 + s.inertia_swing * math.cos(s.q - s.inertia_phase))
     slope: float = inertia * rate * rate + s.viscous * rate
-    slope += s.gravity_Nm * math.cos(s.q + s.gravity_phase + s.tilt)
+    slope += s.gravity_Nm * (1.0 - s.lean) * math.cos(s.q + s.gravity_phase + s.tilt)
     if s.gravity_second != 0.0:
         slope += 2.0 * s.gravity_Nm * s.gravity_second * math.cos(2.0 * s.q + s.gravity_second_phase)
     if s.spring_Nm > 0.0:

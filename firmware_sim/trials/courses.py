@@ -18,8 +18,8 @@ HANDOVER_S = 0.03  # a contact's load builds up within this time at the least
 class Course:
     """What is done to a joint in one recording; SI units, one value per sample.
 
-    `temperature_degC` and `other` (the load of a neighbouring joint, N·m) go along with it. The first `history`
-    samples happen before the recording begins.
+    `temperature_degC` and `other` (the load on a neighbouring joint, N·m, or its angle, rad) go along with it.
+    The first `history` samples happen before the recording begins.
     """
 
     kind: str
@@ -60,12 +60,14 @@ class Course:
 
 @dataclass(frozen=True)
 class Range:
-    """What a course may use: greatest load, travel of the joint either way, motor turn per joint turn."""
+    """What a course may use: greatest load, travel of the joint either way, motor turn per joint turn, and how far a
+    neighbouring joint goes either way, in its channel's unit (None: it bears a load as great as this one)."""
 
     load_Nm: float
     travel_rad: float
     motor_per_joint: float
     one_sided: bool = False
+    neighbour: float | None = None
 
 
 def draw_course(
@@ -95,7 +97,7 @@ def draw_course(
         joint * within.travel_rad * within.motor_per_joint,
         load * within.load_Nm,
         draw_temperature(rng, time, 6.0 if warm else 0.7),
-        draw_neighbour(rng, time, within.load_Nm),
+        draw_neighbour(rng, time, within.load_Nm if within.neighbour is None else within.neighbour),
     )
 
 
@@ -109,12 +111,12 @@ def draw_temperature(rng: np.random.Generator, time: Floats, swing_K: float) -> 
     return np.asarray(20.0 + float(rng.uniform(-1, 1)) + 0.5 * swing * wave)
 
 
-def draw_neighbour(rng: np.random.Generator, time: Floats, load_Nm: float) -> Floats:
-    """A neighbouring joint's load: holds and smooth changes of its own, up to this joint's greatest load."""
+def draw_neighbour(rng: np.random.Generator, time: Floats, most: float) -> Floats:
+    """A neighbouring joint's load or angle: holds and smooth changes of its own, up to `most` either way."""
     knots = _knots(rng, time, 0.6, 3.0)
     values = rng.uniform(-1.0, 1.0, len(knots))
     values[0] = 0.0
-    return np.asarray(load_Nm * _eased(time, knots, values, 0.8))
+    return np.asarray(most * _eased(time, knots, values, 0.8))
 
 
 def _bench(rng: np.random.Generator, time: Floats) -> tuple[Floats, Floats]:

@@ -151,7 +151,7 @@ def _effect(hidden: Hidden, other: str) -> dict[str, Any]:
         "role": hidden.role,
         "listed": kind.listed,
         "size": hidden.sized.size,
-        "parameters": observer_parameters(spec),
+        "parameters": observer_parameters(spec, other),
         "covariates": [c.replace("other:1", other.replace("other_", "other:")) for c in kind.covariates],
         "nearest": [kind.effect] if kind.listed else list(kind.nearest),
         **({"channel": MOTOR_TORQUE} if spec.id in IN_MOTOR_TORQUE else {}),

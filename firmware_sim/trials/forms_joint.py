@@ -190,6 +190,15 @@ def _tilting(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"moment_Nm": 1.0}, 2.0 * _torque(scene), 0.5 * scene.joint.load_Nm)
 
 
+def _leaning(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {
+        "phase_rad": angle(rng),
+        "lean_rad_per_unit": sign(rng) * float(rng.uniform(0.6, 1.4)) / _most(scene),
+        "upright_rad": float(rng.uniform(-0.6, 0.6)),
+    }
+    return Shape(fixed, {"moment_Nm": 1.0}, 2.0 * _torque(scene), 0.5 * scene.joint.load_Nm)
+
+
 def _cross(scene: Scene) -> float:
     return _torque(scene) / max(scene.plain.other_rms, 1e-9)
 
@@ -238,7 +247,8 @@ JOINT = (
     Suspect("inertial_load:folding_arm", TURNING, _folding),
     Suspect("gravity_load:sprung", TURNING, _sprung),
     Suspect("gravity_load:linkage", TURNING, _linkage),
-    Suspect("gravity_load:tilting_base", TURNING, _tilting, neighbour=True),
+    Suspect("gravity_load:tilting_base", TURNING, _tilting, neighbour=True, turned=True),
+    Suspect("gravity_load:leaning_base", TURNING, _leaning, neighbour=True, turned=True),
     Suspect("crosstalk:lagged", ANY, _late_neighbour, neighbour=True),
     Suspect("crosstalk:quadratic", ANY, _bent_neighbour, neighbour=True),
     Suspect("crosstalk:touching", ANY, _touching_neighbour, neighbour=True),

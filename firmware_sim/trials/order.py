@@ -28,7 +28,7 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
-    "crosstalk:posed", "crosstalk:quadratic",
+    "crosstalk:posed", "crosstalk:quadratic", "gravity_load:tilting_base",
     "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "pressure_dependent_friction:worn_through", "routing_friction:unlike_paths",
     "series_compliance:bushing", "series_compliance:one_way", "series_compliance:rubber",
@@ -37,8 +37,7 @@ ALIKE = frozenset({
     "termination_backlash:greased", "termination_backlash:sprung", "thermal_pretension:lagged",
     "viscous_slip:one_drum",
 })  # fmt: skip
-"""Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's. (A base that tilts it
-knows by a channel in rad alone, and the trials' has no unit.)"""
+"""Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
 FORMS = (*FRICTION, *CABLE, *JOINT)
 OTHER_FORMS = (*(s for s in FORMS if s.id not in ALIKE), *MOTOR_FORMS)
 """What can be concealed of laws that the catalogue does not hold."""

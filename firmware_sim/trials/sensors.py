@@ -9,7 +9,8 @@ import numpy as np
 from firmware_sim.trials.joints import DrawnJoint, log_uniform
 from firmware_sim.trials.measures import PlainDrive
 
-NEIGHBOUR = "other_neighbour"
+NEIGHBOUR_LOAD, NEIGHBOUR_ANGLE = "other_neighbour_Nm", "other_neighbour_rad"
+"""The channel of a neighbouring joint: the load on it, or how far it is turned."""
 TEMPERATURE_NOISE_K = 0.02
 NEIGHBOUR_NOISE = 0.002  # of its range
 

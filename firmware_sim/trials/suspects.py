@@ -49,14 +49,16 @@ class Shape:
 @dataclass(frozen=True)
 class Suspect:
     """An effect that may be concealed: in which courses, whether it needs a temperature that moves, a load
-    that changes its sign, a neighbour, a closed circuit (where an open one hangs on a weight, which holds
-    the tension whatever the cable does), a motor torque that is recorded; `shape` draws everything but its size."""
+    that changes its sign, a neighbour (that is `turned`: whose angle counts, not its load), a closed circuit (where an
+    open one hangs on a weight, which holds the tension whatever the cable does), a motor torque that is recorded;
+    `shape` draws everything but its size."""
 
     id: str
     courses: tuple[str, ...]
     shape: Callable[[np.random.Generator, Scene], Shape]
     warm: bool = False
     neighbour: bool = False
+    turned: bool = False
     two_sided: bool = False
     closed: bool = False
     motor_torque: bool = False

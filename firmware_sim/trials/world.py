@@ -19,7 +19,7 @@ from firmware_sim.trials.legs import Leg, legs_of
 from firmware_sim.trials.measures import PlainDrive
 from firmware_sim.trials.order import LAWS, Order, Wanted, order
 from firmware_sim.trials.scene import PAUSE_S, plain_scene, usable
-from firmware_sim.trials.sensors import NEIGHBOUR, draw_sensors, noise_floor_rad
+from firmware_sim.trials.sensors import NEIGHBOUR_ANGLE, NEIGHBOUR_LOAD, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
 from firmware_sim.trials.suspects import Scene, Shape, Suspect
 from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
@@ -83,10 +83,11 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
         how = how.having("motor_torque", {"noise_of_range": log_uniform(rng, 0.002, 0.01)})
     as_stated = asked.kind == "none" and wanted.imperfections == "none" and rng.uniform() < 0.3
     joint = draw_joint(rng, as_stated, closed=any(s.closed for s in asked.suspects))
+    turns = 0.0 if asked.case is not None else _turns(rng, asked.suspects)
     if asked.case is not None:
         courses, sessions = table_courses(rng, joint, how)
     else:
-        courses = _courses(rng, asked.suspects, joint, how)
+        courses = _courses(rng, asked.suspects, joint, how, turns)
         sessions = tuple(range(len(courses))) if "sessions" in how else (0,) * len(courses)
     scene, plain_run = plain_scene(joint, courses[0])
     joint = joint.with_sensors(draw_sensors(rng, joint, scene.plain))
@@ -98,7 +99,7 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
     if "configuration" in how:
         joint = _off(joint, how, scene.plain)
     needed = any(s.neighbour for s in asked.suspects)
-    other = NEIGHBOUR if needed or rng.uniform() < 0.6 else ""
+    other = (NEIGHBOUR_ANGLE if turns else NEIGHBOUR_LOAD) if needed or rng.uniform() < 0.6 else ""
     if asked.case is not None:
         other = f"other_{asked.case.condition}"
     specs = [h.sized.spec for h in hidden]
@@ -141,7 +142,7 @@ def _draw_confounded(rng: np.random.Generator, asked: Order, case: Tie) -> World
         return None
     joint = joint.with_sensors(draw_sensors(rng, joint, usual.plain))
     floor, how = noise_floor_rad(joint, scene.plain), Imperfections()
-    other = NEIGHBOUR if "crosstalk" in case.pair or rng.uniform() < 0.6 else ""
+    other = NEIGHBOUR_LOAD if "crosstalk" in case.pair or rng.uniform() < 0.6 else ""
     hidden = (Hidden(sized, "main"),)
     specs = [h.sized.spec for h in hidden]
     legs = legs_of(rng, joint, scene.plain, specs, courses, (0,) * len(courses), how, other)
@@ -157,7 +158,7 @@ def _as_drawn(scene: Scene, identifier: str, shape: Shape, plain: PlantRun) -> S
 
 
 def _courses(
-    rng: np.random.Generator, suspects: Sequence[Suspect], joint: DrawnJoint, how: Imperfections
+    rng: np.random.Generator, suspects: Sequence[Suspect], joint: DrawnJoint, how: Imperfections, turns: float
 ) -> tuple[Course, ...]:
     """One to three courses on one clock, each with its history; an effect shows in the first at the latest."""
     showing = [k for k in KINDS if all(k in s.courses for s in suspects)]
@@ -168,6 +169,7 @@ def _courses(
     lasts = float(rng.uniform(*SAMPLES)) / rate / count
     two_sided = any(s.two_sided for s in suspects)
     within = usable(joint, not two_sided and rng.uniform() < 0.15)
+    within = replace(within, neighbour=turns or None)
     warm = any(s.warm for s in suspects) or rng.uniform() < 0.2
     same, kind = rng.uniform() < 0.6, str(rng.choice(showing))
     start, found = 0.0, []
@@ -183,6 +185,14 @@ def _courses(
             course = with_history(rng, course, within, how["history"]["course"], how["history"]["lasts_s"])
         found.append(course)
     return tuple(found)
+
+
+def _turns(rng: np.random.Generator, suspects: Sequence[Suspect]) -> float:
+    """How far the neighbouring joint turns either way [rad]; 0 where its channel is the load on it. What needs none of
+    them gets either."""
+    needs = [s for s in suspects if s.neighbour]
+    turned = any(s.turned for s in needs) if needs else rng.uniform() < 0.5
+    return float(rng.uniform(0.4, 1.4)) if turned else 0.0
 
 
 def _conceal(

@@ -14,7 +14,6 @@ import numpy as np
 from firmware_sim.plant import EffectSpec, PlantConfig
 from firmware_sim.plant.records import Floats
 from firmware_sim.trials.joints import DrawnJoint
-from firmware_sim.trials.sensors import NEIGHBOUR
 
 JOINT_FILE = "joint.toml"
 _DIGITS = {"time_s": "%.6f", "temperature_degC": "%.4f"}
@@ -74,11 +73,11 @@ def joint_toml(
     return "\n".join(lines) + "\n"
 
 
-def observer_parameters(effect: EffectSpec) -> dict[str, float | str]:
-    """An effect's parameters as a joint configuration names them: a neighbour by its channel."""
+def observer_parameters(effect: EffectSpec, other: str) -> dict[str, float | str]:
+    """An effect's parameters as a joint configuration names them: a neighbour by its channel, `other`."""
     values: dict[str, float | str] = dict(effect.parameters)
     if effect.id == "crosstalk":
-        values["channel"] = NEIGHBOUR
+        values["channel"] = other
     return values
 
 

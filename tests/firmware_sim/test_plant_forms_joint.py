@@ -270,6 +270,10 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
             {"moment_Nm": 0.3, "phase_rad": 0.2, "tilt_rad_per_unit": 0.7},
             -0.3 * np.sin(q + 0.2 + 0.7 * OTHER),
         ),
+        "gravity_load:leaning_base": (
+            {"moment_Nm": 0.3, "phase_rad": 0.2, "lean_rad_per_unit": 0.7, "upright_rad": 0.3},
+            -0.3 * np.cos(0.3 + 0.7 * OTHER) * np.sin(q + 0.2),
+        ),
         "crosstalk:lagged": ({"load_coefficient": 0.3, "lag_s": smooth}, 0.3 * late),
         "crosstalk:quadratic": (
             {"load_coefficient": 0.3, "bend_per_unit": -0.5},

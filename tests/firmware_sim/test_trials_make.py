@@ -18,6 +18,7 @@ from firmware_sim.trials.make import main, make
 from firmware_sim.trials.order import ALIKE, CATALOGUE_FORMS, KINDS, OTHER_FORMS, Wanted, order
 from firmware_sim.trials.suspects import CATALOGUE
 from firmware_sim.trials.tabletop import CASES
+from firmware_sim.trials.world import _turns, draw_world
 
 PRIVATE = {"routing_friction:bending"}  # depends on a condition: for trials of several sessions
 
@@ -82,6 +83,23 @@ def test_the_truth_stands_beside_the_recordings_it_belongs_to(tmp_path: Path) ->
         assert 0.01 * truth["loop_rad"] < np.std(added) < 2.0 * truth["loop_rad"]
         assert all(e["effect"] not in (folder / "joint.toml").read_text() for e in truth["effects"])
         assert 9000 < sum(entry["rows"] for entry in truth["recordings"]) < 13000
+
+
+def test_a_neighbour_that_turns_the_base_is_known_by_its_angle_and_one_that_loads_it_by_its_load(
+    tmp_path: Path,
+) -> None:
+    rng = np.random.default_rng(5)
+    forms = {s.id: s for s in (*CATALOGUE_FORMS, *OTHER_FORMS)}
+    turns = [_turns(rng, (forms["gravity_load:tilting_base"],)) for _ in range(50)]
+    assert min(turns) >= 0.4
+    assert max(turns) <= 1.4
+    assert {_turns(rng, (forms["crosstalk:lagged"],)) for _ in range(50)} == {0.0}
+    any_of_them = [_turns(rng, (forms["bearing_friction:dahl"],)) for _ in range(200)]
+    assert 60 < sum(t > 0.0 for t in any_of_them) < 140
+    for form, unit in (("gravity_load:leaning_base", "rad"), ("crosstalk:touching", "Nm")):
+        wanted = Wanted(7, ("single",), "other", "some")
+        number = next(k for k in range(200) if order(wanted, k).suspects[0].id == form)
+        assert draw_world(wanted, number).other == f"other_neighbour_{unit}"
 
 
 @pytest.mark.parametrize("laws", ["catalogue", "other"])

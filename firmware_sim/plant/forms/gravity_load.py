@@ -1,11 +1,13 @@
-"""Unseen weight in other forms: held by a spring, on a linkage, on a base that tilts."""
+"""Unseen weight in other forms: held by a spring, on a linkage, on a base that tilts or leans."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import OTHER, TILT
+from firmware_sim.plant.columns import LEAN, OTHER, TILT
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 from firmware_sim.plant.records import Floats
 
@@ -77,4 +79,29 @@ TILTING = form(
     _tilting,
 )
 
-KINDS: tuple[EffectKind, ...] = (SPRUNG, LINKAGE, TILTING)
+
+def _leaning(build: Build, p: Mapping[str, float]) -> None:
+    _weight(build, p)
+
+    def fill(inputs: Floats) -> None:
+        inputs[:, LEAN] = 1.0 - np.cos(p["upright_rad"] + p["lean_rad_per_unit"] * inputs[:, OTHER])
+
+    build.schedules.append(fill)
+
+
+LEANING = form(
+    "gravity_load",
+    "leaning_base",
+    "A weight on a base that a neighbouring joint leans out of its plane: the cables carry "
+    "M − m g l cos(l0 + l · other_1) sin(q + φ).",
+    (
+        _MOMENT,
+        _PHASE,
+        Parameter("lean_rad_per_unit", "l", 0.0),
+        Parameter("upright_rad", "l0", 0.0),
+    ),
+    (*_ACTS, "other:1"),
+    _leaning,
+)
+
+KINDS: tuple[EffectKind, ...] = (SPRUNG, LINKAGE, TILTING, LEANING)
