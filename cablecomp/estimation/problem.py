@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,26 +23,13 @@ from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing
+from cablecomp.estimation.zeros import Zeros
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
-
-@dataclass(frozen=True)
-class Zeros:
-    """A basis of what the zeros of one channel can do to its weighted rows, and how to read the zeros off."""
-
-    Q: FloatArray
-    R: FloatArray
-    penalty_rows: int
-
-    def project(self, rows: FloatArray) -> FloatArray:
-        """Rows (and the penalties) with the best zeros taken off."""
-        padded = np.concatenate([rows, np.zeros(self.penalty_rows)])
-        return np.asarray(padded - self.Q @ (self.Q.T @ padded), dtype=np.float64)
-
-    def solve(self, rows: FloatArray) -> FloatArray:
-        """The zeros themselves."""
-        padded = np.concatenate([rows, np.zeros(self.penalty_rows)])
-        return np.asarray(np.linalg.lstsq(self.R, self.Q.T @ padded, rcond=None)[0], dtype=np.float64)
+Misfits: TypeAlias = dict[str, list[FloatArray]]
+"""Measured less predicted by channel, an array for each recording."""
+Known: TypeAlias = Mapping[int, Mapping[str, FloatArray]]
+"""Misfits of some recordings, by the recording's place and by channel."""
 
 
 @dataclass(frozen=True)
@@ -122,21 +109,19 @@ class Problem:
         """The joint at x as it stood in this recording."""
         return standing(self.config, self.values(x), recording)
 
-    def misfits(
-        self, x: FloatArray, beside: Mapping[str, list[FloatArray]] | None = None, session: str | None = None
-    ) -> dict[str, list[FloatArray]]:
+    def misfits(self, x: FloatArray, known: Known | None = None) -> Misfits:
         """Measured less predicted, zeros still in it, on all judged rows, by channel and recording; NaN where
         the recording lacks the channel. Raises InputError where the drive cannot follow.
 
-        `beside`, `session`: misfits known already, of which only that session's recordings are run again.
+        `known`: misfits of recordings that are not run again, by the recording's place and channel.
         """
         values = self.values(x)
-        found: dict[str, list[FloatArray]] = {c: [] for c in self.channels}
+        found: Misfits = {c: [] for c in self.channels}
         cache: dict[Any, Simulator] = {}
         for k, r in enumerate(self.evidence):
-            if beside is not None and r.session != session:
+            if known is not None and k in known:
                 for c in self.channels:
-                    found[c].append(beside[c][k])
+                    found[c].append(known[k][c])
                 continue
             key = self.stand_key(r)
             if key not in cache:
@@ -165,15 +150,17 @@ class Problem:
     def followed(self, x: FloatArray) -> FloatArray | None:
         """As `residual`; None where the drive cannot follow."""
         try:
-            return self._projected(x, self.misfits(x))
+            return self.weighted(x, self.misfits(x))
         except InputError:
             return None
 
-    def _projected(self, x: FloatArray, misfits: Mapping[str, list[FloatArray]]) -> FloatArray:
+    def weighted(self, x: FloatArray, misfits: Mapping[str, Sequence[FloatArray]]) -> FloatArray:
+        """The residual at x whose misfits are these."""
         return np.concatenate([self.rows(misfits), self.prior(x)])
 
-    def rows(self, misfits: Mapping[str, list[FloatArray]]) -> FloatArray:
-        """Data rows of a residual that has these misfits: weighted, zeros taken off, channel by channel."""
+    def rows(self, misfits: Mapping[str, Sequence[FloatArray]]) -> FloatArray:
+        """Data rows of a residual that has these misfits (or columns of them): weighted, zeros taken off, channel by
+        channel."""
         return np.concatenate([self.bases[c].project(self._rows(c, misfits[c])) for c in self.channels])
 
     def prior(self, x: FloatArray) -> FloatArray:
@@ -202,7 +189,7 @@ class Problem:
             columns[:, k] = (there - here) / step
         return columns
 
-    def _known(self, x: FloatArray) -> dict[str, list[FloatArray]] | None:
+    def _known(self, x: FloatArray) -> Misfits | None:
         """Misfits at x where some parameter is one session's own, so that others need not be run for it."""
         if not any(p.session for p in self.parameters):
             return None
@@ -211,13 +198,12 @@ class Problem:
         except InputError:
             return None
 
-    def _beside(
-        self, x: FloatArray, known: Mapping[str, list[FloatArray]] | None, session: str | None
-    ) -> FloatArray:
+    def _beside(self, x: FloatArray, known: Misfits | None, session: str | None) -> FloatArray:
         if known is None or session is None:
             return self.residual(x)
+        others = (k for k, r in enumerate(self.evidence) if r.session != session)
         try:
-            return self._projected(x, self.misfits(x, known, session))
+            return self.weighted(x, self.misfits(x, {k: {c: known[c][k] for c in known} for k in others}))
         except InputError:
             return self.residual(x)
 
@@ -304,7 +290,7 @@ class Problem:
         for r, m in zip(self.evidence, misfits, strict=True):
             if channel in r.counted:
                 kept = r.counted[channel]
-                parts.append((r.weight * m)[kept] / self.weighing.sigma[channel])
+                parts.append((r.weight[kept] * m[kept].T).T / self.weighing.sigma[channel])
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _length(self) -> int:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
+from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.screening import ask
@@ -32,6 +35,34 @@ def test_an_event_is_promised_of_the_cable_that_it_happens_to(
     assert promised[f"effect.{effect}.{amount}"] == pytest.approx(sign * true, rel=0.1)
     assert promised[f"effect.{effect}.time_s"] == pytest.approx(EVENT_S, abs=0.2)
     assert plain.cost < 0.1 * drive.fit.cost
+
+
+def test_an_event_leaves_recordings_that_ended_before_it_as_they_were_and_later_ones_alike() -> None:
+    """Each of three recordings worked out once for an event anywhere, as if all were run for each."""
+    columns = recorded([EffectSpec("clamp_slip", {"slip_m": 1e-4, "time_s": EVENT_S})], 27.0)
+    parts = {}
+    for k in range(3):
+        kept = (columns["time_s"] >= 9.0 * k) & (columns["time_s"] < 9.0 * (k + 1))
+        parts[f"small/{k}"] = {name: values[kept] for name, values in columns.items()}
+    body = gather_body(TOLERANT, parts, None)
+    drive = calibrate_drive(TOLERANT, body.used, np.random.default_rng(0))
+    slip = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "clamp_slip")
+    here = anchor(drive.fit)
+    for instant, duration, taken_up in (
+        (4.0, 0.0, 0.0),
+        (12.5, 0.0, 0.0),
+        (5.0, 0.0, 1.0),
+        (6.0, 8.0, 0.0),
+        (22.0, 0.0, 0.0),
+    ):
+        values = {"slip_m": 1e-4, "time_s": instant, "duration_s": duration, "taken_up": taken_up}
+        found = here.with_event(slip, values)
+        joint = drive.fit.problem.config.model_copy(update={"effect": (slip.entry(values),)})
+        every = replace(drive.fit.problem, config=joint).misfits(drive.fit.x)
+        assert found is not None
+        for channel, misfits in every.items():
+            for mine, theirs in zip(found[channel], misfits, strict=True):
+                np.testing.assert_array_equal(mine, theirs)
 
 
 def test_an_event_of_a_law_that_knows_no_duration_is_asked_at_once_alone() -> None:

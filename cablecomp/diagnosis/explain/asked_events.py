@@ -12,7 +12,6 @@ from cablecomp.diagnosis.explain.courses import Course, before_all, from_each, i
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
 from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.errors import InputError
 
 
 def best_event(here: Anchor, h: Hypothesis) -> Best | None:
@@ -79,14 +78,11 @@ def _stepped(here: Anchor, h: Hypothesis, best: Best) -> Best:
 def _likely(here: Anchor, h: Hypothesis, values: Mapping[str, float | str], size: float) -> list[Course]:
     """The courses that promise most, of an event of this size, were it over before the first sample."""
     problem = here.fit.problem
-    over = h.entry({**values, h.amount.name: size, h.instant: before_all(problem)})
-    joint = problem.config.model_copy(update={"effect": (*problem.config.effect, over)})
-    try:
-        does, does_not = replace(problem, config=joint).misfits(here.fit.x), here.misfits
-    except InputError:
+    over = here.with_event(h, {**values, h.amount.name: size, h.instant: before_all(problem)})
+    if over is None:
         return []
     instants = instants_of(problem, LIMITS.course_instants)
-    rows = from_each(problem, does, does_not, instants)
+    rows = from_each(problem, over, here.misfits, instants)
     beyond = here.beyond(np.concatenate([rows, np.zeros((len(problem.parameters), len(instants)))]))
     return likely(instants, beyond.T @ beyond, beyond.T @ here.beyond(here.fit.residual))[: LIMITS.courses]
 

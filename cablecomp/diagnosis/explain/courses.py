@@ -9,16 +9,15 @@ products of these columns alone, without a run of the drive for each.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.problem import Problem
-from cablecomp.signal.smoothing import FloatArray
-
-Misfits = dict[str, list[FloatArray]]
+from cablecomp.estimation.problem import Misfits, Problem
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 EVENLY: Final = 0
 """Number of steps of a course that has none."""
@@ -34,11 +33,14 @@ class Course(NamedTuple):
 
 def how_far(course: Course, time_s: FloatArray) -> FloatArray:
     """g, how far an event has gone at these times, 0..1."""
-    since = time_s - course.instant_s
-    share = np.clip(since / course.duration_s, 0.0, 1.0) if course.duration_s > 0.0 else np.ones_like(since)
-    if course.steps != EVENLY:
-        share = (1.0 + np.floor((course.steps - 1) * share)) / course.steps
-    return np.where(since >= 0.0, share, 0.0)
+    return _gone(time_s - course.instant_s, np.array(course.duration_s), np.array(course.steps))
+
+
+def _gone(since_s: FloatArray, duration_s: FloatArray, steps: IntArray) -> FloatArray:
+    """How far events have gone so long after their instants."""
+    share = np.where(duration_s > 0.0, np.clip(since_s / np.maximum(duration_s, 1e-300), 0.0, 1.0), 1.0)
+    stepped = (1.0 + np.floor((steps - 1) * share)) / np.maximum(steps, 1)
+    return np.where(since_s >= 0.0, np.where(steps == EVENLY, share, stepped), 0.0)
 
 
 def before_all(problem: Problem) -> float:
@@ -56,17 +58,13 @@ def instants_of(problem: Problem, count: int) -> FloatArray:
 def from_each(problem: Problem, over: Misfits, none: Misfits, instants: FloatArray) -> FloatArray:
     """What an event takes off the residual's data rows from each of these instants on, a column each: `over` and `none`
     are the misfits with it over before the first sample and without it."""
-    return np.stack([problem.rows(_since(problem, over, none, t)) for t in instants], axis=1)
-
-
-def _since(problem: Problem, over: Misfits, none: Misfits, instant_s: float) -> Misfits:
-    return {
+    return problem.rows({
         c: [
-            (b - a) * (e.at_rows("time_s") >= instant_s)
+            (b - a)[:, None] * (e.at_rows("time_s")[:, None] >= instants)
             for e, a, b in zip(problem.evidence, over[c], none[c], strict=True)
         ]
         for c in problem.channels
-    }
+    })  # fmt: skip
 
 
 def likely(instants: FloatArray, gram: FloatArray, along: FloatArray) -> list[Course]:
@@ -103,7 +101,7 @@ def _closer(instants: FloatArray, gram: FloatArray, along: FloatArray, c: Course
             for a, b in itertools.product(moves.tolist(), moves.tolist())
         ]
         near = [n for n in near if _inside(instants, n)] or [c]
-        found = _taken(np.stack([_rises(instants, n) for n in near]), gram, along)
+        found = _taken(_rises(instants, near), gram, along)
         k = int(np.argmax(found))
         taken, c = float(found[k]), near[k]
         width *= 0.4
@@ -121,7 +119,7 @@ def _courses(instants: tuple[float, ...]) -> tuple[list[Course], FloatArray]:
             found.append(Course(start, float(duration), steps))
     at = np.array(instants)
     found = [c for c in found if _inside(at, c)]
-    return found, np.stack([_rises(at, c) for c in found])
+    return found, _rises(at, found)
 
 
 def _inside(instants: FloatArray, c: Course) -> bool:
@@ -130,9 +128,10 @@ def _inside(instants: FloatArray, c: Course) -> bool:
     return bool(instants[0] <= c.instant_s and last <= instants[-1])
 
 
-def _rises(instants: FloatArray, course: Course) -> FloatArray:
-    """How far a course rises about each of the instants."""
-    return np.asarray(np.diff(how_far(course, _between(instants))), dtype=np.float64)
+def _rises(instants: FloatArray, courses: Sequence[Course]) -> FloatArray:
+    """How far each course rises about each of the instants."""
+    begins, lasts, steps = (np.array(values)[:, None] for values in zip(*courses, strict=True))
+    return np.asarray(np.diff(_gone(_between(instants) - begins, lasts, steps)), dtype=np.float64)
 
 
 def _between(instants: FloatArray) -> FloatArray:

@@ -3,7 +3,9 @@ that no step of the model's own parameters can do."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +14,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.problem import Misfits, Problem
 from cablecomp.signal.smoothing import FloatArray
 
 Best = tuple[float, dict[str, float | str], FloatArray, float]
@@ -29,6 +32,10 @@ class Anchor:
     fit: Fit
     Q: FloatArray
     J: FloatArray
+    sizes: dict[str, float] = field(default_factory=dict)
+    """What was worth seeing of a hypothesis last: at the next start, or beside the next model, it is about that."""
+    over: dict[tuple[int, tuple[object, ...]], Mapping[str, FloatArray]] = field(default_factory=dict)
+    """Misfits of recordings that begin after an event, by the recording's place and what happened."""
 
     @cached_property
     def rated(self) -> FloatArray | None:
@@ -36,9 +43,33 @@ class Anchor:
         return self.fit.problem.finely().followed(self.fit.x)
 
     @cached_property
-    def misfits(self) -> dict[str, list[FloatArray]]:
+    def misfits(self) -> Misfits:
         """What the drive leaves as it stands here."""
         return self.fit.problem.misfits(self.fit.x)
+
+    def with_event(self, h: Hypothesis, values: Mapping[str, float | str]) -> Misfits | None:
+        """What it leaves with an event beside it; None where it cannot be followed so. A recording that ended before
+        is as it was; in one that begins when all is over it is the same whenever and however that came."""
+        begins = float(values[h.instant])
+        ends = begins + float(values.get(h.duration, 0.0))
+        aside = {h.instant, h.duration, *(p.name for p in h.effect.parameters if p.role == "steps")}
+        what = (h.effect.id, *sorted((k, v) for k, v in values.items() if k not in aside))
+        known: dict[int, Mapping[str, FloatArray]] = {}
+        after = []
+        for k, e in enumerate(self.fit.problem.evidence):
+            first, last = (float(e.columns["time_s"][at]) for at in (0, -1))
+            if last < begins:
+                known[k] = {c: m[k] for c, m in self.misfits.items()}
+            elif first >= ends:
+                after.append(k)
+                if (k, what) in self.over:
+                    known[k] = self.over[k, what]
+        try:
+            found = _with(self.fit.problem, h, values).misfits(self.fit.x, known)
+        except InputError:
+            return None
+        self.over.update({(k, what): {c: m[k] for c, m in found.items()} for k in after})
+        return found
 
     def step(self, v: FloatArray) -> FloatArray:
         """Where the anchor's parameters go, by a linear step, to make up for a residual v."""
@@ -54,17 +85,18 @@ class Anchor:
         return np.concatenate([v, np.zeros((self.J.shape[1], *v.shape[1:]))])
 
 
-def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
+def anchor(fit: Fit, reach: float = LIMITS.reach, sizes: dict[str, float] | None = None) -> Anchor:
     """An anchor at a fit (or any evaluated point); `reach`: share of the cost that a step by one in a parameter
-    costs."""
+    costs; `sizes` of hypotheses that were asked elsewhere, and go on there."""
     count = fit.J.shape[1]
     cost = np.sqrt(reach * 2.0 * fit.cost) * np.eye(count)
     J = np.concatenate([fit.J, cost])
+    sizes = {} if sizes is None else sizes
     if not count:
-        return Anchor(fit, np.empty((len(J), 0)), J)
+        return Anchor(fit, np.empty((len(J), 0)), J, sizes)
     scale = np.sqrt(np.maximum(np.sum(J**2, axis=0), 1e-300))
     u, s, _ = np.linalg.svd(J / scale, full_matrices=False)
-    return Anchor(fit, u[:, s > 1e-6], J)
+    return Anchor(fit, u[:, s > 1e-6], J, sizes)
 
 
 def best_start(here: Anchor, h: Hypothesis) -> Best | None:
@@ -72,10 +104,9 @@ def best_start(here: Anchor, h: Hypothesis) -> Best | None:
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)
     best = None
-    size = None  # what was worth seeing at one start is about that at the next
     # an event's instants are looked at coarsely where every run is dear
     for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
-        found = contribution(here, h, start, size)
+        found = contribution(here, h, start)
         if found is None:
             continue
         d, size = found
@@ -96,13 +127,12 @@ def best_start(here: Anchor, h: Hypothesis) -> Best | None:
     return best
 
 
-def contribution(
-    here: Anchor, h: Hypothesis, start: Start, about: float | None = None
-) -> tuple[FloatArray, float] | None:
+def contribution(here: Anchor, h: Hypothesis, start: Start) -> tuple[FloatArray, float] | None:
     """What the effect adds to the prediction (weighted) at a size that is about as large as the residual, looked for
-    from `about` on, or from the start's own."""
+    from what was so last, or from the start's own."""
     wanted = max(float(np.linalg.norm(here.fit.residual)), 1.0)
-    size = float(start.values[h.amount.name]) if about is None else about
+    own = float(start.values[h.amount.name])
+    size = math.copysign(here.sizes.get(h.name, abs(own)), own)
     low, high = h.amount.minimum, h.amount.maximum
     result = None
     for _ in range(4):
@@ -112,6 +142,7 @@ def contribution(
             size *= 0.1
             continue
         result = (d, size)
+        here.sizes[h.name] = abs(size)
         length = float(np.linalg.norm(here.beyond(d))) + 0.1 * float(np.linalg.norm(d))
         ratio = wanted / max(length, 1e-9 * wanted)
         if 0.4 < ratio < 2.5 or abs(size * ratio) >= high * 3.0:
@@ -124,13 +155,18 @@ def difference(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> F
     """What the effect adds at these values. A law with rates is run on every sample, with it and without: rows thinned
     by travel know no acceleration."""
     problem, before = here.fit.problem, here.fit.residual
+    if h.has_instant:
+        misfits = here.with_event(h, values)
+        return None if misfits is None else before - problem.weighted(here.fit.x, misfits)
     if h.effect.rates and not problem.fine:
         if here.rated is None:
             return None
         problem, before = problem.finely(), here.rated
-    joint = problem.config.model_copy(update={"effect": (*problem.config.effect, h.entry(values))})
-    try:
-        found = replace(problem, config=joint).followed(here.fit.x)
-    except InputError:
-        return None
+    found = _with(problem, h, values).followed(here.fit.x)
     return None if found is None else before - found
+
+
+def _with(problem: Problem, h: Hypothesis, values: Mapping[str, float | str]) -> Problem:
+    """The problem with an effect beside what the drive has, nothing of it free."""
+    joint = problem.config.model_copy(update={"effect": (*problem.config.effect, h.entry(values))})
+    return replace(problem, config=joint)

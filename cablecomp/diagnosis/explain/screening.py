@@ -53,18 +53,32 @@ PART = 0.3
 
 def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     """The best linear answer over the hypothesis's starts; None if it cannot be simulated or shows nothing."""
+    return next(iter(ask_all([here], h)), None)
+
+
+def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
+    """What a hypothesis promises at each anchor, best first; its shapes where it promises most without."""
     if h.has_phase:
-        return _ask_pair(here, h)
-    best = best_event(here, h) if h.has_instant else best_start(here, h)
-    if best is None:
-        return None
+        answers = [_ask_pair(here, h) for here in anchors]
+    else:
+        plain = [best_event(here, h) if h.has_instant else best_start(here, h) for here in anchors]
+        least = min((p[0] for p in plain if p is not None), default=0.0)
+        answers = [
+            _answered(here, h, p, shaped=p[0] == least)
+            for here, p in zip(anchors, plain, strict=True)
+            if p is not None
+        ]
+    return sorted((a for a in answers if a is not None), key=lambda a: a.cost)
+
+
+def _answered(here: Anchor, h: Hypothesis, best: Best, *, shaped: bool) -> Answer:
     cost, values, d, size = best
     plain = _answer(here, h, values, cost, d, size)
-    more = (h.further or h.has_instant) and not here.fit.problem.fine
-    shaped = _shaped(here, h, best) if more else None
-    if shaped is None:
+    more = shaped and (h.further or h.has_instant) and not here.fit.problem.fine
+    other = _shaped(here, h, best) if more else None
+    if other is None:
         return plain
-    cost, values, d, size = shaped
+    cost, values, d, size = other
     return replace(_answer(here, h, values, cost, d, size), plain=plain)
 
 
@@ -116,8 +130,7 @@ def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
 
 def _pair(here: Anchor, h: Hypothesis, cosine: Start, sine: Start) -> Answer | None:
     """Both contributions in one linear step."""
-    first = contribution(here, h, cosine)
-    found = [first, contribution(here, h, sine, first and first[1])]
+    found = [contribution(here, h, start) for start in (cosine, sine)]
     if any(f is None for f in found):
         return None
     (d0, s0), (d1, s1) = (f for f in found if f is not None)
@@ -133,12 +146,6 @@ def _pair(here: Anchor, h: Hypothesis, cosine: Start, sine: Start) -> Answer | N
     values = {**cosine.values, h.amount.name: size, h.phase: phase}
     d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
     return _answer(here, h, values, cost, d, size)
-
-
-def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
-    """What a hypothesis promises at each anchor, best first."""
-    asked = [ask(here, h) for here in anchors]
-    return sorted((a for a in asked if a is not None), key=lambda a: a.cost)
 
 
 def _begun(a: Answer, evaluations: int) -> Fit | None:
