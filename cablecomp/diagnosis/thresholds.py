@@ -164,12 +164,14 @@ class Thresholds:
     """Duration of the shortest such course over the span of the recordings; below it the event is at once."""
     durations: int = 16
     """Durations that are looked at, from that one to the whole span, evenly by their logarithm."""
+    curved: tuple[float, ...] = (0.4, 2.5)
+    """Curves of events that are asked for beside an even course: one that settles, one that gets quicker."""
     in_steps: tuple[int, ...] = (2, 3, 4, 5)
     """Equal steps in which an event may go: of more, evenly says as much."""
     stepped: float = 0.6
     """Share of what an event at once, or an even one, would leave, below which it is said to go in steps: of five
     numbers of steps at any instants, one fits some of whatever is left."""
-    courses: int = 5
+    courses: int = 6
     """Courses that are then run, best first by what they promise."""
     edge: float = 0.06
     """Share of a recording at either end within which an event has no before or no after that would show it."""

@@ -38,6 +38,7 @@ Role = Literal[
     "instant",
     "duration",
     "steps",
+    "curve",
     "begin",
     "reference",
     "length",
@@ -47,8 +48,8 @@ Role = Literal[
     "bend",
 ]
 """An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s], how
-long it takes [s] and in how many steps; when a slow course began [s]; the reference of what the law reads; the length
-of cable in a path [m]; the turn in which friction builds up [rad]; a place on a drum [rad]; by how
+long it takes [s], in how many steps or how curved; when a slow course began [s]; the reference of what the law
+reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; a place on a drum [rad]; by how
 much another channel turns the joint; how much what is read grows with itself; any other shape."""
 
 
@@ -63,7 +64,8 @@ class Parameter:
     configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
     the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
     that it leaves out at first (a begin's count from the first of all samples, a bend's are over the channel's largest
-    reading, others' are in units of `scale(config)`); of an event's course it asks by itself. `reach`: times by which a
+    reading, others' are in units of `scale(config)`); of an
+    event's course it asks by itself. `reach`: times by which a
     fit of a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
     `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
     """

@@ -1,4 +1,4 @@
-"""How far an event has gone: at once, evenly for a while, or in equal steps."""
+"""How far an event has gone: at once, for a while (evenly, or ever more slowly or quickly), or in equal steps."""
 
 from __future__ import annotations
 
@@ -41,26 +41,42 @@ STEPS: Final = Parameter(
 )
 """In how many steps."""
 
+CURVE: Final = Parameter(
+    "curve",
+    "-",
+    1.0,
+    0.1,
+    10.0,
+    "c, how it goes in that time: 1 evenly, below 1 ever more slowly, above 1 ever more quickly",
+    role="curve",
+    held=True,
+    omitted=1.0,
+    minimum=0.05,
+    maximum=20.0,
+)
+"""How what takes its time speeds up or settles."""
+
 COURSE: Final = (
-    "g = (t - t*)/d within 0..1, d = 0: a step; in n steps (1 + floor((n - 1)(t - t*)/d))/n, all from t* + d"
+    "g = ((t - t*)/d)^c within 0..1, d = 0: a step; "
+    "in n steps (1 + floor((n - 1)(t - t*)/d))/n, all from t* + d"
 )
 """The course of an event in its equation."""
 
 
 @njit
-def gone(since_s: Any, duration_s: Any, steps: Any) -> Any:
+def gone(since_s: Any, duration_s: Any, steps: Any, curve: Any) -> Any:
     """g, how far an event has gone `since_s` >= 0 after its instant, 0..1."""
     if since_s >= duration_s:
         return 1.0
     share = since_s / duration_s
     if steps < 2.0:
-        return share
+        return share if curve == 1.0 else share**curve
     return (1.0 + int((steps - 1.0) * share)) / steps
 
 
 def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]:
-    """Instant, duration and steps as an event's term takes them; raises InputError for a part of a step, and for
-    several at once."""
+    """Instant, duration, steps and curve as an event's term takes them; raises InputError for a part of a step, for
+    several at once, and for steps that would be curved."""
     steps = values["steps"]
     if steps != int(steps) or steps == 1.0:
         raise InputError(
@@ -72,4 +88,13 @@ def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]
             f"{config.name}: key `effect.steps` is {steps:g}, and `effect.duration_s`, from first step to last, "
             "is 0; give it above 0 [s], or leave the steps out where all happens at once"
         )
-    return {"instant": values["time_s"], "duration": values["duration_s"], "steps": steps}
+    if steps and values["curve"] != 1.0:
+        raise InputError(
+            f"{config.name}: keys `effect.steps` and `effect.curve` are both given; steps are equal: leave one out"
+        )
+    return {
+        "instant": values["time_s"],
+        "duration": values["duration_s"],
+        "steps": steps,
+        "curve": values["curve"],
+    }

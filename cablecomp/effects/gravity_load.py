@@ -11,17 +11,18 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 from cablecomp.errors import InputError
 
 
-@term(parameters=("moment", "phase", "tilt", "channel"))
+@term(parameters=("moment", "phase", "growth", "tilt", "channel"))
 def _weigh(c: Any, p: Any, s: Any) -> None:
-    """p: greatest moment [N m], phase [rad], turn of the base [rad per unit of the channel], the channel's place among
-    the others (-1: none)."""
+    """p: greatest moment [N m], phase [rad], by what share it grows with the joint's angle [1/rad],
+    turn of the base [rad per unit of the channel], the channel's place among the others (-1: none)."""
     angle = c.joint + p.phase
     if p.channel >= 0.0:
         other = c.other[int(p.channel)]
         if not math.isnan(other):
             angle += p.tilt * other
-    c.moment += p.moment * math.sin(angle)
-    c.moment_slope += p.moment * math.cos(angle)
+    lever = p.moment * (1.0 + p.growth * c.joint)
+    c.moment += lever * math.sin(angle)
+    c.moment_slope += lever * math.cos(angle) + p.moment * p.growth * math.sin(angle)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -33,6 +34,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     weight = _weigh(
         moment=values["moment_Nm"],
         phase=values["phase_rad"],
+        growth=values["growth_per_rad"],
         tilt=values["tilt_rad_per_unit"],
         channel=values["channel"],
     )
@@ -42,9 +44,10 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="gravity_load",
     statement="The link's weight turns the joint, more or less by its position, and by how another "
-    "joint has turned its base; the torque channel does not show it.",
-    equation="M_cable = M - m g l sin(q_out + φ + t other(t))",
-    source="statics of a pendulum",
+    "joint has turned its base; on a linkage its lever grows or shrinks on the way. The torque channel "
+    "does not show it.",
+    equation="M_cable = M - m g l (1 + p q_out) sin(q_out + φ + t other(t))",
+    source="statics of a pendulum; a linkage's lever to first order in the joint's angle",
     parameters=(
         Parameter(
             "moment_Nm",
@@ -57,6 +60,18 @@ EFFECT = Effect(
             scale=pretension_moment,
         ),
         Parameter("phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, angle from the hanging rest", role="phase"),
+        Parameter(
+            "growth_per_rad",
+            "1/rad",
+            0.0,
+            -20.0,
+            20.0,
+            "p, share by which its lever grows per radian of the joint, as on a linkage",
+            role="shape",
+            omitted=0.0,
+            of_known_drive=True,
+            tries=(-1.0, 1.0),
+        ),
         Parameter(
             "tilt_rad_per_unit",
             "rad/unit",

@@ -7,16 +7,16 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.effects.course import COURSE, DURATION, STEPS, course, gone
+from cablecomp.effects.course import COURSE, CURVE, DURATION, STEPS, course, gone
 
 
-@term(parameters=("fraction", "instant", "duration", "steps"))
+@term(parameters=("fraction", "instant", "duration", "steps", "curve"))
 def _break(c: Any, p: Any, s: Any) -> None:
     """p: share of EA lost (below 0: by cable l), instant [s], how long it takes [s], in how many
-    steps."""
+    steps, how curved."""
     since = c.time - p.instant
     if since >= 0.0:
-        done = gone(since, p.duration, p.steps)
+        done = gone(since, p.duration, p.steps, p.curve)
         if p.fraction > 0.0:
             c.stiffness_h *= 1.0 - p.fraction * done
         else:
@@ -49,6 +49,7 @@ EFFECT = Effect(
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
         DURATION,
         STEPS,
+        CURVE,
     ),
     acts_through=("time", "load"),
     bounded=True,

@@ -135,6 +135,12 @@ def _biting_again(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**when, **lag}, {"slip_m": 1.0}, *_slip(scene))
 
 
+def _wearing_in(rng: np.random.Generator, scene: Scene) -> Shape:
+    when = _while(rng, scene)
+    lag = {"lag_s": 0.5 * when.pop("duration_s")}
+    return Shape({**when, **lag}, {"fraction": 1.0}, 0.5, 0.7)
+
+
 def _breaking_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**_while(rng, scene), **_unequally(rng)}, {"fraction": 1.0}, 0.5, 0.7)
 
@@ -192,5 +198,6 @@ CABLE = (
     Suspect("strand_break:unequal_steps", ANY, _breaking_unequally),
     Suspect("strand_break:fraying", ANY, _fraying),
     Suspect("strand_break:accelerating", ANY, _fraying),
+    Suspect("strand_break:settling", ANY, _wearing_in),
     Suspect("strand_break:other_cable", ANY, _other_break, closed=True),
 )

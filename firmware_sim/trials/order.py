@@ -32,7 +32,7 @@ ALIKE = frozenset({
     "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "pressure_dependent_friction:worn_through", "routing_friction:unlike_paths",
     "series_compliance:bushing", "series_compliance:one_way", "series_compliance:rubber",
-    "strand_break:fraying", "strand_break:in_steps", "strand_break:other_cable",
+    "strand_break:accelerating", "strand_break:fraying", "strand_break:in_steps", "strand_break:other_cable",
     "strand_friction:rate_dependent", "termination_backlash:dragging_link",
     "termination_backlash:greased", "termination_backlash:sprung", "thermal_pretension:lagged",
     "viscous_slip:one_drum",

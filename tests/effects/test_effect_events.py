@@ -51,6 +51,32 @@ def test_an_event_in_steps_is_as_many_sudden_ones(effect: str, amount: dict[str,
         assert steps[here] == pytest.approx(once[here], rel=1e-3, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("effect", "amount"), [("clamp_slip", {"slip_m": 2e-3}), ("strand_break", {"fraction": 0.3})]
+)
+def test_an_event_may_settle_or_get_quicker(effect: str, amount: dict[str, float]) -> None:
+    """After a quarter of its two seconds a half of it by the square root, a sixteenth by the square."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 4.0, 81)
+    columns = still(time, np.full(81, 0.4))
+    plain = run(config, columns)["deflection_rad"]
+    k = int(np.argmin(np.abs(time - 1.5)))
+    for curve, share in ((0.5, 0.5), (2.0, 0.0625)):
+        course = {"time_s": 1.0, "duration_s": 2.0, "curve": curve}
+        found = run(config, columns, (effect, {**amount, **course}))["deflection_rad"] - plain
+        part = {name: share * value for name, value in amount.items()}
+        once = run(config, columns, (effect, {**part, "time_s": 1.0}))["deflection_rad"] - plain
+        assert found[k] == pytest.approx(once[k], rel=1e-3)
+        whole = run(config, columns, (effect, {**amount, "time_s": 1.0}))["deflection_rad"] - plain
+        assert found[-1] == pytest.approx(whole[-1], rel=1e-3)
+
+
+def test_steps_that_would_be_curved_are_refused_in_one_line() -> None:
+    both = {"fraction": 0.1, "time_s": 0.0, "duration_s": 1.0, "steps": 3.0, "curve": 2.0}
+    with pytest.raises(InputError, match=r"`effect.steps` and `effect.curve` are both given"):
+        run(joint(), still(np.arange(3.0), np.zeros(3)), ("strand_break", both))
+
+
 @pytest.mark.parametrize("cable", ["", "_l"])
 def test_a_clamp_that_holds_so_much_creeps_by_the_excess(cable: str) -> None:
     """Closed circuit with so long a free span that what is let go is cable: under a steady load ds/dt = r (T - T_c),

@@ -66,6 +66,18 @@ def test_gravity_turns_with_the_joint(name: str) -> None:
     assert found == pytest.approx(expected, abs=1e-10)
 
 
+def test_a_weights_lever_may_grow_with_the_joint() -> None:
+    """As on a linkage: m g l (1 + p q) sin(q + phase)."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    weight = 0.4 * unit(config)
+    for growth in (0.8, -0.6):
+        values = {"moment_Nm": weight, "phase_rad": 0.7, "growth_per_rad": growth}
+        found = run(config, columns, ("gravity_load", values))["joint_position_rad"]
+        load = columns["joint_torque_Nm"] - weight * (1.0 + growth * found) * np.sin(found + 0.7)
+        assert found == pytest.approx(fed_with(config, columns, load), abs=1e-10)
+
+
 def test_a_neighbours_load_counts_by_the_pose() -> None:
     """At each angle of the joint as a coefficient of its own: k (1 + p q)."""
     config = joint(JOINTS[0])

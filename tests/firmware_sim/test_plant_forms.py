@@ -77,6 +77,7 @@ SIZES = {
     "strand_break:unequal_steps": {"fraction": 0.3, "time_s": 1.0, "duration_s": 2.0, "wait": 2.0},
     "strand_break:fraying": {"fraction": 0.3, "time_s": 1.0, "duration_s": 2.0, "cable_l": 1.0},
     "strand_break:accelerating": {"fraction": 0.3, "time_s": 1.0, "duration_s": 2.0},
+    "strand_break:settling": {"fraction": 0.3, "time_s": 1.0, "lag_s": 0.5},
     "strand_break:other_cable": {"fraction": 0.3, "time_s": 1.0},
     "crosstalk:lagged": {"load_coefficient": 0.3},
     "crosstalk:quadratic": {"load_coefficient": 0.3, "bend_per_unit": 0.5},

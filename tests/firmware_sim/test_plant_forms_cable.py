@@ -205,15 +205,15 @@ def test_a_clamp_that_is_pulled_too_hard_creeps_by_the_excess() -> None:
 
 def test_wires_that_fray_or_break_in_steps_end_where_they_break_at_once() -> None:
     once = _alone(EffectSpec("strand_break", {"fraction": 0.4, "time_s": 1.0}))
-    for form, more in (
-        ("fraying", {}),
-        ("accelerating", {}),
-        ("in_steps", {"steps": 4.0}),
-        ("unequal_steps", {"growth": 0.5}),
+    lasts = {"duration_s": 2.0}
+    for form, goes in (
+        ("fraying", lasts),
+        ("accelerating", lasts),
+        ("settling", {"lag_s": 0.2}),
+        ("in_steps", {**lasts, "steps": 4.0}),
+        ("unequal_steps", {**lasts, "growth": 0.5}),
     ):
-        run = _alone(
-            EffectSpec(f"strand_break:{form}", {"fraction": 0.4, "time_s": 1.0, "duration_s": 2.0, **more})
-        )
+        run = _alone(EffectSpec(f"strand_break:{form}", {"fraction": 0.4, "time_s": 1.0, **goes}))
         assert run.joint_position_rad[-1] == pytest.approx(once.joint_position_rad[-1], rel=1e-4)
         np.testing.assert_array_equal(run.joint_position_rad[T < 1.0], once.joint_position_rad[T < 1.0])
         between = run.joint_position_rad[(T > 1.2) & (T < 2.8)]

@@ -12,7 +12,6 @@ from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
-from cablecomp.diagnosis.explain.courses import EVENLY
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.experiment import best_experiment
@@ -66,10 +65,11 @@ def named_of(w: Weighed, final: Model) -> Named:
 
 
 def _steps(h: Hypothesis, fit: Fit) -> dict[str, Value]:
-    """In how many steps an event goes, where it does: a number that was chosen, not fitted."""
-    steps = h.effect.of_role("steps")
-    count = course_of(fit, h).steps if h.has_instant else EVENLY
-    return {} if steps is None or count == EVENLY else {steps.name: Value(h.key(steps.name), count, 0.0)}
+    """In how many steps an event goes, or how curved, where it does: numbers that were chosen, not fitted."""
+    if not h.has_instant:
+        return {}
+    chosen = {k: v for k, v in h.course(course_of(fit, h)).items() if k not in (h.instant, h.duration)}
+    return {name: Value(h.key(name), value, 0.0) for name, value in chosen.items()}
 
 
 def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:

@@ -42,20 +42,26 @@ def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     """The best linear answer over the likely courses of an event of this shape, of either cable."""
     values, size = best[1], best[3]
     sizes = (size, -size) if h.two_sided else (size,)
-    starts = [
-        Start({**values, h.amount.name: s, **h.course(c)}) for s in sizes for c in _likely(here, h, values, s)
-    ]
-    asked = (best_start(here, replace(h, starts=(s,))) for s in starts)
-    found = sorted((f for f in asked if f is not None), key=lambda f: f[0])
-    steps = h.effect.of_role("steps")
-    if steps is None:
-        return next(iter(found), None)
-    evenly = next((f for f in found if steps.name not in f[1]), None)
-    stepped = next((_stepped(here, h, f) for f in found if steps.name in f[1]), None)
-    if stepped is None:
-        return evenly
-    otherwise = min(best[0], best[0] if evenly is None else evenly[0])
-    return stepped if stepped[0] < LIMITS.stepped * otherwise else evenly
+    found: dict[str, Best] = {}
+    for s in sizes:
+        for c in _likely(here, h, values, s):
+            start = Start({**values, h.amount.name: s, **h.course(c)})
+            answer = best_start(here, replace(h, starts=(start,)))
+            if answer is not None:
+                of_kind = found.setdefault(_kind(h, c), answer)
+                found[_kind(h, c)] = min(of_kind, answer, key=lambda f: f[0])
+    evenly, curved, stepped = (found.get(kind) for kind in ("", "curve", "steps"))
+    if stepped is not None:
+        stepped = _stepped(here, h, stepped)
+        if stepped[0] < LIMITS.stepped * min(best[0], best[0] if evenly is None else evenly[0]):
+            return stepped
+    return curved if curved and (evenly is None or curved[0] < LIMITS.shaped * evenly[0]) else evenly
+
+
+def _kind(h: Hypothesis, c: Course) -> str:
+    """What of a course the event can have: "steps", a "curve", "" where it goes evenly."""
+    shape = h.course(c).keys() - {h.instant, h.duration}
+    return next((p.role for p in h.effect.parameters if p.name in shape), "")
 
 
 def _stepped(here: Anchor, h: Hypothesis, best: Best) -> Best:

@@ -17,30 +17,33 @@ import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.problem import Misfits, Problem
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray
 
 EVENLY: Final = 0
 """Number of steps of a course that has none."""
 
 
 class Course(NamedTuple):
-    """How an event goes: from when [s], how long [s] (0: at once), in how many equal steps (0: evenly)."""
+    """How an event goes: from when [s], how long [s] (0: at once), in how many equal steps (0: none), and of what has
+    none how curved (1: evenly)."""
 
     instant_s: float
     duration_s: float
     steps: int
+    curve: float = 1.0
 
 
 def how_far(course: Course, time_s: FloatArray) -> FloatArray:
     """g, how far an event has gone at these times, 0..1."""
-    return _gone(time_s - course.instant_s, np.array(course.duration_s), np.array(course.steps))
+    since_s, of_it = time_s - course.instant_s, (course.duration_s, course.steps, course.curve)
+    return _gone(since_s, *(np.array(value) for value in of_it))
 
 
-def _gone(since_s: FloatArray, duration_s: FloatArray, steps: IntArray) -> FloatArray:
+def _gone(since_s: FloatArray, duration_s: FloatArray, steps: FloatArray, curve: FloatArray) -> FloatArray:
     """How far events have gone so long after their instants."""
     share = np.where(duration_s > 0.0, np.clip(since_s / np.maximum(duration_s, 1e-300), 0.0, 1.0), 1.0)
     stepped = (1.0 + np.floor((steps - 1) * share)) / np.maximum(steps, 1)
-    return np.where(since_s >= 0.0, np.where(steps == EVENLY, share, stepped), 0.0)
+    return np.where(since_s >= 0.0, np.where(steps == EVENLY, share**curve, stepped), 0.0)
 
 
 def before_all(problem: Problem) -> float:
@@ -68,17 +71,17 @@ def from_each(problem: Problem, over: Misfits, none: Misfits, instants: FloatArr
 
 
 def likely(instants: FloatArray, gram: FloatArray, along: FloatArray) -> list[Course]:
-    """The course that takes off most of what is left, of each number of steps, best first: evenly for a while, or in
-    equal steps.
+    """The course that takes off most of what is left, of each number of steps, best first: evenly for a while, ever
+    more slowly or quickly, or in equal steps.
 
     `gram` (k, k), `along` (k,): inner products of the columns of `from_each` with one another and with what is left.
     """
     courses, rises = _courses(tuple(instants.tolist()))
     taken = _taken(rises, gram, along)
-    best: dict[int, Course] = {}
+    best: dict[tuple[int, float], Course] = {}
     for k in np.argsort(-taken):
         if taken[k] > 0.0:
-            best.setdefault(courses[k].steps, courses[k])
+            best.setdefault(courses[k][2:], courses[k])
     closer = [_closer(instants, gram, along, c) for c in best.values()]
     return [c for _, c in sorted(closer, key=lambda found: -found[0])]
 
@@ -97,7 +100,7 @@ def _closer(instants: FloatArray, gram: FloatArray, along: FloatArray, c: Course
     for _ in range(4):
         moves = width * np.linspace(-1.0, 1.0, 7)
         near = [
-            Course(c.instant_s + a * c.duration_s, c.duration_s * (1.0 + b), c.steps)
+            c._replace(instant_s=c.instant_s + a * c.duration_s, duration_s=c.duration_s * (1.0 + b))
             for a, b in itertools.product(moves.tolist(), moves.tolist())
         ]
         near = [n for n in near if _inside(instants, n)] or [c]
@@ -115,8 +118,9 @@ def _courses(instants: tuple[float, ...]) -> tuple[list[Course], FloatArray]:
     found = []
     for duration in np.geomspace(LIMITS.briefest, 1.0, LIMITS.durations) * (last - first):
         starts = np.arange(first, last, max(0.1 * duration, (last - first) / len(instants)))
-        for start, steps in itertools.product(starts.tolist(), (EVENLY, *LIMITS.in_steps)):
-            found.append(Course(start, float(duration), steps))
+        shapes = [(EVENLY, c) for c in (1.0, *LIMITS.curved)] + [(n, 1.0) for n in LIMITS.in_steps]
+        for start, shape in itertools.product(starts.tolist(), shapes):
+            found.append(Course(start, float(duration), *shape))
     at = np.array(instants)
     found = [c for c in found if _inside(at, c)]
     return found, _rises(at, found)
@@ -130,8 +134,8 @@ def _inside(instants: FloatArray, c: Course) -> bool:
 
 def _rises(instants: FloatArray, courses: Sequence[Course]) -> FloatArray:
     """How far each course rises about each of the instants."""
-    begins, lasts, steps = (np.array(values)[:, None] for values in zip(*courses, strict=True))
-    return np.asarray(np.diff(_gone(_between(instants) - begins, lasts, steps)), dtype=np.float64)
+    begins, lasts, steps, curve = (np.array(values)[:, None] for values in zip(*courses, strict=True))
+    return np.asarray(np.diff(_gone(_between(instants) - begins, lasts, steps, curve)), dtype=np.float64)
 
 
 def _between(instants: FloatArray) -> FloatArray:

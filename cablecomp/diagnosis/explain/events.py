@@ -15,11 +15,16 @@ from cablecomp.estimation.least_squares import Fit, covariance
 
 def course_of(fit: Fit, term: Hypothesis) -> Course:
     """How an event goes in a fit."""
-    steps = term.effect.of_role("steps")
     entry = next((e for e in fit.problem.config.effect if e.id == term.effect.id), None)
-    count = 0.0 if steps is None or entry is None else float(entry.parameters.get(steps.name, EVENLY))
+    given = {} if entry is None else entry.parameters
+    steps, curve = term.effect.of_role("steps"), term.effect.of_role("curve")
     values = fit.values
-    return Course(values[term.key(term.instant)], values.get(term.key(term.duration), 0.0), int(count))
+    return Course(
+        values[term.key(term.instant)],
+        values.get(term.key(term.duration), 0.0),
+        EVENLY if steps is None else int(given.get(steps.name, EVENLY)),
+        1.0 if curve is None else float(given.get(curve.name, 1.0)),
+    )
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:

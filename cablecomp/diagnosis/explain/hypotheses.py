@@ -85,8 +85,12 @@ class Hypothesis:
     def course(self, c: Course) -> dict[str, float]:
         """The values of an event that goes like this."""
         found = {self.instant: c.instant_s, self.duration: c.duration_s}
-        steps = self.effect.of_role("steps")
-        return found if steps is None or c.steps == EVENLY else {**found, steps.name: float(c.steps)}
+        steps, curve = self.effect.of_role("steps"), self.effect.of_role("curve")
+        if steps is not None and c.steps != EVENLY:
+            found[steps.name] = float(c.steps)
+        if curve is not None and c.curve != curve.neutral:
+            found[curve.name] = c.curve
+        return found
 
     def _of_role(self, role: Role) -> str:
         """The name of the parameter of that role that goes with the amount; "" where there is none."""
@@ -161,7 +165,7 @@ def _by_amount(
     own = [p for p in effect.parameters if p.of in ("", amount.name)]
     together = {name for values in effect.tries for name in values}
     # of an event, asked for by itself; of a channel that is not read
-    aside = ("duration", "steps") if channel else ("duration", "steps", "tilt")
+    aside = ("duration", "steps", "curve", *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
     shaped = {p.of for p in effect.parameters if not p.tries}

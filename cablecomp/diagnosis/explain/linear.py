@@ -52,7 +52,11 @@ class Anchor:
         is as it was; in one that begins when all is over it is the same whenever and however that came."""
         begins = float(values[h.instant])
         ends = begins + float(values.get(h.duration, 0.0))
-        aside = {h.instant, h.duration, *(p.name for p in h.effect.parameters if p.role == "steps")}
+        aside = {
+            h.instant,
+            h.duration,
+            *(p.name for p in h.effect.parameters if p.role in ("steps", "curve")),
+        }
         what = (h.effect.id, *sorted((k, v) for k, v in values.items() if k not in aside))
         known: dict[int, Mapping[str, FloatArray]] = {}
         after = []

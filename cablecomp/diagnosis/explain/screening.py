@@ -58,33 +58,32 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
 
 def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     """What a hypothesis promises at each anchor, best first; its shapes where it promises most without."""
+    asked = [(here, *found) for here in anchors if (found := _plainly(here, h)) is not None]
+    least = min((plain.cost for _, plain, _ in asked), default=0.0)
+    answers = []
+    for here, plain, best in asked:
+        more = plain.cost == least and (h.further or h.has_instant) and not here.fit.problem.fine
+        other = _shaped(here, h, plain, best) if more else None
+        answers.append(plain if other is None else replace(other, plain=plain))
+    return sorted(answers, key=lambda a: a.cost)
+
+
+def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best | None] | None:
+    """The best over the hypothesis's starts, and (of what has no phase) as it was found."""
     if h.has_phase:
-        answers = [_ask_pair(here, h) for here in anchors]
-    else:
-        plain = [best_event(here, h) if h.has_instant else best_start(here, h) for here in anchors]
-        least = min((p[0] for p in plain if p is not None), default=0.0)
-        answers = [
-            _answered(here, h, p, shaped=p[0] == least)
-            for here, p in zip(anchors, plain, strict=True)
-            if p is not None
-        ]
-    return sorted((a for a in answers if a is not None), key=lambda a: a.cost)
+        pair = _ask_pair(here, h, {})
+        return None if pair is None else (pair, None)
+    best = best_event(here, h) if h.has_instant else best_start(here, h)
+    return None if best is None else (_answer(here, h, best), best)
 
 
-def _answered(here: Anchor, h: Hypothesis, best: Best, *, shaped: bool) -> Answer:
-    cost, values, d, size = best
-    plain = _answer(here, h, values, cost, d, size)
-    more = shaped and (h.further or h.has_instant) and not here.fit.problem.fine
-    other = _shaped(here, h, best) if more else None
-    if other is None:
-        return plain
-    cost, values, d, size = other
-    return replace(_answer(here, h, values, cost, d, size), plain=plain)
-
-
-def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
+def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> Answer | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event is asked at
     every instant with each of them, then for its course."""
+    if best is None:
+        found = [_ask_pair(here, h, f) for f in h.further]
+        pair = min((a for a in found if a is not None), key=lambda a: a.cost, default=None)
+        return pair if pair is not None and pair.cost < LIMITS.shaped * plain.cost else None
     if h.has_instant:
         everywhere = (replace(h, starts=tuple(Start({**s.values, **f}) for s in h.starts)) for f in h.further)
         otherwise = [best_event(here, e) for e in everywhere]
@@ -96,12 +95,11 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     other = min((f for f in shaped if f is not None), key=lambda f: f[0], default=None)
     # what an event promises may be out of reach of its fit, which then decides between the shapes
     enough = 1.0 if h.has_instant else LIMITS.shaped
-    return other if other is not None and other[0] < enough * best[0] else None
+    return _answer(here, h, other) if other is not None and other[0] < enough * best[0] else None
 
 
-def _answer(
-    here: Anchor, h: Hypothesis, values: dict[str, float | str], cost: float, d: FloatArray, size: float
-) -> Answer:
+def _answer(here: Anchor, h: Hypothesis, best: Best) -> Answer:
+    cost, values, d, size = best
     problem = with_entry(here.fit.problem, h, h.entry(values))
     old = here.fit.problem.parameters
     count, new = len(old), problem.parameters[len(old) :]
@@ -121,10 +119,11 @@ def _answer(
     return Answer(h, cost, problem, tuple(inside(problem, s) for s in starts), J)
 
 
-def _ask_pair(here: Anchor, h: Hypothesis) -> Answer | None:
-    """Amount and phase as a pair (a cos, a sin), with the best of its other shapes."""
+def _ask_pair(here: Anchor, h: Hypothesis, shape: Mapping[str, float]) -> Answer | None:
+    """Amount and phase as a pair (a cos, a sin), of this shape, with the best of those that its starts have."""
     half = len(h.starts) // 2
-    found = (_pair(here, h, *both) for both in zip(h.starts[:half], h.starts[half:], strict=True))
+    starts = [Start({**s.values, **shape}) for s in h.starts]
+    found = (_pair(here, h, *both) for both in zip(starts[:half], starts[half:], strict=True))
     return min((a for a in found if a is not None), key=lambda a: a.cost, default=None)
 
 
@@ -145,7 +144,7 @@ def _pair(here: Anchor, h: Hypothesis, cosine: Start, sine: Start) -> Answer | N
         return None
     values = {**cosine.values, h.amount.name: size, h.phase: phase}
     d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
-    return _answer(here, h, values, cost, d, size)
+    return _answer(here, h, (cost, values, d, size))
 
 
 def _begun(a: Answer, evaluations: int) -> Fit | None:

@@ -1,4 +1,4 @@
-"""Wires that break in other forms: one after another, fraying, ever faster, the other cable's."""
+"""Wires that break in other forms: one after another, fraying, ever faster or more slowly, the other cable's."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import STEPS, UNEQUAL, ramp, schedule, stairs, unequal_stairs
+from firmware_sim.plant.forms.courses import STEPS, UNEQUAL, ramp, schedule, settling, stairs, unequal_stairs
 
 _LOST = Parameter("fraction", "share of EA lost in the end", low=0.0, high=0.95, neutral=0.0)
 _TIME = Parameter("time_s", "when it begins")
@@ -71,6 +71,20 @@ FRAYING = form(
 )
 
 
+def _wearing_in(build: Build, p: Mapping[str, float]) -> None:
+    schedule(build, _column(p), p["fraction"], lambda t: settling(t, p["time_s"], p["lag_s"]))
+
+
+SETTLING = form(
+    "strand_break",
+    "settling",
+    "The wires that lie badly break first: a cable's EA falls fast and ever more slowly.",
+    (_LOST, _TIME, Parameter("lag_s", "until 63 % of it is gone", 5.0, 0.0), _WHICH),
+    ("time", "load"),
+    _wearing_in,
+)
+
+
 def _faster(build: Build, p: Mapping[str, float]) -> None:
     schedule(build, _column(p), p["fraction"], lambda t: ramp(t, p["time_s"], p["duration_s"]) ** 2)
 
@@ -98,4 +112,4 @@ OTHER_CABLE = form(
     _other,
 )
 
-KINDS: tuple[EffectKind, ...] = (IN_STEPS, UNEQUAL_STEPS, FRAYING, OTHER_CABLE, ACCELERATING)
+KINDS: tuple[EffectKind, ...] = (IN_STEPS, UNEQUAL_STEPS, FRAYING, OTHER_CABLE, SETTLING, ACCELERATING)
