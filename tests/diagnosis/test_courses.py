@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_drive import TOLERANT, calibrated, recorded
@@ -112,3 +114,29 @@ def test_an_event_in_steps_is_promised_with_them(effect: str, amount: str, size:
     assert right.cost < 0.1 * right.plain.cost
     (wrong,) = promised.values()
     assert right.cost < 0.5 * wrong.cost
+
+
+@pytest.mark.parametrize(
+    ("form", "law", "curve"),
+    [
+        ("strand_break:accelerating", {"fraction": 0.3, "time_s": 8.0, "duration_s": 25.0}, 2.5),
+        ("clamp_slip:settling", {"slip_m": 1e-4, "time_s": 8.0, "lag_s": 8.0}, 0.4),
+    ],
+)
+def test_an_event_that_gets_quicker_or_settles_is_promised_so(
+    form: str, law: dict[str, float], curve: float
+) -> None:
+    """The plant's wires break by the square of the time, its clamp settles by an exponential, which the catalogue has
+    not: each nearer to its curve than to an even course, which is asked for as well."""
+    effect = form.partition(":")[0]
+    body, drive = calibrated(recorded([EffectSpec(form, law)], 45.0))
+    (event,) = (h for h in hypotheses(TOLERANT, body.used) if h.name == effect)
+    answer = ask(anchor(drive.fit), event)
+    assert answer is not None
+    values = answer.problem.config.effect[-1].parameters
+    assert values["curve"] == curve
+    straight = tuple(p for p in event.effect.parameters if p.role != "curve")
+    evenly = ask(anchor(drive.fit), replace(event, effect=replace(event.effect, parameters=straight)))
+    assert evenly is not None
+    assert "curve" not in evenly.problem.config.effect[-1].parameters
+    assert answer.cost < 0.8 * evenly.cost
