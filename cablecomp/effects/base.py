@@ -57,17 +57,16 @@ much another channel turns the joint; how much what is read grows with itself; a
 class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
 
-    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where
-    a scale is given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`:
-    a diagnosis leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in
-    the parameter's unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a
-    configuration leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`:
-    the amount whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape
-    that it leaves out at first (a begin's count from the first of all samples, a bend's are over the channel's largest
-    reading, others' are in units of `scale(config)`); of an
-    event's course it asks by itself. `reach`: times by which a
-    fit of a log-spaced shape may leave low..high; at 1, another effect is the better word where it ends on `high`.
-    `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
+    `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a scale is
+    given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`: a diagnosis leaves
+    it where it starts, because another parameter takes its part. `minimum`..`maximum`, in the parameter's unit, is
+    what the law can take; beyond it a configuration is refused. `omitted`: its value where a configuration leaves it
+    out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`: the amount whose shape
+    it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it leaves out at
+    first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, others' are
+    in units of `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of a log-spaced
+    shape may leave low..high; at 1, another effect is the better word where it ends on `high`. `of_known_drive`:
+    beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
     """
 
     name: str
