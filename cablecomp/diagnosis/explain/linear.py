@@ -33,7 +33,7 @@ class Anchor:
     Q: FloatArray
     J: FloatArray
     sizes: dict[str, float] = field(default_factory=dict)
-    """What was worth seeing of a hypothesis last: at the next start, or beside the next model, it is about that."""
+    """What was worth seeing of a hypothesis last: at its next start it is about that."""
     over: dict[tuple[int, tuple[object, ...]], Mapping[str, FloatArray]] = field(default_factory=dict)
     """Misfits of recordings that begin after an event, by the recording's place and what happened."""
 
@@ -89,18 +89,17 @@ class Anchor:
         return np.concatenate([v, np.zeros((self.J.shape[1], *v.shape[1:]))])
 
 
-def anchor(fit: Fit, reach: float = LIMITS.reach, sizes: dict[str, float] | None = None) -> Anchor:
+def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
     """An anchor at a fit (or any evaluated point); `reach`: share of the cost that a step by one in a parameter
-    costs; `sizes` of hypotheses that were asked elsewhere, and go on there."""
+    costs."""
     count = fit.J.shape[1]
     cost = np.sqrt(reach * 2.0 * fit.cost) * np.eye(count)
     J = np.concatenate([fit.J, cost])
-    sizes = {} if sizes is None else sizes
     if not count:
-        return Anchor(fit, np.empty((len(J), 0)), J, sizes)
+        return Anchor(fit, np.empty((len(J), 0)), J)
     scale = np.sqrt(np.maximum(np.sum(J**2, axis=0), 1e-300))
     u, s, _ = np.linalg.svd(J / scale, full_matrices=False)
-    return Anchor(fit, u[:, s > 1e-6], J, sizes)
+    return Anchor(fit, u[:, s > 1e-6], J)
 
 
 def best_start(here: Anchor, h: Hypothesis) -> Best | None:

@@ -55,8 +55,8 @@ class Beginning:
     """What a round begins from.
 
     `nominal`: a further point to ask from. `number`: 0 for the first round. `cold`: values to begin from where the
-    drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well; `sizes`: of
-    hypotheses, as they were asked last. Once the time is up nothing further is begun but the most promising fit.
+    drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well. Once the time
+    is up nothing further is begun but the most promising fit.
     """
 
     model: Model
@@ -67,7 +67,6 @@ class Beginning:
     number: int
     cold: Mapping[str, float] | None
     known: Sequence[Model]
-    sizes: dict[str, float]
 
     @property
     def cost(self) -> float:
@@ -153,7 +152,7 @@ def _pairs(begun: Sequence[Begun], at: Beginning) -> list[Begun]:
 
 def _asked(at: Beginning) -> list[list[Answer]]:
     """What each hypothesis that the model has not promises, by a linear step from each anchor."""
-    anchors = [anchor(f, sizes=at.sizes) for f in (at.model.fit, at.nominal) if f is not None]
+    anchors = [anchor(f) for f in (at.model.fit, at.nominal) if f is not None]
     ids = {t.effect.id for t in at.model.terms if isinstance(t, Hypothesis)}
     left = [h for h in at.pool if h.effect.id not in ids]  # a second of the same would share its parameters
 

@@ -63,7 +63,6 @@ def select(
         nominal = Fit(problem, nominal.x, problem.residual(nominal.x), problem.jacobian(nominal.x))
     beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
     rounds: list[Round] = []
-    sizes: dict[str, float] = {}
     cold = cold_starts(pool, baseline)
     best = first
     for number in range(0 if quiet(baseline) else LIMITS.rounds):
@@ -72,8 +71,7 @@ def select(
         tried: list[Tried] = []
         for model, start in beam:
             known = [t.model for r in rounds for t in r.tried]
-            begun = Beginning(model, start, pool, groups, pace, number, cold, known, sizes)
-            rounds.append(one_round(begun, rng))
+            rounds.append(one_round(Beginning(model, start, pool, groups, pace, number, cold, known), rng))
             tried += rounds[-1].tried
         found = _carried(tried, groups, None if number == 0 else best)
         if found is None:
