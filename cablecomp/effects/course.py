@@ -57,8 +57,8 @@ CURVE: Final = Parameter(
 """How what takes its time speeds up or settles."""
 
 COURSE: Final = (
-    "g = ((t - t*)/d)^c within 0..1, d = 0: a step; "
-    "in n steps (1 + floor((n - 1)(t - t*)/d))/n, all from t* + d"
+    "g = u^c, u = (t - t*)/d within 0..1, d = 0: a step; "
+    "in n steps (1 + floor((n - 1) u^c))/n, all from t* + d"
 )
 """The course of an event in its equation."""
 
@@ -69,14 +69,16 @@ def gone(since_s: Any, duration_s: Any, steps: Any, curve: Any) -> Any:
     if since_s >= duration_s:
         return 1.0
     share = since_s / duration_s
+    if curve != 1.0:
+        share = share**curve
     if steps < 2.0:
-        return share if curve == 1.0 else share**curve
+        return share
     return (1.0 + int((steps - 1.0) * share)) / steps
 
 
 def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]:
-    """Instant, duration, steps and curve as an event's term takes them; raises InputError for a part of a step, for
-    several at once, and for steps that would be curved."""
+    """Instant, duration, steps and curve as an event's term takes them; raises InputError for a part of a step, and
+    for several at once."""
     steps = values["steps"]
     if steps != int(steps) or steps == 1.0:
         raise InputError(
@@ -87,10 +89,6 @@ def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]
         raise InputError(
             f"{config.name}: key `effect.steps` is {steps:g}, and `effect.duration_s`, from first step to last, "
             "is 0; give it above 0 [s], or leave the steps out where all happens at once"
-        )
-    if steps and values["curve"] != 1.0:
-        raise InputError(
-            f"{config.name}: keys `effect.steps` and `effect.curve` are both given; steps are equal: leave one out"
         )
     return {
         "instant": values["time_s"],

@@ -71,10 +71,15 @@ def test_an_event_may_settle_or_get_quicker(effect: str, amount: dict[str, float
         assert found[-1] == pytest.approx(whole[-1], rel=1e-3)
 
 
-def test_steps_that_would_be_curved_are_refused_in_one_line() -> None:
-    both = {"fraction": 0.1, "time_s": 0.0, "duration_s": 1.0, "steps": 3.0, "curve": 2.0}
-    with pytest.raises(InputError, match=r"`effect.steps` and `effect.curve` are both given"):
-        run(joint(), still(np.arange(3.0), np.zeros(3)), ("strand_break", both))
+def test_curved_steps_come_ever_sooner() -> None:
+    """Three steps by the square: the second when the square of the share is a half."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 4.0, 401)
+    columns = still(time, np.full(401, 0.4))
+    course = {"fraction": 0.3, "time_s": 1.0, "duration_s": 2.0, "steps": 3.0, "curve": 2.0}
+    found = run(config, columns, ("strand_break", course))["deflection_rad"]
+    jumps = time[1:][np.abs(np.diff(found)) > 1e-6]
+    assert jumps == pytest.approx([1.0, 1.0 + 2.0 * np.sqrt(0.5), 3.0], abs=0.011)
 
 
 @pytest.mark.parametrize("cable", ["", "_l"])

@@ -24,13 +24,13 @@ def best_event(here: Anchor, h: Hypothesis) -> Best | None:
     width = times[1] - times[0]
     for _ in range(2 if here.fit.problem.fine else 4):
         width *= 0.5
-        closer = best_start(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)))
+        closer = best_start(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)), best[3])
         if closer is not None and closer[0] < best[0]:
             best = closer
             t = float(best[1][h.instant])
     if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
         mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
-        other = best_start(here, mirrored)
+        other = best_start(here, mirrored, -best[3])
         # what one cable promises by the opposite of what it does is the other's
         opposite = float(best[1][h.amount.name]) * best[3] < 0.0
         if other is not None and (opposite or other[0] < best[0]):

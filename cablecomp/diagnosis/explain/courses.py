@@ -24,8 +24,8 @@ EVENLY: Final = 0
 
 
 class Course(NamedTuple):
-    """How an event goes: from when [s], how long [s] (0: at once), in how many equal steps (0: none), and of what has
-    none how curved (1: evenly)."""
+    """How an event goes: from when [s], how long [s] (0: at once), in how many equal steps (0: none), and how curved
+    (1: evenly)."""
 
     instant_s: float
     duration_s: float
@@ -42,8 +42,9 @@ def how_far(course: Course, time_s: FloatArray) -> FloatArray:
 def _gone(since_s: FloatArray, duration_s: FloatArray, steps: FloatArray, curve: FloatArray) -> FloatArray:
     """How far events have gone so long after their instants."""
     share = np.where(duration_s > 0.0, np.clip(since_s / np.maximum(duration_s, 1e-300), 0.0, 1.0), 1.0)
+    share = share**curve
     stepped = (1.0 + np.floor((steps - 1) * share)) / np.maximum(steps, 1)
-    return np.where(since_s >= 0.0, np.where(steps == EVENLY, share**curve, stepped), 0.0)
+    return np.where(since_s >= 0.0, np.where(steps == EVENLY, share, stepped), 0.0)
 
 
 def before_all(problem: Problem) -> float:

@@ -3,7 +3,6 @@ that no step of the model's own parameters can do."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,8 +31,6 @@ class Anchor:
     fit: Fit
     Q: FloatArray
     J: FloatArray
-    sizes: dict[str, float] = field(default_factory=dict)
-    """What was worth seeing of a hypothesis last: at its next start it is about that."""
     over: dict[tuple[int, tuple[object, ...]], Mapping[str, FloatArray]] = field(default_factory=dict)
     """Misfits of recordings that begin after an event, by the recording's place and what happened."""
 
@@ -102,14 +99,15 @@ def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
     return Anchor(fit, u[:, s > 1e-6], J)
 
 
-def best_start(here: Anchor, h: Hypothesis) -> Best | None:
-    """The best linear answer over the hypothesis's starts."""
+def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best | None:
+    """The best linear answer over the hypothesis's starts; `about`: a size that is known to be worth seeing."""
     left = here.beyond(here.fit.residual)
     energy = float(left @ left)
     best = None
+    size = about  # what was worth seeing at one start is about that at the next
     # an event's instants are looked at coarsely where every run is dear
     for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
-        found = contribution(here, h, start)
+        found = contribution(here, h, start, size)
         if found is None:
             continue
         d, size = found
@@ -130,12 +128,13 @@ def best_start(here: Anchor, h: Hypothesis) -> Best | None:
     return best
 
 
-def contribution(here: Anchor, h: Hypothesis, start: Start) -> tuple[FloatArray, float] | None:
+def contribution(
+    here: Anchor, h: Hypothesis, start: Start, about: float | None = None
+) -> tuple[FloatArray, float] | None:
     """What the effect adds to the prediction (weighted) at a size that is about as large as the residual, looked for
-    from what was so last, or from the start's own."""
+    from `about` on, or from the start's own."""
     wanted = max(float(np.linalg.norm(here.fit.residual)), 1.0)
-    own = float(start.values[h.amount.name])
-    size = math.copysign(here.sizes.get(h.name, abs(own)), own)
+    size = float(start.values[h.amount.name]) if about is None else about
     low, high = h.amount.minimum, h.amount.maximum
     result = None
     for _ in range(4):
@@ -145,7 +144,6 @@ def contribution(here: Anchor, h: Hypothesis, start: Start) -> tuple[FloatArray,
             size *= 0.1
             continue
         result = (d, size)
-        here.sizes[h.name] = abs(size)
         length = float(np.linalg.norm(here.beyond(d))) + 0.1 * float(np.linalg.norm(d))
         ratio = wanted / max(length, 1e-9 * wanted)
         if 0.4 < ratio < 2.5 or abs(size * ratio) >= high * 3.0:

@@ -53,19 +53,19 @@ PART = 0.3
 
 def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     """The best linear answer over the hypothesis's starts; None if it cannot be simulated or shows nothing."""
-    return next(iter(ask_all([here], h)), None)
+    found = _plainly(here, h)
+    if found is None:
+        return None
+    plain, best = found
+    more = (h.further or h.has_instant) and not here.fit.problem.fine
+    other = _shaped(here, h, plain, best) if more else None
+    return plain if other is None else replace(other, plain=plain)
 
 
 def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
-    """What a hypothesis promises at each anchor, best first; its shapes where it promises most without."""
-    asked = [(here, *found) for here in anchors if (found := _plainly(here, h)) is not None]
-    least = min((plain.cost for _, plain, _ in asked), default=0.0)
-    answers = []
-    for here, plain, best in asked:
-        more = plain.cost == least and (h.further or h.has_instant) and not here.fit.problem.fine
-        other = _shaped(here, h, plain, best) if more else None
-        answers.append(plain if other is None else replace(other, plain=plain))
-    return sorted(answers, key=lambda a: a.cost)
+    """What a hypothesis promises at each anchor, best first."""
+    asked = [ask(here, h) for here in anchors]
+    return sorted((a for a in asked if a is not None), key=lambda a: a.cost)
 
 
 def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best | None] | None:
@@ -129,7 +129,8 @@ def _ask_pair(here: Anchor, h: Hypothesis, shape: Mapping[str, float]) -> Answer
 
 def _pair(here: Anchor, h: Hypothesis, cosine: Start, sine: Start) -> Answer | None:
     """Both contributions in one linear step."""
-    found = [contribution(here, h, start) for start in (cosine, sine)]
+    first = contribution(here, h, cosine)
+    found = [first, contribution(here, h, sine, first and first[1])]
     if any(f is None for f in found):
         return None
     (d0, s0), (d1, s1) = (f for f in found if f is not None)
