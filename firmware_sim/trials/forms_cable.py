@@ -129,16 +129,19 @@ def _letting_go_unequally(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**_while(rng, scene), **_unequally(rng)}, {"slip_m": 1.0}, *_slip(scene))
 
 
-def _biting_again(rng: np.random.Generator, scene: Scene) -> Shape:
+def _settling(rng: np.random.Generator, scene: Scene) -> dict[str, float]:
+    """As `_while`, most of it over in that time."""
     when = _while(rng, scene)
-    lag = {"lag_s": 0.5 * when.pop("duration_s")}
-    return Shape({**when, **lag}, {"slip_m": 1.0}, *_slip(scene))
+    lasts_s = when.pop("duration_s")
+    return {**when, "lag_s": 0.5 * lasts_s}
+
+
+def _biting_again(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape(_settling(rng, scene), {"slip_m": 1.0}, *_slip(scene))
 
 
 def _wearing_in(rng: np.random.Generator, scene: Scene) -> Shape:
-    when = _while(rng, scene)
-    lag = {"lag_s": 0.5 * when.pop("duration_s")}
-    return Shape({**when, **lag}, {"fraction": 1.0}, 0.5, 0.7)
+    return Shape(_settling(rng, scene), {"fraction": 1.0}, 0.5, 0.7)
 
 
 def _breaking_unequally(rng: np.random.Generator, scene: Scene) -> Shape:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import TIME
-from firmware_sim.plant.effects.base import Parameter
 from firmware_sim.plant.records import Floats
 
 
@@ -51,23 +50,6 @@ def stairs(
     at = start_s + duration_s * np.concatenate([[0.0], np.cumsum(waits) / max(np.sum(waits), 1e-300)])
     gone = np.concatenate([[0.0], np.cumsum(sizes) / np.sum(sizes)])
     return gone[np.searchsorted(at, time_s, side="right")]
-
-
-STEPS = (
-    Parameter("duration_s", "from the first step to the last", 15.0, 0.0),
-    Parameter("steps", "how many", 3.0, 2.0, 20.0),
-)
-"""What steps have beside their size and the instant of the first."""
-UNEQUAL = (
-    Parameter("growth", "of each step over the last", 1.0, 0.05, 20.0),
-    Parameter("wait", "for each step over that for the last", 1.0, 0.05, 20.0),
-)
-"""What steps that are not equal have beside their number and time."""
-
-
-def unequal_stairs(time_s: Floats, p: Mapping[str, float]) -> Floats:
-    """`stairs` of an effect's parameters."""
-    return stairs(time_s, p["time_s"], p["duration_s"], p["steps"], p["growth"], p["wait"])
 
 
 def schedule(build: Build, column: int, size: float, course: Callable[[Floats], Floats]) -> None:
