@@ -32,6 +32,11 @@ Known: TypeAlias = Mapping[int, Mapping[str, FloatArray]]
 """Misfits of some recordings, by the recording's place and by channel."""
 
 
+def of_recording(misfits: Misfits, place: int) -> dict[str, FloatArray]:
+    """Those of one recording."""
+    return {c: parts[place] for c, parts in misfits.items()}
+
+
 @dataclass(frozen=True)
 class Weighing:
     """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero
@@ -203,7 +208,7 @@ class Problem:
             return self.residual(x)
         others = (k for k, r in enumerate(self.evidence) if r.session != session)
         try:
-            return self.weighted(x, self.misfits(x, {k: {c: known[c][k] for c in known} for k in others}))
+            return self.weighted(x, self.misfits(x, {k: of_recording(known, k) for k in others}))
         except InputError:
             return self.residual(x)
 

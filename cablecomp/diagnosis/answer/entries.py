@@ -45,7 +45,7 @@ def named_of(w: Weighed, final: Model) -> Named:
         values = [replace(v, interval_95=i) for v, i in zip(values, found, strict=True)]
     values, recording = _in_its_recording(values, w.term, final.fit)
     parameters: dict[str, Value | str] = {v.name.removeprefix(mine): v for v in values}
-    parameters |= _steps(w.term, final.fit)
+    parameters |= _chosen(w.term, final.fit)
     if recording:
         parameters["recording"] = recording
     if w.term.channel:
@@ -64,7 +64,7 @@ def named_of(w: Weighed, final: Model) -> Named:
     )
 
 
-def _steps(h: Hypothesis, fit: Fit) -> dict[str, Value]:
+def _chosen(h: Hypothesis, fit: Fit) -> dict[str, Value]:
     """In how many steps an event goes, or how curved, where it does: numbers that were chosen, not fitted."""
     if not h.has_instant:
         return {}

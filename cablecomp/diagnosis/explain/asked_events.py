@@ -46,10 +46,9 @@ def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     for s in sizes:
         for c in _likely(here, h, values, s):
             start = Start({**values, h.amount.name: s, **h.course(c)})
-            answer = best_start(here, replace(h, starts=(start,)))
-            if answer is not None:
-                of_kind = found.setdefault(_kind(h, c), answer)
-                found[_kind(h, c)] = min(of_kind, answer, key=lambda f: f[0])
+            answer, kind = best_start(here, replace(h, starts=(start,))), _kind(h, c)
+            if answer is not None and (kind not in found or answer[0] < found[kind][0]):
+                found[kind] = answer
     evenly, curved, stepped = (found.get(kind) for kind in ("", "curve", "steps"))
     if stepped is not None:
         stepped = _stepped(here, h, stepped)

@@ -13,7 +13,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.problem import Misfits, Problem
+from cablecomp.estimation.problem import Misfits, Problem, of_recording
 from cablecomp.signal.smoothing import FloatArray
 
 Best = tuple[float, dict[str, float | str], FloatArray, float]
@@ -60,7 +60,7 @@ class Anchor:
         for k, e in enumerate(self.fit.problem.evidence):
             first, last = (float(e.columns["time_s"][at]) for at in (0, -1))
             if last < begins:
-                known[k] = {c: m[k] for c, m in self.misfits.items()}
+                known[k] = of_recording(self.misfits, k)
             elif first >= ends:
                 after.append(k)
                 if (k, what) in self.over:
@@ -69,7 +69,7 @@ class Anchor:
             found = _with(self.fit.problem, h, values).misfits(self.fit.x, known)
         except InputError:
             return None
-        self.over.update({(k, what): {c: m[k] for c, m in found.items()} for k in after})
+        self.over.update({(k, what): of_recording(found, k) for k in after})
         return found
 
     def step(self, v: FloatArray) -> FloatArray:
