@@ -78,7 +78,7 @@ def gone(since_s: Any, duration_s: Any, steps: Any, curve: Any) -> Any:
 
 def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]:
     """Instant, duration, steps and curve as an event's term takes them; raises InputError for a part of a step, and
-    for several at once."""
+    for steps or a curve of what happens at once."""
     steps = values["steps"]
     if steps != int(steps) or steps == 1.0:
         raise InputError(
@@ -89,6 +89,11 @@ def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float]
         raise InputError(
             f"{config.name}: key `effect.steps` is {steps:g}, and `effect.duration_s`, from first step to last, "
             "is 0; give it above 0 [s], or leave the steps out where all happens at once"
+        )
+    if values["curve"] != 1.0 and values["duration_s"] == 0.0:
+        raise InputError(
+            f"{config.name}: key `effect.curve` is {values['curve']:g}, and `effect.duration_s`, the time that it "
+            "shapes, is 0; give it above 0 [s], or leave the curve out where all happens at once"
         )
     return {
         "instant": values["time_s"],

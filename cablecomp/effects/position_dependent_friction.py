@@ -14,7 +14,7 @@ from cablecomp.mechanics.change import Factor
 
 def _groove(values: Mapping[str, float]) -> Factor | None:
     """Of the output drum: the wave, and the patch."""
-    wave = _wave(values["amplitude"], values["phase_rad"])
+    wave = _wave(values["amplitude"], values["phase_rad"], values["order"])
     height, place, width = values["patch"], values["place_rad"], values["width_rad"]
     if height == 0.0:
         return wave
@@ -26,9 +26,9 @@ def _groove(values: Mapping[str, float]) -> Factor | None:
     return factor
 
 
-def _wave(amplitude: float, phase_rad: float) -> Factor | None:
+def _wave(amplitude: float, phase_rad: float, order: float = 1.0) -> Factor | None:
     def factor(angle: Floats) -> Floats:
-        return np.asarray(1.0 + amplitude * np.cos(angle - phase_rad), dtype=np.float64)
+        return np.asarray(1.0 + amplitude * np.cos(order * angle - phase_rad), dtype=np.float64)
 
     return factor if amplitude else None
 
@@ -44,10 +44,11 @@ EFFECT = Effect(
     id="position_dependent_friction",
     statement="A drum's groove is rougher in one place than in another, so that friction depends "
     "on where the joint stands.",
-    equation="output drum: mu = mu0 (1 + a cos(q - φ)) for the place of the groove that the cable leaves when the "
+    equation="output drum: mu = mu0 (1 + a cos(k q - φ)) for the place of the groove that the cable leaves when the "
     "joint stands at q, beside it 1 + h/(1 + ((q - p)/w)^4) for a patch; input drum: 1 + a_in cos(q_m - φ_in), q_m "
     "the motor's angle",
-    source="first harmonic of a friction coefficient that varies along the groove; position-dependent "
+    source="one harmonic of a friction coefficient that varies along the groove, the first or, where a tool has "
+    "chattered, a higher one; position-dependent "
     "friction of joints: B. Armstrong-Hélouvry, Control of Machines with Friction, 1991",
     parameters=(
         Parameter(
@@ -68,10 +69,27 @@ EFFECT = Effect(
             0.0,
             -math.pi,
             math.pi,
-            "φ, joint angle of the roughest place",
+            "φ, k times the joint angle of a roughest place",
             role="phase",
             omitted=0.0,
             of="amplitude",
+        ),
+        Parameter(
+            "order",
+            "-",
+            1.0,
+            1.0,
+            10.0,
+            "k, how often a turn of the drum repeats it",
+            log=True,
+            role="shape",
+            omitted=1.0,
+            minimum=0.2,
+            maximum=50.0,
+            of="amplitude",
+            tries=(2.5, 4.0, 5.5, 7.0),
+            reach=1.0,
+            of_known_drive=True,
         ),
         Parameter(
             "input_amplitude",

@@ -10,19 +10,24 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(
-        play_share=values["fraction"], play_yield_N=values["yield_N"], play_time_s=values["yields_in_s"]
+        play_share=values["fraction"],
+        play_yield_N=values["yield_N"],
+        play_time_s=values["yields_in_s"],
+        play_spread=values["spread"],
     )
 
 
 EFFECT = Effect(
     id="strand_friction",
     statement="Wires rub inside the cable: part of its stretch follows the tension only after a change has "
-    "overcome their grip.",
-    equation="free span's stretch = L/EA (T - T0 + s p), p = P_y[T - T0], the play operator of radius y; greased, it "
-    "yields in its own time: t_y dp/dt = P_y[T - T0] - p",
+    "overcome their grip, of all wires at once or of one after the other.",
+    equation="free span's stretch = L/EA (T - T0 + s p), p = P_y[T - T0], the play operator of radius y, or the mean "
+    "of five with radii evenly from y (1 - u) to y (1 + u); greased, it yields in its own time: "
+    "t_y dp/dt = P_y[T - T0] - p",
     source="bending and axial hysteresis of spiral strands by interwire friction: K. O. Papailiou, On the "
     "bending stiffness of transmission line conductors, IEEE Trans. Power Delivery 12 (1997); play "
-    "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989",
+    "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989; many of them: W. D. Iwan, "
+    "J. Applied Mechanics 33 (1966)",
     parameters=(
         Parameter(
             "fraction",
@@ -60,6 +65,20 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(0.1, 0.4),
             reach=1.0,
+        ),
+        Parameter(
+            "spread",
+            "-",
+            0.0,
+            0.0,
+            1.0,
+            "u, how far the grips of the wires differ, over y; 0: all hold alike, 1: some yield at once",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+            tries=(1.0,),
+            of_known_drive=True,
         ),
     ),
     acts_through=("load_direction", "reversal", "load"),

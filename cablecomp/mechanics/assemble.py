@@ -113,7 +113,9 @@ def _places(circuits: int, cables: int, capacity: int, extra: Change) -> dict[st
     context_at = cables * floats(records.STATE)
     filter_at = context_at + floats(records.CONTEXT)
     grids_at = filter_at + floats(records.FILTER) + sum(term.state_size for term in extra.terms)
-    steps_at = grids_at + grids_room
+    spans = cables if extra.play_spread > 0.0 else 0
+    plays_at = grids_at + grids_room
+    steps_at = plays_at + spans * records.PLAYS * floats(records.PLAY)
     profiles_at = steps_at + 2 * cables * floats(records.STEP)
     return {
         "circuits": circuits,
@@ -122,11 +124,13 @@ def _places(circuits: int, cables: int, capacity: int, extra: Change) -> dict[st
         "terms": len(extra.terms),
         "capacity": capacity,
         "grids": grids,
+        "spans": spans,
         "cables_at": cables_at,
         "sensor_at": parameters_at + sum(len(term.parameters) for term in extra.terms),
         "context_at": context_at,
         "filter_at": filter_at,
         "grids_at": grids_at,
+        "plays_at": plays_at,
         "steps_at": steps_at,
         "profiles_at": profiles_at,
         "spare_at": profiles_at + stacks * capacity * floats(records.POINT),
@@ -183,6 +187,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             play_share=extra.play_share,
             play_yield=extra.play_yield_N,
             play_time=extra.play_time_s,
+            play_spread=extra.play_spread,
             viscous=extra.viscous_Ns_per_m_rad,
             viscous_on=(1.0 + extra.viscous_skew, 1.0 - extra.viscous_skew),
             merge=config.observer.merge_tolerance,

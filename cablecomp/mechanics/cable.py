@@ -10,7 +10,7 @@ from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Wound, set_pending, wrap_commit, wrap_eval
-from cablecomp.mechanics.records import IN, OUT
+from cablecomp.mechanics.records import IN, OUT, PLAYS
 from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 
@@ -72,12 +72,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
             length *= cable.guide_place
             ends = 1
         else:
-            play, d_play = span_play(cable.play_yield, state.play, tension - t0)
-            if cable.play_time > 0.0 and not d.context.first:
-                # so much of the way to where it would rest, within a sample
-                part = -math.expm1(-d.context.dt / cable.play_time)
-                play, d_play = state.play + part * (play - state.play), part * d_play
-            state.play_try = play
+            play, d_play = span_plays(d, c, tension - t0)
             total = length * cable.play_share * play / t0
             slope = length * cable.play_share * d_play
     total += length * strain
@@ -94,6 +89,32 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
     state.stretch = total * unit
     state.compliance = slope * unit / t0
     return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit)
+
+
+@inlined_kernel
+def span_plays(d: Drive, c: int, x: float) -> tuple[float, float]:
+    """What the free span's play, or the mean of its plays, passes on at the change of tension x [N]; its derivative by
+    x."""
+    cable, state = d.cables[c], d.states[c]
+    # so much of the way to where it would rest, within a sample
+    slow = cable.play_time > 0.0 and not d.context.first
+    part = -math.expm1(-d.context.dt / cable.play_time) if slow else 1.0
+    if cable.play_spread <= 0.0:
+        play, slope = span_play(cable.play_yield, state.play, x)
+        if slow:
+            play, slope = state.play + part * (play - state.play), part * slope
+        state.play_try = play
+        return play, slope
+    play = slope = 0.0
+    for k in range(PLAYS):
+        of_it = d.plays[c, k]
+        one, by_x = span_play(
+            cable.play_yield * (1.0 + cable.play_spread * ((2 * k + 1) / PLAYS - 1.0)), of_it.rest, x
+        )
+        of_it.rest_try = of_it.rest + part * (one - of_it.rest) if slow else one
+        play += of_it.rest_try / PLAYS
+        slope += part * by_x / PLAYS
+    return play, slope
 
 
 @kernel
@@ -120,6 +141,9 @@ def cable_commit(d: Drive, laws: Floats, c: int) -> None:
     first = OUT
     if laws is not None:
         state.play = state.play_try
+        if cable.play_spread > 0.0:
+            for k in range(PLAYS):
+                d.plays[c, k].rest = d.plays[c, k].rest_try
         if cable.guide > 0.0:
             guide_commit(d, laws, c)
         if cable.viscous > 0.0:

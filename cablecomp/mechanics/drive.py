@@ -13,6 +13,8 @@ from cablecomp.mechanics.records import (
     CONTEXT,
     FILTER,
     GRID,
+    PLAY,
+    PLAYS,
     POINT,
     SENSOR,
     SIZES,
@@ -47,6 +49,7 @@ class Drive(NamedTuple):
     states: Any  # by cable
     steps: Any  # by wrap: 2c is cable c's drum OUT, 2c + 1 its drum IN
     grids: Any  # by wrap, where slip is viscous
+    plays: Any  # [cable, play], where wires yield one after the other
     profiles: Points  # [stack, point] (`profile.py`): the wraps, then the guides
     heights: Ints  # points in use, by stack
 
@@ -77,6 +80,7 @@ def named(fixed: Floats, layout: Ints, memory: Floats, heights: Ints) -> Drive:
         records(memory, 0, (size.cables,), STATE),
         records(memory, size.steps_at, (2 * size.cables,), STEP),
         records(memory, size.grids_at, (size.grids,), GRID),
+        records(memory, size.plays_at, (size.spans, PLAYS), PLAY),
         records(memory, size.profiles_at, (size.stacks, size.capacity), POINT),
         heights,
     )

@@ -12,6 +12,7 @@ import numpy as np
 
 OUT, IN = 0, 1  # the two drums of a cable: on the output pulley, on the input pulley
 WET_NODES = 96  # grid nodes of a drum with viscous slip
+PLAYS = 5  # plays of a span whose wires yield one after the other
 
 
 def record(fields: list[Any]) -> np.dtype[Any]:
@@ -33,6 +34,7 @@ SIZES = record(
         ("terms", "i8"),
         ("capacity", "i8"),  # points that a profile has room for
         ("grids", "i8"),  # drums with viscous slip: all or none
+        ("spans", "i8"),  # cables whose wires yield one after the other: all or none
         # in `fixed`: circuits, then
         ("cables_at", "i8"),
         ("sensor_at", "i8"),  # behind the terms' parameters
@@ -40,6 +42,7 @@ SIZES = record(
         ("context_at", "i8"),
         ("filter_at", "i8"),  # the terms' own states follow
         ("grids_at", "i8"),
+        ("plays_at", "i8"),
         ("steps_at", "i8"),  # all that a refused sample puts back lies before
         ("profiles_at", "i8"),
         ("spare_at", "i8"),  # room for an undo copy
@@ -79,6 +82,7 @@ CABLE = record(
         ("play_share", "f8"),  # of the span's compliance that follows through a play
         ("play_yield", "f8"),  # radius of that play, N
         ("play_time", "f8"),  # in which it yields, s
+        ("play_spread", "f8"),  # of `PLAYS` radii about that one, over it; 0: one play
         ("viscous", "f8"),  # N s/m per rad
         ("viscous_on", "f8", (2,)),  # what of that each drum has
         ("merge", "f8"),  # error of v that merging of pieces may leave
@@ -169,6 +173,14 @@ FILTER = record(
         ("motor_slope", "f8"),
         ("load", "f8"),
         ("load_slope", "f8"),
+    ]
+)
+
+# One of the plays of a free span: N; `_try`: pending.
+PLAY = record(
+    [
+        ("rest", "f8"),
+        ("rest_try", "f8"),
     ]
 )
 

@@ -37,6 +37,19 @@ def test_relaxation_lowers_the_tensions_by_its_law(name: str) -> None:
     assert found["deflection_rad"] == pytest.approx(np.zeros_like(time), abs=1e-12)
 
 
+@pytest.mark.parametrize("exponent", [-2.5, 0.4])
+def test_creep_may_come_to_rest_or_go_by_a_power_of_time(exponent: float) -> None:
+    """Its rate falls as (1 + t/t_c)^(p - 1), worked out by quadrature."""
+    config = joint()
+    time = np.linspace(0.0, 60.0, 301)
+    law = {"fraction": 0.02, "time_constant_s": 3.0, "exponent": exponent}
+    found = run(config, resting(time), ("pretension_relaxation", law))["tension_h_N"]
+    for k in (1, 40, 300):
+        lost, _ = quad(lambda t: 0.02 / 3.0 * (1.0 + t / 3.0) ** (exponent - 1.0), 0.0, time[k - 1])
+        # what lies on the drums is moved on in steps of a ten-thousandth of T0
+        assert found[k] == pytest.approx(config.drive.stage[0].pretension_N * (1.0 - lost), rel=1.01e-4)
+
+
 def test_creep_that_began_before_the_recording_goes_on() -> None:
     """A recording that begins 20 s into the creep: the joint's tensions are those of one long recording there."""
     config = joint(free_length_m=LONG)
@@ -257,6 +270,23 @@ def test_strand_friction_is_a_play_in_the_tension(radius: float) -> None:
     extra = (found["deflection_rad"] - run(config, columns)["deflection_rad"]) * stage.output_radius_m
     expected = 0.7 * 3.0 / 1e8 * play(found["tension_h_N"] - stage.pretension_N, radius)
     assert extra == pytest.approx(expected, abs=1e-6 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("spread", [0.4, 1.0])
+def test_wires_that_yield_one_after_the_other_are_many_plays(spread: float) -> None:
+    """As many contacts as one likes, their limits evenly from y (1 - u) to y (1 + u): five do as well within 2 %."""
+    config = joint("snow-open-rig", EA_N=1e8, free_length_m=3.0)
+    stage = config.drive.stage[0]
+    columns = excitation(config, moving=False)
+    strands = {"fraction": 0.7, "yield_N": 4.0, "spread": spread}
+    found = run(config, columns, ("strand_friction", strands))
+    extra = (found["deflection_rad"] - run(config, columns)["deflection_rad"]) * stage.output_radius_m
+    change = found["tension_h_N"] - stage.pretension_N
+    radii = 4.0 * (1.0 + spread * (np.arange(400) / 199.5 - 1.0))
+    expected = 0.7 * 3.0 / 1e8 * np.mean([play(change, r) for r in radii], axis=0)
+    assert extra == pytest.approx(expected, abs=0.02 * np.ptp(expected))
+    alike = 0.7 * 3.0 / 1e8 * play(change, 4.0)
+    assert np.max(np.abs(extra - alike)) > 0.05 * np.ptp(expected)
 
 
 def test_greased_strands_follow_a_step_of_tension_in_their_own_time() -> None:

@@ -131,3 +131,11 @@ def test_several_steps_at_once_are_refused_in_one_line() -> None:
     several = {"fraction": 0.1, "time_s": 0.0, "steps": 3.0}
     with pytest.raises(InputError, match=r"from first step to last, is 0; give it above 0"):
         run(joint(), still(np.zeros(3), np.zeros(3)), ("strand_break", several))
+
+
+def test_a_curve_of_what_happens_at_once_is_refused_in_one_line() -> None:
+    sudden = {"slip_m": 1e-4, "time_s": 0.0, "curve": 2.0}
+    with pytest.raises(
+        InputError, match=r"`effect.duration_s`, the time that it shapes, is 0; give it above 0"
+    ):
+        run(joint(), still(np.zeros(3), np.zeros(3)), ("clamp_slip", sudden))

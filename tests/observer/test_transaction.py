@@ -27,6 +27,7 @@ EFFECTS = (
     ("thermal_pretension", {"coefficient_per_K": 1e-3, "reference_degC": 20.0}),
 )
 STUCK = (("routing_friction", {"mu_angle": 0.05, "arc_length_m": 0.01}),)
+LOOSE = (("strand_friction", {"fraction": 0.2, "yield_N": 2.0, "spread": 1.0}),)
 WET = (("viscous_slip", {"coefficient_Ns_per_m_rad": 50.0}),)
 
 
@@ -49,6 +50,7 @@ def variants(config: JointConfig) -> Iterator[tuple[str, Observer]]:
     yield "effects", Observer(with_effects(config, EFFECTS))
     yield "guide", Observer(with_effects(config, STUCK))
     yield "viscous", Observer(with_effects(config, WET))
+    yield "loose", Observer(with_effects(config, LOOSE))
 
 
 def walk(config: JointConfig, rng: np.random.Generator, count: int) -> list[Sample]:
