@@ -94,6 +94,14 @@ def _threaded(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"amplitude": 1.0}, 1.5, 0.9)
 
 
+def _polished(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {
+        "place_rad": float(rng.uniform(-0.6, 0.6)) * scene.joint.travel_rad,
+        "width_rad": float(rng.uniform(0.05, 0.25)),
+    }
+    return Shape(fixed, {"height": 1.0}, 1.5, 5.0)
+
+
 def _burr(rng: np.random.Generator, scene: Scene) -> Shape:
     shape = _patch(rng, scene)
     grain = sign(rng) * float(rng.uniform(0.4, 0.9))
@@ -114,4 +122,5 @@ FRICTION = (
     Suspect("position_dependent_friction:threaded", TURNING, _threaded),
     Suspect("position_dependent_friction:input_drum", TURNING, _input_drum),
     Suspect("position_dependent_friction:burr", TURNING, _burr),
+    Suspect("position_dependent_friction:polished", TURNING, _polished),
 )

@@ -40,6 +40,20 @@ def test_a_termination_beds_in_and_comes_to_rest() -> None:
     np.testing.assert_allclose(_still(law, 0 * T + 20.0, 100.0), 0.95, rtol=1e-6)
 
 
+def test_a_cable_beds_in_soon_and_its_anchorage_late() -> None:
+    """The sum of two rates that each fall by themselves, integrated."""
+    law = EffectSpec("pretension_relaxation:double", {"fraction": 0.06, "quick_s": 0.4, "slow_s": 2.5})
+    found = solve_ivp(
+        lambda t, y: [0.03 / 0.4 * np.exp(-t / 0.4) + 0.03 / 2.5 * np.exp(-t / 2.5)],
+        (0, T[-1]),
+        [0.0],
+        t_eval=T,
+        rtol=1e-9,
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(_still(law, 0 * T + 20.0), 1 - found.y[0], rtol=1e-6)
+
+
 def test_warmth_quickens_creep() -> None:
     law = EffectSpec(
         "pretension_relaxation:warm_creep", {"fraction": 0.03, "time_constant_s": 0.8, "doubling_K": 4.0}
@@ -128,6 +142,18 @@ def test_many_strands_obey_masings_rule() -> None:
     back = np.arange(200, 401)
     expected = added[200] - 2 * np.interp((pull[200] - pull[back]) / 2, pull[first], added[first])
     assert np.max(np.abs(added[back] - expected)) < 0.01 * np.ptp(added)
+
+
+def test_layers_that_grip_ever_less_are_plays_each_with_a_third_of_the_next() -> None:
+    effect = EffectSpec("strand_friction:graded", {"fraction": 0.6, "yield_N": 9.0})
+    pull, added = _stretch(effect, course(0.0, 0.8, -0.4, 0.3, points=200))
+    expected = np.zeros(len(pull))
+    for radius in (9.0, 3.0, 1.0, 1 / 3, 1 / 9, 1 / 27):
+        rest = 0.0
+        for k, x in enumerate(pull):
+            rest = min(max(rest, x - radius), x + radius)
+            expected[k] += 0.1 * rest
+    assert np.max(np.abs(added - expected)) < 5e-3 * np.ptp(expected)
 
 
 def test_greased_strands_yield_in_their_own_time() -> None:

@@ -206,6 +206,18 @@ def test_a_rippled_groove_is_met_where_the_joint_stands(place: float) -> None:
     assert left == pytest.approx(_left_over(s, mu, 0.25, 1.0), rel=0.02)
 
 
+@pytest.mark.parametrize("place", [-0.6, 0.3, 1.2])
+def test_a_polished_part_is_met_where_the_joint_stands(place: float) -> None:
+    law = {"height": 2.0, "place_rad": 0.2, "width_rad": 0.15}
+    effect = EffectSpec("position_dependent_friction:polished", law)
+    left, s = _small_loop(effect, place / 0.5, mu_output=0.3, mu_input=STICKS)
+
+    def mu(depth: np.ndarray) -> np.ndarray:
+        return np.asarray(0.3 * (1.0 + 2.0 / (1.0 + np.exp(-2.0 * (place - depth - 0.2) / 0.15))))
+
+    assert left == pytest.approx(_left_over(s, mu, 0.25, 1.0), rel=0.02)
+
+
 @pytest.mark.parametrize("place", [-1.0, 0.5, 2.0])
 def test_the_input_drums_groove_is_met_where_the_motor_stands(place: float) -> None:
     def left(amplitude: float) -> tuple[float, StageConfig]:

@@ -1,5 +1,5 @@
-"""A groove that is rough in places, in other forms: a patch, ripples, the input drum's groove,
-a burr."""
+"""A groove that is rough in places, in other forms: a patch, ripples, the input drum's groove, a burr, a
+polished part."""
 
 from __future__ import annotations
 
@@ -89,4 +89,26 @@ BURR = form(
     _burr,
 )
 
-KINDS: tuple[EffectKind, ...] = (PATCH, THREADED, INPUT_DRUM, BURR)
+
+def _polished(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["grooved"] = 1
+    beyond = 0.5 * (1.0 + np.tanh((_ANGLES - p["place_rad"]) / p["width_rad"]))
+    for k in range(len(build.cables)):
+        if build.cables[k]["shaft_out"] == build.output:
+            build.grooves[2 * k] = 1.0 + p["height"] * beyond
+
+
+POLISHED = form(
+    "position_dependent_friction",
+    "polished",
+    "A groove worn smooth as far as the joint used to go: mu (1 + h (1 + tanh((q − q_p)/w))/2).",
+    (
+        Parameter("height", "h, growth of mu beyond that place", low=-0.95, high=10.0, neutral=0.0),
+        _PLACE,
+        Parameter("width_rad", "w, within which it changes", 0.1, 0.05, 10.0),
+    ),
+    _ACTS,
+    _polished,
+)
+
+KINDS: tuple[EffectKind, ...] = (PATCH, THREADED, INPUT_DRUM, BURR, POLISHED)

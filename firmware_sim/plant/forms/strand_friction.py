@@ -1,4 +1,5 @@
-"""Friction between strands in other forms: many small plays (Masing), one that takes time, one that grows with T."""
+"""Friction between strands in other forms: many small plays (Masing), most of them weak (graded), one that takes time,
+one that grows with T."""
 
 from __future__ import annotations
 
@@ -34,6 +35,26 @@ MASING = form(
 )
 
 
+_LESS = 3.0
+
+
+def _graded(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["plays"] = PLAYS
+    whole = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["compliance"] = whole[:, None] / PLAYS
+    build.plays["radius"] = p["yield_N"] * _LESS ** -np.arange(float(PLAYS))
+
+
+GRADED = form(
+    "strand_friction",
+    "graded",
+    "Layers that grip ever less from the core outwards: as Masing's contacts, each limit a third of the next.",
+    (_FRACTION, _YIELD),
+    _ACTS,
+    _graded,
+)
+
+
 def _slow(build: Build, p: Mapping[str, float]) -> None:
     build.cables["plays"] = 1
     build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
@@ -65,4 +86,4 @@ PROPORTIONAL = form(
     _proportional,
 )
 
-KINDS: tuple[EffectKind, ...] = (MASING, RATE_DEPENDENT, PROPORTIONAL)
+KINDS: tuple[EffectKind, ...] = (MASING, GRADED, RATE_DEPENDENT, PROPORTIONAL)
