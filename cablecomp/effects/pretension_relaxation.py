@@ -1,4 +1,4 @@
-"""Pretension relaxation: cable and terminations creep, the pretension falls with the logarithm or a power of time."""
+"""Pretension relaxation: cable and terminations creep, the pretension falls with the logarithm of time."""
 
 from __future__ import annotations
 
@@ -10,17 +10,14 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, pretension_moment, term
 
 
-@term(parameters=("fraction", "time_constant", "exponent", "began", "hanging"), state=("start",))
+@term(parameters=("fraction", "time_constant", "began", "hanging"), state=("start",))
 def _relax(c: Any, p: Any, s: Any) -> None:
-    """p: fraction, time constant [s], exponent (0: logarithm), when it began [s] (none: with the first sample),
-    hanging moment R T0 [N m] (closed: 0); s: when it began."""
+    """p: fraction, time constant [s], when it began [s] (none: with the first sample), hanging moment R T0 [N m]
+    (closed: 0); s: when it began."""
     start = s.start
     if c.first:
         start = c.time if math.isnan(p.began) else p.began
-    course = math.log1p(max(c.time - start, 0.0) / p.time_constant)
-    if p.exponent != 0.0:
-        course = math.expm1(p.exponent * course) / p.exponent
-    factor = max(1.0 - p.fraction * course, LEAST_PRETENSION)
+    factor = max(1.0 - p.fraction * math.log1p(max(c.time - start, 0.0) / p.time_constant), LEAST_PRETENSION)
     if p.hanging > 0.0:
         c.moment += p.hanging * (1.0 - factor)
     else:
@@ -36,7 +33,6 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     terms = _relax(
         fraction=values["fraction"],
         time_constant=values["time_constant_s"],
-        exponent=values["exponent"],
         began=values["began_s"],
         hanging=hanging,
     )
@@ -46,12 +42,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="pretension_relaxation",
     statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
-    "more slowly; it goes on without end or comes to rest.",
-    equation="T0(t) = T0 (1 - a ((1 + (t - t0)/t_c)^p - 1)/p), p = 0: a ln(1 + (t - t0)/t_c), p < 0: it comes to rest "
-    "at a/|p|; t0 the recording's first sample unless it is given (creep that goes on from recording to recording); in "
-    "an open circuit T = T0(t) + M/R",
-    source="logarithmic stress relaxation of steel wire, power-law creep of polymers, at constant length: W. N. "
-    "Findley, J. S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
+    "more slowly.",
+    equation="T0(t) = T0 (1 - a ln(1 + (t - t0)/t_c)), t0 the recording's first sample unless it is given (creep that "
+    "goes on from recording to recording); in an open circuit T = T0(t) + M/R",
+    source="logarithmic stress relaxation of steel wire and polymers at constant length: W. N. Findley, J. "
+    "S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     parameters=(
         Parameter(
             "fraction",
@@ -76,19 +71,6 @@ EFFECT = Effect(
             minimum=1e-6,
         ),
         Parameter(
-            "exponent",
-            "-",
-            0.0,
-            -4.0,
-            1.0,
-            "p, below 0 it comes to rest, above 0 it goes by a power of time, at 0 by the logarithm",
-            role="shape",
-            omitted=0.0,
-            minimum=-10.0,
-            maximum=1.0,
-            of_known_drive=True,
-        ),
-        Parameter(
             "began_s",
             "s",
             0.0,
@@ -103,10 +85,6 @@ EFFECT = Effect(
     ),
     acts_through=("time",),
     bounded=True,
-    tries=tuple(
-        {"exponent": p, "time_constant_s": t, "began_s": 0.0}
-        for p, t in ((-2.0, 4.0), (-2.0, 20.0), (-2.0, 100.0), (0.5, 20.0))
-    ),
     change=_change,
     flag="drifts",
     rank=15,

@@ -27,12 +27,6 @@ def _bedding_in(rng: np.random.Generator, scene: Scene) -> Shape:
     )
 
 
-def _bedding_in_twice(rng: np.random.Generator, scene: Scene) -> Shape:
-    span = _span(scene)
-    fixed = {"quick_s": float(rng.uniform(0.05, 0.3)) * span, "slow_s": float(rng.uniform(0.8, 3.0)) * span}
-    return Shape(fixed, {"fraction": 1.0}, 0.15, 0.5)
-
-
 def _warm_creep(rng: np.random.Generator, scene: Scene) -> Shape:
     time_constant = log_uniform(rng, 2.0, 40.0)
     span = float(np.log1p(_span(scene) / time_constant))
@@ -187,7 +181,6 @@ def _other_break(rng: np.random.Generator, scene: Scene) -> Shape:
 CABLE = (
     Suspect("pretension_relaxation:power_law", ANY, _power_creep, closed=True),
     Suspect("pretension_relaxation:exponential", ANY, _bedding_in, closed=True),
-    Suspect("pretension_relaxation:double", ANY, _bedding_in_twice, closed=True),
     Suspect("pretension_relaxation:warm_creep", ANY, _warm_creep, warm=True, closed=True),
     Suspect("thermal_pretension:lagged", ANY, _late_frame, warm=True, closed=True),
     Suspect("thermal_pretension:quadratic", ANY, _bent, warm=True, closed=True),

@@ -37,19 +37,6 @@ def test_relaxation_lowers_the_tensions_by_its_law(name: str) -> None:
     assert found["deflection_rad"] == pytest.approx(np.zeros_like(time), abs=1e-12)
 
 
-@pytest.mark.parametrize("exponent", [-2.5, 0.4])
-def test_creep_may_come_to_rest_or_go_by_a_power_of_time(exponent: float) -> None:
-    """Its rate falls as (1 + t/t_c)^(p - 1), worked out by quadrature."""
-    config = joint()
-    time = np.linspace(0.0, 60.0, 301)
-    law = {"fraction": 0.02, "time_constant_s": 3.0, "exponent": exponent}
-    found = run(config, resting(time), ("pretension_relaxation", law))["tension_h_N"]
-    for k in (1, 40, 300):
-        lost, _ = quad(lambda t: 0.02 / 3.0 * (1.0 + t / 3.0) ** (exponent - 1.0), 0.0, time[k - 1])
-        # what lies on the drums is moved on in steps of a ten-thousandth of T0
-        assert found[k] == pytest.approx(config.drive.stage[0].pretension_N * (1.0 - lost), rel=1.01e-4)
-
-
 def test_creep_that_began_before_the_recording_goes_on() -> None:
     """A recording that begins 20 s into the creep: the joint's tensions are those of one long recording there."""
     config = joint(free_length_m=LONG)

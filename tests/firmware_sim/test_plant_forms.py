@@ -19,7 +19,6 @@ SIZES = {
     "viscous_slip:one_drum": {"coefficient_Ns_per_m_rad": 2e4},
     "pretension_relaxation:power_law": {"fraction": 0.05, "scale_s": 1.0},
     "pretension_relaxation:exponential": {"fraction": 0.05, "time_constant_s": 2.0},
-    "pretension_relaxation:double": {"fraction": 0.05, "quick_s": 0.5, "slow_s": 2.0},
     "pretension_relaxation:warm_creep": {"fraction": 0.05, "time_constant_s": 0.5},
     "thermal_pretension:lagged": {"coefficient_per_K": 0.02, "lag_s": 1.0},
     "thermal_pretension:quadratic": {"coefficient_per_K": 0.02, "bend_per_K": 0.1},

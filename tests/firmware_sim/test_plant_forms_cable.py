@@ -40,20 +40,6 @@ def test_a_termination_beds_in_and_comes_to_rest() -> None:
     np.testing.assert_allclose(_still(law, 0 * T + 20.0, 100.0), 0.95, rtol=1e-6)
 
 
-def test_a_cable_beds_in_soon_and_its_anchorage_late() -> None:
-    """The sum of two rates that each fall by themselves, integrated."""
-    law = EffectSpec("pretension_relaxation:double", {"fraction": 0.06, "quick_s": 0.4, "slow_s": 2.5})
-    found = solve_ivp(
-        lambda t, y: [0.03 / 0.4 * np.exp(-t / 0.4) + 0.03 / 2.5 * np.exp(-t / 2.5)],
-        (0, T[-1]),
-        [0.0],
-        t_eval=T,
-        rtol=1e-9,
-        atol=1e-12,
-    )
-    np.testing.assert_allclose(_still(law, 0 * T + 20.0), 1 - found.y[0], rtol=1e-6)
-
-
 def test_warmth_quickens_creep() -> None:
     law = EffectSpec(
         "pretension_relaxation:warm_creep", {"fraction": 0.03, "time_constant_s": 0.8, "doubling_K": 4.0}

@@ -144,8 +144,7 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
         mute = {p.name for p in effect.parameters if (p.of_load and not told) or (p.of_known_drive and vague)}
         # a shape goes with its amount
         asked = tuple(p for p in effect.parameters if not mute & {p.name, p.of})
-        tries = tuple(values for values in effect.tries if not mute & values.keys())
-        found += _of_effect(replace(effect, parameters=asked, tries=tries), config, evidence)
+        found += _of_effect(replace(effect, parameters=asked), config, evidence)
     return found
 
 

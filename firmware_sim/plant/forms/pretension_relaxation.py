@@ -69,26 +69,6 @@ EXPONENTIAL = form(
 )
 
 
-def _double(build: Build, p: Mapping[str, float]) -> None:
-    def loss(inputs: Floats) -> Floats:
-        time = np.maximum(inputs[:, TIME], 0.0)
-        quick, slow = (-np.expm1(-time / p[name]) for name in ("quick_s", "slow_s"))
-        return np.asarray(p["fraction"] * (0.5 * quick + 0.5 * slow))
-
-    lowered(build, loss)
-
-
-DOUBLE = form(
-    "pretension_relaxation",
-    "double",
-    "The cable beds in soon and its anchorage late, half of it each: T0 (1 − a/2 (2 − e^(−t/t_1) − e^(−t/t_2))), t the "
-    "clock's time.",
-    (_FRACTION, Parameter("quick_s", "t_1", 3.0, 1e-3), Parameter("slow_s", "t_2", 60.0, 1e-3)),
-    ("time",),
-    _double,
-)
-
-
 def _warm(build: Build, p: Mapping[str, float]) -> None:
     def loss(inputs: Floats) -> Floats:
         time = np.maximum(inputs[:, TIME], 0.0)
@@ -114,4 +94,4 @@ WARM = form(
     _warm,
 )
 
-KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, DOUBLE, WARM)
+KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM)
