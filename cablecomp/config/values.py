@@ -7,7 +7,7 @@ ID.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,15 +26,17 @@ SENSOR_KEYS: Final = tuple(Sensors.model_fields)
 def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig:
     """The configuration with these values in place of its own (`offset[k]` of single recordings is left out); raises
     InputError for one that no drive can have."""
-    stages = [stage.model_dump() for stage in config.drive.stage]
+    stages: list[dict[str, Any]] = []
     sensors: dict[str, Any] = {}
-    effects = [(e.id, dict(e.parameters)) for e in config.effect]
+    effects: list[tuple[str, dict[str, Any]]] = []
     for name, value in values.items():
         key, _, which = name.partition(".")
         if name.startswith("effect."):
+            effects = effects or [(e.id, e.parameters) for e in config.effect]
             identifier, parameter = effect_name(name)
             next(p for i, p in effects if i == identifier)[parameter] = value
         elif key in STAGE_KEYS:
+            stages = stages or [dict(stage) for stage in config.drive.stage]
             places = range(len(stages)) if not which else (int(which) - 1,)
             factor = value / stages[places[0]][key]
             for place in places:
@@ -42,20 +44,25 @@ def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig
             stages[places[0]][key] = value
         elif name in SENSOR_KEYS:
             sensors[name] = value
+    # a fit calls this for every value that it tries: what stays as it is is not made anew
+    changed: dict[str, Any] = {}
+    if stages:
+        changed["drive"] = config.drive.model_copy(update={"stage": _stages(config.name, stages)})
+    if sensors:
+        changed["sensors"] = config.sensors.model_copy(update=sensors)
+    if effects:
+        entries = zip(config.effect, effects, strict=True)
+        changed["effect"] = tuple(type(e)(id=i, **p) for e, (i, p) in entries)
+    return config.model_copy(update=changed) if changed else config
+
+
+def _stages(name: str, stages: Sequence[Mapping[str, Any]]) -> tuple[Stage, ...]:
     try:
-        drive = config.drive.model_copy(update={"stage": tuple(Stage(**s) for s in stages)})
+        return tuple(Stage(**s) for s in stages)
     except ValidationError as error:
         first = error.errors()[0]
         where, value = first["loc"][0], first["input"]
-        raise InputError(
-            f"{config.name}: `{where}` would come to {value:.4g}: {first['msg'].lower()}"
-        ) from None
-    changed = {
-        "drive": drive,
-        "sensors": config.sensors.model_copy(update=sensors),
-        "effect": tuple(type(e)(id=i, **p) for e, (i, p) in zip(config.effect, effects, strict=True)),
-    }
-    return config.model_copy(update=changed)
+        raise InputError(f"{name}: `{where}` would come to {value:.4g}: {first['msg'].lower()}") from None
 
 
 def effect_name(name: str) -> tuple[str, str]:

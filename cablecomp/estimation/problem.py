@@ -22,7 +22,7 @@ from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
-from cablecomp.estimation.standing import standing
+from cablecomp.estimation.standing import standing, stood, with_common
 from cablecomp.estimation.zeros import Zeros
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
@@ -121,6 +121,7 @@ class Problem:
         `known`: misfits of recordings that are not run again, by the recording's place and channel.
         """
         values = self.values(x)
+        common = with_common(self.config, values)
         found: Misfits = {c: [] for c in self.channels}
         cache: dict[Any, Simulator] = {}
         for k, r in enumerate(self.evidence):
@@ -130,7 +131,7 @@ class Problem:
                 continue
             key = self.stand_key(r)
             if key not in cache:
-                cache[key] = simulator(standing(self.config, values, r), self.fine)
+                cache[key] = simulator(stood(common, values, r), self.fine)
             predicted = cache[key].predict(r)
             for c in self.channels:
                 if c in r.columns:

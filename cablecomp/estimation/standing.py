@@ -20,13 +20,24 @@ ON_THE_CLOCK = ("instant", "begin")
 
 
 def standing(config: JointConfig, values: Mapping[str, float], recording: Evidence) -> JointConfig:
-    """The joint with these values as it stood in this recording.
+    """The joint with these values as it stood in this recording."""
+    return stood(with_common(config, values), values, recording)
+
+
+def with_common(config: JointConfig, values: Mapping[str, float]) -> JointConfig:
+    """The joint with those of these values that are no session's own and go with no condition."""
+    common = {k: v for k, v in values.items() if "@" not in k and "~" not in k}
+    return with_values(config, _checked(config, common))
+
+
+def stood(common: JointConfig, values: Mapping[str, float], recording: Evidence) -> JointConfig:
+    """The joint of common values as it stood in this recording, with what of these values is its session's own or goes
+    with its conditions.
 
     The cable's law EA(T) and a coefficient mu(T) belong to the material: where a session's pretension is its own, their
     values at that pretension follow from those at the common one.
     """
-    common = {k: v for k, v in values.items() if "@" not in k and "~" not in k}
-    joint = in_its_place(with_values(config, _checked(config, common)), recording)
+    joint = in_its_place(common, recording)
     own: dict[str, float] = {}
     for name, value in values.items():
         base, at, session = name.partition("@")
