@@ -13,7 +13,14 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.weighing import _against, _alone_by_far, _at_bound, _follows, _too_little
+from cablecomp.diagnosis.explain.weighing import (
+    _against,
+    _alone_by_far,
+    _at_bound,
+    _follows,
+    _slight,
+    _too_little,
+)
 
 
 @pytest.mark.parametrize(
@@ -68,6 +75,28 @@ def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float,
     said = _too_little(removes, left)
     assert bool(said) is little
     assert not little or (f"{removes:.0%}" in said and f"{left:.0%}" in said)
+
+
+@pytest.mark.parametrize(
+    ("name", "beside", "gain", "share", "slight"),
+    [
+        ("bearing_friction", True, 0.2, 0.01, True),
+        ("bearing_friction", False, 0.2, 0.01, False),
+        ("bearing_friction", True, 0.6, 0.01, False),
+        ("bearing_friction", True, 0.2, 0.10, False),
+        ("clock_skew", True, 0.2, 0.01, False),
+    ],
+)
+def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form(
+    name: str, beside: bool, gain: float, share: float, slight: bool
+) -> None:
+    """Not alone, not where it takes off most of what was left, not a delay."""
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    term = asked[name]
+    model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
+    said = _slight(model, term, gain, share)
+    assert bool(said) is slight
+    assert not slight or "1.0% of the mismatch" in said
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:
