@@ -27,6 +27,15 @@ def one_jaw() -> Diagnosis:
 
 
 @pytest.fixture(scope="module")
+def two_sessions() -> Diagnosis:
+    """Every fourth of the straight recordings of the jaw, of both its sessions: the command that the README gives
+    for all 45, in a third of its time."""
+    return files.diagnosed(
+        files.joint("davinci-jaw"), [p for session in ("L_4", "L_2") for p in jaw.of_session(session)[::4]]
+    )
+
+
+@pytest.fixture(scope="module")
 def bends() -> Diagnosis:
     """Five bends of the sheath in one call."""
     return files.diagnosed(files.joint("tendon-sheath"), [sheath.path(b) for b in sheath.BENDS])
@@ -57,6 +66,15 @@ def test_what_it_names_predicts_what_it_was_not_fitted_to(one_jaw: Diagnosis) ->
           f"{degrees(after.final_rmse_rad):.2f} deg")  # fmt: skip
     assert after.heldout_rmse_rad < 0.75 * before.heldout_rmse_rad
     assert after.final_rmse_rad < before.final_rmse_rad
+
+
+def test_both_sessions_of_the_jaw_name_path_and_stiffening_cable(two_sessions: Diagnosis) -> None:
+    e = two_sessions.augmented
+    print(f"\n  jaw, both sessions: {two_sessions.verdict}, {[(n.effect, n.confidence) for n in two_sessions.named]}, "
+          f"left out {degrees(e.heldout_rmse_rad):.2f}, kept for the end {degrees(e.final_rmse_rad):.2f} deg")  # fmt: skip
+    assert two_sessions.verdict == "partly explained"
+    assert {"routing_friction", "nonlinear_cable"} <= {n.effect for n in two_sessions.named}
+    assert e.final_rmse_rad < 0.6 * two_sessions.baseline.final_rmse_rad
 
 
 def test_the_sheath_is_routing_friction_that_depends_on_its_bend(bends: Diagnosis) -> None:
