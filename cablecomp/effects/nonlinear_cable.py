@@ -6,29 +6,37 @@ from collections.abc import Mapping
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, Restated
-from cablecomp.mechanics.tables import LEAST_STIFFNESS
+from cablecomp.mechanics.tables import LEAST_STIFFNESS, knee_area
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(stiffening=values["stiffening"], steady=values["steady"])
+    return Change(stiffening=values["stiffening"], steady=values["steady"], knee=values["knee"])
 
 
 def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
-    """1/EA(T) keeps its values: b -> b t/g, g = 1 + b (t - 1), w -> w/c, EA -> EA/c, c = w + (1 - w)/g, t = T0'/T0."""
-    gain = max(1.0 + values["stiffening"] * (factor - 1.0), LEAST_STIFFNESS)
-    steady = values.get("steady", 0.0)
+    """1/EA(T) keeps its values: b -> b t/g, g = 1 + b (t - 1), w -> w/c, EA -> EA/c, c = w + (1 - w)/g, t = T0'/T0;
+    with a knee g = (1 - b S(1))/(1 - b S(t)), b stays and u -> u/t."""
+    b, steady, knee = values["stiffening"], values.get("steady", 0.0), values.get("knee", 0.0)
+    if knee:
+        gain = (1.0 - b * knee_area(knee, 1.0)[1]) / (1.0 - b * knee_area(knee, factor)[1])
+        law = {"stiffening": b, "knee": knee / factor}
+    else:
+        gain = max(1.0 + b * (factor - 1.0), LEAST_STIFFNESS)
+        law = {"stiffening": b * factor / gain}
     compliance = steady + (1.0 - steady) / gain
     share = {"steady": steady / compliance} if steady else {}
-    return Restated({"stiffening": values["stiffening"] * factor / gain, **share}, EA=1.0 / compliance)
+    return Restated({**law, **share}, EA=1.0 / compliance)
 
 
 EFFECT = Effect(
     id="nonlinear_cable",
     statement="The stranded cable is stiffer the more it is pulled, because its wires bed down; where a share of its "
-    "compliance is the wires' own, it becomes no stiffer than these.",
-    equation="1/EA(T) = (w + (1 - w)/(1 + b (T/T0 - 1)))/EA, EA(T) the tangent stiffness dT/dε; w = 0: linear in T",
+    "compliance is the wires' own, it becomes no stiffer than these. Or all at once: a core or a cover that carries "
+    "from some tension on, or yields.",
+    equation="1/EA(T) = (w + (1 - w)/(1 + b (T/T0 - 1)))/EA, EA(T) the tangent stiffness dT/dε; w = 0: linear in T; "
+    "with a knee (w + (1 - w) (1 - b S(T))/(1 - b S(T0)))/EA, S = (1 + tanh((T/T0 - u)/(0.15 u)))/2",
     source="G. A. Costello, Theory of Wire Rope, 1990: strands stiffen as contact between wires builds up; "
-    "linear in tension as first order, two compliances in series as the next",
+    "linear in tension as first order, two compliances in series as the next; a knee as two straight lines, rounded",
     parameters=(
         Parameter(
             "stiffening",
@@ -36,7 +44,7 @@ EFFECT = Effect(
             0.0,
             -0.5,
             0.9,
-            "b, share of EA gained per pretension (of what is not steady)",
+            "b, share of EA gained per pretension (of what is not steady); of compliance lost at the knee",
             minimum=-0.6,
             maximum=0.95,
         ),
@@ -52,6 +60,21 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=0.98,
             tries=(0.4, 0.7),
+        ),
+        Parameter(
+            "knee",
+            "-",
+            0.0,
+            0.3,
+            3.0,
+            "u, T/T0 around which the compliance falls by the share b; 0: no knee, EA(T) grows all along",
+            log=True,
+            role="shape",
+            omitted=0.0,
+            of_known_drive=True,
+            minimum=0.0,
+            maximum=10.0,
+            tries=(0.75, 1.0, 1.3),
         ),
     ),
     acts_through=("load",),

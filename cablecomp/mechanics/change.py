@@ -46,6 +46,8 @@ class Change:
     stiffening: float = 0.0
     steady: float = 0.0
     """Share of the cable's compliance at T0 that does not stiffen."""
+    knee: float = 0.0
+    """T/T0 around which it stiffens, at once; 0: with the tension."""
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
     guide_skew: float = 0.0
@@ -76,6 +78,7 @@ def together(changes: Sequence[Change]) -> Change:
         motor_angle_factor=_product([c.motor_angle_factor for c in changes]),
         stiffening=sum(c.stiffening for c in changes),
         steady=max((c.steady for c in changes), default=0.0),
+        knee=max((c.knee for c in changes), default=0.0),
         guide_angle=sum(c.guide_angle for c in changes),
         guide_length_m=sum(c.guide_length_m for c in changes),
         guide_skew=sum(c.guide_skew for c in changes),
@@ -116,13 +119,14 @@ def law_tables(change: Change, config: JointConfig) -> Floats | None:
     )
     if by_tension is None and by_joint is None and by_motor is None:
         if change.stiffening != 0.0:
-            return np.stack([stiffening_law(change.stiffening, change.steady)] * LAWS)
+            return np.stack([stiffening_law(change.stiffening, change.steady, change.knee)] * LAWS)
         inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
         return np.stack([plain_law()] * LAWS) if inside or change.moves_pretension else None
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
 
     def table(groove: Factor) -> Floats:
-        return law_table(by_tension or np.ones_like, groove, widest, change.stiffening, change.steady)
+        stiffness = change.stiffening, change.steady, change.knee
+        return law_table(by_tension or np.ones_like, groove, widest, *stiffness)
 
     elsewhere = table(np.ones_like)
     laws = np.stack([elsewhere] * LAWS)

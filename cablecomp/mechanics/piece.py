@@ -13,6 +13,8 @@ from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
     GROOVED,
     HEAD,
+    KNEE,
+    KNEE_WIDTH,
     LEAST_STIFFNESS,
     MODE,
     PLAIN,
@@ -20,6 +22,7 @@ from cablecomp.mechanics.tables import (
     STIFF,
     STIFFENING,
     Floats,
+    between,
     groove,
     stiffening_strain,
     strain,
@@ -27,6 +30,8 @@ from cablecomp.mechanics.tables import (
 
 LEAST_CLOSED = 1e-6
 """Stiffening coefficient from which on a piece is done in closed form."""
+MOST_PARTS = 16
+"""Parts in which a piece of a cable with a knee is done at most."""
 PI2_6 = math.pi**2 / 6.0
 # Bernoulli's numbers over (2 k + 1)!
 B2, B4, B6, B8, B10, B12, B14 = (
@@ -62,13 +67,15 @@ def piece(
         return piece_plain(dy, d, tau1, tau2)
     if laws[law, HEAD, MODE] == PLAIN:
         return piece_plain(dy, d, tau1, tau2)
-    if laws[law, HEAD, MODE] == STIFF:
+    if laws[law, HEAD, MODE] == STIFF and laws[law, HEAD, KNEE] == 0.0:
         total, slope = _piece_stiff(laws[law, HEAD, STIFFENING], dy, v1, tau1, v2, tau2)
         steady = laws[law, HEAD, STEADY]
         if steady == 0.0:
             return total, slope
         plain, plain_slope = piece_plain(dy, d, tau1, tau2)
         return steady * plain + (1.0 - steady) * total, steady * plain_slope + (1.0 - steady) * slope
+    if laws[law, HEAD, KNEE] > 0.0:
+        return _piece_bent(laws, law, y1, v1, tau1, y2, v2, tau2)
     return piece_table(laws, law, y1, v1, y2, v2)
 
 
@@ -139,6 +146,27 @@ def _stiff_sums(x: Floats, weights: Floats, b: float, v1: float, d: float) -> tu
         e, de = stiffening_strain(b, tau)
         total += weights[j] * e
         slope += weights[j] * de * tau
+    return total, slope
+
+
+@inner_kernel
+def _piece_bent(
+    laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
+) -> tuple[float, float]:
+    """`piece_table` for a cable with a knee, in parts across which the tension changes by twice the knee's width."""
+    parts = min(1 + int(abs(tau2 - tau1) / (2.0 * KNEE_WIDTH * laws[law, HEAD, KNEE])), MOST_PARTS)
+    s1 = groove(laws, law, y1)
+    span = groove(laws, law, y2) - s1
+    total = slope = 0.0
+    y, v = y1, v1
+    for k in range(1, parts + 1):
+        share = k / parts
+        y_next = between(laws, law, y1, y2, share) if span > 0.0 else y1 + share * (y2 - y1)
+        v_next = v1 + share * (v2 - v1)
+        a, b = piece_table(laws, law, y, v, y_next, v_next)
+        total += a
+        slope += b
+        y, v = y_next, v_next
     return total, slope
 
 

@@ -25,6 +25,7 @@ Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
 LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften further
+KNEE_WIDTH = 0.15  # of the tanh in which a knee rises, over the tension at which it lies
 LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
 TAU: Floats = np.exp(LN_TAU)
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
@@ -41,7 +42,8 @@ HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3
     STIFFENING, STEADY,  # b and w in EA(T) = EA/(w + (1 - w)/(1 + b (tau - 1)))
     GROOVED,  # 0 = g(y) is y itself
     BY_TENSION,  # 0 = v is ln tau itself
-) = range(11)  # fmt: skip
+    KNEE, KNEE_AREA, KNEE_RISE,  # u (0: none), area under the knee up to T0, and the share of the rise that lies there
+) = range(14)  # fmt: skip
 
 
 def plain_law() -> Floats:
@@ -49,12 +51,21 @@ def plain_law() -> Floats:
     return np.zeros((4, 16))
 
 
-def stiffening_law(stiffening: float, steady: float = 0.0) -> Floats:
-    """Constant mu with the tangent stiffness EA/(steady + (1 - steady)/(1 + stiffening (tau - 1))), in the form of a
-    table."""
+def stiffening_law(stiffening: float, steady: float = 0.0, knee: float = 0.0) -> Floats:
+    """Constant mu with the tangent stiffness EA/(steady + (1 - steady) f(tau)), in the form of a table.
+
+    f = 1/(1 + stiffening (tau - 1)); with a knee (1 - stiffening S(tau))/(1 - stiffening S(1)), where S rises from 0 to
+    1 about tau = knee."""
     table = np.zeros((4, 16))
-    table[HEAD, MODE], table[HEAD, STIFFENING], table[HEAD, STEADY] = STIFF, stiffening, steady
+    table[HEAD, MODE] = STIFF
+    _set_stiffness(table[HEAD], stiffening, steady, knee)
     return table
+
+
+def _set_stiffness(head: Floats, stiffening: float, steady: float, knee: float) -> None:
+    head[STIFFENING], head[STEADY], head[KNEE] = stiffening, steady, knee
+    if knee > 0.0:
+        head[KNEE_AREA], head[KNEE_RISE] = knee_area(knee, 1.0)
 
 
 def law_table(
@@ -63,12 +74,13 @@ def law_table(
     wrap_max_rad: float,
     stiffening: float = 0.0,
     steady: float = 0.0,
+    knee: float = 0.0,
 ) -> Floats:
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination) and the tangent stiffness as `stiffening_law`; both factors are vectorised and positive."""
     table = np.zeros((4, SIZE))
     head = table[HEAD]
-    head[STIFFENING], head[STEADY] = stiffening, steady
+    _set_stiffness(head, stiffening, steady, knee)
     by_tension = tension_factor(TAU)
     if np.any(by_tension != 1.0):
         v = _integral(LN_TAU, 1.0 / by_tension)
@@ -231,7 +243,7 @@ def tau_of_v(laws: Floats, law: int, v: float) -> float:
 
 @leaf_kernel
 def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
-    """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int w + (1 - w)/(1 + b (tau - 1)) d tau."""
+    """e(tau) = strain * EA/T0 beyond that at T0, and its derivative: int w + (1 - w) f d tau (`stiffening_law`)."""
     if laws is None:
         return tau - 1.0, 1.0
     if laws[law, HEAD, MODE] == PLAIN:
@@ -242,9 +254,33 @@ def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
 @inner_kernel
 def _strain_in_part(laws: Floats, law: int, tau: float) -> tuple[float, float]:
     """The same of a cable part of whose compliance is steady."""
-    e, de = stiffening_strain(laws[law, HEAD, STIFFENING], tau)
+    if laws[law, HEAD, KNEE] > 0.0:
+        e, de = _knee_strain(laws, law, tau)
+    else:
+        e, de = stiffening_strain(laws[law, HEAD, STIFFENING], tau)
     steady = laws[law, HEAD, STEADY]
     return steady * (tau - 1.0) + (1.0 - steady) * e, steady + (1.0 - steady) * de
+
+
+@leaf_kernel
+def knee_area(knee: float, tau: float) -> tuple[float, float]:
+    """S = (1 + tanh x)/2, x = (tau - u)/(0.15 u) for a knee at u: its integral over tau (from where x = 0, but for a
+    constant), and S."""
+    width = KNEE_WIDTH * knee
+    x = (tau - knee) / width
+    decayed = math.exp(-2.0 * abs(x))
+    area = 0.5 * (tau + width * (abs(x) + math.log1p(decayed)))
+    rise = 1.0 / (1.0 + decayed)
+    return area, rise if x > 0.0 else 1.0 - rise
+
+
+@inner_kernel
+def _knee_strain(laws: Floats, law: int, tau: float) -> tuple[float, float]:
+    """The same of a cable that gives by the share b less beyond its knee."""
+    b = laws[law, HEAD, STIFFENING]
+    area, rise = knee_area(laws[law, HEAD, KNEE], tau)
+    at_1 = 1.0 - b * laws[law, HEAD, KNEE_RISE]
+    return (tau - 1.0 - b * (area - laws[law, HEAD, KNEE_AREA])) / at_1, (1.0 - b * rise) / at_1
 
 
 @inner_kernel

@@ -122,7 +122,7 @@ def piece(
     joint: JointConfig, recordings: Mapping[str, Columns], seconds: float, seed: int, number: int
 ) -> dict[str, dict[str, FloatArray]]:
     """One piece: stretches of recordings of one session, at most `seconds` together, drawn from the seed; by the
-    recordings' names.
+    recordings' names. A run's pieces begin with another recording each, as long as there is one.
 
     Raises InputError where nothing lasts long enough to be diagnosed.
     """
@@ -132,7 +132,8 @@ def piece(
         raise InputError("no recording holds 200 samples of joint_position_rad; physics is concealed in such")
     names = list(usable)
     session = session_names(joint, names)
-    first = names[int(rng.integers(len(names)))]
+    turns = np.random.default_rng([seed, 41]).permutation(len(names))
+    first = names[int(turns[number % len(names)])]
     mates = [n for n in names if session[n] == session[first] and n != first]
     chosen, left = {}, seconds
     for name in (first, *(str(n) for n in rng.permutation(np.asarray(mates, dtype=object)))):

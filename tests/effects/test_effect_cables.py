@@ -313,24 +313,32 @@ def wrap_stretch(strain: Callable[[float], float], tau: float, mu: float) -> flo
     return float(quad(lambda s: strain(math.exp(sign * mu * s)), 0.0, reach, epsabs=0.0, epsrel=1e-12)[0])
 
 
-@pytest.mark.parametrize(("b", "steady"), [(-0.4, 0.0), (0.3, 0.0), (0.9, 0.0), (0.9, 0.5)])
-def test_a_stiffening_cable_against_quadrature(b: float, steady: float) -> None:
+@pytest.mark.parametrize(
+    ("b", "steady", "knee"),
+    [(-0.4, 0.0, 0.0), (0.3, 0.0, 0.0), (0.9, 0.0, 0.0), (0.9, 0.5, 0.0), (0.8, 0.0, 0.8), (-0.4, 0.3, 0.7)],
+)
+def test_a_stiffening_cable_against_quadrature(b: float, steady: float, knee: float) -> None:
     """Free span and both wraps of an open circuit, unloaded from T0: stretched by int dT/EA(T)."""
     config = joint("snow-open-rig")
     stage = config.drive.stage[0]
 
     def strain(tau: float) -> float:
+        def gives(x: float) -> float:
+            if knee:
+                return 1.0 - 0.5 * b * (1.0 + math.tanh((x - knee) / (0.15 * knee)))
+            return 1.0 / (1.0 + b * (x - 1.0))
+
         def compliance(x: float) -> float:
-            return steady + (1.0 - steady) / (1.0 + b * (x - 1.0))
+            return steady + (1.0 - steady) * gives(x) / gives(1.0)
 
         return float(quad(compliance, 1.0, tau, epsabs=0.0, epsrel=1e-12)[0])
 
     time = np.linspace(0.0, 1.0, 60)
     unit = stage.output_radius_m * stage.pretension_N
     load = -0.5 * unit * time
-    found = run(config, still(time, load), ("nonlinear_cable", {"stiffening": b, "steady": steady}))[
-        "deflection_rad"
-    ]
+    found = run(
+        config, still(time, load), ("nonlinear_cable", {"stiffening": b, "steady": steady, "knee": knee})
+    )["deflection_rad"]
     for k in (15, 35, 59):
         tau = 1.0 + load[k] / unit
         stretch = stage.free_length_m * strain(tau)

@@ -20,10 +20,10 @@ from cablecomp.estimation.standing import apart_of, as_it_stood, at_pretension, 
 from cablecomp.signal.smoothing import FloatArray
 
 
-def both(steady: float = 0.0, **coat: float) -> JointConfig:
+def both(steady: float = 0.0, knee: float = 0.0, **coat: float) -> JointConfig:
     """The joint with a cable that stiffens and a coat."""
     by_pressure = {"exponent": 0.25, **coat}
-    by_pull = {"stiffening": 0.3, "steady": steady}
+    by_pull = {"stiffening": 0.3, "steady": steady, "knee": knee}
     return with_effects(JOINT, [("nonlinear_cable", by_pull), ("pressure_dependent_friction", by_pressure)])
 
 
@@ -31,11 +31,16 @@ TENSIONS = np.linspace(20.0, 120.0, 11)
 
 
 def stiffness(config: JointConfig) -> np.ndarray:
-    """EA(T) = EA/(w + (1 - w)/(1 + b (T/T0 - 1))) [N]."""
+    """EA(T) = EA/(w + (1 - w) f), f = 1/(1 + b (T/T0 - 1)), with a knee (1 - b S(T/T0))/(1 - b S(1)) [N]."""
     stage = config.drive.stage[0]
     (cable,) = [e.parameters for e in config.effect if e.id == "nonlinear_cable"]
     b, w = float(cable["stiffening"]), float(cable.get("steady", 0.0))
-    return np.asarray(stage.EA_N / (w + (1.0 - w) / (1.0 + b * (TENSIONS / stage.pretension_N - 1.0))))
+    tau, u = TENSIONS / stage.pretension_N, float(cable.get("knee", 0.0))
+    gives = 1.0 / (1.0 + b * (tau - 1.0))
+    if u:
+        rise, at_1 = (0.5 * (1.0 + np.tanh((t - u) / (0.15 * u))) for t in (tau, 1.0))
+        gives = (1.0 - b * rise) / (1.0 - b * at_1)
+    return np.asarray(stage.EA_N / (w + (1.0 - w) * gives))
 
 
 def friction(config: JointConfig, key: str) -> np.ndarray:
@@ -47,7 +52,17 @@ def friction(config: JointConfig, key: str) -> np.ndarray:
     return np.asarray(getattr(stage, key) * tau**-n * (1.0 - lost * tau**10 / (tau**10 + place**10)))
 
 
-@pytest.mark.parametrize("coat", [{}, {"steady": 0.4}, {"lost": 0.6, "place": 1.3}, {"lost": -0.4}])
+@pytest.mark.parametrize(
+    "coat",
+    [
+        {},
+        {"steady": 0.4},
+        {"knee": 1.2},
+        {"steady": 0.4, "knee": 0.8},
+        {"lost": 0.6, "place": 1.3},
+        {"lost": -0.4},
+    ],
+)
 @pytest.mark.parametrize("factor", [0.7, 1.0, 1.6])
 def test_another_pretension_keeps_the_laws_of_cable_and_coat(factor: float, coat: dict[str, float]) -> None:
     here = both(**coat)

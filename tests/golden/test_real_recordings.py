@@ -69,9 +69,9 @@ def test_what_it_names_predicts_what_it_was_not_fitted_to(one_jaw: Diagnosis) ->
 
 
 def test_both_sessions_of_the_jaw_name_path_and_stiffening_cable(two_sessions: Diagnosis) -> None:
-    e = two_sessions.augmented
-    print(f"\n  jaw, both sessions: {two_sessions.verdict}, {[(n.effect, n.confidence) for n in two_sessions.named]}, "
-          f"left out {degrees(e.heldout_rmse_rad):.2f}, kept for the end {degrees(e.final_rmse_rad):.2f} deg")  # fmt: skip
+    e, names = two_sessions.augmented, [(n.effect, n.confidence) for n in two_sessions.named]
+    print(f"\n  jaw, both sessions: {two_sessions.verdict}, {names}, left out {degrees(e.heldout_rmse_rad):.2f}, "
+          f"kept for the end {degrees(e.final_rmse_rad):.2f} deg")  # fmt: skip
     assert two_sessions.verdict == "partly explained"
     assert {"routing_friction", "nonlinear_cable"} <= {n.effect for n in two_sessions.named}
     assert e.final_rmse_rad < 0.6 * two_sessions.baseline.final_rmse_rad

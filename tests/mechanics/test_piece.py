@@ -35,3 +35,31 @@ def test_a_stiffening_piece_is_the_integral_of_its_strain(
         assert total == pytest.approx(WIDTH_RAD * mean, abs=2e-13)
         mean_slope = (strain(end) - strain(begin)) / (end - begin)
         assert slope == pytest.approx(WIDTH_RAD * mean_slope, abs=2e-12)
+
+
+@pytest.mark.parametrize(("share", "knee"), [(-0.5, 0.7), (0.75, 1.0), (0.9, 1.5), (0.95, 0.3)])
+@pytest.mark.parametrize("rise", [0.01, 0.049, 0.2, 0.5, 2.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
+    share: float, knee: float, rise: float, way: float
+) -> None:
+    """e(tau) = (tau - 1 - b/2 (tau - 1 + s ln(cosh x/cosh x_1)))/(1 - b S(1)), x = (tau - u)/s, s = 0.15 u."""
+    law = np.stack([stiffening_law(share, 0.0, knee)])
+    width = 0.15 * knee
+    first = (1.0 - knee) / width
+
+    def strain(v: float) -> float:
+        tau = np.exp(v)
+        x = (tau - knee) / width
+        grown = np.logaddexp(x, -x) - np.logaddexp(first, -first)
+        share_1 = 0.5 * share * (1.0 + np.tanh(first))
+        return float((tau - 1.0 - 0.5 * share * (tau - 1.0 + width * grown)) / (1.0 - share_1))
+
+    for begin in (-2.5, -0.6, 0.0, 0.4):
+        end = begin + way * rise
+        total, slope = piece(law, 0, 1.0, begin, np.exp(begin), 1.0 + WIDTH_RAD, end, np.exp(end))
+        low, high = sorted((begin, end))
+        bend = [np.log(knee)] if low < np.log(knee) < high else None
+        area = quad(strain, low, high, epsabs=1e-13, epsrel=1e-12, points=bend, limit=200)[0]
+        assert total == pytest.approx(WIDTH_RAD * area / (high - low), rel=1e-7, abs=1e-9)
+        assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), rel=1e-6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from cablecomp.mechanics.tables import (
     G_OF_Y,
@@ -55,6 +56,31 @@ def test_strain_is_the_integral_of_the_stiffness_named(stiffening: float, steady
         slope = (strain_of_tau(law, 0, tau + 1e-6)[0] - strain_of_tau(law, 0, tau - 1e-6)[0]) / 2e-6
         assert slope == pytest.approx(steady + (1.0 - steady) / (1.0 + stiffening * (tau - 1.0)), rel=1e-6)
         assert strain_of_tau(law, 0, tau)[1] == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.parametrize("steady", [0.0, 0.7])
+@pytest.mark.parametrize(("share", "knee"), [(-0.5, 0.7), (0.75, 1.0), (0.75, 1.3), (0.95, 0.3)])
+def test_strain_with_a_knee_is_the_integral_of_its_compliance(
+    share: float, knee: float, steady: float
+) -> None:
+    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S = (1 + tanh((tau - u)/(0.15 u)))/2, e(1) = 0; in a table
+    too."""
+    law = np.stack([stiffening_law(share, steady, knee)])
+    table = np.stack([law_table(hardly, hardly, WRAP, share, steady, knee)])
+
+    def yields(tau: float) -> float:
+        return 1.0 - share * 0.5 * (1.0 + np.tanh((tau - knee) / (0.15 * knee)))
+
+    def compliance(tau: float) -> float:
+        return float(steady + (1.0 - steady) * yields(tau) / yields(1.0))
+
+    for tau in (0.02, 0.5, 0.9, 1.0, 1.3, 2.4, 8.0):
+        strain = quad(compliance, 1.0, tau, epsrel=1e-12, epsabs=1e-14, limit=200, points=sorted((1.0, tau)))[
+            0
+        ]
+        assert strain_of_tau(law, 0, tau)[0] == pytest.approx(strain, rel=1e-10, abs=1e-13)
+        assert strain_of_tau(law, 0, tau)[1] == pytest.approx(compliance(tau), rel=1e-12)
+        assert strain_of_tau(table, 0, tau) == pytest.approx(strain_of_tau(law, 0, tau), rel=1e-12)
 
 
 def test_no_stiffening_is_the_plain_law() -> None:

@@ -131,6 +131,10 @@ def test_pieces_are_stretches_of_one_session_and_the_same_again() -> None:
             found[0]["time_s"], next(iter(piece(JOINT, whole, 30.0, 2, number).values()))["time_s"]
         )
     assert len(piece(JOINT, whole, 70.0, 2, 0)) == 2
+    short = {name: {c: v[:2000] for c, v in table.items()} for name, table in whole.items()}
+    seconds = float(np.ptp(next(iter(short.values()))["time_s"]))
+    first = [next(iter(piece(JOINT, short, seconds, 2, number))) for number in range(4)]
+    assert sorted(first) == sorted(whole)  # none twice while there are others
     with pytest.raises(InputError, match="200 samples"):
         piece(JOINT, {"a": {"time_s": np.arange(5.0)}}, 20.0, 0, 0)
 
