@@ -34,9 +34,9 @@ EFFECT = Effect(
     "compliance is the wires' own, it becomes no stiffer than these. Or all at once: a core or a cover that carries "
     "from some tension on, or yields.",
     equation="1/EA(T) = (w + (1 - w)/(1 + b (T/T0 - 1)))/EA, EA(T) the tangent stiffness dT/dε; w = 0: linear in T; "
-    "with a knee (w + (1 - w) (1 - b S(T))/(1 - b S(T0)))/EA, S = (1 + tanh((T/T0 - u)/(0.15 u)))/2",
+    "with a knee (w + (1 - w) (1 - b S(T))/(1 - b S(T0)))/EA, S rises straight from 0 at 0.75 u T0 to 1 at 1.25 u T0",
     source="G. A. Costello, Theory of Wire Rope, 1990: strands stiffen as contact between wires builds up; "
-    "linear in tension as first order, two compliances in series as the next; a knee as two straight lines, rounded",
+    "linear in tension as first order, two compliances in series as the next; a knee as three straight lines",
     parameters=(
         Parameter(
             "stiffening",

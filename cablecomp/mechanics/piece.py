@@ -14,13 +14,18 @@ from cablecomp.mechanics.tables import (
     GROOVED,
     HEAD,
     KNEE,
-    KNEE_WIDTH,
+    KNEE_AREA,
+    KNEE_HALF,
+    KNEE_RISE,
+    KNEE_V_HIGH,
+    KNEE_V_LOW,
     LEAST_STIFFNESS,
     MODE,
     PLAIN,
     STEADY,
     STIFF,
     STIFFENING,
+    TABLED,
     Floats,
     between,
     groove,
@@ -30,8 +35,6 @@ from cablecomp.mechanics.tables import (
 
 LEAST_CLOSED = 1e-6
 """Stiffening coefficient from which on a piece is done in closed form."""
-MOST_PARTS = 16
-"""Parts in which a piece of a cable with a knee is done at most."""
 PI2_6 = math.pi**2 / 6.0
 # Bernoulli's numbers over (2 k + 1)!
 B2, B4, B6, B8, B10, B12, B14 = (
@@ -153,21 +156,64 @@ def _stiff_sums(x: Floats, weights: Floats, b: float, v1: float, d: float) -> tu
 def _piece_bent(
     laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
 ) -> tuple[float, float]:
-    """`piece_table` for a cable with a knee, in parts across which the tension changes by twice the knee's width."""
-    parts = min(1 + int(abs(tau2 - tau1) / (2.0 * KNEE_WIDTH * laws[law, HEAD, KNEE])), MOST_PARTS)
-    s1 = groove(laws, law, y1)
-    span = groove(laws, law, y2) - s1
+    """`piece` for a cable with a knee: in parts below it, in it, and above it."""
+    tabled = laws[law, HEAD, MODE] == TABLED
+    v_in, v_out = laws[law, HEAD, KNEE_V_LOW], laws[law, HEAD, KNEE_V_HIGH]
+    if v2 < v1:
+        v_in, v_out = v_out, v_in
     total = slope = 0.0
-    y, v = y1, v1
-    for k in range(1, parts + 1):
-        share = k / parts
-        y_next = between(laws, law, y1, y2, share) if span > 0.0 else y1 + share * (y2 - y1)
-        v_next = v1 + share * (v2 - v1)
-        a, b = piece_table(laws, law, y, v, y_next, v_next)
-        total += a
-        slope += b
-        y, v = y_next, v_next
+    y, v, tau = y1, v1, tau1
+    for k in range(3):
+        y_to, v_to, tau_to = y2, v2, tau2
+        if k < 2:
+            bend = v_in if k == 0 else v_out
+            share = (bend - v1) / (v2 - v1) if v2 != v1 else 2.0
+            if not 0.0 < share < 1.0:
+                continue
+            v_to, tau_to = bend, math.exp(bend)
+            y_to = between(laws, law, y1, y2, share) if tabled else y1 + share * (y2 - y1)
+        if tabled:
+            part, part_slope = piece_table(laws, law, y, v, y_to, v_to)
+        else:
+            part, part_slope = _piece_of_line(laws, law, y_to - y, v, tau, v_to, tau_to)
+        total += part
+        slope += part_slope
+        y, v, tau = y_to, v_to, tau_to
     return total, slope
+
+
+@inner_kernel
+def _piece_of_line(
+    laws: Floats, law: int, dy: float, v1: float, tau1: float, v2: float, tau2: float
+) -> tuple[float, float]:
+    """`piece` under plain friction where the compliance is a straight line over the tension, beside a knee or in it:
+    e is a parabola of exp(v), done in closed form; on short pieces, where differences would cancel, by Gauss-Legendre
+    quadrature."""
+    d = v2 - v1
+    if abs(d) < 0.05:
+        total = slope = 0.0
+        for j in range(len(MIDDLE_X)):
+            e, de = strain(laws, law, v1 + d * MIDDLE_X[j])
+            total += MIDDLE_W[j] * e
+            slope += MIDDLE_W[j] * de
+        return total * dy, slope * dy
+    head = laws[law, HEAD]
+    knee, steady = head[KNEE], head[STEADY]
+    at_1 = 1.0 - head[STIFFENING] * head[KNEE_RISE]
+    middle = 0.5 * (tau1 + tau2)
+    low, width = (1.0 - KNEE_HALF) * knee, 2.0 * KNEE_HALF * knee
+    grown, rise = tau2 - tau1, 0.0  # of tau, and of the integral of S
+    area = 0.0  # integral over v of the integral of S
+    if middle > low + width:
+        rise, area = grown, grown - knee * d
+    elif middle > low:
+        rise = grown * (middle - low) / width
+        area = (grown * (middle - 2.0 * low) + low * low * d) / (2.0 * width)
+    share = (1.0 - steady) / at_1
+    bent = grown - d - head[STIFFENING] * (area - head[KNEE_AREA] * d)
+    total = steady * (grown - d) + share * bent
+    slope = steady * grown + share * (grown - head[STIFFENING] * rise)
+    return total * dy / d, slope * dy / d
 
 
 @inner_kernel

@@ -25,7 +25,7 @@ Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
 LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften further
-KNEE_WIDTH = 0.15  # of the tanh in which a knee rises, over the tension at which it lies
+KNEE_HALF = 0.25  # half the tension over which a knee rises, over that amid it
 LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
 TAU: Floats = np.exp(LN_TAU)
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
@@ -42,8 +42,9 @@ HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3
     STIFFENING, STEADY,  # b and w in EA(T) = EA/(w + (1 - w)/(1 + b (tau - 1)))
     GROOVED,  # 0 = g(y) is y itself
     BY_TENSION,  # 0 = v is ln tau itself
-    KNEE, KNEE_AREA, KNEE_RISE,  # u (0: none), area under the knee up to T0, and the share of the rise that lies there
-) = range(14)  # fmt: skip
+    KNEE, KNEE_AREA, KNEE_RISE,  # u (0: none), integral of S from there to T0, S at T0
+    KNEE_V_LOW, KNEE_V_HIGH,  # v where S begins to rise, and where it is 1
+) = range(16)  # fmt: skip
 
 
 def plain_law() -> Floats:
@@ -55,17 +56,20 @@ def stiffening_law(stiffening: float, steady: float = 0.0, knee: float = 0.0) ->
     """Constant mu with the tangent stiffness EA/(steady + (1 - steady) f(tau)), in the form of a table.
 
     f = 1/(1 + stiffening (tau - 1)); with a knee (1 - stiffening S(tau))/(1 - stiffening S(1)), where S rises from 0 to
-    1 about tau = knee."""
+    1 straight from 0.75 knee to 1.25 knee."""
     table = np.zeros((4, 16))
     table[HEAD, MODE] = STIFF
-    _set_stiffness(table[HEAD], stiffening, steady, knee)
+    _set_stiffness(table, stiffening, steady, knee)
     return table
 
 
-def _set_stiffness(head: Floats, stiffening: float, steady: float, knee: float) -> None:
+def _set_stiffness(table: Floats, stiffening: float, steady: float, knee: float) -> None:
+    head = table[HEAD]
     head[STIFFENING], head[STEADY], head[KNEE] = stiffening, steady, knee
     if knee > 0.0:
         head[KNEE_AREA], head[KNEE_RISE] = knee_area(knee, 1.0)
+        low, high = (v_of_tau(table[None], 0, (1.0 + way * KNEE_HALF) * knee) for way in (-1.0, 1.0))
+        head[KNEE_V_LOW], head[KNEE_V_HIGH] = low, high
 
 
 def law_table(
@@ -80,7 +84,6 @@ def law_table(
     termination) and the tangent stiffness as `stiffening_law`; both factors are vectorised and positive."""
     table = np.zeros((4, SIZE))
     head = table[HEAD]
-    _set_stiffness(head, stiffening, steady, knee)
     by_tension = tension_factor(TAU)
     if np.any(by_tension != 1.0):
         v = _integral(LN_TAU, 1.0 / by_tension)
@@ -101,6 +104,7 @@ def law_table(
         head[MODE] = TABLED
     else:
         head[MODE] = STIFF if stiffening != 0.0 else PLAIN
+    _set_stiffness(table, stiffening, steady, knee)
     return table
 
 
@@ -264,14 +268,14 @@ def _strain_in_part(laws: Floats, law: int, tau: float) -> tuple[float, float]:
 
 @leaf_kernel
 def knee_area(knee: float, tau: float) -> tuple[float, float]:
-    """S = (1 + tanh x)/2, x = (tau - u)/(0.15 u) for a knee at u: its integral over tau (from where x = 0, but for a
-    constant), and S."""
-    width = KNEE_WIDTH * knee
-    x = (tau - knee) / width
-    decayed = math.exp(-2.0 * abs(x))
-    area = 0.5 * (tau + width * (abs(x) + math.log1p(decayed)))
-    rise = 1.0 / (1.0 + decayed)
-    return area, rise if x > 0.0 else 1.0 - rise
+    """Integral over tau of S, which rises straight from 0 at 0.75 u to 1 at 1.25 u for a knee at u; and S."""
+    beyond = tau - (1.0 - KNEE_HALF) * knee
+    if beyond <= 0.0:
+        return 0.0, 0.0
+    width = 2.0 * KNEE_HALF * knee
+    if beyond >= width:
+        return tau - knee, 1.0
+    return 0.5 * beyond * beyond / width, beyond / width
 
 
 @inner_kernel

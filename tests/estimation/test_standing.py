@@ -38,7 +38,7 @@ def stiffness(config: JointConfig) -> np.ndarray:
     tau, u = TENSIONS / stage.pretension_N, float(cable.get("knee", 0.0))
     gives = 1.0 / (1.0 + b * (tau - 1.0))
     if u:
-        rise, at_1 = (0.5 * (1.0 + np.tanh((t - u) / (0.15 * u))) for t in (tau, 1.0))
+        rise, at_1 = (np.interp(t, [0.75 * u, 1.25 * u], [0.0, 1.0]) for t in (tau, 1.0))
         gives = (1.0 - b * rise) / (1.0 - b * at_1)
     return np.asarray(stage.EA_N / (w + (1.0 - w) * gives))
 

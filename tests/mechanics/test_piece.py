@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -37,29 +39,31 @@ def test_a_stiffening_piece_is_the_integral_of_its_strain(
         assert slope == pytest.approx(WIDTH_RAD * mean_slope, abs=2e-12)
 
 
+@pytest.mark.parametrize("steady", [0.0, 0.4])
 @pytest.mark.parametrize(("share", "knee"), [(-0.5, 0.7), (0.75, 1.0), (0.9, 1.5), (0.95, 0.3)])
-@pytest.mark.parametrize("rise", [0.01, 0.049, 0.2, 0.5, 2.0])
+@pytest.mark.parametrize("rise", [0.01, 0.049, 0.051, 0.2, 0.5, 2.0])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
-    share: float, knee: float, rise: float, way: float
+    share: float, knee: float, rise: float, way: float, steady: float
 ) -> None:
-    """e(tau) = (tau - 1 - b/2 (tau - 1 + s ln(cosh x/cosh x_1)))/(1 - b S(1)), x = (tau - u)/s, s = 0.15 u."""
-    law = np.stack([stiffening_law(share, 0.0, knee)])
-    width = 0.15 * knee
-    first = (1.0 - knee) / width
+    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0."""
+    law = np.stack([stiffening_law(share, steady, knee)])
+    bends = np.array([0.75 * knee, 1.25 * knee])
+
+    def area(tau: float) -> float:
+        inside = min(max(tau, bends[0]), bends[1]) - bends[0]
+        return float(inside**2 / (2.0 * np.ptp(bends)) + max(tau - bends[1], 0.0))
 
     def strain(v: float) -> float:
-        tau = np.exp(v)
-        x = (tau - knee) / width
-        grown = np.logaddexp(x, -x) - np.logaddexp(first, -first)
-        share_1 = 0.5 * share * (1.0 + np.tanh(first))
-        return float((tau - 1.0 - 0.5 * share * (tau - 1.0 + width * grown)) / (1.0 - share_1))
+        at_1 = 1.0 - share * np.interp(1.0, bends, [0.0, 1.0])
+        bent = (np.expm1(v) - share * (area(np.exp(v)) - area(1.0))) / at_1
+        return float(steady * np.expm1(v) + (1.0 - steady) * bent)
 
     for begin in (-2.5, -0.6, 0.0, 0.4):
         end = begin + way * rise
         total, slope = piece(law, 0, 1.0, begin, np.exp(begin), 1.0 + WIDTH_RAD, end, np.exp(end))
         low, high = sorted((begin, end))
-        bend = [np.log(knee)] if low < np.log(knee) < high else None
-        area = quad(strain, low, high, epsabs=1e-13, epsrel=1e-12, points=bend, limit=200)[0]
-        assert total == pytest.approx(WIDTH_RAD * area / (high - low), rel=1e-7, abs=1e-9)
-        assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), rel=1e-6)
+        parts = [low, *(v for v in np.log(bends) if low < v < high), high]
+        found = sum(quad(strain, a, b, epsabs=1e-14, epsrel=1e-13)[0] for a, b in pairwise(parts))
+        assert total == pytest.approx(WIDTH_RAD * found / (high - low), abs=2e-13)
+        assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), abs=2e-12)

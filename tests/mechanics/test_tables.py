@@ -63,13 +63,13 @@ def test_strain_is_the_integral_of_the_stiffness_named(stiffening: float, steady
 def test_strain_with_a_knee_is_the_integral_of_its_compliance(
     share: float, knee: float, steady: float
 ) -> None:
-    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S = (1 + tanh((tau - u)/(0.15 u)))/2, e(1) = 0; in a table
-    too."""
+    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0; in a
+    table too."""
     law = np.stack([stiffening_law(share, steady, knee)])
     table = np.stack([law_table(hardly, hardly, WRAP, share, steady, knee)])
 
     def yields(tau: float) -> float:
-        return 1.0 - share * 0.5 * (1.0 + np.tanh((tau - knee) / (0.15 * knee)))
+        return 1.0 - share * float(np.interp(tau, [0.75 * knee, 1.25 * knee], [0.0, 1.0]))
 
     def compliance(tau: float) -> float:
         return float(steady + (1.0 - steady) * yields(tau) / yields(1.0))
