@@ -99,7 +99,7 @@ def _weighed(
     exchanges = 0
     while True:
         after = case.remainder_of(found.final.fit, rng)
-        weighed = weigh(found, after.location, share_left(case.drive, found.final), rng)
+        weighed = weigh(found, after.location, case.locate, share_left(case.drive, found.final), rng)
         better = sorted((w.difference.z, k, w.better) for k, w in enumerate(weighed) if w.better is not None)
         more = better and exchanges < LIMITS.exchanges
         if more and (other := exchanged(found, better[0][2], case.drive)) is not None:
@@ -132,8 +132,8 @@ def _judged(
     if not predicts(drive.fit, final, baseline, augmented, drive.floor_rad):
         weighed = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed]
     named = sorted(
-        (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: -w.evidence["gain"]
-    )  # what is missed most stands first
+        (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: (-w.removes, -w.evidence["gain"])
+    )  # what takes off most stands first
     kept, remainder = final, after
     if not named:
         kept = without_effects(final, drive, found.groups)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from cablecomp.diagnosis.locate.responses import every_row, responses
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.result import Errors
 from cablecomp.estimation.least_squares import Fit
+
+SURROGATES: Final = 7
+"""Seed of the surrogates that models without an effect are held against."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +57,14 @@ class Case:
         return locate(series, rng, sensitivities(fit), drive=responses(fit))
 
     def remainder_of(self, fit: Fit, rng: np.random.Generator) -> Remainder:
-        """What a fit to these recordings leaves."""
-        series = series_of(fit, self.covariates, self.drive.floor_rad)
+        """What a fit to these recordings, or some of them, leaves."""
+        known = dict(zip((e.name for e in self.drive.fit.problem.evidence), self.covariates, strict=True))
+        series = series_of(fit, [known[e.name] for e in fit.problem.evidence], self.drive.floor_rad)
         return Remainder(series, locate(series, rng, sensitivities(fit)))
+
+    def locate(self, fit: Fit) -> Location:
+        """Where what such a fit leaves lies, by surrogates that are the same for all fits."""
+        return self.remainder_of(fit, np.random.default_rng(SURROGATES)).location
 
 
 @dataclass(frozen=True)

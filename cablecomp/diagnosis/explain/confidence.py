@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any, Final
 
 FEATURES: Final = (
-    "log_gain", "log_z", "z_blocks", "selected_in", "margin_gain", "margin_z", "share_left", "rivals", "follows",
-    "unsteady", "at_bound", "tries",
+    "log_gain", "selected_in", "form_z", "form_margin_z", "share_left", "unfollowed", "tries",
 )  # fmt: skip
 """What is learnt from. How many effects there are, and how large each is beside the others, stands in the evidence
-and is not learnt from: in trials that is as it was drawn, in a machine as it is."""
+and is not learnt from: in trials that is as it was drawn, in a machine as it is. Nor are rivals counted, what is still
+followed, how steady an amount is, whether it is on a bound: beside these seven they said nothing more of laws left out
+(trials seed 661: Brier score 0.097 with them, 0.095 without)."""
 OF_TRIED: Final = ("log_gain", "log_z", "selected_in")
 _FILE: Final = Path(__file__).with_name("confidence.json")
 
@@ -90,14 +91,13 @@ def _log_z(z: float) -> float:
 def features(
     *,
     gain: float,
-    z: float,
-    z_blocks: float,
     selected_in: float,
-    margin_gain: float,
-    margin_z: float,
+    form_z: float,
+    form_margin_z: float,
     share_left: float,
     share_total: float,
     rivals: int,
+    unfollowed: float,
     follows: float,
     unsteady: float,
     at_bound: bool,
@@ -106,29 +106,33 @@ def features(
 ) -> dict[str, float]:
     """The evidence of one name.
 
-    `gain`, `z`, `z_blocks`: of the model over the one without the effect, on data left out, where the other laws of
-    either may have other forms (`discrepancy`). `selected_in`: share of resampled data in which it is the best of its
-    round. `margin_gain`, `margin_z`: as these, over the nearest rival in its place.
-    `share_left`: mean square left by the final model beyond noise over the calibrated drive's. `share_total`: share of
-    the calibrated drive's square that it takes off. `rivals`: effects in its model confidence set. `follows`:
-    share of the remainder that still follows what the effect acts through. `unsteady`: difference of its amount
-    between halves of the data, in units of it. `at_bound`: one of its parameters, lengths and shares apart, is on a
-    bound. `tries`: points that it was asked at (an event: many instants), the best of which counts. `terms`: effects in
-    the final model.
+    `gain`: of the model over the one without the effect, on data left out, where the other laws of either may have
+    other forms (`discrepancy`). `selected_in`: share of resampled data in which it is the best of its round. `form_z`:
+    standard errors of that gain where the effect itself may have another form, too; `form_margin_z`: over the nearest
+    rival in its place, which may as well. `share_left`: mean square left by the final model beyond noise over the
+    calibrated drive's. `share_total`: share of the calibrated drive's square that it takes off. `rivals`: effects in
+    its model confidence set. `unfollowed`: p-value of what is left without it following a covariate that the effect
+    acts through: the residual's own word, in which the effect's law has no part. `follows`: share of the remainder that
+    still follows what it acts through. `unsteady`: difference of its amount between halves of the data, in units of it.
+    `at_bound`: one of its parameters, lengths and shares apart, is on a bound. `tries`: points that it was asked at (an
+    event: many instants), the best of which counts. `terms`: effects in the final model.
     """
     return {
         "log_gain": _log_gain(gain),
-        "log_z": _log_z(z),
-        "z_blocks": min(max(z_blocks, -3.0), 10.0),
         "selected_in": selected_in,
-        "margin_gain": min(max(margin_gain, -1.0), 1.0),
-        "margin_z": min(max(margin_z, -3.0), 10.0),
+        "form_z": _bounded_z(form_z),
+        "form_margin_z": _bounded_z(form_margin_z),
         "share_left": min(max(share_left, 0.0), 1.0),
         "share_total": min(max(share_total, 0.0), 1.0),
         "rivals": float(min(rivals, 4)),
+        "unfollowed": unfollowed,
         "follows": follows,
         "unsteady": unsteady,
         "at_bound": float(at_bound),
         "tries": math.log10(max(tries, 1)),
         "terms": float(terms),
     }
+
+
+def _bounded_z(z: float) -> float:
+    return min(max(z, -3.0), 10.0)

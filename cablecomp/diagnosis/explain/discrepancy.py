@@ -31,13 +31,18 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 def left_out_with_discrepancy(
-    model: Model, beside: Sequence[Hypothesis], groups: Groups, event: Hypothesis | None = None
+    model: Model,
+    beside: Sequence[Hypothesis],
+    groups: Groups,
+    *,
+    event: Hypothesis | None = None,
+    own: Hypothesis | None = None,
 ) -> FloatArray:
     """Weighted residual of every data row with its fold left out, where these effects of the model may have other forms
-    (an event among them another course), and one further `event` of it another course; as `left_out` where there is
-    nothing of these."""
+    (an event among them another course), one further `event` of it another course, and what is asked about its `own`
+    form, too; as `left_out` where there is nothing of these."""
     fit, n = model.fit, len(groups.fold)
-    laws = {h.effect.id for h in beside}
+    laws = {h.effect.id for h in (*beside, own) if h is not None}
     columns = [
         fit.J[:n, k]
         for k, p in enumerate(fit.problem.parameters)
@@ -45,8 +50,8 @@ def left_out_with_discrepancy(
     ]
     forms = _forms(fit.problem) if columns else []
     free = [(c * f, LIMITS.form) for c in columns for f in forms]
-    events = [h for h in (*beside, event) if h is not None and h.has_instant]
-    free += [(c, LIMITS.course) for h in events for c in _courses(fit, h)]
+    courses = (*((h, LIMITS.course) for h in (*beside, event)), (own, LIMITS.own_course))
+    free += [(c, sd) for h, sd in courses if h is not None and h.has_instant for c in _courses(fit, h)]
     if not free:
         return model.left_out
     D = np.stack([c for c, _ in free], axis=1)

@@ -53,6 +53,11 @@ class Rivals(NamedTuple):
     event that does no better than a step stands in for none."""
     selected_in: float = 1.0
     """Share of resampled data in which the term is the best of these."""
+    any_form: ScoreDifference | None = None
+    """The term's score over the model without it where it may have any form of its own."""
+    any_form_ahead: ScoreDifference | None = None
+    """The same against the nearest of the effects in its place, which may have any form of theirs; None where nothing
+    was tried."""
 
 
 def rivals(
@@ -80,7 +85,9 @@ def rivals(
     mine = left_out_with_discrepancy(model, beside, groups)
     size = scales(mine, groups)
     losses = {term.name: block_losses(mine, size, groups)}
+    mine_freely = left_out_with_discrepancy(model, beside, groups, own=term)
     differences: dict[str, ScoreDifference] = {}
+    freely: list[ScoreDifference] = []
     models: dict[str, Model] = {}
     chosen = roughs[: LIMITS.promising // 2]
     fits = side_by_side(lambda p: _tried(p[0]), chosen)
@@ -91,10 +98,12 @@ def rivals(
         models[a.hypothesis.name] = other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
         theirs = left_out_with_discrepancy(other, beside, groups)
         differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
+        theirs_freely = left_out_with_discrepancy(other, beside, groups, own=a.hypothesis)
+        freely.append(score_difference(mine_freely, theirs_freely, groups))
         losses[a.hypothesis.name] = block_losses(theirs, size, groups)
         if term.has_instant and a.hypothesis.has_instant:
             own, its = (
-                left_out_with_discrepancy(m, beside, groups, t)
+                left_out_with_discrepancy(m, beside, groups, event=t)
                 for m, t in ((model, term), (other, a.hypothesis))
             )
             step = score_difference(own, its, groups)
@@ -108,7 +117,16 @@ def rivals(
     best = selected_in(losses, rng)
     stepped = [h.name for h in others if h.has_instant and not h.effect.steps] if term.effect.steps else []
     lesser = tuple(n for n in stepped if n in differences and differences[n].gain >= -LIMITS.tie)
-    return Rivals(effects, tuple(plain), {**differences, **plain}, models, lesser, best[term.name])
+    return Rivals(
+        effects,
+        tuple(plain),
+        {**differences, **plain},
+        models,
+        lesser,
+        best[term.name],
+        score_difference(mine_freely, left_out_with_discrepancy(base, beside, groups), groups),
+        min(freely, key=lambda d: d.z, default=None),
+    )
 
 
 class Plain(NamedTuple):

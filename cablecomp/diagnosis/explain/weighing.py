@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -58,15 +58,21 @@ class Weighed:
     better: Model | None = None
 
 
-def weigh(found: Search, left: Location, share_left: float, rng: np.random.Generator) -> list[Weighed]:
+Locate = Callable[[Fit], Location]
+"""Says where what a fit leaves of the joint's angle lies."""
+
+
+def weigh(
+    found: Search, left: Location, locate: Locate, share_left: float, rng: np.random.Generator
+) -> list[Weighed]:
     """Every effect of the search's model, most certain first; `left`: where lies what the final model leaves,
-    `share_left`: how much of the mismatch that is."""
+    `locate`: asked the same of models without an effect, `share_left`: how much of the mismatch is left."""
     selection, final = found.selection, found.selection.final
     # whoever took nothing off in any round stands in for nobody
     able = {t.term.name for r in selection.rounds for t in r.tried if t.difference.gain > 0.0}
     pool = [h for h in found.pool if h.name in able]
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
-    weighed = [_weighed(found, t, pool, left, share_left, rng) for t in terms]
+    weighed = [_weighed(found, t, pool, left, locate, share_left, rng) for t in terms]
     return sorted(weighed, key=lambda w: -w.confidence)
 
 
@@ -75,6 +81,7 @@ def _weighed(
     term: Hypothesis,
     pool: Sequence[Hypothesis],
     left: Location,
+    locate: Locate,
     share_left: float,
     rng: np.random.Generator,
 ) -> Weighed:
@@ -94,14 +101,13 @@ def _weighed(
     ways = [_gone(selection, bare, final), *_alone(selection, term.name)]
     evidence = features(
         gain=own.gain,
-        z=own.z,
-        z_blocks=own.z_blocks,
         selected_in=instead.selected_in if term.name in found.put_in else _selected(selection, term),
-        margin_gain=nearest.gain,
-        margin_z=nearest.z,
+        form_z=(instead.any_form or ALONE).z,
+        form_margin_z=(instead.any_form_ahead or NO_RIVAL).z,
         share_left=share_left,
         share_total=_share(selection, ways[0]),
         rivals=len(set(instead.effects) - set(instead.lesser)),
+        unfollowed=0.0 if bare is None else _unfollowed(term, locate(bare.fit)),
         follows=_follows(term, left),
         unsteady=_unsteady(final, term, groups),
         at_bound=_at_bound(final, term),
@@ -282,6 +288,12 @@ def _follows(term: Hypothesis, left: Location) -> float:
     return max(shares, default=0.0)
 
 
+def _unfollowed(term: Hypothesis, before: Location) -> float:
+    """p-value of what is left without the effect following one of the first two covariates that it acts through."""
+    wanted = term.acts_through[:2]
+    return min((m.p_value for m in before.mismatch if m.covariate in wanted), default=1.0)
+
+
 def _against(instead: Sequence[str], own: ScoreDifference, evidence: Mapping[str, float]) -> str:
     """What speaks against a name, in words."""
     reasons, follows = [], evidence["follows"]
@@ -289,6 +301,8 @@ def _against(instead: Sequence[str], own: ScoreDifference, evidence: Mapping[str
         reasons.append(f"{', '.join(instead)} in its place explains data left out as well")
     if follows > LIMITS.why_follows:
         reasons.append(f"{follows:.0%} of what is left still follows the covariate that it acts through")
+    if evidence["unfollowed"] > LIMITS.unfollowed:
+        reasons.append("what is left without it does not follow, beyond chance, what it acts through")
     if own.z < LIMITS.z:
         reasons.append(f"z = {own.z:.1f}, {LIMITS.z:g} are asked for")
     if evidence["selected_in"] < LIMITS.why_selected:
