@@ -223,7 +223,9 @@ def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_fi
         final = [n for n in found.final.fit if n != term]
         return SimpleNamespace(final=SimpleNamespace(fit=final))
 
-    case: Any = SimpleNamespace(remainder_of=lambda fit, rng: SimpleNamespace(location=None), drive=None)
+    case: Any = SimpleNamespace(
+        remainder_of=lambda fit, rng: SimpleNamespace(location=None), locate=None, drive=None
+    )
     monkeypatch.setattr(diagnose_module, "weigh", lambda found, *_: weighed(found.final.fit))
     monkeypatch.setattr(diagnose_module, "share_left", lambda drive, final: 0.0)
     monkeypatch.setattr(diagnose_module, "done_without", less)
@@ -254,7 +256,9 @@ def test_what_predicts_better_in_the_place_of_an_effect_is_put_there_a_few_times
     def exchanged(found: Any, model: Any, drive: Any) -> Any:
         return SimpleNamespace(final=SimpleNamespace(fit=model)) if follows else None
 
-    case: Any = SimpleNamespace(remainder_of=lambda fit, rng: SimpleNamespace(location=None), drive=None)
+    case: Any = SimpleNamespace(
+        remainder_of=lambda fit, rng: SimpleNamespace(location=None), locate=None, drive=None
+    )
     monkeypatch.setattr(diagnose_module, "weigh", weighed)
     monkeypatch.setattr(diagnose_module, "share_left", lambda drive, final: 0.0)
     monkeypatch.setattr(diagnose_module, "exchanged", exchanged)

@@ -11,6 +11,7 @@ from turning import JOINT, recorded
 from cablecomp.diagnosis.answer import entries
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain import weighing
+from cablecomp.diagnosis.explain.confidence import learnt
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.weighing import (
@@ -20,6 +21,7 @@ from cablecomp.diagnosis.explain.weighing import (
     _follows,
     _slight,
     _too_little,
+    _unfollowed,
 )
 
 
@@ -45,7 +47,7 @@ def test_that_all_of_a_cable_lies_on_its_guides_is_held_against_no_name(
     assert _at_bound(model, term) is held
 
 
-STRONG = {"follows": 0.0, "selected_in": 1.0, "share_left": 0.0}
+STRONG = {"follows": 0.0, "selected_in": 1.0, "share_left": 0.0, "unfollowed": 0.001}
 
 
 @pytest.mark.parametrize(
@@ -54,6 +56,7 @@ STRONG = {"follows": 0.0, "selected_in": 1.0, "share_left": 0.0}
         (("clamp_slip",), 9.0, {}, "clamp_slip in its place"),
         ((), 1.2, {}, "z = 1.2"),
         ((), 9.0, {"follows": 0.6}, "60% of what is left still follows"),
+        ((), 9.0, {"unfollowed": 0.4}, "does not follow, beyond chance, what it acts through"),
         ((), 9.0, {"selected_in": 0.2}, "the best of its round in 20%"),
         ((), 9.0, {"share_left": 0.7}, "70% of the mismatch is left over"),
         ((), 9.0, {}, "weak in every respect"),
@@ -110,7 +113,26 @@ def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> N
     )
     term = cast(Hypothesis, SimpleNamespace(acts_through=("load", "reversal")))
     assert _follows(term, left) == 0.2
-    assert _follows(cast(Hypothesis, SimpleNamespace(acts_through=("velocity",))), left) == 0.0
+    assert _unfollowed(term, left) == 0.001
+    other = cast(Hypothesis, SimpleNamespace(acts_through=("velocity", "load", "temperature")))
+    assert _follows(other, left) == 0.0
+    assert _unfollowed(other, left) == 0.4
+    assert _unfollowed(cast(Hypothesis, SimpleNamespace(acts_through=("velocity",))), left) == 1.0
+
+
+def test_confidence_goes_the_way_that_each_sign_points() -> None:
+    """The model that ships, from a case amid those that it was learnt on."""
+    middle = learnt().centre
+    usual = learnt().probability(middle)
+    for sign, better in {
+        "form_z": 1,
+        "form_margin_z": 1,
+        "selected_in": 1,
+        "unfollowed": -1,
+        "tries": -1,
+    }.items():
+        moved = {**middle, sign: middle[sign] + learnt().scale[sign]}
+        assert (learnt().probability(moved) - usual) * better > 0.01, sign
 
 
 @pytest.mark.parametrize(("confidence", "said"), [(0.3, True), (0.9, False)])

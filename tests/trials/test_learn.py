@@ -47,7 +47,7 @@ def board(effects: int = 1500, seed: int = 1) -> dict[str, Any]:
     rows = []
     for k in range(effects):
         evidence = dict(zip(FEATURES, rng.standard_normal(len(FEATURES)).tolist(), strict=True))
-        p = 1.0 / (1.0 + np.exp(-(0.3 + 1.5 * evidence["margin_z"] - 1.0 * evidence["share_left"])))
+        p = 1.0 / (1.0 + np.exp(-(0.3 + 1.5 * evidence["form_margin_z"] - 1.0 * evidence["share_left"])))
         name = {"evidence": {**evidence, "z": float(rng.uniform(2, 9))}, "right": bool(rng.uniform() < p)}
         seen = float(rng.uniform(2, 9))
         left = {
