@@ -132,8 +132,8 @@ def _judged(
     if not predicts(drive.fit, final, baseline, augmented, drive.floor_rad):
         weighed = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed]
     named = sorted(
-        (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: (-w.removes, -w.evidence["gain"])
-    )  # what takes off most stands first
+        (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: -w.evidence["gain"]
+    )  # what is missed most stands first
     kept, remainder = final, after
     if not named:
         kept = without_effects(final, drive, found.groups)

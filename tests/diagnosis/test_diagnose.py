@@ -88,6 +88,9 @@ def test_routing_friction_is_named_and_predicts_what_nobody_had_seen(routing: Di
     assert routing.augmented.heldout_rmse_rad < 0.5 * routing.baseline.heldout_rmse_rad
     assert routing.augmented.final_rmse_rad < 0.5 * routing.baseline.final_rmse_rad
     assert found.heldout_gain > 0.5
+    # the residual without it follows what it acts through; no rival in any form comes near
+    assert found.evidence["unfollowed"] < LIMITS.unfollowed
+    assert found.evidence["form_margin_z"] > LIMITS.z
 
 
 def test_bearing_friction_is_named_with_its_size() -> None:

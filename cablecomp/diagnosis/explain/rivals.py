@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,11 @@ from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
+ALONE: Final = ScoreDifference(1.0, 99.0, 10.0)
+"""Of an effect without which the drive cannot follow the recordings."""
+NO_RIVAL: Final = ScoreDifference(1.0, 10.0, 10.0)
+"""Of an effect in whose place nothing could be tried."""
+
 
 class Rivals(NamedTuple):
     """What was tried in a term's place."""
@@ -53,11 +58,10 @@ class Rivals(NamedTuple):
     event that does no better than a step stands in for none."""
     selected_in: float = 1.0
     """Share of resampled data in which the term is the best of these."""
-    any_form: ScoreDifference | None = None
-    """The term's score over the model without it where it may have any form of its own."""
-    any_form_ahead: ScoreDifference | None = None
-    """The same against the nearest of the effects in its place, which may have any form of theirs; None where nothing
-    was tried."""
+    any_form: ScoreDifference = ALONE
+    """The term's score over the model without it where it may have another form of its own."""
+    any_form_ahead: ScoreDifference = NO_RIVAL
+    """The same against the nearest of the effects in its place, which may have other forms of theirs."""
 
 
 def rivals(
@@ -125,7 +129,7 @@ def rivals(
         lesser,
         best[term.name],
         score_difference(mine_freely, left_out_with_discrepancy(base, beside, groups), groups),
-        min(freely, key=lambda d: d.z, default=None),
+        min(freely, key=lambda d: d.z, default=NO_RIVAL),
     )
 
 

@@ -15,7 +15,7 @@ from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.plausible import better_word
-from cablecomp.diagnosis.explain.rivals import Rivals, rivals
+from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.usual import lost_in_usual
@@ -26,11 +26,6 @@ from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.signal.smoothing import FloatArray
-
-ALONE = ScoreDifference(1.0, 99.0, 10.0)
-"""Of an effect without which the drive cannot follow the recordings."""
-NO_RIVAL = ScoreDifference(1.0, 10.0, 10.0)
-"""Of an effect in whose place nothing could be tried."""
 
 NO_SIZE: Final = ("length", "instant", "duration")
 """Roles of parameters whose bounds are no sign against an effect."""
@@ -102,8 +97,8 @@ def _weighed(
     evidence = features(
         gain=own.gain,
         selected_in=instead.selected_in if term.name in found.put_in else _selected(selection, term),
-        form_z=(instead.any_form or ALONE).z,
-        form_margin_z=(instead.any_form_ahead or NO_RIVAL).z,
+        form_z=instead.any_form.z,
+        form_margin_z=instead.any_form_ahead.z,
         share_left=share_left,
         share_total=_share(selection, ways[0]),
         rivals=len(set(instead.effects) - set(instead.lesser)),
