@@ -107,15 +107,16 @@ def features(
     """The evidence of one name.
 
     `gain`: of the model over the one without the effect, on data left out, where the other laws of either may have
-    other forms (`discrepancy`). `selected_in`: share of resampled data in which it is the best of its round. `form_z`:
-    standard errors of that gain where the effect itself may have another form, too; `form_margin_z`: over the nearest
-    rival in its place, which may as well. `share_left`: mean square left by the final model beyond noise over the
-    calibrated drive's. `share_total`: share of the calibrated drive's square that it takes off. `rivals`: effects in
-    its model confidence set. `unfollowed`: p-value of what is left without it following a covariate that the effect
-    acts through: the residual's own word, in which the effect's law has no part. `follows`: share of the remainder that
-    still follows what it acts through. `unsteady`: difference of its amount between halves of the data, in units of it.
-    `at_bound`: one of its parameters, lengths and shares apart, is on a bound. `tries`: points that it was asked at (an
-    event: many instants), the best of which counts. `terms`: effects in the final model.
+    other forms (`discrepancy`). `selected_in`: share of resampled data in which it is the best of its round.
+    `form_z`: standard errors of that gain where the effect itself may have another form, too (not an event);
+    `form_margin_z`: over the nearest rival in its place, which may as well. `share_left`: mean square left by the
+    final model beyond noise over the calibrated drive's. `share_total`: share of the calibrated drive's square that
+    it takes off. `rivals`: effects in its model confidence set. `unfollowed`: p-value of what is left without it
+    following a covariate that the effect acts through: the residual's own word, in which the effect's law has no
+    part. `follows`: share of the remainder that still follows what it acts through. `unsteady`: difference of its
+    amount between halves of the data, in units of it. `at_bound`: one of its parameters, lengths and shares apart, is
+    on a bound. `tries`: points that it was asked at (an event: many instants), the best of which counts. `terms`:
+    effects in the final model.
     """
     return {
         "log_gain": _log_gain(gain),

@@ -97,8 +97,9 @@ def _weighed(
     evidence = features(
         gain=own.gain,
         selected_in=instead.selected_in if term.name in found.put_in else _selected(selection, term),
-        form_z=instead.any_form.z,
-        form_margin_z=instead.any_form_ahead.z,
+        # an event of any course predicts nothing of a part left out: it is weighed as it goes
+        form_z=(own if term.has_instant else instead.any_form).z,
+        form_margin_z=(nearest if term.has_instant else instead.any_form_ahead).z,
         share_left=share_left,
         share_total=_share(selection, ways[0]),
         rivals=len(set(instead.effects) - set(instead.lesser)),
