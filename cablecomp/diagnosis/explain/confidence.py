@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 FEATURES: Final = (
-    "log_gain", "selected_in", "form_z", "form_margin_z", "share_left", "unfollowed", "tries",
+    "log_gain", "selected_in", "form_z", "form_margin_z", "share_left", "unfollowed_rest", "tries",
 )  # fmt: skip
 """What is learnt from. How many effects there are, and how large each is beside the others, stands in the evidence
 and is not learnt from: in trials that is as it was drawn, in a machine as it is. Nor are rivals counted, what is still
@@ -127,6 +127,7 @@ def features(
         "share_total": min(max(share_total, 0.0), 1.0),
         "rivals": float(min(rivals, 4)),
         "unfollowed": unfollowed,
+        "unfollowed_rest": unfollowed * (1.0 - min(max(gain, 0.0), 1.0)),
         "follows": follows,
         "unsteady": unsteady,
         "at_bound": float(at_bound),
