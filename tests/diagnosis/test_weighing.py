@@ -128,7 +128,7 @@ def test_confidence_goes_the_way_that_each_sign_points() -> None:
         "form_z": 1,
         "form_margin_z": 1,
         "selected_in": 1,
-        "unfollowed": -1,
+        "unfollowed_rest": -1,
         "tries": -1,
     }.items():
         moved = {**middle, sign: middle[sign] + learnt().scale[sign]}
