@@ -237,8 +237,7 @@ class Thresholds:
     course: float = 0.5
     """By how much of itself, one standard deviation, at each of them."""
     own_course: float = 0.7071
-    """The same of an event that is asked about, where it may have a form of its own: twice the variance, for its law
-    is free as well."""
+    """The same of an event as a rival in any form of its own: twice the variance, for its law is free as well."""
     unfollowed: float = 0.05
     """p-value from which what is left without an effect is said not to follow a covariate that it acts through (trials
     seed 661, 253 names: below it 184 of 194 were right, above it 42 of 59)."""

@@ -127,6 +127,7 @@ def features(
         "share_total": min(max(share_total, 0.0), 1.0),
         "rivals": float(min(rivals, 4)),
         "unfollowed": unfollowed,
+        # where the effect takes off nearly all, that the rest follows nothing says little against it
         "unfollowed_rest": unfollowed * (1.0 - min(max(gain, 0.0), 1.0)),
         "follows": follows,
         "unsteady": unsteady,
