@@ -198,9 +198,11 @@ def find_load(step_rows_at: int, joint: Arrays, rows: Floats, outs: Floats) -> i
     """The load [N m] under which the joint encoder would read the only row's `joint`, by Newton's method;
     written to its `load`. `step_rows_at`: where the machine code of `step_rows` lies.
 
-    Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe; where both cables
-    are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a load that the joint
-    cannot take (an open circuit's cable slack, a drum unwound): if that is what the angle asks for, it is refused.
+    Nothing is committed. The deflection rises with the load, so a bracket keeps the iteration safe. The solution's own
+    compliance leaves out what readings add (a soft mount): where a step by it does not go far, the secant's counts.
+    Where both cables are slack every load near zero fits, and the nearest is taken. An end of the bracket may be a
+    load that the joint cannot take (an open circuit's cable slack, a drum unwound): if that is what the angle asks
+    for, it is refused.
     """
     read, answer = readings_in(rows[0]), answer_in(outs[0])
     if not math.isfinite(read.joint):
@@ -210,7 +212,10 @@ def find_load(step_rows_at: int, joint: Arrays, rows: Floats, outs: Floats) -> i
     below = above = STATUS_OK  # what is wrong with the loads at the ends of the bracket
     load = d.context.load * d.sensor.gain + d.sensor.offset
     reach = d.circuits[0].radius * d.cables[0].T0
-    taken = 0.0  # the last load that the joint could take
+    taken, missed = (
+        0.0,
+        math.inf,
+    )  # the last load that the joint could take, and by how much the angle missed there
     for _ in range(200):
         read.load = load
         _, status = call_step_rows(step_rows_at, (joint, rows, outs, False))
@@ -225,15 +230,17 @@ def find_load(step_rows_at: int, joint: Arrays, rows: Floats, outs: Floats) -> i
         elif status != STATUS_OK:
             return status
         else:
-            miss = answer.joint - read.joint
-            taken = load
+            miss, compliance = answer.joint - read.joint, answer.compliance
+            if load != taken and abs(miss) > 0.25 * abs(missed):
+                compliance = max(compliance, (miss - missed) / (load - taken))
+            taken, missed = load, miss
             if abs(miss) < 1e-13:
                 return STATUS_OK
             if miss > 0.0:
                 high, above = load, STATUS_OK
             else:
                 low, below = load, STATUS_OK
-            new = load - miss / max(answer.compliance, 1e-12)
+            new = load - miss / max(compliance, 1e-12)
         if not low < new < high:
             new = 0.5 * (low + high)
         if abs(new - load) <= 1e-14 + 1e-13 * abs(load):

@@ -49,6 +49,16 @@ def test_a_coupling_stiffens_from_its_own_slope_to_a_contacts() -> None:
         assert gave == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
+def test_a_seat_softens_from_its_own_slope_to_the_loads_square() -> None:
+    config = joint()
+    columns = excitation(config)
+    load, plain = columns["joint_torque_Nm"], run(config, columns)["deflection_rad"]
+    for softening, expected in ((1e-6, 3e-3 * load), (1e4, 30.0 * load * np.abs(load))):
+        mount = ("series_compliance", {"compliance_rad_per_Nm": 3e-3, "softening_per_Nm": softening})
+        gave = run(config, columns, mount)["deflection_rad"] - plain
+        assert gave == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
 def test_rubber_gives_way_exponentially_to_a_step_of_load_and_lags_a_ramp() -> None:
     config, lag = joint(), 0.3
     time = np.linspace(0.0, 3.0, 601)
@@ -90,6 +100,21 @@ def test_compliance_and_clearance_see_what_passes_the_load_path() -> None:
     far = np.abs(path) > 0.05
     assert bent - without == pytest.approx(1e-3 * path, abs=1e-12)
     assert (loose - without)[far] == pytest.approx(1e-3 * np.sign(path)[far], abs=1e-9)
+
+
+@pytest.mark.parametrize("compliance", [1.0e-4, 4.0474e-4, 1.5176e-3, 0.03, 0.3])
+def test_the_load_is_found_behind_a_mount_of_any_softness(compliance: float) -> None:
+    """Newton's steps by the cables alone go back and forth where the mount yields as much as they do."""
+    config = joint()
+    columns = excitation(config, 120, moving=False)
+    soft = with_effects(config, [("series_compliance", {"compliance_rad_per_Nm": compliance})])
+    observer = Observer(soft)
+    observer.run({key: value[:90] for key, value in columns.items()})
+    for load in (-0.9, -0.2, 0.05, 0.3, 0.9):
+        sample = Sample(float(columns["time_s"][90]), 0.0, load, temperature_degC=21.0)
+        reading = observer.peek(sample).joint_position_rad
+        asked = sample._replace(joint_position_rad=reading, joint_torque_Nm=float("nan"))
+        assert observer.inverse(asked).joint_torque_Nm == pytest.approx(load, abs=1e-6)
 
 
 def test_backlash_jumps_by_its_gap_at_zero_load() -> None:
