@@ -1,4 +1,5 @@
-"""Pretension relaxation: cable and terminations creep, the pretension falls with the logarithm of time."""
+"""Pretension relaxation: cable and terminations creep, the pretension falls with the logarithm or a power of time, or
+comes to rest."""
 
 from __future__ import annotations
 
@@ -10,14 +11,17 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, pretension_moment, term
 
 
-@term(parameters=("fraction", "time_constant", "began", "hanging"), state=("start",))
+@term(parameters=("fraction", "time_constant", "power", "began", "hanging"), state=("start",))
 def _relax(c: Any, p: Any, s: Any) -> None:
-    """p: fraction, time constant [s], when it began [s] (none: with the first sample), hanging moment R T0 [N m]
-    (closed: 0); s: when it began."""
+    """p: fraction, time constant [s], power, when it began [s] (none: with the first sample), hanging moment
+    R T0 [N m] (closed: 0); s: when it began."""
     start = s.start
     if c.first:
         start = c.time if math.isnan(p.began) else p.began
-    factor = max(1.0 - p.fraction * math.log1p(max(c.time - start, 0.0) / p.time_constant), LEAST_PRETENSION)
+    passed = math.log1p(max(c.time - start, 0.0) / p.time_constant)
+    if p.power != 0.0:
+        passed = math.expm1(p.power * passed) / p.power
+    factor = max(1.0 - p.fraction * passed, LEAST_PRETENSION)
     if p.hanging > 0.0:
         c.moment += p.hanging * (1.0 - factor)
     else:
@@ -33,6 +37,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     terms = _relax(
         fraction=values["fraction"],
         time_constant=values["time_constant_s"],
+        power=values["power"],
         began=values["began_s"],
         hanging=hanging,
     )
@@ -42,11 +47,13 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="pretension_relaxation",
     statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
-    "more slowly.",
-    equation="T0(t) = T0 (1 - a ln(1 + (t - t0)/t_c)), t0 the recording's first sample unless it is given (creep that "
-    "goes on from recording to recording); in an open circuit T = T0(t) + M/R",
-    source="logarithmic stress relaxation of steel wire and polymers at constant length: W. N. Findley, J. "
-    "S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
+    "more slowly, or until it comes to rest.",
+    equation="T0(t) = T0 (1 - a (u^m - 1)/m), m = 0: T0 (1 - a ln u), u = 1 + (t - t0)/t_c, t0 the recording's first "
+    "sample unless it is given (creep that goes on from recording to recording); m < 0: it comes to rest at "
+    "T0 (1 - a/|m|); in an open circuit T = T0(t) + M/R",
+    source="stress relaxation of steel wire and polymers at constant length, by the logarithm or a power of time: "
+    "W. N. Findley, J. S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976; "
+    "of high order, m = -1/(n - 1), and first order, m large below 0: F. Garofalo, Fundamentals of Creep, 1965",
     parameters=(
         Parameter(
             "fraction",
@@ -54,10 +61,10 @@ EFFECT = Effect(
             0.0,
             1e-4,
             0.3,
-            "a, loss per factor e of time",
+            "a, loss per factor e of time; per t_c at first",
             log=True,
-            minimum=-0.5,
-            maximum=0.5,
+            minimum=-4.0,
+            maximum=4.0,
         ),
         Parameter(
             "time_constant_s",
@@ -69,6 +76,19 @@ EFFECT = Effect(
             log=True,
             role="shape",
             minimum=1e-6,
+        ),
+        Parameter(
+            "power",
+            "-",
+            0.0,
+            -4.0,
+            1.0,
+            "m, power of time; 0: its logarithm; below 0 it comes to rest",
+            role="shape",
+            omitted=0.0,
+            minimum=-8.0,
+            maximum=1.0,
+            tries=(-2.0, 0.5),
         ),
         Parameter(
             "began_s",

@@ -1,5 +1,5 @@
-"""Series compliance: torque sensor, coupling and mount give way with the load, more one way, less as they are loaded
-more, or in their own time."""
+"""Series compliance: torque sensor, coupling and mount give way with the load, more one way, less or more as they are
+loaded more, or in their own time."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_compliance
 
 
-@term(parameters=("compliance", "skew", "stiffening"))
+@term(parameters=("compliance", "skew", "stiffening", "softening"))
 def _give_way(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], skew, stiffening [1/(N m)]."""
+    """p: compliance [rad/(N m)], skew, stiffening [1/(N m)], softening [1/(N m)]."""
     path = c.load - c.moment
-    c.reading += (
-        p.compliance * (path + p.skew * abs(path)) / (1.0 + (p.stiffening * path) ** 2) ** (1.0 / 6.0)
-    )
+    gives = p.compliance * (path + p.skew * abs(path))
+    if p.stiffening != 0.0:
+        gives /= (1.0 + (p.stiffening * path) ** 2) ** (1.0 / 6.0)
+    if p.softening != 0.0:
+        gives *= math.sqrt(1.0 + (p.softening * path) ** 2)
+    c.reading += gives
 
 
 @term(parameters=("compliance", "lag", "decades"), state=(("late", 3), "path", "time"))
@@ -46,6 +49,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         compliance=values["compliance_rad_per_Nm"],
         skew=values["skew"],
         stiffening=values["stiffening_per_Nm"],
+        softening=values["softening_per_Nm"],
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)
@@ -63,12 +67,14 @@ def _per_moment(config: JointConfig) -> float:
 EFFECT = Effect(
     id="series_compliance",
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
-    "stiffen as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
-    equation="q_out = q_drive + c_s (M + s |M|)/(1 + (g M)^2)^(1/6) + c_l y, t_l dy/dt = M - y, M the moment in the "
-    "load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l 10^(-d/2), t_l, t_l 10^(d/2)",
+    "stiffen or soften as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
+    equation="q_out = q_drive + c_s (M + s |M|) (1 + (h M)^2)^(1/2)/(1 + (g M)^2)^(1/6) + c_l y, t_l dy/dt = M - y, M "
+    "the moment in the load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l 10^(-d/2), t_l, "
+    "t_l 10^(d/2)",
     source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
-    "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; delayed "
-    "elasticity: C. Zener, Elasticity and Anelasticity of Metals, 1948",
+    "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; bolted "
+    "and clamped seats soften as they open (VDI 2230); delayed elasticity: C. Zener, Elasticity and "
+    "Anelasticity of Metals, 1948",
     parameters=(
         Parameter(
             "compliance_rad_per_Nm",
@@ -110,6 +116,21 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(2.0, 7.0),
             reach=1.0,
+            of="compliance_rad_per_Nm",
+        ),
+        Parameter(
+            "softening_per_Nm",
+            "1/(N m)",
+            0.0,
+            0.3,
+            20.0,
+            "h, one over the moment from which it yields by the load's square; 0: it yields in proportion",
+            log=True,
+            role="shape",
+            scale=_per_moment,
+            omitted=0.0,
+            minimum=0.0,
+            tries=(1.0, 4.0),
             of="compliance_rad_per_Nm",
         ),
         Parameter(

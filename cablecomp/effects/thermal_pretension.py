@@ -19,10 +19,10 @@ from cablecomp.effects.base import (
 )
 
 
-@term(parameters=("coefficient", "reference", "lag", "hanging"), state=("time", "warm"))
+@term(parameters=("coefficient", "bend", "reference", "lag", "hanging"), state=("time", "warm"))
 def _expand(c: Any, p: Any, s: Any) -> None:
-    """p: coefficient [1/K], reference [degC], lag [s], moment R T0 that hangs [N m] (closed circuit: 0); s: time [s]
-    and temperature [degC] of what expands.
+    """p: coefficient [1/K], its growth [1/K], reference [degC], lag [s], moment R T0 that hangs [N m] (closed circuit:
+    0); s: time [s] and temperature [degC] of what expands.
 
     Without a temperature nothing is changed.
     """
@@ -32,7 +32,8 @@ def _expand(c: Any, p: Any, s: Any) -> None:
             warm += (s.warm - warm) * math.exp(-(c.time - s.time) / p.lag)
         if c.commit:
             s.time, s.warm = c.time, warm
-        factor = max(1.0 + p.coefficient * (warm - p.reference), LEAST_PRETENSION)
+        over = warm - p.reference
+        factor = max(1.0 + p.coefficient * over * (1.0 + p.bend * over), LEAST_PRETENSION)
         if p.hanging > 0.0:
             c.moment += p.hanging * (1.0 - factor)
         else:
@@ -45,6 +46,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     hanging = 0.0 if closed else pretension_moment(config)
     terms = _expand(
         coefficient=values["coefficient_per_K"],
+        bend=values["bend_per_K"],
         reference=values["reference_degC"],
         lag=values["lag_s"],
         hanging=hanging,
@@ -58,19 +60,25 @@ def _per_strain(config: JointConfig) -> float:
 
 
 def _at_reference(values: Mapping[str, float], reference: float) -> Restated:
-    """T0 (1 + k (ϑ - ϑ_ref)) keeps its values: T0 -> T0 f, k -> k/f, f = 1 + k (ϑ_ref' - ϑ_ref)."""
-    factor = 1.0 + values["coefficient_per_K"] * (reference - values["reference_degC"])
-    return Restated({"coefficient_per_K": values["coefficient_per_K"] / factor}, pretension=factor)
+    """T0 (1 + k D (1 + b D)) keeps its values, D = ϑ - ϑ_ref: T0 -> T0 f, k -> k g/f, b -> b/g with d = ϑ_ref' - ϑ_ref,
+    f = 1 + k d (1 + b d), g = 1 + 2 b d."""
+    moved, bend = reference - values["reference_degC"], values.get("bend_per_K", 0.0)
+    factor = 1.0 + values["coefficient_per_K"] * moved * (1.0 + bend * moved)
+    steeper = 1.0 + 2.0 * bend * moved
+    bent = {"bend_per_K": bend / steeper} if "bend_per_K" in values else {}
+    return Restated(
+        {"coefficient_per_K": values["coefficient_per_K"] * steeper / factor, **bent}, pretension=factor
+    )
 
 
 EFFECT = Effect(
     id="thermal_pretension",
     statement="Cable and frame expand differently with temperature, and the pretension rises or falls with "
     "it.",
-    equation="T0(ϑ) = T0 (1 + k (ϑ - ϑ_ref)), with k = (α_frame - α_cable) EA/T0 for a stiff frame, ϑ "
+    equation="T0(ϑ) = T0 (1 + k D (1 + b D)), D = ϑ - ϑ_ref, with k = (α_frame - α_cable) EA/T0 for a stiff frame, ϑ "
     "the temperature of what expands: t_l dϑ/dt = ϑ_measured - ϑ; in an open circuit T = T0(ϑ) + M/R",
     source="thermal strain of a member held at constant length: S. Timoshenko, Strength of Materials, part "
-    "I, 1930",
+    "I, 1930; expansion of polymers rises with temperature: R. K. Kirby, NBS, Am. Inst. Phys. Handbook, 1972",
     parameters=(
         Parameter(
             "coefficient_per_K",
@@ -105,6 +113,19 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             tries=(5.0, 20.0, 60.0),
+        ),
+        Parameter(
+            "bend_per_K",
+            "1/K",
+            0.0,
+            -0.5,
+            0.5,
+            "b, share by which k grows per kelvin away from the reference",
+            role="bend",
+            omitted=0.0,
+            minimum=-2.0,
+            maximum=2.0,
+            tries=(-0.5, 0.5),
         ),
     ),
     acts_through=("temperature", "time"),

@@ -34,6 +34,12 @@ def _warm_creep(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"fraction": 1.0}, 0.1 / span, 0.15 / span)
 
 
+def _creep_in_two(rng: np.random.Generator, scene: Scene) -> Shape:
+    share, span = float(rng.uniform(0.3, 0.7)), _span(scene)
+    fixed = {"share": share, "time_constant_s": float(rng.uniform(0.05, 0.3)) * span, "lasts_s": span}
+    return Shape(fixed, {"fraction": 1.0}, 0.1, 0.5 / (share + (1.0 - share) * _WHOLE))
+
+
 def _reach(scene: Scene, reference: float) -> float:
     return max(float(np.max(np.abs(scene.course.temperature_degC - reference))), 1e-3)
 
@@ -49,6 +55,12 @@ def _bent(rng: np.random.Generator, scene: Scene) -> Shape:
     reach = _reach(scene, reference)
     fixed = {"reference_degC": reference, "bend_per_K": sign(rng) * float(rng.uniform(0.3, 0.8)) / reach}
     return Shape(fixed, {"coefficient_per_K": sign(rng) / reach}, 0.1, 0.2)
+
+
+def _from_contact(rng: np.random.Generator, scene: Scene) -> Shape:
+    contact = float(np.quantile(scene.course.temperature_degC, rng.uniform(0.2, 0.6)))
+    most = max(float(np.max(scene.course.temperature_degC)) - contact, 1e-3)
+    return Shape({"contact_degC": contact}, {"coefficient_per_K": sign(rng) / most}, 0.15, 0.4)
 
 
 def _transient(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -182,9 +194,11 @@ CABLE = (
     Suspect("pretension_relaxation:power_law", ANY, _power_creep, closed=True),
     Suspect("pretension_relaxation:exponential", ANY, _bedding_in, closed=True),
     Suspect("pretension_relaxation:warm_creep", ANY, _warm_creep, warm=True, closed=True),
+    Suspect("pretension_relaxation:in_two", ANY, _creep_in_two, closed=True),
     Suspect("thermal_pretension:lagged", ANY, _late_frame, warm=True, closed=True),
     Suspect("thermal_pretension:quadratic", ANY, _bent, warm=True, closed=True),
     Suspect("thermal_pretension:transient", ANY, _transient, warm=True, closed=True),
+    Suspect("thermal_pretension:from_contact", ANY, _from_contact, warm=True, closed=True),
     Suspect("nonlinear_cable:saturating", ANY, _saturating),
     Suspect("nonlinear_cable:power_law", ANY, _hertz),
     Suspect("nonlinear_cable:knee", ANY, _knee),

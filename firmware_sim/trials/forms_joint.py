@@ -55,6 +55,13 @@ def _softening(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"compliance_rad_per_Nm": 1.0}, first, 100.0 * first)
 
 
+def _staged(rng: np.random.Generator, scene: Scene) -> Shape:
+    beyond = log_uniform(rng, 0.1, 0.4) if rng.uniform() < 0.5 else log_uniform(rng, 2.5, 8.0)
+    first = scene.plain.loop_rad / scene.plain.load_rms
+    fixed = {"knee_Nm": float(rng.uniform(0.2, 0.6)) * scene.joint.load_Nm, "beyond": beyond}
+    return Shape(fixed, {"compliance_rad_per_Nm": 1.0}, first, 100.0 * first)
+
+
 def _one_way(rng: np.random.Generator, scene: Scene) -> Shape:
     first = scene.plain.loop_rad / scene.plain.load_rms
     skew = sign(rng) * float(rng.uniform(0.4, 1.0))
@@ -227,6 +234,7 @@ JOINT = (
     Suspect("bearing_friction:unlike_ways", ANY, _lip_seal),
     Suspect("series_compliance:stiffening", ANY, _stiffening),
     Suspect("series_compliance:softening", ANY, _softening),
+    Suspect("series_compliance:staged", ANY, _staged),
     Suspect("series_compliance:one_way", ANY, _one_way, two_sided=True),
     Suspect("series_compliance:rubber", ANY, _rubber),
     Suspect("series_compliance:bushing", ANY, _bushing),

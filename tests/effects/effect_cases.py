@@ -120,3 +120,7 @@ def second_differences(time: Floats, q: Floats) -> Floats:
         v[n] = (1.5 * q[n] - 2.0 * q[n - 1] + 0.5 * q[n - 2]) / h
         a[n] = (1.5 * v[n] - 2.0 * v[n - 1] + 0.5 * v[n - 2]) / h
     return a
+
+
+def resting(time: Floats, **more: Floats) -> dict[str, Floats]:
+    return still(time, np.zeros_like(time), **more)

@@ -40,6 +40,24 @@ def test_a_termination_beds_in_and_comes_to_rest() -> None:
     np.testing.assert_allclose(_still(law, 0 * T + 20.0, 100.0), 0.95, rtol=1e-6)
 
 
+def test_a_termination_beds_in_while_the_cable_creeps_on() -> None:
+    law = EffectSpec(
+        "pretension_relaxation:in_two",
+        {"fraction": 0.06, "share": 0.4, "time_constant_s": 0.8, "lasts_s": 20.0},
+    )
+    for start in (0.0, 60.0):
+        since = T + start
+        expected = 1 - 0.024 * (1 - np.exp(-since / 0.8)) - 0.036 * since / 20.0
+        np.testing.assert_allclose(_still(law, 0 * T + 20.0, start), expected, rtol=1e-6)
+
+
+def test_a_frame_that_closes_a_gap_pulls_from_then_on() -> None:
+    law = EffectSpec("thermal_pretension:from_contact", {"coefficient_per_K": -0.02, "contact_degC": 21.0})
+    expected = np.where(WARM > 21.0, 1 - 0.02 * (WARM - 21.0), 1.0)
+    assert 0.1 < np.mean(WARM > 21.0) < 0.9
+    np.testing.assert_allclose(_still(law, WARM), expected, rtol=1e-6)
+
+
 def test_warmth_quickens_creep() -> None:
     law = EffectSpec(
         "pretension_relaxation:warm_creep", {"fraction": 0.03, "time_constant_s": 0.8, "doubling_K": 4.0}

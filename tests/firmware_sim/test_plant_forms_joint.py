@@ -80,6 +80,10 @@ def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:
             {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4},
             1e-3 * path + 2.5e-3 * path * np.abs(path),
         ),
+        "staged": (
+            {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.3, "beyond": 4.0},
+            np.where(np.abs(path) < 0.3, 1e-3 * path, np.sign(path) * (4e-3 * np.abs(path) - 9e-4)),
+        ),
         "one_way": ({"compliance_rad_per_Nm": 1e-3, "skew": 1.0}, 2e-3 * np.maximum(path, 0.0)),
         "rubber": ({"compliance_rad_per_Nm": 1e-3, "share": 0.5, "lag_s": 0.0}, 1e-3 * path),
     }

@@ -194,19 +194,19 @@ def _by_amount(
     name = ":".join(filter(None, (effect.id, channel, second)))
     tried = [{p.name: v} for p in own for v in p.tries] + [dict(values) for values in effect.tries]
     asked = tuple(
-        {n: _absolute(effect.parameter(n), v, config, evidence, channel) for n, v in values.items()}
-        for values in tried
+        {n: _absolute(effect, n, v, config, evidence, channel) for n, v in values.items()} for values in tried
     )
     other = ({n: v} for n, values in widths.items() for v in values if v not in grids[n])
     return Hypothesis(effect, name, amount, starts, two_sided, channel, (*other, *asked))
 
 
 def _absolute(
-    p: Parameter, tried: float, config: JointConfig, evidence: Sequence[Evidence], channel: str
+    effect: Effect, name: str, tried: float, config: JointConfig, evidence: Sequence[Evidence], channel: str
 ) -> float:
     """A value to try in the parameter's unit."""
+    p = effect.parameter(name)
     if p.role == "bend":
-        return tried / _width(evidence, channel)
+        return tried / (_width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
     if p.role == "begin":
         return tried + min(float(e.columns["time_s"][0]) for e in evidence)
     return tried if p.scale is None else tried * p.scale(config)
@@ -245,6 +245,12 @@ def _grid(
 def _width(evidence: Sequence[Evidence], channel: str) -> float:
     """The largest reading of a channel, of either sign."""
     return max(float(np.nanmax(np.abs(e.columns[channel]))) for e in evidence)
+
+
+def _reach(evidence: Sequence[Evidence], channel: str) -> float:
+    """Half of what a channel covers over all recordings."""
+    readings = np.concatenate([e.columns[channel] for e in evidence if channel in e.columns])
+    return 0.5 * float(np.nanmax(readings) - np.nanmin(readings))
 
 
 def instants(evidence: Sequence[Evidence], *, between: bool) -> tuple[float, ...]:

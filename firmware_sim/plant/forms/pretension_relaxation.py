@@ -94,4 +94,30 @@ WARM = form(
     _warm,
 )
 
-KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM)
+
+def _in_two(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        time = np.maximum(inputs[:, TIME], 0.0)
+        bedded = -np.expm1(-time / p["time_constant_s"])
+        crept = time / p["lasts_s"]
+        return np.asarray(p["fraction"] * (p["share"] * bedded + (1.0 - p["share"]) * crept))
+
+    lowered(build, loss)
+
+
+IN_TWO = form(
+    "pretension_relaxation",
+    "in_two",
+    "A termination beds in while the cable creeps on evenly: T0 (1 − a (s (1 − e^(−t/t_c)) + (1 − s) t/t_l)), t the "
+    "clock's time.",
+    (
+        _FRACTION,
+        Parameter("share", "s, of the bedding in", 0.5, 0.0, 1.0),
+        Parameter("time_constant_s", "t_c", 5.0, 1e-3),
+        Parameter("lasts_s", "t_l", 60.0, 1e-3),
+    ),
+    ("time",),
+    _in_two,
+)
+
+KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM, IN_TWO)

@@ -1,5 +1,5 @@
-"""Series compliance in other forms: a coupling that stiffens, one that softens, one that is softer one
-way, one of rubber, a bushing that creeps over decades of time."""
+"""Series compliance in other forms: a coupling that stiffens, one that softens, one of two stages,
+one that is softer one way, one of rubber, a bushing that creeps over decades of time."""
 
 from __future__ import annotations
 
@@ -49,6 +49,26 @@ SOFTENING = form(
     (_SOFT, Parameter("knee_Nm", "M_k", low=1e-9)),
     ("load",),
     _softening,
+)
+
+
+def _staged(build: Build, p: Mapping[str, float]) -> None:
+    def yields(inputs: Floats, outputs: Floats) -> None:
+        path = outputs[:, PATH]
+        beyond = path - np.clip(path, -p["knee_Nm"], p["knee_Nm"])
+        outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * (path + (p["beyond"] - 1.0) * beyond)
+
+    build.mounts.append(yields)
+
+
+STAGED = form(
+    "series_compliance",
+    "staged",
+    "A coupling of two stages: + c M up to |M| = M_k, and b c per moment beyond it (b < 1: lobes that close, b > 1: a "
+    "seat that gapes).",
+    (_SOFT, Parameter("knee_Nm", "M_k", low=1e-9), Parameter("beyond", "b", 3.0, 0.0)),
+    ("load",),
+    _staged,
 )
 
 
@@ -119,4 +139,4 @@ BUSHING = form(
     _bushing,
 )
 
-KINDS: tuple[EffectKind, ...] = (STIFFENING, SOFTENING, ONE_WAY, RUBBER, BUSHING)
+KINDS: tuple[EffectKind, ...] = (STIFFENING, SOFTENING, STAGED, ONE_WAY, RUBBER, BUSHING)

@@ -1,4 +1,4 @@
-"""Thermal pretension in other forms: late, bent, and gone once all is warm."""
+"""Thermal pretension in other forms: late, bent, one way, and gone once all is warm."""
 
 from __future__ import annotations
 
@@ -71,4 +71,22 @@ TRANSIENT = form(
     _transient,
 )
 
-KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TRANSIENT)
+
+def _from_contact(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        over = inputs[:, TEMPERATURE] - p["contact_degC"]
+        return np.asarray(-p["coefficient_per_K"] * np.maximum(over, 0.0))
+
+    lowered(build, loss)
+
+
+FROM_CONTACT = form(
+    "thermal_pretension",
+    "from_contact",
+    "The frame expands into a gap before it pulls at the cable: T0 (1 + k max(ϑ − ϑ_c, 0)).",
+    (_RATE, Parameter("contact_degC", "ϑ_c, at which the gap is closed", 20.0)),
+    ("temperature",),
+    _from_contact,
+)
+
+KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TRANSIENT, FROM_CONTACT)
