@@ -18,9 +18,10 @@ def _relax(c: Any, p: Any, s: Any) -> None:
     start = s.start
     if c.first:
         start = c.time if math.isnan(p.began) else p.began
-    passed = math.log1p(max(c.time - start, 0.0) / p.time_constant)
+    slower = 1.0 + max(-p.power, 0.0)
+    passed = math.log1p(max(c.time - start, 0.0) / (p.time_constant * slower))
     if p.power != 0.0:
-        passed = math.expm1(p.power * passed) / p.power
+        passed = slower * math.expm1(p.power * passed) / p.power
     factor = max(1.0 - p.fraction * passed, LEAST_PRETENSION)
     if p.hanging > 0.0:
         c.moment += p.hanging * (1.0 - factor)
@@ -48,12 +49,13 @@ EFFECT = Effect(
     id="pretension_relaxation",
     statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
     "more slowly, or until it comes to rest.",
-    equation="T0(t) = T0 (1 - a (u^m - 1)/m), m = 0: T0 (1 - a ln u), u = 1 + (t - t0)/t_c, t0 the recording's first "
-    "sample unless it is given (creep that goes on from recording to recording); m < 0: it comes to rest at "
-    "T0 (1 - a/|m|); in an open circuit T = T0(t) + M/R",
+    equation="T0(t) = T0 (1 - a k (u^m - 1)/m), m = 0: T0 (1 - a ln u), u = 1 + (t - t0)/(k t_c), k = 1, of m < 0 "
+    "k = 1 - m: then it comes to rest, at T0 (1 - a (1 + 1/|m|)), by T0 (1 - a (1 - e^(-(t - t0)/t_c))) for m far below "
+    "0; t0 the recording's first sample unless it is given (creep that goes on from recording to recording); in an open "
+    "circuit T = T0(t) + M/R",
     source="stress relaxation of steel wire and polymers at constant length, by the logarithm or a power of time: "
     "W. N. Findley, J. S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976; "
-    "of high order, m = -1/(n - 1), and first order, m large below 0: F. Garofalo, Fundamentals of Creep, 1965",
+    "of an order n > 1, m = -1/(n - 1), and of the first, m far below 0: F. Garofalo, Fundamentals of Creep, 1965",
     parameters=(
         Parameter(
             "fraction",
@@ -63,8 +65,8 @@ EFFECT = Effect(
             0.3,
             "a, loss per factor e of time; per t_c at first",
             log=True,
-            minimum=-4.0,
-            maximum=4.0,
+            minimum=-0.5,
+            maximum=0.5,
         ),
         Parameter(
             "time_constant_s",
@@ -86,7 +88,7 @@ EFFECT = Effect(
             "m, power of time; 0: its logarithm; below 0 it comes to rest",
             role="shape",
             omitted=0.0,
-            minimum=-8.0,
+            minimum=-20.0,
             maximum=1.0,
             tries=(-2.0, 0.5),
         ),

@@ -10,16 +10,17 @@ from typing import Any
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_compliance
 
+HERTZ = 2.0 / 3.0
+"""Power of the load by which a contact yields."""
 
-@term(parameters=("compliance", "skew", "stiffening", "softening"))
+
+@term(parameters=("compliance", "skew", "bends", "power"))
 def _give_way(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], skew, stiffening [1/(N m)], softening [1/(N m)]."""
+    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], power from there on."""
     path = c.load - c.moment
     gives = p.compliance * (path + p.skew * abs(path))
-    if p.stiffening != 0.0:
-        gives /= (1.0 + (p.stiffening * path) ** 2) ** (1.0 / 6.0)
-    if p.softening != 0.0:
-        gives *= math.sqrt(1.0 + (p.softening * path) ** 2)
+    if p.bends != 0.0:
+        gives *= (1.0 + (p.bends * path) ** 2) ** (0.5 * (p.power - 1.0))
     c.reading += gives
 
 
@@ -48,8 +49,8 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     elastic = _give_way(
         compliance=values["compliance_rad_per_Nm"],
         skew=values["skew"],
-        stiffening=values["stiffening_per_Nm"],
-        softening=values["softening_per_Nm"],
+        bends=values["stiffening_per_Nm"],
+        power=values["power"],
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)
@@ -68,9 +69,8 @@ EFFECT = Effect(
     id="series_compliance",
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
     "stiffen or soften as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
-    equation="q_out = q_drive + c_s (M + s |M|) (1 + (h M)^2)^(1/2)/(1 + (g M)^2)^(1/6) + c_l y, t_l dy/dt = M - y, M "
-    "the moment in the load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l 10^(-d/2), t_l, "
-    "t_l 10^(d/2)",
+    equation="q_out = q_drive + c_s (M + s |M|) (1 + (g M)^2)^((p - 1)/2) + c_l y, t_l dy/dt = M - y, M the moment "
+    "in the load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l 10^(-d/2), t_l, t_l 10^(d/2)",
     source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
     "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; bolted "
     "and clamped seats soften as they open (VDI 2230); delayed elasticity: C. Zener, Elasticity and "
@@ -108,29 +108,26 @@ EFFECT = Effect(
             0.0,
             0.3,
             20.0,
-            "g, one over the moment from which it yields by the load's 2/3 power; 0: it yields in proportion",
+            "g, one over the moment from which it yields by a power of the load; 0: it yields in proportion",
             log=True,
             role="shape",
             scale=_per_moment,
             omitted=0.0,
             minimum=0.0,
-            tries=(2.0, 7.0),
             reach=1.0,
             of="compliance_rad_per_Nm",
         ),
         Parameter(
-            "softening_per_Nm",
-            "1/(N m)",
+            "power",
+            "-",
+            HERTZ,
             0.0,
-            0.3,
-            20.0,
-            "h, one over the moment from which it yields by the load's square; 0: it yields in proportion",
-            log=True,
+            2.0,
+            "p, of the load by which it yields from there on: below 1 it stiffens (2/3: a contact), above 1 it softens",
             role="shape",
-            scale=_per_moment,
-            omitted=0.0,
+            omitted=HERTZ,
             minimum=0.0,
-            tries=(1.0, 4.0),
+            maximum=3.0,
             of="compliance_rad_per_Nm",
         ),
         Parameter(
@@ -177,5 +174,9 @@ EFFECT = Effect(
     acts_through=("load", "load_rate"),
     bounded=True,
     change=_change,
+    tries=tuple(
+        {"stiffening_per_Nm": g, "power": p}
+        for g, p in ((2.0, HERTZ), (7.0, HERTZ), (7.0, 0.3), (1.0, 2.0), (4.0, 2.0))
+    ),
     rank=5,
 )

@@ -92,7 +92,7 @@ def test_shapes_that_belong_together_are_asked_for_together() -> None:
     assert any(v["preload_Nm"] < 0.0 for v in together)
     coupling = _of("series_compliance", "series_compliance")
     assert set(coupling.starts[0].values) == {"compliance_rad_per_Nm"}
-    assert {k for v in coupling.further for k in v} == {"skew", "stiffening_per_Nm"}
+    assert {k for v in coupling.further for k in v} == {"skew", "stiffening_per_Nm", "power"}
     rubber = _of("series_compliance", "series_compliance:late_rad_per_Nm")
     assert set(rubber.starts[0].values) == {"late_rad_per_Nm", "lag_s", "compliance_rad_per_Nm"}
     assert rubber.further == ({"decades": 2.0},)

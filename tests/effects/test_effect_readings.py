@@ -54,7 +54,8 @@ def test_a_seat_softens_from_its_own_slope_to_the_loads_square() -> None:
     columns = excitation(config)
     load, plain = columns["joint_torque_Nm"], run(config, columns)["deflection_rad"]
     for softening, expected in ((1e-6, 3e-3 * load), (1e4, 30.0 * load * np.abs(load))):
-        mount = ("series_compliance", {"compliance_rad_per_Nm": 3e-3, "softening_per_Nm": softening})
+        law = {"compliance_rad_per_Nm": 3e-3, "stiffening_per_Nm": softening, "power": 2.0}
+        mount = ("series_compliance", law)
         gave = run(config, columns, mount)["deflection_rad"] - plain
         assert gave == pytest.approx(expected, rel=1e-6, abs=1e-6)
 

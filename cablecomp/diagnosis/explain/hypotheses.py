@@ -168,7 +168,7 @@ def _by_amount(
     aside = ("duration", "steps", "curve", *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
-    shaped = {p.of for p in effect.parameters if not p.tries}
+    shaped = {p.of for p in effect.parameters if not p.tries and p.name not in together}
     further = [p for p in own if not p.shape and p is not amount and p.name not in shaped]
     low, high = amount.bounds(config)
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
@@ -192,7 +192,9 @@ def _by_amount(
     )
     second = "" if amount is next(p for p in effect.parameters if not p.shape) else amount.name
     name = ":".join(filter(None, (effect.id, channel, second)))
-    tried = [{p.name: v} for p in own for v in p.tries] + [dict(values) for values in effect.tries]
+    names = {p.name for p in own}
+    tried = [{p.name: v} for p in own for v in p.tries]
+    tried += [dict(values) for values in effect.tries if set(values) <= names]
     asked = tuple(
         {n: _absolute(effect, n, v, config, evidence, channel) for n, v in values.items()} for values in tried
     )
