@@ -50,9 +50,9 @@ EFFECT = Effect(
     statement="The cable or its terminations creep, so that the pretension falls, fast at first and ever "
     "more slowly, or until it comes to rest.",
     equation="T0(t) = T0 (1 - a k (u^m - 1)/m), m = 0: T0 (1 - a ln u), u = 1 + (t - t0)/(k t_c), k = 1, of m < 0 "
-    "k = 1 - m: then it comes to rest, at T0 (1 - a (1 + 1/|m|)), by T0 (1 - a (1 - e^(-(t - t0)/t_c))) for m far below "
-    "0; t0 the recording's first sample unless it is given (creep that goes on from recording to recording); in an open "
-    "circuit T = T0(t) + M/R",
+    "k = 1 - m: then it comes to rest, at T0 (1 - a (1 + 1/|m|)), for m far below 0 by T0 (1 - a (1 - e^(-(t - "
+    "t0)/t_c))); t0 the recording's first sample unless it is given (creep that goes on from recording to recording); "
+    "in an open circuit T = T0(t) + M/R",
     source="stress relaxation of steel wire and polymers at constant length, by the logarithm or a power of time: "
     "W. N. Findley, J. S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976; "
     "of an order n > 1, m = -1/(n - 1), and of the first, m far below 0: F. Garofalo, Fundamentals of Creep, 1965",
@@ -108,6 +108,10 @@ EFFECT = Effect(
     acts_through=("time",),
     bounded=True,
     change=_change,
+    tries=tuple(
+        {"began_s": 0.0, "power": m, "time_constant_s": t}
+        for m, t in ((-2.0, 5.0), (-2.0, 30.0), (-2.0, 200.0), (0.5, 3.0), (0.5, 100.0))
+    ),
     flag="drifts",
     rank=15,
 )

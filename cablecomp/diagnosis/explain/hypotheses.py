@@ -163,7 +163,7 @@ def _by_amount(
     effect: Effect, amount: Parameter, channel: str, config: JointConfig, evidence: Sequence[Evidence]
 ) -> Hypothesis:
     own = [p for p in effect.parameters if p.of in ("", amount.name)]
-    together = {name for values in effect.tries for name in values}
+    together = {n for values in effect.tries for n in values if effect.parameter(n).omitted is not None}
     # of an event, asked for by itself; of a channel that is not read
     aside = ("duration", "steps", "curve", *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
