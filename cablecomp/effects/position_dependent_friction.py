@@ -89,6 +89,7 @@ EFFECT = Effect(
             of="amplitude",
             tries=(2.5, 4.0, 5.5, 7.0),
             reach=1.0,
+            ends_as_another=True,
             of_known_drive=True,
         ),
         Parameter(

@@ -65,6 +65,7 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(0.1, 0.4),
             reach=1.0,
+            ends_as_another=True,
         ),
         Parameter(
             "spread",

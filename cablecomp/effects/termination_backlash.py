@@ -117,6 +117,7 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             reach=1.0,
+            ends_as_another=True,
         ),
         Parameter(
             "preload_Nm",

@@ -46,9 +46,9 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
 
 
 def better_word(fit: Fit, h: Hypothesis) -> str:
-    """The shape of an effect that stands where another effect is the better word (`Parameter.reach` of one): on the
+    """The shape of an effect that stands where another effect is the better word (`Parameter.ends_as_another`): on the
     most that is plausible, or near it; "" where none does. The least is the plain law."""
-    strict = {h.key(p.name): p.name for p in h.effect.parameters if p.reach <= 1.0}
+    strict = {h.key(p.name): p.name for p in h.effect.parameters if p.ends_as_another}
     at = zip(fit.problem.parameters, fit.x, strict=True)
     at_most = (p.base for p, x in at if p.value(float(x)) > LIMITS.near_bound * p.high)
     return next((strict[name] for name in at_most if name in strict), "")
