@@ -65,8 +65,9 @@ class Parameter:
     it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it leaves out at
     first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, others' are
     in units of `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of a log-spaced
-    shape may leave low..high. `ends_as_another`: where it ends on `high`, another effect is the better word.
-    `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
+    shape may leave low..high. `ends_as_another`: whether, of the effect's values, another effect is the better word
+    where it ends on `high`. `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are
+    not asked for.
     """
 
     name: str
@@ -86,7 +87,7 @@ class Parameter:
     of: str = ""
     tries: tuple[float, ...] = ()
     reach: float = 30.0
-    ends_as_another: bool = False
+    ends_as_another: Callable[[Mapping[str, float]], bool] | None = None
     of_known_drive: bool = False
 
     @property
@@ -107,6 +108,11 @@ class Parameter:
         """Prior range (low, high) for this joint, in the parameter's unit."""
         unit = 1.0 if self.scale is None else self.scale(config)
         return self.low * unit, self.high * unit
+
+
+def always(_values: Mapping[str, float]) -> bool:
+    """`Parameter.ends_as_another` whatever the effect's other values are."""
+    return True
 
 
 LEAST_PRETENSION = 0.05
@@ -202,8 +208,8 @@ class Effect:
     steps: bool = False
     """Among its shapes is a plain step of the joint, which a step of the encoder's zero cannot be told from."""
     tries: tuple[Mapping[str, float], ...] = ()
-    """Shapes that a diagnosis leaves out at first and asks for together, in units of their `scale(config)`; with them one
-    that has to be given, which is asked for without them as well."""
+    """Shapes that a diagnosis leaves out at first and asks for together, in units of their `scale(config)`; with them
+    one that has to be given, which is asked for without them as well."""
     flag: str = ""
     """What a joint does that has it, in a list of many joints, where that changes from night to night."""
     rank: int = 0

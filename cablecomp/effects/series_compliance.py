@@ -60,6 +60,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(terms=(*elastic, *late) if values["compliance_rad_per_Nm"] else late)
 
 
+def _stiffens(values: Mapping[str, float]) -> bool:
+    """Ever more at once it is play; what softens over all of its load is a coupling."""
+    return values.get("power", HERTZ) < 1.0
+
+
 def _per_moment(config: JointConfig) -> float:
     """1/(R T0) [1/(N m)]."""
     return 1.0 / pretension_moment(config)
@@ -114,7 +119,9 @@ EFFECT = Effect(
             scale=_per_moment,
             omitted=0.0,
             minimum=0.0,
+            tries=(2.0, 7.0),
             reach=1.0,
+            ends_as_another=_stiffens,
             of="compliance_rad_per_Nm",
         ),
         Parameter(
@@ -129,6 +136,7 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=3.0,
             of="compliance_rad_per_Nm",
+            of_known_drive=True,
         ),
         Parameter(
             "late_rad_per_Nm",
@@ -174,9 +182,6 @@ EFFECT = Effect(
     acts_through=("load", "load_rate"),
     bounded=True,
     change=_change,
-    tries=tuple(
-        {"stiffening_per_Nm": g, "power": p}
-        for g, p in ((2.0, HERTZ), (7.0, HERTZ), (7.0, 0.3), (1.0, 2.0), (4.0, 2.0))
-    ),
+    tries=tuple({"stiffening_per_Nm": g, "power": p} for g, p in ((7.0, 0.3), (1.0, 2.0), (4.0, 2.0))),
     rank=5,
 )

@@ -164,9 +164,26 @@ def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -
         low, high = (np.array([p.x(getattr(p, end)) for p in ends]) for end in ("low", "high"))
         problem = SimpleNamespace(parameters=ends, bounds=lambda: (low, high))
         x = np.array([p.x(v) for p, v in zip(ends, (gap_rad, closes_Nm), strict=True)])
-        return better_word(cast("Fit", SimpleNamespace(problem=problem, x=x)), gap)
+        return better_word(cast("Fit", SimpleNamespace(problem=problem, x=x, values={})), gap)
 
     assert most == gap.effect.parameter("closes_Nm").bounds(JOINT)[1]
     assert word(0.1, most) == "closes_Nm"
     assert word(0.1, free["closes_Nm"].low) == ""  # a gap that closes at once is one
     assert word(free["gap_rad"].high, 0.5 * most) == ""
+
+
+def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:
+    coupling = _of("series_compliance", "series_compliance")
+    shapes = ("stiffening_per_Nm", "power")
+    free = {p.base.rpartition(".")[2]: p for p in coupling.free(dict.fromkeys(shapes, 0.5), JOINT)}
+    ends = [free[name] for name in shapes]
+    at = np.array([p.x(p.high) for p in ends])
+
+    def word(power: float) -> str:
+        problem = SimpleNamespace(parameters=ends)
+        values = {coupling.key("power"): power}
+        fit = SimpleNamespace(problem=problem, x=at, values=values)
+        return better_word(cast("Fit", fit), coupling)
+
+    assert word(0.4) == "stiffening_per_Nm"
+    assert word(1.8) == ""

@@ -48,7 +48,9 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
 def better_word(fit: Fit, h: Hypothesis) -> str:
     """The shape of an effect that stands where another effect is the better word (`Parameter.ends_as_another`): on the
     most that is plausible, or near it; "" where none does. The least is the plain law."""
-    strict = {h.key(p.name): p.name for p in h.effect.parameters if p.ends_as_another}
+    own = {p.name: fit.values.get(h.key(p.name), p.omitted or p.neutral) for p in h.effect.parameters}
+    ends = ((p.name, p.ends_as_another) for p in h.effect.parameters)
+    strict = {h.key(name): name for name, as_another in ends if as_another is not None and as_another(own)}
     at = zip(fit.problem.parameters, fit.x, strict=True)
     at_most = (p.base for p, x in at if p.value(float(x)) > LIMITS.near_bound * p.high)
     return next((strict[name] for name in at_most if name in strict), "")
