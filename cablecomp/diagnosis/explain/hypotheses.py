@@ -163,12 +163,13 @@ def _by_amount(
     effect: Effect, amount: Parameter, channel: str, config: JointConfig, evidence: Sequence[Evidence]
 ) -> Hypothesis:
     own = [p for p in effect.parameters if p.of in ("", amount.name)]
-    together = {n for values in effect.tries for n in values if effect.parameter(n).omitted is not None}
+    asked_together = {name for values in effect.tries for name in values}
+    together = {p.name for p in own if p.omitted is not None and p.name in asked_together}
     # of an event, asked for by itself; of a channel that is not read
     aside = ("duration", "steps", "curve", *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
-    shaped = {p.of for p in effect.parameters if not p.tries and p.name not in together}
+    shaped = {p.of for p in effect.parameters if not p.tries and p.name not in asked_together}
     further = [p for p in own if not p.shape and p is not amount and p.name not in shaped]
     low, high = amount.bounds(config)
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
