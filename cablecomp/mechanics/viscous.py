@@ -114,31 +114,34 @@ def viscous_eval(
         first, slope = _relax(slide)
         grid.first_try = first
         total = 0.0
-        inner = _strain(slide, new[0])[0]
-        for j in range(1, count):
-            outer = _strain(slide, new[j])[0]
-            total += 0.5 * h * (inner + outer)
-            inner = outer
+        if bent:
+            total = _whole_strain(slide)
+        else:
+            for j in range(count - 1):
+                total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
         grid.total_try = total
     grid.count_try, grid.angle_try, grid.end_try = count, w, tau
-    at_end = _strain(slide, tau)[0]
-    total = grid.total_try + 0.5 * (w - last) * (_strain(slide, new[count - 1])[0] + at_end)
+    at_last, at_end = new[count - 1] - 1.0, tau - 1.0
+    if bent:
+        at_last, at_end = strain_of_tau(laws, law, new[count - 1])[0], strain_of_tau(laws, law, tau)[0]
+    total = grid.total_try + 0.5 * (w - last) * (at_last + at_end)
     return Wound(total, slope / dv_dtau(laws, law, tau, v), at_end)
 
 
 @inner_kernel
-def _strain(s: Slide, tau: float) -> tuple[float, float]:
-    """Strain beyond that at T0, in T0/EA, and its derivative by T/T0."""
-    if s.bent:
-        return strain_of_tau(s.laws, s.law, tau)
-    return tau - 1.0, 1.0
+def _whole_strain(s: Slide) -> float:
+    """Integral of the strain over the nodes."""
+    total, inner = 0.0, strain_of_tau(s.laws, s.law, s.new[0])[0]
+    for j in range(1, s.nodes):
+        outer = strain_of_tau(s.laws, s.law, s.new[j])[0]
+        total += 0.5 * s.h * (inner + outer)
+        inner = outer
+    return total
 
 
 @inner_kernel
 def _mu(s: Slide, j: int) -> float:
-    """Friction on the outer side of node j."""
-    if not s.bent:
-        return s.mu
+    """Friction on the outer side of node j, where laws are bent."""
     last = s.nodes - 1
     mu, mean = s.mu, 0.5 * (s.about[j] + (s.tau if j == last else s.about[j + 1]))
     if s.laws[s.law, HEAD, GROOVED] != 0.0:
@@ -151,11 +154,10 @@ def _mu(s: Slide, j: int) -> float:
 
 @inner_kernel
 def _changed(s: Slide, j: int) -> tuple[float, float]:
-    """By how much the strain at node j has changed in this step, and its derivative by the tension there."""
-    if not s.bent:
-        return s.new[j] - s.old[j], 1.0
-    strain, slope = _strain(s, s.about[j])
-    return strain + slope * (s.new[j] - s.about[j]) - _strain(s, s.old[j])[0], slope
+    """By how much the strain at node j has changed in this step, and its derivative by the tension there, where laws
+    are bent."""
+    strain, slope = strain_of_tau(s.laws, s.law, s.about[j])
+    return strain + slope * (s.new[j] - s.about[j]) - strain_of_tau(s.laws, s.law, s.old[j])[0], slope
 
 
 class Moved(NamedTuple):
@@ -222,7 +224,7 @@ def _relax_straight(s: Slide) -> tuple[int, float]:
     for _ in range(60):
         first = _front(s)
         if first == s.nodes:
-            return first, 0.5 * s.gap * _strain(s, s.tau)[1]
+            return first, 0.5 * s.gap * (strain_of_tau(s.laws, s.law, s.tau)[1] if s.bent else 1.0)
         moved = _newton(s, first)
         if moved.done or _unbalanced(s, max(first - 1, 0)) <= 1e-13:
             break
@@ -236,11 +238,11 @@ def _front(s: Slide) -> int:
     half = 0.5 * s.h
     for j in range(s.nodes - 1):
         a, b = s.new[j], s.new[j + 1]
-        if a != s.old[j] or abs(b - a) > half * _mu(s, j) * (a + b):
+        if a != s.old[j] or abs(b - a) > half * (_mu(s, j) if s.bent else s.mu) * (a + b):
             return j
     last = s.nodes - 1
     a, b = s.new[last], s.tau
-    slips = abs(b - a) > 0.5 * s.gap * _mu(s, last) * (a + b)
+    slips = abs(b - a) > 0.5 * s.gap * (_mu(s, last) if s.bent else s.mu) * (a + b)
     return last if a != s.old[last] or slips else s.nodes
 
 
@@ -275,9 +277,10 @@ def _side(a: float, b: float, per_distance: float, mu: float) -> int:
 @inner_kernel
 def _outward(s: Slide, j: int, per_h: float, per_gap: float) -> Face:
     """The face on the outer side of node j; beyond the last node lies the departure point."""
+    mu = _mu(s, j) if s.bent else s.mu
     if j == s.nodes - 1:
-        return _face(s.new[j], s.tau, per_gap, _mu(s, j))
-    return _face(s.new[j], s.new[j + 1], per_h, _mu(s, j))
+        return _face(s.new[j], s.tau, per_gap, mu)
+    return _face(s.new[j], s.new[j + 1], per_h, mu)
 
 
 @inner_kernel
@@ -299,7 +302,9 @@ def _newton(s: Slide, first: int) -> Moved:
     for j in range(first, s.nodes):
         outer = _outward(s, j, per_h, per_gap)
         share = inside if 0 < j < s.nodes - 1 else _share(s, j)
-        changed, capacity = _changed(s, j)
+        changed, capacity = s.new[j] - s.old[j], 1.0
+        if s.bent:
+            changed, capacity = _changed(s, j)
         own = capacity - share * (outer.by_a - inner.by_b)
         target = share * (outer.slip - inner.slip) - changed
         if j > first:
@@ -320,9 +325,11 @@ def _substitute(s: Slide, first: int, by_end: float) -> Moved:
     per_h, last = 1.0 / s.h, s.nodes - 1
     per_gap = 1.0 / s.gap
     change = s.right[last]
-    mu, capacity = _mu(s, last), _changed(s, last)[1]
+    mu, capacity, at_end = s.mu, 1.0, 1.0
+    if s.bent:
+        mu, capacity, at_end = _mu(s, last), _changed(s, last)[1], strain_of_tau(s.laws, s.law, s.tau)[1]
     same = _side(s.new[last], s.tau, per_gap, mu) == _side(s.new[last] + change, s.tau, per_gap, mu)
-    slope, whole = 0.5 * s.gap * (_strain(s, s.tau)[1] + capacity * by_end), 0.0
+    slope, whole = 0.5 * s.gap * (at_end + capacity * by_end), 0.0
     for j in range(last, first - 1, -1):
         b = s.new[j]
         moved = max(b + change, 1e-9)
@@ -331,7 +338,9 @@ def _substitute(s: Slide, first: int, by_end: float) -> Moved:
             inward, by_inward = s.right[j - 1] - s.upper[j - 1] * change, -s.upper[j - 1] * by_end
         if j > 0:
             a = s.new[j - 1]
-            mu, inner = _mu(s, j - 1), _changed(s, j - 1)[1]
+            inner = 1.0
+            if s.bent:
+                mu, inner = _mu(s, j - 1), _changed(s, j - 1)[1]
             same = same and _side(a, b, per_h, mu) == _side(a + inward, moved, per_h, mu)
             slope += 0.5 * s.h * (capacity * by_end + inner * by_inward)
             capacity = inner
@@ -353,7 +362,9 @@ def _unbalanced(s: Slide, first: int) -> float:
     for j in range(first, s.nodes):
         outer = _outward(s, j, per_h, per_gap).slip
         share = inside if 0 < j < s.nodes - 1 else _share(s, j)
-        changed, capacity = _changed(s, j)
+        changed, capacity = s.new[j] - s.old[j], 1.0
+        if s.bent:
+            changed, capacity = _changed(s, j)
         own = capacity + share * (per_h + (per_gap if j == s.nodes - 1 else per_h))
         largest = max(largest, abs(changed - share * (outer - inner)) / own)
         inner = outer
