@@ -91,6 +91,7 @@ EFFECT = Effect(
             minimum=-20.0,
             maximum=1.0,
             tries=(-2.0, 0.5),
+            of_known_drive=True,
         ),
         Parameter(
             "began_s",

@@ -37,7 +37,7 @@ def drum_eval(d: Drive, laws: Floats, c: int, end: int, tau: float, v: float, w:
     w = w if w > LEAST_WRAP else LEAST_WRAP
     if laws is not None:
         if cable.viscous > 0.0:
-            return viscous_eval(d, laws, c, end, w, tau, v, mu)
+            return viscous_eval(d, c, end, w, tau, mu)
     meet = wrap_eval(d.profiles[wrap], laws, cable.law[end], d.heights[wrap], w, v, tau, mu)
     set_pending(step, meet)
     slope = meet.slope

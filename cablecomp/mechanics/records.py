@@ -197,12 +197,11 @@ GRID = record(
         ("time_try", "f8"),
         ("rate_try", "f8"),  # rad^2 that stretch diffused in that step
         ("first_try", "f8"),  # the deepest node that moved; count_try if none did
-        ("total_try", "f8"),  # integral of the strain, in T0/EA, over the nodes
+        ("total_try", "f8"),  # integral of T/T0 - 1 over the nodes
         ("tau", "f8", (WET_NODES,)),
         ("tau_try", "f8", (WET_NODES,)),
         ("upper", "f8", (WET_NODES,)),  # elimination: upper diagonal,
         ("right", "f8", (WET_NODES,)),  # right-hand side, then the solution
-        ("about", "f8", (WET_NODES,)),  # T/T0 about which bent laws are taken for straight
     ]
 )
 

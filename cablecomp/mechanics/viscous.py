@@ -1,9 +1,8 @@
 """Viscous slip: where cable slides on a drum, friction takes mu T + c v per radian (v slip speed) instead of mu T.
 
 The stretch then diffuses through the sliding zone: with displacement rate v(y), conservation gives
-R T0/EA de/dt = dv/dy, e the strain by the cable's law (T/T0 - 1 where it is straight), and the slip law
-c v = shrink(dT/dy, mu T), mu by the tension and by the place in the groove. Solved implicitly on a grid fixed to the
-drum by Newton's method on a tridiagonal system; only the part that can move is solved. c = 0 is the plain law (other
+(R/EA) dT/dt = dv/dy and the slip law c v = shrink(dT/dy, mu T). Solved implicitly on a grid fixed to the drum
+by Newton's method on a tridiagonal system; only the part that can move is solved. c = 0 is the plain law (other
 code: `profile.py`).
 """
 
@@ -15,17 +14,6 @@ from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inner_kernel
 from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
-from cablecomp.mechanics.tables import (
-    BY_TENSION,
-    GROOVED,
-    HEAD,
-    MODE,
-    PLAIN,
-    dv_dtau,
-    groove,
-    strain_of_tau,
-    v_of_tau,
-)
 
 STIFFEST = 1e3  # diffusion number per step beyond which slip is as good as quasi-static
 LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
@@ -43,7 +31,6 @@ def viscous_fill(grid: Any, w: float, reach: float) -> None:
     grid.tau_try[:] = 1.0
     grid.upper[:] = 1.0
     grid.right[:] = 1.0
-    grid.about[:] = 1.0
 
 
 @inner_kernel
@@ -65,17 +52,11 @@ class Slide(NamedTuple):
     tau: float  # T/T0 there
     mu: float
     rate: float  # rad^2 that stretch diffuses in this step
-    laws: Floats
-    law: int
-    bent: bool  # strain is not in proportion to tension, or mu depends on it or on the place
-    about: Floats  # T/T0 at the nodes about which such laws are taken for straight
 
 
 @inner_kernel
-def viscous_eval(
-    d: Drive, laws: Floats, c: int, end: int, w: float, tau: float, v: float, mu: float
-) -> Wound:
-    """The cable on a drum at wrap angle w and end tension T/T0 = tau, v by its law; kept as pending."""
+def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> Wound:
+    """The cable on a drum at wrap angle w and end tension T/T0 = tau; kept as pending."""
     cable, state, context, grid = d.cables[c], d.states[c], d.context, d.grids[2 * c + end]
     old, new = grid.tau, grid.tau_try
     h = grid.step
@@ -98,11 +79,7 @@ def viscous_eval(
         else:
             old[j] = t_old + (y - w_old) / (w - w_old) * (tau - t_old)
     last = (count - 1) * h
-    law = cable.law[end]
-    bent = laws[law, HEAD, MODE] != PLAIN
-    slide = Slide(
-        old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate, laws, law, bent, grid.about
-    )
+    slide = Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate)
     moved = Moved(False, 0.0, 0.0)
     if alike:
         moved = _follow(slide, int(grid.first_try))
@@ -114,50 +91,12 @@ def viscous_eval(
         first, slope = _relax(slide)
         grid.first_try = first
         total = 0.0
-        if bent:
-            total = _whole_strain(slide)
-        else:
-            for j in range(count - 1):
-                total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
+        for j in range(count - 1):
+            total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
         grid.total_try = total
     grid.count_try, grid.angle_try, grid.end_try = count, w, tau
-    at_last, at_end = new[count - 1] - 1.0, tau - 1.0
-    if bent:
-        at_last, at_end = strain_of_tau(laws, law, new[count - 1])[0], strain_of_tau(laws, law, tau)[0]
-    total = grid.total_try + 0.5 * (w - last) * (at_last + at_end)
-    return Wound(total, slope / dv_dtau(laws, law, tau, v), at_end)
-
-
-@inner_kernel
-def _whole_strain(s: Slide) -> float:
-    """Integral of the strain over the nodes."""
-    total, inner = 0.0, strain_of_tau(s.laws, s.law, s.new[0])[0]
-    for j in range(1, s.nodes):
-        outer = strain_of_tau(s.laws, s.law, s.new[j])[0]
-        total += 0.5 * s.h * (inner + outer)
-        inner = outer
-    return total
-
-
-@inner_kernel
-def _mu(s: Slide, j: int) -> float:
-    """Friction on the outer side of node j, where laws are bent."""
-    last = s.nodes - 1
-    mu, mean = s.mu, 0.5 * (s.about[j] + (s.tau if j == last else s.about[j + 1]))
-    if s.laws[s.law, HEAD, GROOVED] != 0.0:
-        near, reach = j * s.h, s.gap if j == last else s.h
-        mu *= (groove(s.laws, s.law, near + reach) - groove(s.laws, s.law, near)) / reach
-    if s.laws[s.law, HEAD, BY_TENSION] != 0.0:
-        mu /= mean * dv_dtau(s.laws, s.law, mean, v_of_tau(s.laws, s.law, mean))
-    return mu
-
-
-@inner_kernel
-def _changed(s: Slide, j: int) -> tuple[float, float]:
-    """By how much the strain at node j has changed in this step, and its derivative by the tension there, where laws
-    are bent."""
-    strain, slope = strain_of_tau(s.laws, s.law, s.about[j])
-    return strain + slope * (s.new[j] - s.about[j]) - strain_of_tau(s.laws, s.law, s.old[j])[0], slope
+    total = grid.total_try + 0.5 * (w - last) * (new[count - 1] + tau - 2.0)
+    return Wound(total, slope * tau, tau - 1.0)
 
 
 class Moved(NamedTuple):
@@ -171,10 +110,8 @@ class Moved(NamedTuple):
 @inner_kernel
 def _follow(s: Slide, first: int) -> Moved:
     """The solved step at another end value and wrap angle: but for the last node's equation all are as they were, so
-    the elimination that `upper` keeps still holds, as long as no face begins or ceases to slip and all is linear."""
+    the elimination that `upper` keeps still holds, as long as no face begins or ceases to slip."""
     last = s.nodes - 1
-    if s.bent:
-        return Moved(False, 0.0, 0.0)
     per_h, per_gap = 1.0 / s.h, 1.0 / s.gap
     if first > last:  # nothing moved
         at_end = _side(s.new[last], s.tau, per_gap, s.mu)
@@ -196,27 +133,6 @@ def _follow(s: Slide, first: int) -> Moved:
 def _relax(s: Slide) -> tuple[int, float]:
     """Implicit step of all nodes; returns the deepest that moved, and the derivative of the integral by the end value.
 
-    Bent laws are taken for straight about the last solution until that stays: faces that begin or cease to slip, on
-    which Newton's method for all at once would go back and forth, are settled for straight laws.
-    """
-    if not s.bent:
-        return _relax_straight(s)
-    first, slope = s.nodes, 0.0
-    for _ in range(30):
-        copy_floats(s.new, 0, s.about, 0, s.nodes)
-        first, slope = _relax_straight(s)
-        moved = 0.0
-        for j in range(first, s.nodes):
-            moved = max(moved, abs(s.new[j] - s.about[j]))
-        if moved <= 1e-14:
-            break
-    return first, slope
-
-
-@inner_kernel
-def _relax_straight(s: Slide) -> tuple[int, float]:
-    """The same for straight laws.
-
     The equations are linear as long as no face begins or ceases to slip: Newton's method is there after one step once
     it knows which faces do. One that only rounding moves may change its side for ever, so it is balance that counts.
     """
@@ -224,7 +140,7 @@ def _relax_straight(s: Slide) -> tuple[int, float]:
     for _ in range(60):
         first = _front(s)
         if first == s.nodes:
-            return first, 0.5 * s.gap * (strain_of_tau(s.laws, s.law, s.tau)[1] if s.bent else 1.0)
+            return first, 0.5 * s.gap
         moved = _newton(s, first)
         if moved.done or _unbalanced(s, max(first - 1, 0)) <= 1e-13:
             break
@@ -235,15 +151,14 @@ def _relax_straight(s: Slide) -> tuple[int, float]:
 def _front(s: Slide) -> int:
     """The deepest node that moves, or their number if none does; deep cable may still creep while the cable outside of
     it sticks."""
-    half = 0.5 * s.h
+    half = 0.5 * s.mu * s.h
     for j in range(s.nodes - 1):
         a, b = s.new[j], s.new[j + 1]
-        if a != s.old[j] or abs(b - a) > half * (_mu(s, j) if s.bent else s.mu) * (a + b):
+        if abs(b - a) > half * (a + b) or a != s.old[j]:
             return j
     last = s.nodes - 1
     a, b = s.new[last], s.tau
-    slips = abs(b - a) > 0.5 * s.gap * (_mu(s, last) if s.bent else s.mu) * (a + b)
-    return last if a != s.old[last] or slips else s.nodes
+    return last if abs(b - a) > 0.5 * s.mu * s.gap * (a + b) or a != s.old[last] else s.nodes
 
 
 class Face(NamedTuple):
@@ -256,7 +171,6 @@ class Face(NamedTuple):
 
 @inner_kernel
 def _face(a: float, b: float, per_distance: float, mu: float) -> Face:
-    """`mu` at the mean of both; that it changes with them is left out of the derivatives, beside 1/distance."""
     steep = (b - a) * per_distance
     limit = mu * 0.5 * (a + b)
     if steep > limit:
@@ -277,10 +191,9 @@ def _side(a: float, b: float, per_distance: float, mu: float) -> int:
 @inner_kernel
 def _outward(s: Slide, j: int, per_h: float, per_gap: float) -> Face:
     """The face on the outer side of node j; beyond the last node lies the departure point."""
-    mu = _mu(s, j) if s.bent else s.mu
     if j == s.nodes - 1:
-        return _face(s.new[j], s.tau, per_gap, mu)
-    return _face(s.new[j], s.new[j + 1], per_h, mu)
+        return _face(s.new[j], s.tau, per_gap, s.mu)
+    return _face(s.new[j], s.new[j + 1], per_h, s.mu)
 
 
 @inner_kernel
@@ -298,15 +211,12 @@ def _newton(s: Slide, first: int) -> Moved:
     inside = s.rate * per_h
     inner = Face(0.0, 0.0, 0.0)
     if first > 0:
-        inner = _outward(s, first - 1, per_h, per_gap)
+        inner = _face(s.new[first - 1], s.new[first], per_h, s.mu)
     for j in range(first, s.nodes):
         outer = _outward(s, j, per_h, per_gap)
         share = inside if 0 < j < s.nodes - 1 else _share(s, j)
-        changed, capacity = s.new[j] - s.old[j], 1.0
-        if s.bent:
-            changed, capacity = _changed(s, j)
-        own = capacity - share * (outer.by_a - inner.by_b)
-        target = share * (outer.slip - inner.slip) - changed
+        own = 1.0 - share * (outer.by_a - inner.by_b)
+        target = share * (outer.slip - inner.slip) - (s.new[j] - s.old[j])
         if j > first:
             below = share * inner.by_a
             own -= below * s.upper[j - 1]
@@ -325,11 +235,8 @@ def _substitute(s: Slide, first: int, by_end: float) -> Moved:
     per_h, last = 1.0 / s.h, s.nodes - 1
     per_gap = 1.0 / s.gap
     change = s.right[last]
-    mu, capacity, at_end = s.mu, 1.0, 1.0
-    if s.bent:
-        mu, capacity, at_end = _mu(s, last), _changed(s, last)[1], strain_of_tau(s.laws, s.law, s.tau)[1]
-    same = _side(s.new[last], s.tau, per_gap, mu) == _side(s.new[last] + change, s.tau, per_gap, mu)
-    slope, whole = 0.5 * s.gap * (at_end + capacity * by_end), 0.0
+    same = _side(s.new[last], s.tau, per_gap, s.mu) == _side(s.new[last] + change, s.tau, per_gap, s.mu)
+    slope, whole = 0.5 * s.gap * (1.0 + by_end), 0.0
     for j in range(last, first - 1, -1):
         b = s.new[j]
         moved = max(b + change, 1e-9)
@@ -338,12 +245,8 @@ def _substitute(s: Slide, first: int, by_end: float) -> Moved:
             inward, by_inward = s.right[j - 1] - s.upper[j - 1] * change, -s.upper[j - 1] * by_end
         if j > 0:
             a = s.new[j - 1]
-            inner = 1.0
-            if s.bent:
-                mu, inner = _mu(s, j - 1), _changed(s, j - 1)[1]
-            same = same and _side(a, b, per_h, mu) == _side(a + inward, moved, per_h, mu)
-            slope += 0.5 * s.h * (capacity * by_end + inner * by_inward)
-            capacity = inner
+            same = same and _side(a, b, per_h, s.mu) == _side(a + inward, moved, per_h, s.mu)
+            slope += 0.5 * s.h * (by_end + by_inward)
             whole += 0.5 * s.h * (change + inward)
         s.new[j], s.right[j] = moved, 0.0
         change, by_end = inward, by_inward
@@ -357,16 +260,13 @@ def _unbalanced(s: Slide, first: int) -> float:
     inside = s.rate * per_h
     inner = 0.0
     if first > 0:
-        inner = _outward(s, first - 1, per_h, per_gap).slip
+        inner = _face(s.new[first - 1], s.new[first], per_h, s.mu).slip
     largest = 0.0
     for j in range(first, s.nodes):
         outer = _outward(s, j, per_h, per_gap).slip
         share = inside if 0 < j < s.nodes - 1 else _share(s, j)
-        changed, capacity = s.new[j] - s.old[j], 1.0
-        if s.bent:
-            changed, capacity = _changed(s, j)
-        own = capacity + share * (per_h + (per_gap if j == s.nodes - 1 else per_h))
-        largest = max(largest, abs(changed - share * (outer - inner)) / own)
+        own = 1.0 + share * (per_h + (per_gap if j == s.nodes - 1 else per_h))
+        largest = max(largest, abs(s.new[j] - s.old[j] - share * (outer - inner)) / own)
         inner = outer
     return largest
 
