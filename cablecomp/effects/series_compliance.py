@@ -12,16 +12,17 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 
 HERTZ = 2.0 / 3.0
 """Power of the load by which a contact yields."""
+CONTACT = 1.0 / 6.0
+"""Half of what that is less than 1, to the last digit."""
 
 
-@term(parameters=("compliance", "skew", "bends", "power"))
+@term(parameters=("compliance", "skew", "bends", "less"))
 def _give_way(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], power from there on."""
+    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], half of what its power there
+    is less than 1."""
     path = c.load - c.moment
     gives = p.compliance * (path + p.skew * abs(path))
-    if p.bends != 0.0:
-        gives *= (1.0 + (p.bends * path) ** 2) ** (0.5 * (p.power - 1.0))
-    c.reading += gives
+    c.reading += gives / (1.0 + (p.bends * path) ** 2) ** p.less
 
 
 @term(parameters=("compliance", "lag", "decades"), state=(("late", 3), "path", "time"))
@@ -50,7 +51,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         compliance=values["compliance_rad_per_Nm"],
         skew=values["skew"],
         bends=values["stiffening_per_Nm"],
-        power=values["power"],
+        less=CONTACT if values["power"] == HERTZ else 0.5 * (1.0 - values["power"]),
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)
