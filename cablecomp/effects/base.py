@@ -63,11 +63,11 @@ class Parameter:
     what the law can take; beyond it a configuration is refused. `omitted`: its value where a configuration leaves it
     out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`: the amount whose shape
     it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it leaves out at
-    first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, others' are
-    in units of `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of a log-spaced
-    shape may leave low..high. `ends_as_another`: whether, of the effect's values, another effect is the better word
-    where it ends on `high`. `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are
-    not asked for.
+    first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, or half of
+    what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course it asks by
+    itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `ends_as_another`: whether, of the
+    effect's values, another effect is the better word where it ends on `high`. `of_known_drive`: beside a drive known
+    by order of magnitude it, and what is `of` it, are not asked for.
     """
 
     name: str

@@ -55,7 +55,8 @@ EFFECT = Effect(
     "in an open circuit T = T0(t) + M/R",
     source="stress relaxation of steel wire and polymers at constant length, by the logarithm or a power of time: "
     "W. N. Findley, J. S. Lai and K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976; "
-    "of an order n > 1, m = -1/(n - 1), and of the first, m far below 0: F. Garofalo, Fundamentals of Creep, 1965",
+    "of an order n > 1, m = -1/(n - 1), and of the first, m far below 0: F. Garofalo, Fundamentals of Creep and "
+    "Creep-Rupture in Metals, 1965",
     parameters=(
         Parameter(
             "fraction",

@@ -13,16 +13,15 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 HERTZ = 2.0 / 3.0
 """Power of the load by which a contact yields."""
 CONTACT = 1.0 / 6.0
-"""Half of what that is less than 1, to the last digit."""
+"""Half of what that is less than 1."""
 
 
-@term(parameters=("compliance", "skew", "bends", "less"))
+@term(parameters=("compliance", "skew", "bends", "exponent"))
 def _give_way(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], half of what its power there
-    is less than 1."""
+    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], exponent (1 - power)/2."""
     path = c.load - c.moment
     gives = p.compliance * (path + p.skew * abs(path))
-    c.reading += gives / (1.0 + (p.bends * path) ** 2) ** p.less
+    c.reading += gives / (1.0 + (p.bends * path) ** 2) ** p.exponent
 
 
 @term(parameters=("compliance", "lag", "decades"), state=(("late", 3), "path", "time"))
@@ -51,7 +50,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         compliance=values["compliance_rad_per_Nm"],
         skew=values["skew"],
         bends=values["stiffening_per_Nm"],
-        less=CONTACT if values["power"] == HERTZ else 0.5 * (1.0 - values["power"]),
+        exponent=CONTACT - 0.5 * (values["power"] - HERTZ),
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)

@@ -65,10 +65,8 @@ def _at_reference(values: Mapping[str, float], reference: float) -> Restated:
     moved, bend = reference - values["reference_degC"], values.get("bend_per_K", 0.0)
     factor = 1.0 + values["coefficient_per_K"] * moved * (1.0 + bend * moved)
     steeper = 1.0 + 2.0 * bend * moved
-    bent = {"bend_per_K": bend / steeper} if "bend_per_K" in values else {}
-    return Restated(
-        {"coefficient_per_K": values["coefficient_per_K"] * steeper / factor, **bent}, pretension=factor
-    )
+    told = {"coefficient_per_K": values["coefficient_per_K"] * steeper / factor, "bend_per_K": bend / steeper}
+    return Restated(told, pretension=factor)
 
 
 EFFECT = Effect(
@@ -78,7 +76,8 @@ EFFECT = Effect(
     equation="T0(ϑ) = T0 (1 + k D (1 + b D)), D = ϑ - ϑ_ref, with k = (α_frame - α_cable) EA/T0 for a stiff frame, ϑ "
     "the temperature of what expands: t_l dϑ/dt = ϑ_measured - ϑ; in an open circuit T = T0(ϑ) + M/R",
     source="thermal strain of a member held at constant length: S. Timoshenko, Strength of Materials, part "
-    "I, 1930; expansion of polymers rises with temperature: R. K. Kirby, NBS, Am. Inst. Phys. Handbook, 1972",
+    "I, 1930; coefficients of expansion themselves rise with temperature: R. K. Kirby, T. A. Hahn and B. D. "
+    "Rothrock, in American Institute of Physics Handbook, 1972",
     parameters=(
         Parameter(
             "coefficient_per_K",

@@ -212,10 +212,8 @@ def find_load(step_rows_at: int, joint: Arrays, rows: Floats, outs: Floats) -> i
     below = above = STATUS_OK  # what is wrong with the loads at the ends of the bracket
     load = d.context.load * d.sensor.gain + d.sensor.offset
     reach = d.circuits[0].radius * d.cables[0].T0
-    taken, missed = (
-        0.0,
-        math.inf,
-    )  # the last load that the joint could take, and by how much the angle missed there
+    taken = 0.0  # the last load that the joint could take
+    missed = math.inf  # by how much the angle missed there
     for _ in range(200):
         read.load = load
         _, status = call_step_rows(step_rows_at, (joint, rows, outs, False))

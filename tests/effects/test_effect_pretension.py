@@ -140,7 +140,7 @@ def test_relaxation_goes_by_a_power_of_time_or_comes_to_rest(
 
 
 def test_of_the_first_order_it_falls_exponentially() -> None:
-    """(1 + t/(21 t_c))^-20 is e^(-t/t_c) within 3 % of the whole fall, which is 1 + 1/20 of a."""
+    """(1 + t/(21 t_c))^-20 is e^(-20 t/(21 t_c)) within 3 % of the whole fall, which is 21/20 of a."""
     config, time = joint(free_length_m=LONG), np.linspace(0.0, 20.0, 200)
     law = {"fraction": 0.1, "time_constant_s": 4.0, "power": -20.0}
     found = run(config, resting(time), ("pretension_relaxation", law))["tension_h_N"]

@@ -92,14 +92,15 @@ def _weighed(
         instead = rivals(final, term, bare, pool, groups, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
     nearest = min(against.values(), key=lambda v: v.z, default=NO_RIVAL)
+    # an event of any course predicts nothing of a part left out: it is weighed as it goes
+    ahead, of_rival = (own, nearest) if term.has_instant else (instead.any_form, instead.any_form_ahead)
     # as the last to come, and alone: of which it takes off more
     ways = [_gone(selection, bare, final), *_alone(selection, term.name)]
     evidence = features(
         gain=own.gain,
         selected_in=instead.selected_in if term.name in found.put_in else _selected(selection, term),
-        # an event of any course predicts nothing of a part left out: it is weighed as it goes
-        form_z=(own if term.has_instant else instead.any_form).z,
-        form_margin_z=(nearest if term.has_instant else instead.any_form_ahead).z,
+        form_z=ahead.z,
+        form_margin_z=of_rival.z,
         share_left=share_left,
         share_total=_share(selection, ways[0]),
         rivals=len(set(instead.effects) - set(instead.lesser)),
