@@ -28,15 +28,16 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
-    "crosstalk:posed", "crosstalk:quadratic", "gravity_load:tilting_base",
+    "clamp_slip:unequal_steps", "crosstalk:posed", "crosstalk:quadratic", "gravity_load:tilting_base",
     "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "position_dependent_friction:threaded", "pressure_dependent_friction:worn_through",
     "pretension_relaxation:exponential", "pretension_relaxation:power_law", "routing_friction:unlike_paths",
     "series_compliance:bushing", "series_compliance:one_way", "series_compliance:rubber",
     "series_compliance:softening", "strand_break:accelerating", "strand_break:fraying", "strand_break:in_steps",
-    "strand_break:other_cable", "strand_friction:masing", "strand_friction:rate_dependent",
-    "termination_backlash:dragging_link", "termination_backlash:greased", "termination_backlash:sprung",
-    "thermal_pretension:lagged", "thermal_pretension:quadratic", "viscous_slip:one_drum",
+    "strand_break:other_cable", "strand_break:unequal_steps", "strand_friction:masing",
+    "strand_friction:rate_dependent", "termination_backlash:dragging_link", "termination_backlash:greased",
+    "termination_backlash:sprung", "thermal_pretension:lagged", "thermal_pretension:quadratic",
+    "viscous_slip:one_drum",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
 FORMS = (*FRICTION, *CABLE, *JOINT)

@@ -12,6 +12,7 @@ from plant_joints import clock, course, joint
 from scipy.integrate import quad, solve_ivp
 
 from firmware_sim.plant import EffectSpec, PlantRun, simulate
+from firmware_sim.plant.forms.courses import worked
 
 STICKS = 50.0
 
@@ -213,6 +214,25 @@ def test_a_clamp_slides_in_steps_or_for_a_while() -> None:
     moved = (unequal.joint_position_rad - unequal.joint_position_rad[0]) * radius
     for at, gone in ((0.48, 0.0), (0.52, 1e-4), (1.48, 1e-4), (1.52, 3e-4), (1.98, 3e-4), (2.02, 7e-4)):
         assert moved[round(at * 100)] == pytest.approx(gone, abs=2e-8)
+
+
+def test_what_the_load_works_at_goes_on_while_that_moves_alone() -> None:
+    """Half of it before the load rests, the other half after; by how far it goes, up or down."""
+    time = np.linspace(0.0, 8.0, 801)
+    load = np.interp(time, [0.0, 2.0, 3.0, 5.0, 5.5, 8.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    gone = worked(time, load, 1.0, 6.0)
+    for at, share in ((1.99, 0.0), (2.5, 0.25), (3.0, 0.5), (4.9, 0.5), (5.25, 0.75), (5.5, 1.0), (8.0, 1.0)):
+        assert gone[np.searchsorted(time, at)] == pytest.approx(share, abs=0.006)
+    np.testing.assert_array_equal(worked(time, 0.0 * load, 1.0, 6.0), time >= 1.0)
+    # what went on before and after is not its
+    assert worked(time, load, 2.5, 0.25)[np.searchsorted(time, 2.625)] == pytest.approx(0.5, abs=0.03)
+    config = joint("open")
+    moment = np.interp(T, [0.0, 1.5, 2.0], [0.2, 0.2, 0.4]) * config.stages[0].output_radius_m
+    moment *= config.stages[0].pretension_N
+    law = EffectSpec("clamp_slip:worked_loose", {"slip_m": 2e-4, "time_s": 0.5, "duration_s": 2.0})
+    plain, loose = (simulate(config, T, 0 * T, moment, effects=e) for e in ((), (law,)))
+    moved = (loose.joint_position_rad - plain.joint_position_rad) * config.stages[0].output_radius_m
+    np.testing.assert_allclose(moved, 2e-4 * np.clip((T - 1.5) / 0.5, 0.0, 1.0), atol=2e-7)
 
 
 @pytest.mark.parametrize("effect", ["clamp_slip", "strand_break"])

@@ -48,6 +48,9 @@ KINDS: tuple[EffectKind, ...] = (
     _SLIP.settling(
         "A clamp that gives way and bites again: one cable gains length fast at first and ever more slowly."
     ),
+    _SLIP.worked(
+        "worked_loose", "A clamp that the load works loose: one cable gains length whenever the load moves."
+    ),
     _SLIP.of_cable_l("The clamp of cable l slips at once: the joint stands off the other way."),
     OVERLOAD,
 )

@@ -52,6 +52,14 @@ def stairs(
     return gone[np.searchsorted(at, time_s, side="right")]
 
 
+def worked(time_s: Floats, load_Nm: Floats, start_s: float, duration_s: float) -> Floats:
+    """From 0 to 1 as the load comes and goes: how far it has gone up and down since `start_s`, over how far it goes in
+    `duration_s`; a step where it rests for all that time."""
+    within = (time_s[1:] > start_s) & (time_s[:-1] < start_s + duration_s)
+    moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(load_Nm)) * within)])
+    return moved / moved[-1] if moved[-1] > 0.0 else (time_s >= start_s).astype(float)
+
+
 def schedule(build: Build, column: int, size: float, course: Callable[[Floats], Floats]) -> None:
     """Let every run add `size` times a course over its time [s] to an input column."""
 

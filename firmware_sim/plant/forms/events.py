@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from firmware_sim.plant.assembly import Build
+from firmware_sim.plant.columns import JOINT_TORQUE, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import ramp, schedule, settling, stairs
+from firmware_sim.plant.forms.courses import ramp, schedule, settling, stairs, worked
 from firmware_sim.plant.records import Floats
 
 Values: TypeAlias = Mapping[str, float]
@@ -86,6 +87,21 @@ class Event:
         return self.form(
             name, statement, (lasts,), lambda t, p: ramp(t, p["time_s"], p["duration_s"]) ** power
         )
+
+    def worked(self, name: str, statement: str) -> EffectKind:
+        """It as the load works at it: nothing while that rests, by how far it goes up and down for a while."""
+        lasts = Parameter("duration_s", "how long", 15.0, 0.0)
+
+        def happen(build: Build, p: Values) -> None:
+            column = self.columns[1 if p[self.which.name] >= 0.5 else 0]
+
+            def fill(inputs: Floats) -> None:
+                gone = worked(inputs[:, TIME], inputs[:, JOINT_TORQUE], p["time_s"], p["duration_s"])
+                inputs[:, column] += p[self.size.name] * gone
+
+            build.schedules.append(fill)
+
+        return form(self.effect, name, statement, (self.size, BEGINS, lasts, self.which), self.acts, happen)
 
     def settling(self, statement: str) -> EffectKind:
         """It fast at first and ever more slowly."""

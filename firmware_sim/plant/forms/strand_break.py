@@ -21,6 +21,9 @@ KINDS: tuple[EffectKind, ...] = (
         "Wires break one after another, each time more or fewer than the last, and after a longer or a shorter wait."
     ),
     _BREAK.for_a_while("fraying", "A cable frays: its EA falls at a steady rate for a while.", _LASTS),
+    _BREAK.worked(
+        "fatigued", "Wires break as the load comes and goes: EA of one cable falls whenever it moves."
+    ),
     _BREAK.of_cable_l("Wires of cable l break at once: its EA falls by the fraction."),
     _BREAK.settling("The wires that lie badly break first: a cable's EA falls fast and ever more slowly."),
     _BREAK.for_a_while(
