@@ -166,11 +166,14 @@ class Thresholds:
     """Durations that are looked at, from that one to the whole span, evenly by their logarithm."""
     curved: tuple[float, ...] = (0.4, 2.5)
     """Curves of events that are asked for beside an even course: one that settles, one that gets quicker."""
-    in_steps: tuple[int, ...] = (2, 3, 4, 5)
-    """Equal steps in which an event may go: of more, evenly says as much."""
+    another_step: float = 0.8
+    """Share of what an event in steps would leave that it may leave with one step more, or it has the fewer."""
+    least_step: float = 0.03
+    """Share of what the steps so far take off that one more has to take off: what an event does from an instant on is
+    known about as closely before it is run."""
     stepped: float = 0.6
-    """Share of what an event at once, or an even one, would leave, below which it is said to go in steps: of five
-    numbers of steps at any instants, one fits some of whatever is left."""
+    """Share of what an event at once, or one that takes its time, would leave, below which it is said to go in steps:
+    of steps at any instants and of any size some fit whatever is left."""
     courses: int = 6
     """Courses that are then run, best first by what they promise."""
     edge: float = 0.06

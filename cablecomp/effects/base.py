@@ -37,8 +37,9 @@ Role = Literal[
     "phase",
     "instant",
     "duration",
-    "steps",
     "curve",
+    "step",
+    "step size",
     "begin",
     "reference",
     "length",
@@ -48,9 +49,10 @@ Role = Literal[
     "bend",
 ]
 """An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s], how
-long it takes [s], in how many steps or how curved; when a slow course began [s]; the reference of what the law
-reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; a place on a drum [rad]; by how
-much another channel turns the joint; how much what is read grows with itself; any other shape."""
+long it takes [s], how curved, when a further step comes [s] and how large it is; when a slow course began [s]; the
+reference of what the law reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; a place
+on a drum [rad]; by how much another channel turns the joint; how much what is read grows with itself; any other
+shape."""
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,18 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension, term, wrap_deflection
-from cablecomp.effects.course import COURSE, CURVE, DURATION, STEPS, course, gone
+from cablecomp.effects.course import COURSE, CURVE, DURATION, LENGTHS, STEPS, course, gone
 from cablecomp.errors import InputError
 from cablecomp.mechanics.change import Term
 
 
-@term(parameters=("slip", "instant", "duration", "steps", "curve", "taken_up"))
+@term(parameters=("slip", "instant", "duration", "curve", "taken_up", *LENGTHS))
 def _slip(c: Any, p: Any, s: Any) -> None:
-    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s], in how many
-    steps, how curved, share that the other takes up."""
+    """p: length let go [m] (below 0: by cable l), instant [s], how long it takes [s], how curved, share that the
+    other takes up, when further steps come [s], how large they are."""
     since = c.time - p.instant
     if since >= 0.0:
-        done = gone(since, p.duration, p.steps, p.curve)
+        done = gone(since, p.duration, p.curve, p.after, p.size)
         if p.slip > 0.0:
             c.length_h -= p.slip * done
             c.length_l += p.slip * done * p.taken_up
@@ -144,8 +144,8 @@ EFFECT = Effect(
             of="slip_m",
         ),
         replace(DURATION, of="slip_m"),
-        replace(STEPS, of="slip_m"),
         replace(CURVE, of="slip_m"),
+        *(replace(p, of="slip_m") for p in STEPS),
         Parameter(
             "taken_up",
             "-",

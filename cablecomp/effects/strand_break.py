@@ -7,16 +7,16 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, term
-from cablecomp.effects.course import COURSE, CURVE, DURATION, STEPS, course, gone
+from cablecomp.effects.course import COURSE, CURVE, DURATION, LENGTHS, STEPS, course, gone
 
 
-@term(parameters=("fraction", "instant", "duration", "steps", "curve"))
+@term(parameters=("fraction", "instant", "duration", "curve", *LENGTHS))
 def _break(c: Any, p: Any, s: Any) -> None:
-    """p: share of EA lost (below 0: by cable l), instant [s], how long it takes [s], in how many
-    steps, how curved."""
+    """p: share of EA lost (below 0: by cable l), instant [s], how long it takes [s], how curved,
+    when further steps come [s], how large they are."""
     since = c.time - p.instant
     if since >= 0.0:
-        done = gone(since, p.duration, p.steps, p.curve)
+        done = gone(since, p.duration, p.curve, p.after, p.size)
         if p.fraction > 0.0:
             c.stiffness_h *= 1.0 - p.fraction * done
         else:
@@ -48,8 +48,8 @@ EFFECT = Effect(
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
         DURATION,
-        STEPS,
         CURVE,
+        *STEPS,
     ),
     acts_through=("time", "load"),
     bounded=True,

@@ -35,21 +35,14 @@ def fitted(parameters: tuple[Parameter, ...], J: Any) -> Any:
     return Fit(problem, np.array([1.0, *(p.start for p in parameters[1:])]), np.zeros(0), J)
 
 
-def slip(size_sd: float, instant_sd: float) -> tuple[Any, Any]:
+def slip(size_sd: float, instant_sd: float) -> tuple[Any, Hypothesis]:
     """A fit that holds a slip of 0.1 mm, with these deviations (by the likelihood) of its size, in units of it, and of
     its instant [s]; and the hypothesis."""
     size = Parameter("effect.clamp_slip.slip_m", 0.0, -1.0, 1.0, False, SLIP_M)
     when = Parameter("effect.clamp_slip.time_s", 40.0, 40.0 - REACH_S / 2, 40.0 + REACH_S / 2, False)
     fit = fitted((size, when), np.diag([1.0 / size_sd, 1.0 / instant_sd if instant_sd < REACH_S else 0.0]))
     effect = catalogue()["clamp_slip"]
-    term = SimpleNamespace(
-        has_instant=True,
-        effect=effect,
-        instant="time_s",
-        duration="duration_s",
-        amount=effect.parameter("slip_m"),
-        key=lambda k: f"effect.clamp_slip.{k}",
-    )
+    term = Hypothesis(effect, effect.id, effect.parameter("slip_m"), (), two_sided=True)
     return fit, term
 
 
@@ -105,7 +98,6 @@ def test_a_share_that_trades_with_a_slips_size_is_not_held_against_it() -> None:
 
 
 def test_what_is_no_event_has_nothing_to_place() -> None:
-    fit, term = slip(0.5, REACH_S)
-    term.has_instant = False
-    plain: Hypothesis = term
-    assert untold(fit, plain, 0.0) == ""
+    fit, _ = slip(0.5, REACH_S)
+    effect = catalogue()["thermal_pretension"]
+    assert untold(fit, Hypothesis(effect, effect.id, effect.parameters[0], (), two_sided=True), 0.0) == ""

@@ -14,15 +14,18 @@ from numpy.typing import NDArray
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.effects import Change, Effect, Parameter, catalogue, register, with_effects
 from cablecomp.effects.base import CompiledTerm
+from cablecomp.effects.course import FURTHER
 from cablecomp.observer import Observer
 
 Floats = NDArray[np.float64]
 Columns = dict[str, Floats]
 CONFIGS = Path(__file__).parents[2] / "configs" / "joints"
 
-IN_TWO_SECONDS = {"time_s": 0.7, "duration_s": 0.4, "steps": 3.0, "began_s": -1.0, "lag_s": 0.3}
-"""Times at which something happens while the excitation lasts, in how many steps."""
-OTHER_LAW = {"closes_Nm": 0.0, "preload_Nm": 0.0}
+IN_TWO_SECONDS = {"time_s": 0.7, "began_s": -1.0, "lag_s": 0.3} | {
+    f"{step}_after_s": 0.2 * k for k, step in enumerate(FURTHER, start=1)
+}
+"""Times at which something happens while the excitation lasts."""
+OTHER_LAW = {"closes_Nm": 0.0, "preload_Nm": 0.0, "duration_s": 0.0, "curve": 1.0}
 """Values of a law that an effect may have in the place of another of its own."""
 
 

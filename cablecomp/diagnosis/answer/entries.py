@@ -65,11 +65,11 @@ def named_of(w: Weighed, final: Model) -> Named:
 
 
 def _chosen(h: Hypothesis, fit: Fit) -> dict[str, Value]:
-    """In how many steps an event goes, or how curved, where it does: numbers that were chosen, not fitted."""
+    """When further steps of an event come, or how curved it goes, where it does: chosen, not fitted."""
     if not h.has_instant:
         return {}
-    chosen = {k: v for k, v in h.course(course_of(fit, h)).items() if k not in (h.instant, h.duration)}
-    return {name: Value(h.key(name), value, 0.0) for name, value in chosen.items()}
+    course = h.course(course_of(fit, h))
+    return {k: Value(h.key(k), v, 0.0) for k, v in course.items() if h.effect.parameter(k).held}
 
 
 def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:

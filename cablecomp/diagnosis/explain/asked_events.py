@@ -8,10 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.courses import Course, before_all, from_each, instants_of, likely
+from cablecomp.diagnosis.explain.courses import (
+    Course,
+    before_all,
+    course_in,
+    from_each,
+    in_steps,
+    instants_of,
+    likely,
+    moved_closer,
+)
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
 from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.signal.smoothing import FloatArray
 
 
 def best_event(here: Anchor, h: Hypothesis) -> Best | None:
@@ -46,38 +56,19 @@ def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     for s in sizes:
         for c in _likely(here, h, values, s):
             start = Start({**values, h.amount.name: s, **h.course(c)})
-            answer, kind = best_start(here, replace(h, starts=(start,))), _kind(h, c)
+            answer, kind = best_start(here, replace(h, starts=(start,))), _kind(c)
             if answer is not None and (kind not in found or answer[0] < found[kind][0]):
                 found[kind] = answer
     evenly, curved, stepped = (found.get(kind) for kind in ("", "curve", "steps"))
-    if stepped is not None:
-        stepped = _stepped(here, h, stepped)
-        if stepped[0] < LIMITS.stepped * min(best[0], best[0] if evenly is None else evenly[0]):
-            return stepped
-    return curved if curved and (evenly is None or curved[0] < LIMITS.shaped * evenly[0]) else evenly
+    smooth = curved if curved and (evenly is None or curved[0] < LIMITS.shaped * evenly[0]) else evenly
+    if stepped and stepped[0] < LIMITS.stepped * min(best[0], best[0] if smooth is None else smooth[0]):
+        return stepped
+    return smooth
 
 
-def _kind(h: Hypothesis, c: Course) -> str:
-    """What of a course the event can have: "steps", a "curve", "" where it goes evenly."""
-    shape = h.course(c).keys() - {h.instant, h.duration}
-    return next((p.role for p in h.effect.parameters if p.name in shape), "")
-
-
-def _stepped(here: Anchor, h: Hypothesis, best: Best) -> Best:
-    """An event in steps with these where they are best: between two rows no derivative tells where one is."""
-    width = 0.08 * float(best[1][h.duration])
-    for _ in range(4):
-        begins, lasts = float(best[1][h.instant]), float(best[1][h.duration])
-        moved = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1))
-        near = tuple(
-            Start({**best[1], h.instant: begins + a * width, h.duration: lasts + b * width}) for a, b in moved
-        )
-        closer = best_start(here, replace(h, starts=near))
-        if closer is not None and closer[0] < best[0]:
-            best = closer
-        else:
-            width *= 0.4
-    return best
+def _kind(c: Course) -> str:
+    """What of a course the event has: "steps", a "curve", "" where it goes evenly."""
+    return "steps" if c.steps else "curve" if c.curve != 1.0 else ""
 
 
 def _likely(here: Anchor, h: Hypothesis, values: Mapping[str, float | str], size: float) -> list[Course]:
@@ -86,10 +77,23 @@ def _likely(here: Anchor, h: Hypothesis, values: Mapping[str, float | str], size
     over = here.with_event(h, {**values, h.amount.name: size, h.instant: before_all(problem)})
     if over is None:
         return []
+    left = here.beyond(here.fit.residual)
+
+    def products(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rows = from_each(problem, over, here.misfits, at)
+        beyond = here.beyond(np.concatenate([rows, np.zeros((len(problem.parameters), len(at)))]))
+        return beyond.T @ beyond, beyond.T @ left
+
     instants = instants_of(problem, LIMITS.course_instants)
-    rows = from_each(problem, over, here.misfits, instants)
-    beyond = here.beyond(np.concatenate([rows, np.zeros((len(problem.parameters), len(instants)))]))
-    return likely(instants, beyond.T @ beyond, beyond.T @ here.beyond(here.fit.residual))[: LIMITS.courses]
+    gram, along = products(instants)
+    found = likely(instants, gram, along)[: LIMITS.courses]
+    steps = in_steps(gram, along, float(left @ left)) if h.goes_in_steps else None
+    if steps is not None:
+        wide = float(np.median(np.diff(instants)))
+        near = np.unique(np.add.outer(instants[list(steps.at)], wide * np.linspace(-1.0, 1.0, 11)))
+        places = tuple(np.searchsorted(near, instants[list(steps.at)]).tolist())
+        found.append(course_in(moved_closer(*products(near), steps._replace(at=places)), near))
+    return found
 
 
 def _turned(h: Hypothesis, t: float) -> Start:

@@ -16,35 +16,46 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.course import FURTHER
 from cablecomp.estimation.problem import Misfits, Problem
 from cablecomp.signal.smoothing import FloatArray
 
-EVENLY: Final = 0
-"""Number of steps of a course that has none."""
+ALIKE: Final = 1e-4
+"""Share of a column that others beside cannot do, below which they are the same step."""
+MOST_MOVES: Final = 6
+"""Rounds in which steps are moved, one after another; few are needed."""
 
 
 class Course(NamedTuple):
-    """How an event goes: from when [s], how long [s] (0: at once), in how many equal steps (0: none), and how curved
-    (1: evenly)."""
+    """How an event goes: from when [s], how long [s] (0: at once) and how curved (1: evenly); or in steps, each further
+    one so long after the first [s] and so many times as large."""
 
     instant_s: float
     duration_s: float
-    steps: int
     curve: float = 1.0
+    steps: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def lasts_s(self) -> float:
+        """From its first to its last [s]."""
+        return self.steps[-1][0] if self.steps else self.duration_s
 
 
 def how_far(course: Course, time_s: FloatArray) -> FloatArray:
     """g, how far an event has gone at these times, 0..1."""
-    since_s, of_it = time_s - course.instant_s, (course.duration_s, course.steps, course.curve)
-    return _gone(since_s, *(np.array(value) for value in of_it))
+    since_s = time_s - course.instant_s
+    if not course.steps:
+        return _gone(since_s, np.array(course.duration_s), np.array(course.curve))
+    steps = ((0.0, 1.0), *course.steps)
+    gone = np.array([size * (since_s >= after) for after, size in steps])
+    return np.asarray(np.sum(gone, axis=0) / sum(size for _, size in steps), dtype=np.float64)
 
 
-def _gone(since_s: FloatArray, duration_s: FloatArray, steps: FloatArray, curve: FloatArray) -> FloatArray:
+def _gone(since_s: FloatArray, duration_s: FloatArray, curve: FloatArray) -> FloatArray:
     """How far events have gone so long after their instants."""
     share = np.where(duration_s > 0.0, np.clip(since_s / np.maximum(duration_s, 1e-300), 0.0, 1.0), 1.0)
-    share = share**curve
-    stepped = (1.0 + np.floor((steps - 1) * share)) / np.maximum(steps, 1)
-    return np.where(since_s >= 0.0, np.where(steps == EVENLY, share, stepped), 0.0)
+    share = np.where(curve >= 1.0, share**curve, 1.0 - (1.0 - share) ** (1.0 / curve))
+    return np.where(since_s >= 0.0, share, 0.0)
 
 
 def before_all(problem: Problem) -> float:
@@ -72,19 +83,100 @@ def from_each(problem: Problem, over: Misfits, none: Misfits, instants: FloatArr
 
 
 def likely(instants: FloatArray, gram: FloatArray, along: FloatArray) -> list[Course]:
-    """The course that takes off most of what is left, of each number of steps, best first: evenly for a while, ever
-    more slowly or quickly, or in equal steps.
+    """The course that takes off most of what is left, of each curve, best first: evenly for a while, or ever more
+    slowly or quickly.
 
     `gram` (k, k), `along` (k,): inner products of the columns of `from_each` with one another and with what is left.
     """
     courses, rises = _courses(tuple(instants.tolist()))
     taken = _taken(rises, gram, along)
-    best: dict[tuple[int, float], Course] = {}
+    best: dict[float, Course] = {}
     for k in np.argsort(-taken):
         if taken[k] > 0.0:
-            best.setdefault(courses[k][2:], courses[k])
+            best.setdefault(courses[k].curve, courses[k])
     closer = [_closer(instants, gram, along, c) for c in best.values()]
     return [c for _, c in sorted(closer, key=lambda found: -found[0])]
+
+
+class Steps(NamedTuple):
+    """Steps of an event among some instants: their places, their sizes, what they take off the square."""
+
+    at: tuple[int, ...]
+    sizes: FloatArray
+    taken: float
+
+
+def in_steps(gram: FloatArray, along: FloatArray, square: float) -> Steps | None:
+    """The fewest steps, two to four, of one sign, that leave not much more than one more would; None where no two do.
+
+    `gram`, `along` as of `likely`, `square` of what is left. The best two of all, then one at a time, each moved to its
+    best place beside the others.
+    """
+    best = _best_two(gram, along)
+    while best is not None and len(best.at) <= len(FURTHER):
+        further = _one_more(gram, along, best)
+        if further is None or not _worth(further, best, square):
+            break
+        best = further
+    return best
+
+
+def _worth(further: Steps, steps: Steps, square: float) -> bool:
+    """Whether a step more takes off enough of what these leave of a square, and beside what they take off."""
+    least = LIMITS.least_step * steps.taken
+    gone = further.taken - steps.taken
+    return gone > max(least, (1.0 - LIMITS.another_step) * (square - steps.taken))
+
+
+def moved_closer(gram: FloatArray, along: FloatArray, steps: Steps) -> Steps:
+    """The same steps, each where it takes off most beside the others, until none moves."""
+    for _ in range(MOST_MOVES):
+        before = steps
+        for k in range(len(steps.at)):
+            others = steps.at[:k] + steps.at[k + 1 :]
+            moved = _added(gram, along, others)
+            if moved is not None and moved.taken > steps.taken:
+                steps = moved
+        if steps is before:
+            break
+    return steps
+
+
+def _best_two(gram: FloatArray, along: FloatArray) -> Steps | None:
+    found = [s for k in range(len(along)) if (s := _added(gram, along, (k,))) is not None]
+    return max(found, key=lambda s: s.taken, default=None)
+
+
+def _one_more(gram: FloatArray, along: FloatArray, steps: Steps) -> Steps | None:
+    added = _added(gram, along, steps.at)
+    return None if added is None else moved_closer(gram, along, added)
+
+
+def _added(gram: FloatArray, along: FloatArray, others: tuple[int, ...]) -> Steps | None:
+    """These steps and the one beside them that takes off most, all of the sign asked for; None where there is none."""
+    o = list(others)
+    # what the others cannot do of each column, and of what is left
+    bound = gram[np.ix_(o, o)] + 1e-9 * np.diag(gram[o, o])
+    per = np.linalg.lstsq(bound, np.column_stack((gram[o], along[o])))[0]
+    own = np.diag(gram) - np.einsum("ok,ok->k", gram[o], per[:, :-1])
+    free = along - gram[o].T @ per[:, -1]
+    size = np.where(own > ALIKE * np.diag(gram), free / np.maximum(own, 1e-300), 0.0)
+    rest = per[:, -1:] - per[:, :-1] * size
+    taken = along[o] @ rest + along * size
+    able = (size > 0.0) & np.all(rest > 0.0, axis=0)
+    if not able.any():
+        return None
+    k = int(np.argmax(np.where(able, taken, -np.inf)))
+    order = np.argsort([*o, k])
+    places, sizes = np.array([*o, k])[order], np.append(rest[:, k], size[k])[order]
+    return Steps(tuple(places.tolist()), sizes, float(taken[k]))
+
+
+def course_in(steps: Steps, instants: FloatArray) -> Course:
+    """The course that these steps at these instants make."""
+    first, *further = instants[list(steps.at)].tolist()
+    sizes = (steps.sizes[1:] / steps.sizes[0]).tolist()
+    return Course(first, 0.0, 1.0, tuple((t - first, size) for t, size in zip(further, sizes, strict=True)))
 
 
 def _taken(rises: FloatArray, gram: FloatArray, along: FloatArray) -> FloatArray:
@@ -119,24 +211,24 @@ def _courses(instants: tuple[float, ...]) -> tuple[list[Course], FloatArray]:
     found = []
     for duration in np.geomspace(LIMITS.briefest, 1.0, LIMITS.durations) * (last - first):
         starts = np.arange(first, last, max(0.1 * duration, (last - first) / len(instants)))
-        shapes = [(EVENLY, c) for c in (1.0, *LIMITS.curved)] + [(n, 1.0) for n in LIMITS.in_steps]
-        for start, shape in itertools.product(starts.tolist(), shapes):
-            found.append(Course(start, float(duration), *shape))
+        for start, curve in itertools.product(starts.tolist(), (1.0, *LIMITS.curved)):
+            found.append(Course(start, float(duration), curve))
     at = np.array(instants)
     found = [c for c in found if _inside(at, c)]
     return found, _rises(at, found)
 
 
 def _inside(instants: FloatArray, c: Course) -> bool:
-    """Whether the first step, and the last, has a before and an after; what goes evenly may go on."""
-    last = c.instant_s + (c.duration_s if c.steps else 0.0)
-    return bool(instants[0] <= c.instant_s and last <= instants[-1])
+    """Whether its beginning has a before and an after; it may go on."""
+    return bool(instants[0] <= c.instant_s <= instants[-1])
 
 
 def _rises(instants: FloatArray, courses: Sequence[Course]) -> FloatArray:
     """How far each course rises about each of the instants."""
-    begins, lasts, steps, curve = (np.array(values)[:, None] for values in zip(*courses, strict=True))
-    return np.asarray(np.diff(_gone(_between(instants) - begins, lasts, steps, curve)), dtype=np.float64)
+    begins, lasts, curve = (
+        np.array(values)[:, None] for values in zip(*(c[:3] for c in courses), strict=True)
+    )
+    return np.asarray(np.diff(_gone(_between(instants) - begins, lasts, curve)), dtype=np.float64)
 
 
 def _between(instants: FloatArray) -> FloatArray:

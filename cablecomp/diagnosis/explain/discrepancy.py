@@ -16,7 +16,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_of
 from cablecomp.diagnosis.explain.events import course_of
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import COURSE, Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
 from cablecomp.diagnosis.folds import Groups
@@ -46,7 +46,7 @@ def left_out_with_discrepancy(
     columns = [
         fit.J[:n, k]
         for k, p in enumerate(fit.problem.parameters)
-        if _law_of(p.name) in laws and role_of(p.base) not in ("instant", "duration")
+        if _law_of(p.name) in laws and role_of(p.base) not in ("instant", *COURSE)
     ]
     forms = _forms(fit.problem) if columns else []
     free = [(c * f, LIMITS.form) for c in columns for f in forms]
@@ -71,7 +71,7 @@ def _courses(fit: Fit, event: Hypothesis) -> list[FloatArray]:
     for k, p in enumerate(problem.parameters):
         if p.name == event.key(event.instant):
             # beyond how far a fit moves it, and before it has gone on for as long as it takes
-            over[k] = (before_all(problem) - course_of(fit, event).duration_s) / p.scale
+            over[k] = (before_all(problem) - course_of(fit, event).lasts_s) / p.scale
         elif p.name == event.key(event.amount.name):
             none[k] = p.x(event.amount.neutral)
     try:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.courses import EVENLY, Course
+from cablecomp.diagnosis.explain.courses import Course
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.plausible import amount_of
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -16,15 +16,8 @@ from cablecomp.estimation.least_squares import Fit, covariance
 def course_of(fit: Fit, term: Hypothesis) -> Course:
     """How an event goes in a fit."""
     entry = next((e for e in fit.problem.config.effect if e.id == term.effect.id), None)
-    given = {} if entry is None else entry.parameters
-    steps, curve = term.effect.of_role("steps"), term.effect.of_role("curve")
-    values = fit.values
-    return Course(
-        values[term.key(term.instant)],
-        values.get(term.key(term.duration), 0.0),
-        EVENLY if steps is None else int(given.get(steps.name, EVENLY)),
-        1.0 if curve is None else float(given.get(curve.name, 1.0)),
-    )
+    given = {} if entry is None else {term.key(k): v for k, v in entry.parameters.items()}
+    return term.course_by({k: float(v) for k, v in {**given, **fit.values}.items() if not isinstance(v, str)})
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:

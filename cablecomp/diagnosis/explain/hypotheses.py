@@ -6,17 +6,21 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
-from cablecomp.diagnosis.explain.courses import EVENLY, Course
+from cablecomp.diagnosis.explain.courses import Course
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.effects.base import Role
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
+
+COURSE: Final = ("duration", "curve", "step", "step size")
+"""Roles of what tells an event's course beside its instant."""
 
 
 @dataclass(frozen=True)
@@ -84,13 +88,39 @@ class Hypothesis:
 
     def course(self, c: Course) -> dict[str, float]:
         """The values of an event that goes like this."""
-        found = {self.instant: c.instant_s, self.duration: c.duration_s}
-        steps, curve = self.effect.of_role("steps"), self.effect.of_role("curve")
-        if steps is not None and c.steps != EVENLY:
-            found[steps.name] = float(c.steps)
+        found = {self.instant: c.instant_s}
+        for (after, size), (after_s, of_it) in zip(self._further_steps, c.steps, strict=False):
+            found |= {after: after_s, size: of_it}
+        if not c.steps and self.duration:
+            found[self.duration] = c.duration_s
+        curve = self.effect.of_role("curve")
         if curve is not None and c.curve != curve.neutral:
             found[curve.name] = c.curve
         return found
+
+    def course_by(self, values: Mapping[str, float]) -> Course:
+        """How an event of these values, by their full names, goes."""
+        steps = (
+            (values.get(self.key(a), math.nan), values.get(self.key(w), 1.0)) for a, w in self._further_steps
+        )
+        curve = self.effect.of_role("curve")
+        return Course(
+            values[self.key(self.instant)],
+            values.get(self.key(self.duration), 0.0),
+            1.0 if curve is None else values.get(self.key(curve.name), curve.neutral),
+            tuple((a, w) for a, w in steps if not math.isnan(a)),
+        )
+
+    @property
+    def goes_in_steps(self) -> bool:
+        """Whether it is an event whose law knows further steps."""
+        return bool(self._further_steps)
+
+    @property
+    def _further_steps(self) -> list[tuple[str, str]]:
+        """The names of when each further step comes, and of how large it is."""
+        of = {r: [p.name for p in self.effect.parameters if p.role == r] for r in ("step", "step size")}
+        return list(zip(of["step"], of["step size"], strict=True))
 
     def _of_role(self, role: Role) -> str:
         """The name of the parameter of that role that goes with the amount; "" where there is none."""
@@ -166,7 +196,7 @@ def _by_amount(
     asked_together = {name for values in effect.tries for name in values}
     together = {p.name for p in own if p.omitted is not None and p.name in asked_together}
     # of an event, asked for by itself; of a channel that is not read
-    aside = ("duration", "steps", "curve", *(() if channel else ("tilt",)))
+    aside = (*COURSE, *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
     shaped = {p.of for p in effect.parameters if not p.tries and p.name not in asked_together}
