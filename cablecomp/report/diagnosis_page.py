@@ -115,6 +115,8 @@ def _parameter(effect: Effect, name: str, entry: Any) -> tuple[str, str, str, st
     value, sd = known(entry["value"]), known(entry["sd"])
     ends = entry.get("interval_95")
     known_as = next((p for p in effect.parameters if p.name == name), None)
+    if known_as is not None and known_as.held:
+        return name, with_sd(value, sd), known_as.unit, "chosen, not fitted"
     if known_as is None:
         return name, with_sd(value, sd), "", between(*ends) if ends else interval(value, sd)
     least = 0.0 if known_as.low >= 0.0 else known_as.minimum
