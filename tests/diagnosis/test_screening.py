@@ -10,7 +10,7 @@ from small_drive import TOLERANT, calibrated, recorded
 
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
-from cablecomp.diagnosis.explain.hypotheses import COURSE, hypotheses
+from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.screening import ask
 from firmware_sim.plant import EffectSpec
@@ -87,7 +87,7 @@ def test_an_event_of_a_law_that_knows_no_duration_is_asked_at_once_alone() -> No
     """A user's own event may have an instant and nothing of a course."""
     body, drive = calibrated(recorded([EffectSpec("clamp_slip", {"slip_m": 1e-4, "time_s": EVENT_S})], 20.0))
     (slip,) = (h for h in hypotheses(TOLERANT, body.used) if h.name == "clamp_slip")
-    kept = tuple(p for p in slip.effect.parameters if p.role not in COURSE)
+    kept = tuple(p for p in slip.effect.parameters if p.role not in OF_COURSE)
     sudden = replace(slip, effect=replace(slip.effect, parameters=kept))
     assert sudden.duration == ""
     answer = ask(anchor(drive.fit), sudden)

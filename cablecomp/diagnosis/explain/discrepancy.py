@@ -16,7 +16,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_of
 from cablecomp.diagnosis.explain.events import course_of
-from cablecomp.diagnosis.explain.hypotheses import COURSE, Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
 from cablecomp.diagnosis.folds import Groups
@@ -46,7 +46,7 @@ def left_out_with_discrepancy(
     columns = [
         fit.J[:n, k]
         for k, p in enumerate(fit.problem.parameters)
-        if _law_of(p.name) in laws and role_of(p.base) not in ("instant", *COURSE)
+        if _law_of(p.name) in laws and role_of(p.base) not in ("instant", *OF_COURSE)
     ]
     forms = _forms(fit.problem) if columns else []
     free = [(c * f, LIMITS.form) for c in columns for f in forms]

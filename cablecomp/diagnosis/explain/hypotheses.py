@@ -19,7 +19,7 @@ from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
 
-COURSE: Final = ("duration", "curve", "step", "step size")
+OF_COURSE: Final = ("duration", "curve", "step", "step size")
 """Roles of what tells an event's course beside its instant."""
 
 
@@ -196,7 +196,7 @@ def _by_amount(
     asked_together = {name for values in effect.tries for name in values}
     together = {p.name for p in own if p.omitted is not None and p.name in asked_together}
     # of an event, asked for by itself; of a channel that is not read
-    aside = (*COURSE, *(() if channel else ("tilt",)))
+    aside = (*OF_COURSE, *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
     shaped = {p.of for p in effect.parameters if not p.tries and p.name not in asked_together}
