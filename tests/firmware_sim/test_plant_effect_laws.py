@@ -12,11 +12,6 @@ from plant_joints import clock, course, joint
 from firmware_sim.plant import EffectSpec, PlantConfig, PlantRun, simulate
 
 
-@pytest.fixture(scope="module")
-def plain() -> PlantRun:
-    return play(None)
-
-
 def test_effects_on_the_channels_follow_their_equations(plain: PlantRun) -> None:
     path = plain.load_path_Nm
     cases = {

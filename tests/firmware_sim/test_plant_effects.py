@@ -109,11 +109,6 @@ SIZES = {
 }
 
 
-@pytest.fixture(scope="module")
-def plain() -> PlantRun:
-    return play(None)
-
-
 def test_the_whole_catalogue_is_there_and_at_least_eight_effects_that_are_not_in_it() -> None:
     assert set(LISTED) == CATALOGUE
     assert len(UNLISTED) >= 8

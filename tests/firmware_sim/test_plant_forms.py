@@ -96,11 +96,6 @@ SIZES = {
 }
 
 
-@pytest.fixture(scope="module")
-def plain() -> PlantRun:
-    return play(None)
-
-
 def test_every_effect_of_the_catalogue_has_two_further_forms_at_least() -> None:
     assert set(SIZES) == set(FORMS)
     for effect in LISTED:

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from plant_effect_course import play
 from plant_joints import clock, joint
 
 from firmware_sim.plant import EffectSpec, PlantRun, simulate
-
-
-@pytest.fixture(scope="module")
-def plain() -> PlantRun:
-    return play(None)
 
 
 def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:

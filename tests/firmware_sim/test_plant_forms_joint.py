@@ -12,11 +12,6 @@ from plant_joints import clock, course, joint
 from firmware_sim.plant import EffectSpec, PlantRun, simulate
 
 
-@pytest.fixture(scope="module")
-def plain() -> PlantRun:
-    return play(None)
-
-
 def _carried(run: PlantRun) -> np.ndarray:
     """What the cables carry, N·m."""
     return np.asarray(joint().stages[0].output_radius_m * (run.tension_h_N - run.tension_l_N))
