@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
-from cablecomp.diagnosis.explain.courses import Course, course_in, how_far, in_steps, instants_of, likely
+from cablecomp.diagnosis.explain.courses import Course, how_far, instants_of, likely
 from cablecomp.diagnosis.explain.discrepancy import _courses
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.screening import ask, rough
+from cablecomp.diagnosis.explain.steps import course_in, in_steps
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit
@@ -112,15 +113,19 @@ def test_what_an_event_does_is_known_from_before_the_first_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effect", "amount", "size", "late_s"),
-    [("clamp_slip", "slip_m", 1e-4, 0.3), ("strand_break", "fraction", 0.08, 2.2)],
+    ("effect", "amount", "size", "growth", "wait"),
+    [
+        ("clamp_slip", "slip_m", 1e-4, 1.0, 1.0),
+        ("strand_break", "fraction", 0.3, 1.0, 1.0),
+        ("clamp_slip", "slip_m", 1e-4, 1.3, 0.5),
+    ],
 )
 def test_an_event_in_steps_is_promised_with_them(
-    effect: str, amount: str, size: float, late_s: float
+    effect: str, amount: str, size: float, growth: float, wait: float
 ) -> None:
-    """The plant's clamp lets go three times (its wires break so), each time more than before and after half the wait:
-    each event as the other's explains far less. A cable that grows softer shows it when the load moves on."""
-    course = {"time_s": 12.0, "duration_s": 16.0, "steps": 3.0, "growth": 1.3, "wait": 0.5}
+    """The plant's clamp lets go three times (its wires break so), each time `growth` times as much as before, after
+    `wait` times as long: each event as the other's explains far less."""
+    course = {"time_s": 12.0, "duration_s": 16.0, "steps": 3.0, "growth": growth, "wait": wait}
     body, drive = calibrated(
         recorded([EffectSpec(f"{effect}:unequal_steps", {amount: size, **course})], 45.0)
     )
@@ -133,15 +138,15 @@ def test_an_event_in_steps_is_promised_with_them(
     right = promised.pop(effect)
     values = right.problem.config.effect[-1].parameters
     assert values["time_s"] == pytest.approx(12.0, abs=0.3)
-    assert values["second_after_s"] == pytest.approx(16.0 * 2.0 / 3.0, abs=late_s)
-    assert values["third_after_s"] == pytest.approx(16.0, abs=late_s)
+    assert values["second_after_s"] == pytest.approx(16.0 / (1.0 + wait), abs=0.3)
+    assert values["third_after_s"] == pytest.approx(16.0, abs=0.6)
     assert "fourth_after_s" not in values
     assert right.plain is not None
-    assert right.cost < 0.15 * right.plain.cost
+    assert right.cost < 0.1 * right.plain.cost
     (fit,) = rough([right], LIMITS.settled)
     assert abs(fit.values[f"effect.{effect}.{amount}"]) == pytest.approx(size, rel=0.03)
-    # 1.3 and 1.69 times the first
-    assert 1.0 < fit.values[f"effect.{effect}.second_size"] < fit.values[f"effect.{effect}.third_size"] < 2.0
+    for step, times in (("second", growth), ("third", growth**2)):
+        assert fit.values[f"effect.{effect}.{step}_size"] == pytest.approx(times, rel=0.25)
     (wrong,) = promised.values()
     assert right.cost < 0.5 * wrong.cost
 

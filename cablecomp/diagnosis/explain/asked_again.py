@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.events import values_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.linear import anchor, best_start
 from cablecomp.diagnosis.explain.model import Model, placed, stripped
@@ -36,15 +37,14 @@ def _in_another_course(fit: Fit, term: Hypothesis) -> Fit | None:
     """The fit with the event in the best of its likely courses; None where that is no better."""
     problem = stripped(fit.problem, term)
     J = derivative_of_rest(fit, problem)
-    entry = next((e for e in fit.problem.config.effect if e.id == term.effect.id), None)
-    if J is None or entry is None:
+    if J is None:
         return None
     x = placed(fit, problem)
     residual = problem.followed(x)
     if residual is None:
         return None
     here = anchor(Fit(problem, x, residual, J))
-    values = {k: fit.values.get(term.key(k), v) for k, v in entry.parameters.items()}
+    values = values_of(fit, term)
     now = best_start(here, replace(term, starts=(Start(values),)), float(values[term.amount.name]))
     other = None if now is None else in_another_course(here, term, now)
     if other is None:

@@ -13,11 +13,17 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit, covariance
 
 
+def values_of(fit: Fit, term: Hypothesis) -> dict[str, float | str]:
+    """The values of an effect in a fit, those that were chosen among them."""
+    entry = next((e for e in fit.problem.config.effect if e.id == term.effect.id), None)
+    given = {} if entry is None else dict(entry.parameters)
+    names = (p.name for p in term.effect.parameters)
+    return given | {n: fit.values[term.key(n)] for n in names if term.key(n) in fit.values}
+
+
 def course_of(fit: Fit, term: Hypothesis) -> Course:
     """How an event goes in a fit."""
-    entry = next((e for e in fit.problem.config.effect if e.id == term.effect.id), None)
-    given = {} if entry is None else {term.key(k): v for k, v in entry.parameters.items()}
-    return term.course_by({k: float(v) for k, v in {**given, **fit.values}.items() if not isinstance(v, str)})
+    return term.course_by(values_of(fit, term))
 
 
 def untold(fit: Fit, term: Hypothesis, removes: float) -> str:

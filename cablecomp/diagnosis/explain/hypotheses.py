@@ -98,18 +98,25 @@ class Hypothesis:
             found[curve.name] = c.curve
         return found
 
-    def course_by(self, values: Mapping[str, float]) -> Course:
-        """How an event of these values, by their full names, goes."""
-        steps = (
-            (values.get(self.key(a), math.nan), values.get(self.key(w), 1.0)) for a, w in self._further_steps
-        )
+    def course_by(self, values: Mapping[str, float | str]) -> Course:
+        """How an event of these values goes."""
+
+        def value(name: str, otherwise: float) -> float:
+            return float(values.get(name, otherwise))
+
+        steps = [(value(after, math.nan), value(size, 1.0)) for after, size in self._further_steps]
         curve = self.effect.of_role("curve")
         return Course(
-            values[self.key(self.instant)],
-            values.get(self.key(self.duration), 0.0),
-            1.0 if curve is None else values.get(self.key(curve.name), curve.neutral),
-            tuple((a, w) for a, w in steps if not math.isnan(a)),
+            float(values[self.instant]),
+            value(self.duration, 0.0),
+            1.0 if curve is None else value(curve.name, curve.neutral),
+            tuple((after, size) for after, size in steps if not math.isnan(after)),
         )
+
+    @property
+    def of_course(self) -> frozenset[str]:
+        """The names of what tells the event's course beside its instant."""
+        return frozenset(p.name for p in self.effect.parameters if p.role in OF_COURSE)
 
     @property
     def goes_in_steps(self) -> bool:

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, Hypothesis, Start
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit
@@ -47,9 +47,9 @@ class Anchor:
     def with_event(self, h: Hypothesis, values: Mapping[str, float | str]) -> Misfits | None:
         """What it leaves with an event beside it; None where it cannot be followed so. A recording that ended before
         is as it was; in one that begins when all is over it is the same whenever and however that came."""
-        course = h.course_by({h.key(k): v for k, v in values.items() if not isinstance(v, str)})
+        course = h.course_by(values)
         begins, ends = course.instant_s, course.instant_s + course.lasts_s
-        aside = {h.instant, *(p.name for p in h.effect.parameters if p.role in OF_COURSE)}
+        aside = h.of_course | {h.instant}
         what = (h.effect.id, *sorted((k, v) for k, v in values.items() if k not in aside))
         known: dict[int, Mapping[str, FloatArray]] = {}
         after = []

@@ -15,7 +15,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.asked_events import best_course, best_event
-from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, Hypothesis, Start
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start, contribution
 from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -100,8 +100,7 @@ def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> An
 
 def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
     """What an event promises in the best of its likely courses; None where that is not enough more than `now`."""
-    of_course = {p.name for p in h.effect.parameters if p.role in OF_COURSE}
-    bare = {k: v for k, v in now[1].items() if k not in of_course}
+    bare = {k: v for k, v in now[1].items() if k not in h.of_course}
     other = best_course(here, h, (now[0], bare, *now[2:]))
     return _answer(here, h, other) if other is not None and other[0] < LIMITS.shaped * now[0] else None
 
