@@ -107,15 +107,24 @@ def gone(since_s: Any, duration_s: Any, curve: Any, after_s: Any, size: Any) -> 
 
 def course(values: Mapping[str, float], config: JointConfig) -> dict[str, float | list[float]]:
     """Instant, duration, curve and further steps as an event's term takes them; raises InputError for steps out of
-    order or of what takes its time otherwise, and for a curve of what happens at once."""
+    order, without an instant or of what takes its time otherwise, and for a curve of what happens at once."""
     after = [values[f"{step}_after_s"] for step in FURTHER]
     sizes = [values[f"{step}_size"] for step in FURTHER]
     given = [a for a in after if not math.isnan(a)]
     if any(math.isnan(a) for a in after[: len(given)]) or given != sorted(given):
-        said = ", ".join(f"{step}_after_s = {a:g}" for step, a in zip(FURTHER, after, strict=True))
+        said = ", ".join(
+            f"{k}_after_s = {a:g}" for k, a in zip(FURTHER, after, strict=True) if not math.isnan(a)
+        )
         raise InputError(
-            f"{config.name}: an event's steps come one after another, each counted from the first, "
-            f"and {said}; give them in rising order, without a gap"
+            f"{config.name}: an event's further steps come one after another, each counted from the first, and "
+            f"`effect` has {said}; give them in rising order, from `{FURTHER[0]}_after_s` on"
+        )
+    sized = zip(FURTHER, after, sizes, strict=True)
+    lone = next((k for k, a, w in sized if math.isnan(a) and w != 1.0), None)
+    if lone is not None:
+        raise InputError(
+            f"{config.name}: key `effect.{lone}_size` is given, and `effect.{lone}_after_s`, when that step comes, "
+            "is not; give it too [s], or leave the size out"
         )
     if given and (values["duration_s"] != 0.0 or values["curve"] != 1.0):
         raise InputError(

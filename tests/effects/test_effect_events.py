@@ -120,8 +120,15 @@ def test_a_slip_without_an_instant_is_refused_in_one_line() -> None:
 @pytest.mark.parametrize(
     ("after", "said"),
     [
-        ({"second_after_s": 2.0, "third_after_s": 1.0}, "give them in rising order, without a gap"),
-        ({"third_after_s": 1.0}, "give them in rising order, without a gap"),
+        (
+            {"second_after_s": 2.0, "third_after_s": 1.0},
+            "give them in rising order, from `second_after_s` on",
+        ),
+        (
+            {"third_after_s": 1.0},
+            "has third_after_s = 1; give them in rising order, from `second_after_s` on",
+        ),
+        ({"second_after_s": 1.0, "third_size": 2.0}, "`effect.third_after_s`, when that step comes, is not"),
         ({"second_after_s": 1.0, "duration_s": 2.0}, "both are given; leave one of them out"),
     ],
 )
