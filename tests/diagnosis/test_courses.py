@@ -113,18 +113,20 @@ def test_what_an_event_does_is_known_from_before_the_first_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effect", "amount", "size", "growth", "wait"),
+    ("effect", "amount", "size", "growth", "wait", "late_s", "left"),
     [
-        ("clamp_slip", "slip_m", 1e-4, 1.0, 1.0),
-        ("strand_break", "fraction", 0.3, 1.0, 1.0),
-        ("clamp_slip", "slip_m", 1e-4, 1.3, 0.5),
+        ("clamp_slip", "slip_m", 1e-4, 1.0, 1.0, 0.3, 0.1),
+        ("clamp_slip", "slip_m", 1e-4, 1.3, 0.5, 0.3, 0.1),
+        ("strand_break", "fraction", 0.08, 1.0, 1.0, 2.2, 0.15),
+        ("strand_break", "fraction", 0.08, 1.3, 0.5, 2.2, 0.15),
     ],
 )
 def test_an_event_in_steps_is_promised_with_them(
-    effect: str, amount: str, size: float, growth: float, wait: float
+    effect: str, amount: str, size: float, growth: float, wait: float, late_s: float, left: float
 ) -> None:
     """The plant's clamp lets go three times (its wires break so), each time `growth` times as much as before, after
-    `wait` times as long: each event as the other's explains far less."""
+    `wait` times as long: each event as the other's explains far less. A cable that grows softer shows it only when the
+    load moves on, so its steps are placed less closely before it is run."""
     course = {"time_s": 12.0, "duration_s": 16.0, "steps": 3.0, "growth": growth, "wait": wait}
     body, drive = calibrated(
         recorded([EffectSpec(f"{effect}:unequal_steps", {amount: size, **course})], 45.0)
@@ -138,15 +140,15 @@ def test_an_event_in_steps_is_promised_with_them(
     right = promised.pop(effect)
     values = right.problem.config.effect[-1].parameters
     assert values["time_s"] == pytest.approx(12.0, abs=0.3)
-    assert values["second_after_s"] == pytest.approx(16.0 / (1.0 + wait), abs=0.3)
-    assert values["third_after_s"] == pytest.approx(16.0, abs=0.6)
+    assert values["second_after_s"] == pytest.approx(16.0 / (1.0 + wait), abs=late_s)
+    assert values["third_after_s"] == pytest.approx(16.0, abs=late_s)
     assert "fourth_after_s" not in values
     assert right.plain is not None
-    assert right.cost < 0.1 * right.plain.cost
+    assert right.cost < left * right.plain.cost
     (fit,) = rough([right], LIMITS.settled)
     assert abs(fit.values[f"effect.{effect}.{amount}"]) == pytest.approx(size, rel=0.03)
     for step, times in (("second", growth), ("third", growth**2)):
-        assert fit.values[f"effect.{effect}.{step}_size"] == pytest.approx(times, rel=0.25)
+        assert fit.values[f"effect.{effect}.{step}_size"] == pytest.approx(times, rel=0.35)
     (wrong,) = promised.values()
     assert right.cost < 0.5 * wrong.cost
 

@@ -3,7 +3,6 @@ one that takes its time."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -54,38 +53,9 @@ def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
                 found[kind] = answer
     evenly, curved, stepped = (found.get(kind) for kind in ("", "curve", "steps"))
     smooth = curved if curved and (evenly is None or curved[0] < LIMITS.shaped * evenly[0]) else evenly
-    least = min(best[0], best[0] if smooth is None else smooth[0])
-    if stepped is not None and stepped[0] < least:
-        stepped = _stepped(here, h, stepped)
-        if stepped[0] < LIMITS.stepped * least:
-            return stepped
+    if stepped and stepped[0] < LIMITS.stepped * min(best[0], best[0] if smooth is None else smooth[0]):
+        return stepped
     return smooth
-
-
-def _stepped(here: Anchor, h: Hypothesis, best: Best) -> Best:
-    """An event in steps with each where it is best: between two rows no derivative tells where one is."""
-    width = 0.08 * h.course_by(best[1]).lasts_s
-    for _ in range(4):
-        course = h.course_by(best[1])
-        near = tuple(Start({**best[1], **h.course(c)}) for c in _moved(course, width))
-        closer = best_start(here, replace(h, starts=near))
-        if closer is not None and closer[0] < best[0]:
-            best = closer
-        else:
-            width *= 0.4
-    return best
-
-
-def _moved(course: Course, width: float) -> list[Course]:
-    """The course with one of its steps earlier or later by so much, where they stay in their order."""
-    at = [0.0, *(after for after, _ in course.steps)]
-    found = []
-    for k, way in itertools.product(range(len(at)), (width, -width)):
-        moved = [t + way * (j == k) for j, t in enumerate(at)]
-        if moved == sorted(moved):
-            steps = tuple((t - moved[0], size) for t, (_, size) in zip(moved[1:], course.steps, strict=True))
-            found.append(course._replace(instant_s=course.instant_s + moved[0], steps=steps))
-    return found
 
 
 def _kind(c: Course) -> str:
