@@ -18,6 +18,7 @@ import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
+N = TypeVar("N", int, bool)
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -66,12 +67,12 @@ def is_compiled(function: str = "step_rows") -> bool:
     return any(CACHE.rglob(f"*.{function}-*.nbi"))
 
 
-def constant(value: int) -> int:
-    """A constant that compiled functions take as they take any integer.
+def constant(value: N) -> N:
+    """A constant that compiled functions take as they take any integer, or any truth value.
 
     For a plain one numba compiles the function it is handed to, and all that this calls, once more for that very value.
     """
-    return cast(int, np.int64(value))
+    return cast(N, np.bool_(value) if isinstance(value, bool) else np.int64(value))
 
 
 def cached(decorate: Callable[[], T]) -> T:
@@ -98,9 +99,11 @@ def njit(function: F) -> F:
 def kernel(function: F) -> F:
     """As `njit`, for the mechanics: arrays are borrowed from Python, none is made or returned.
 
-    So no references need to be counted (`_nrt`); counting took longer than the mechanics itself.
+    So no references need to be counted (`_nrt`); counting took longer than the mechanics itself. What a forced inline
+    function calls is not forced inline with it, as numba has it where nothing is said (`forceinline`): law tables' code
+    was five times as large for that, and took four times as long to compile.
     """
-    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
+    compile_ = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=False, _nrt=False)
     return cached(lambda: compile_(function))
 
 
@@ -120,6 +123,7 @@ def inner_kernel(function: F) -> F:
         cache=True,
         error_model="numpy",
         nogil=True,
+        forceinline=False,
         _nrt=False,
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,

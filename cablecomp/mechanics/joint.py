@@ -10,7 +10,7 @@ import math
 
 from cablecomp.mechanics.circuit import Solved, circuit_commit, circuit_solve
 from cablecomp.mechanics.drive import Drive, Terms
-from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
+from cablecomp.mechanics.jit import constant, inlined_kernel, inner_kernel
 from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
@@ -21,6 +21,8 @@ UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
 farther off it is refused."""
 EPSILON = 2.3e-16
 """Last digit of 1."""
+AFRESH = constant(False)
+"""Nothing was solved just now that the next solution is near to."""
 
 
 @inner_kernel
@@ -91,13 +93,13 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
     x = d.context
     load = x.load
     if d.size.terms == 0:
-        solved = _solve_all(d, laws, load, False)
+        solved = _solve_all(d, laws, load, AFRESH)
     else:
         solved = Solved(x.joint, 0.0, STATUS_DIVERGED, 0.0, 0.0)
         low, high = -1e300, 1e300
         followed = False
         excess = moved = 0.0
-        again = settled = False
+        again, settled = AFRESH, False
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
