@@ -52,4 +52,9 @@ def test_diagnosis_of_100_000_samples(benchmark: BenchmarkFixture, what: str) ->
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     names = [n.effect for n in found.named]
     print(f"\n  {what}: {found.verdict} {names}, peak memory of the process {peak:.2f} GB")
-    assert names[:1] == (["routing_friction"] if what == "routing friction" else [])
+    if (
+        what == "a seal's drag, outside of the catalogue"
+    ):  # late readings do the same to the angle, and that is said
+        assert any("N m s/rad" in line for line in found.warnings)
+    else:
+        assert names[:1] == (["routing_friction"] if what == "routing friction" else [])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cablecomp.diagnosis.answer.alike import drag_alike
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, bears
@@ -72,4 +73,5 @@ def warnings_of(model: Model) -> tuple[str, ...]:
         lines.append(
             "the joint as fitted has no solution at up to twice these loads; record greater ones as well"
         )
-    return tuple(lines)
+    alike = drag_alike(model.fit)
+    return (*lines, alike) if alike else tuple(lines)
