@@ -136,7 +136,7 @@ def announce_compilation(joint: JointConfig | None = None, bounds: bool = False)
 
     if is_compiled("step_rows") and (not bounds or is_compiled("bounds_step")):
         return
-    errors().print("compiling the kernels, once for this version (a minute or so) ...", style="dim")
+    errors().print("compiling the kernels, once for this version (half a minute or so) ...", style="dim")
     if joint is not None:
         from cablecomp.observer.first_use import compile_first
 
