@@ -308,10 +308,6 @@ class Thresholds:
     exchanges: int = 2
     """Effects of the final model in whose place such another one is put, if that model then predicts better: the search
     met them with other effects beside, or fitted them worse."""
-    alike: float = 0.25
-    """Share of the square of what late readings do to the angle in which a drag differs, up to which it is said that
-    the two are hardly told apart: where half of it (RMS) is the same, a second effect, or other values, take up most of
-    the rest (the benchmark's seal is named as late readings and a bearing's friction)."""
     usual: float = 0.25
     """Mean square that an effect has to take off over that of what the joint is known to leave (`[remainder]`): half
     of it, as RMS (pieces of the jaw's `L_4`, seeds 76 to 79: what had been concealed took 0.4 and more, gravity and

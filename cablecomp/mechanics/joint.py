@@ -99,7 +99,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
         low, high = -1e300, 1e300
         followed = False
         excess = moved = 0.0
-        again, settled = AFRESH, False
+        again = settled = False
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):

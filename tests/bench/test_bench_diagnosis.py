@@ -13,12 +13,11 @@ from cablecomp.config import parse_joint
 from cablecomp.diagnosis.diagnose import diagnose
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
+SEAL = "a seal's drag, outside of the catalogue"
 CONCEALED = {
     "routing friction": EffectSpec("routing_friction", {"mu_angle": 0.3, "arc_length_m": 0.01}),
     "nothing": None,
-    "a seal's drag, outside of the catalogue": EffectSpec(
-        "joint_viscous_friction", {"coefficient_Nms_per_rad": 0.05}
-    ),
+    SEAL: EffectSpec("joint_viscous_friction", {"coefficient_Nms_per_rad": 0.05}),
 }
 
 
@@ -52,9 +51,7 @@ def test_diagnosis_of_100_000_samples(benchmark: BenchmarkFixture, what: str) ->
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     names = [n.effect for n in found.named]
     print(f"\n  {what}: {found.verdict} {names}, peak memory of the process {peak:.2f} GB")
-    if (
-        what == "a seal's drag, outside of the catalogue"
-    ):  # late readings do the same to the angle, and that is said
+    if what == SEAL:  # late readings do nearly the same to the angle: that is named, and this said beside it
         assert any("N m s/rad" in line for line in found.warnings)
     else:
         assert names[:1] == (["routing_friction"] if what == "routing friction" else [])

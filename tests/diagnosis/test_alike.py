@@ -12,6 +12,10 @@ from small_drive import calibrated, course, recorded
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.answer.alike import drag_alike
+from cablecomp.diagnosis.answer.verdict import warnings_of
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.effects import catalogue
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.signal.smoothing import FloatArray
@@ -58,3 +62,11 @@ def test_nothing_is_said_of_early_readings_or_where_the_motors_torque_tells(
     delay_s: float, motor_too: bool
 ) -> None:
     assert drag_alike(late(delay_s, motor_too)) is None
+
+
+def test_it_is_a_warning_of_a_diagnosis_that_found_the_delay() -> None:
+    fit = late(LATE_S)
+    effect = catalogue()["clock_skew"]
+    found = Hypothesis(effect, effect.id, effect.parameters[0], (), False)
+    assert drag_alike(fit) in warnings_of(Model((found,), fit, fit.residual))
+    assert warnings_of(Model((), fit, fit.residual)) == ()  # a delay that the joint is known to have

@@ -113,16 +113,12 @@ def test_what_an_event_does_is_known_from_before_the_first_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effect", "amount", "size", "growth", "wait", "late_s", "left"),
-    [
-        ("clamp_slip", "slip_m", 1e-4, 1.0, 1.0, 0.3, 0.1),
-        ("clamp_slip", "slip_m", 1e-4, 1.3, 0.5, 0.3, 0.1),
-        ("strand_break", "fraction", 0.08, 1.0, 1.0, 2.2, 0.15),
-        ("strand_break", "fraction", 0.08, 1.3, 0.5, 2.2, 0.15),
-    ],
+    ("effect", "amount", "size", "late_s", "left", "rel"),
+    [("clamp_slip", "slip_m", 1e-4, 0.3, 0.1, 0.25), ("strand_break", "fraction", 0.08, 2.2, 0.15, 0.35)],
 )
+@pytest.mark.parametrize(("growth", "wait"), [(1.0, 1.0), (1.3, 0.5)])
 def test_an_event_in_steps_is_promised_with_them(
-    effect: str, amount: str, size: float, growth: float, wait: float, late_s: float, left: float
+    effect: str, amount: str, size: float, late_s: float, left: float, rel: float, growth: float, wait: float
 ) -> None:
     """The plant's clamp lets go three times (its wires break so), each time `growth` times as much as before, after
     `wait` times as long: each event as the other's explains far less. A cable that grows softer shows it only when the
@@ -148,7 +144,7 @@ def test_an_event_in_steps_is_promised_with_them(
     (fit,) = rough([right], LIMITS.settled)
     assert abs(fit.values[f"effect.{effect}.{amount}"]) == pytest.approx(size, rel=0.03)
     for step, times in (("second", growth), ("third", growth**2)):
-        assert fit.values[f"effect.{effect}.{step}_size"] == pytest.approx(times, rel=0.35)
+        assert fit.values[f"effect.{effect}.{step}_size"] == pytest.approx(times, rel=rel)
     (wrong,) = promised.values()
     assert right.cost < 0.5 * wrong.cost
 

@@ -73,5 +73,6 @@ def warnings_of(model: Model) -> tuple[str, ...]:
         lines.append(
             "the joint as fitted has no solution at up to twice these loads; record greater ones as well"
         )
-    alike = drag_alike(model.fit)
-    return (*lines, alike) if alike else tuple(lines)
+    if any(isinstance(t, Hypothesis) and t.effect.id == "clock_skew" for t in model.terms):
+        lines += filter(None, [drag_alike(model.fit)])
+    return tuple(lines)
