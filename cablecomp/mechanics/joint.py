@@ -22,7 +22,7 @@ farther off it is refused."""
 EPSILON = 2.3e-16
 """Last digit of 1."""
 AFRESH = constant(False)
-"""Nothing was solved just now that the next solution is near to."""
+"""Nothing was solved just now that the next solution is near to (for a plain False circuits are compiled twice)."""
 
 
 @inner_kernel
@@ -99,7 +99,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
         low, high = -1e300, 1e300
         followed = False
         excess = moved = 0.0
-        again = settled = False
+        again, settled = AFRESH, False
         run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
