@@ -104,7 +104,7 @@ def _left(result: Mapping[str, Any], unit: Scale) -> str:
         return f"What remains, {size} RMS, follows nothing that was asked."
     share = 100.0 * known(remainder["share"])
     text = str(remainder["description"]).partition(";")[0]
-    return f"What remains: {size} RMS, {share:.0f} % of the calibrated drive's square; it {text}."
+    return f"What remains: {size} RMS, {share:.0f} % of the calibrated drive's square; {text}."
 
 
 def _unseen(result: Mapping[str, Any]) -> str:

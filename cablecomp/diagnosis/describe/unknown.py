@@ -224,7 +224,7 @@ def _text(
     law: SparseLaw | None,
 ) -> str:
     if memory == "undecided" and period is None and law is None and not events and parity == "undecided":
-        return f"{1e3 * rms:.3g} mrad RMS beyond the stated noise, without a pattern that could be described"
+        return "beyond the stated noise, without a pattern that could be described"
     words = [f"a structured remainder of {1e3 * rms:.3g} mrad RMS"]
     words.append(
         {
