@@ -68,7 +68,8 @@ class Parameter:
     first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, or half of
     what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course it asks by
     itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `ends_as_another`: whether, of the
-    effect's values, another effect is the better word where it ends on `high`. `of_known_drive`: beside a drive known
+    effect's values, another effect is the better word where it ends on `high`; `is_another`: wherever it ends.
+    `of_known_drive`: beside a drive known
     by order of magnitude it, and what is `of` it, are not asked for.
     """
 
@@ -90,6 +91,7 @@ class Parameter:
     tries: tuple[float, ...] = ()
     reach: float = 30.0
     ends_as_another: Callable[[Mapping[str, float]], bool] | None = None
+    is_another: Callable[[Mapping[str, float]], bool] | None = None
     of_known_drive: bool = False
 
     @property
@@ -201,6 +203,9 @@ class Effect:
     """Channels without which no recording tells it: an output that has to be measured, an input that has to change."""
     rates: bool = False
     """Its law knows rates within a stroke: a fit has to run it on every sample, not on rows thinned by travel."""
+    felt_by_motor: bool = False
+    """It turns the joint or holds it, so that the motor feels it: a load that is read at the motor holds it already, and
+    the cables' tensions do not change by it."""
     posture: bool = False
     """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
     at_pretension: Callable[[Mapping[str, float], float], Restated] | None = None

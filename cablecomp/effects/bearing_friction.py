@@ -91,6 +91,7 @@ EFFECT = Effect(
         ),
     ),
     acts_through=("reversal", "velocity", "load_direction"),
+    felt_by_motor=True,
     bounded=False,
     change=_change,
     rank=10,

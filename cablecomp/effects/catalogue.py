@@ -133,9 +133,12 @@ def _empirical(config: JointConfig) -> list[Term]:
 
 
 def _change(effect: Effect, values: Mapping[str, float], config: JointConfig) -> Change:
-    """What the effect changes; nothing at all where every value that says how much is neutral."""
+    """What the effect changes; nothing at all where every value that says how much is neutral, and where the load is
+    read at the motor, which feels the effect."""
     amounts = [p for p in effect.parameters if not p.shape]
     if amounts and all(values[p.name] == p.neutral for p in amounts):
+        return Change()
+    if effect.felt_by_motor and config.observer.load == "motor_torque":
         return Change()
     return effect.change(values, config)
 

@@ -87,6 +87,7 @@ EFFECT = Effect(
     texts=("channel",),
     texts_optional=True,
     channel_ends="_rad",  # a base is turned by an angle: what may be anything else is a neighbour's load
+    felt_by_motor=True,
     bounded=False,
     change=_change,
 )

@@ -73,6 +73,7 @@ EFFECT = Effect(
     ),
     acts_through=("acceleration",),
     rates=True,
+    felt_by_motor=True,
     bounded=False,
     change=_change,
 )

@@ -9,25 +9,34 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, input_moment, term
 
 
-@term(parameters=("torque", "presliding"), state=("z",))
+@term(parameters=("torque", "presliding", "at_joint"), state=("z",))
 def _take(c: Any, p: Any, s: Any) -> None:
-    """p: torque [N m], presliding [rad]; s: z, the elasto-plastic direction of the motor's motion."""
+    """p: torque [N m], presliding [rad], by how much more the joint would hold back where the load is read at the
+    motor, else 0; s: z, the elasto-plastic direction of the motor's motion."""
     z = 0.0 if c.first else s.z
     z = min(max(z + (c.motor - c.motor_old) / p.presliding, -1.0), 1.0)
     c.motor_moment += p.torque * z
+    c.moment -= p.at_joint * p.torque * z
     if c.commit:
         s.z = z
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_take(torque=values["torque_Nm"], presliding=values["presliding_rad"]))
+    read_there = config.observer.load == "motor_torque"
+    terms = _take(
+        torque=values["torque_Nm"],
+        presliding=values["presliding_rad"],
+        at_joint=1.0 / config.drive.ratio if read_there else 0.0,
+    )
+    return Change(terms=terms)
 
 
 EFFECT = Effect(
     id="motor_friction",
     statement="Between the motor's torque sensor and the cable, friction holds back with a nearly constant torque; the "
-    "motor feels it, the joint does not.",
-    equation="τ_motor = -r (T_h - T_l) + τ_m z, dz = dq_in/δ within -1 <= z <= 1",
+    "motor feels it, the joint does not; a load that is read at the motor is off by it.",
+    equation="τ_motor = -r (T_h - T_l) + τ_m z, dz = dq_in/δ within -1 <= z <= 1; load read at the motor: "
+    "M = (τ_m z - τ_motor) R/r",
     source="one elasto-plastic (Jenkins) element, the static limit of P. Dahl, A Solid Friction Model, 1968",
     parameters=(
         Parameter(

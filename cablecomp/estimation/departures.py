@@ -1,7 +1,8 @@
 """How recordings' zeros depart from their session's: by chance, with the load, or because one was set anew.
 
 What follows the load is a drive that yields, and a model's to explain: were it taken for chance, no model would be
-asked for it. A zero far off all others was set anew, and says nothing of how the others scatter.
+asked for it. A zero far off all others was set anew, and says nothing of how the others scatter. Of few recordings it
+is what they leave within that tells how far is far.
 """
 
 from __future__ import annotations
@@ -11,21 +12,25 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from cablecomp.effects.catalogue import role_of
 from cablecomp.estimation.evidence import Evidence
-from cablecomp.estimation.limits import MOVED, TELLING
+from cablecomp.estimation.limits import FAR, MOVED, TELLING
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
 
+FEWEST: Final = 8
+"""Rows of a recording that say nothing of its zero."""
 ROUNDS: Final = 30
 """Of reweighted least squares: ten settle it."""
 
 
 class Departures(NamedTuple):
-    """`sd`: by how much zeros depart by chance, in the channel's unit; `moved`: recordings whose zero was set anew."""
+    """`sd`: by how much zeros depart by chance, in the channel's unit; `moved`: recordings whose zero was set anew;
+    None where too few tell one by the others."""
 
     sd: float
-    moved: frozenset[str]
+    moved: frozenset[str] | None
 
 
 def departures(problem: Problem, zeros: Mapping[str, FloatArray]) -> Departures | None:
@@ -34,7 +39,7 @@ def departures(problem: Problem, zeros: Mapping[str, FloatArray]) -> Departures 
     if not repeated:
         return None
     departed = np.array([float(zeros[r.name][0] - zeros[r.session][0]) for r in repeated])
-    usual = Departures(float(np.sqrt(np.mean(departed**2))), frozenset())
+    usual = Departures(float(np.sqrt(np.mean(departed**2))), None)
     A = _lines(repeated, [load_of(problem.config, r.columns) for r in repeated])
     count = A.shape[1]
     if len(departed) < count + TELLING:
@@ -50,6 +55,37 @@ def departures(problem: Problem, zeros: Mapping[str, FloatArray]) -> Departures 
     left = departed[kept] - A[kept] @ np.linalg.lstsq(A[kept], departed[kept], rcond=None)[0]
     moved = frozenset(r.name for r, k in zip(repeated, kept, strict=True) if not k)
     return Departures(min(float(np.sqrt(left @ left / free)), usual.sd), moved)
+
+
+def set_anew(
+    problem: Problem, channel: str, zeros: Mapping[str, FloatArray], left: Sequence[FloatArray]
+) -> frozenset[str]:
+    """Of few recordings those whose zero lies further from the others' of their session than all that is left within
+    recordings could move it. Where loads differ by more than they vary within, a drive that yields does it too; an
+    event in the model moves zeros apart itself, and nothing is found beside it.
+
+    `left`: misfit of the channel on judged rows, by recording, its zero taken off [the channel's unit]."""
+    found = set(problem.weighing.moved.get(channel, ()))
+    if any(role_of(p.base) == "instant" for p in problem.parameters):
+        return frozenset(found)
+    for session in problem.repeated:
+        seen = [
+            (r, m[r.counted[channel]])
+            for r, m in zip(problem.evidence, left, strict=True)
+            if r.session == session and channel in r.counted and r.counted[channel].sum() > FEWEST
+        ]
+        if len(seen) < 2:
+            continue
+        within = float(np.sqrt(np.mean(np.concatenate([m - np.mean(m) for _, m in seen]) ** 2)))
+        zero = np.array([float(zeros[r.name][0] + np.mean(m)) for r, m in seen])
+        loads = [np.atleast_1d(load_of(problem.config, r.columns)) for r, _ in seen]
+        varies = float(np.sqrt(np.mean([np.var(v) for v in loads])))
+        load = np.array([float(np.mean(v)) for v in loads])
+        usual = int(np.argmin([np.median(np.abs(zero - z)) for z in zero]))
+        far = np.abs(zero - zero[usual]) > FAR * within
+        alike = np.abs(load - load[usual]) <= varies
+        found |= {r.name for (r, _), gone in zip(seen, far & alike, strict=True) if gone}
+    return frozenset(found)
 
 
 def _lines(recordings: Sequence[Evidence], loads: Sequence[FloatArray | float]) -> FloatArray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from cablecomp.estimation.departures import departures
+from cablecomp.estimation.departures import departures, set_anew
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.limits import HOPELESS, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
@@ -188,10 +188,11 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
     """What a misfit counts for, out of what this fit leaves: RMS by channel times the root of the longest memory, never
     below `floor`; the recordings' zeros by how they scatter (one step of expectation-maximisation)."""
     problem = fit.problem
+    left = {c: problem.left(fit.x, c) for c in problem.channels}
     sigma, zero_sd, moved, size, memory = {}, {}, {}, {}, 1.0
     for c in problem.channels:
         parts = []
-        for r, m in zip(problem.evidence, problem.left(fit.x, c), strict=True):
+        for r, m in zip(problem.evidence, left[c], strict=True):
             if c in r.counted and r.counted[c].sum() > 8:
                 parts.append((r.weight * m)[r.counted[c]])
         whole = np.concatenate(parts)
@@ -200,10 +201,12 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
     for c in problem.channels:
         # one memory for all: a channel whose misfit wanders may not be given up for the sake of another
         sigma[c] = max(size[c] * float(np.sqrt(memory)), floor.sigma[c])
-        scatter = departures(problem, problem.zeros(fit.x)[c])
+        zeros = problem.zeros(fit.x)[c]
+        scatter = departures(problem, zeros)
         if scatter is not None:
             seen = min(scatter.sd, ZERO * size[c])
-            zero_sd[c], moved[c] = max(seen, floor.zero_sd.get(c, 0.0)), scatter.moved
+            zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
+            moved[c] = set_anew(problem, c, zeros, left[c]) if scatter.moved is None else scatter.moved
     return Weighing(sigma, zero_sd, moved)
 
 

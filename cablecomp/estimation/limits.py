@@ -27,8 +27,11 @@ TELLING: Final = 4
 set anew."""
 MOVED: Final = 4.0
 """Standard deviations (scaled median) beyond which a recording's zero was set anew."""
+FAR: Final = 6.0
+"""How far the zero of one of few recordings has to lie from the others', in what is left within them (RMS), to have
+been set anew: a step within a recording, or what goes on through it, leaves as much within as it moves the zero."""
 MOVED_SD: Final = 30.0
-"""Prior sd of such a zero, in that of the others."""
+"""Prior sd of such a zero, in what a row counts for."""
 CARRYOVER_SD: Final = 1.0
 """Prior sd of a recording's carry-over, in what the assumed histories add in the mean (RMS)."""
 HISTORY_CUTS: Final = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)

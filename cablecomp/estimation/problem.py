@@ -224,12 +224,14 @@ class Problem:
         return self._aside(channel, self.misfits(x)[channel])
 
     def left(self, x: FloatArray, channel: str = JOINT, own_zero: bool = True) -> list[FloatArray]:
-        """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions') taken off."""
+        """Misfit of a channel on all judged rows with the recordings' zeros (or the sessions', where a recording's was
+        not set anew) taken off."""
         misfits = self.misfits(x)[channel]
         zeros, carryover = self._aside(channel, misfits)
         parts = []
         for r, m in zip(self.evidence, misfits, strict=True):
-            zero = zeros[r.name if own_zero else r.session]
+            own = own_zero or r.name in self.weighing.moved.get(channel, ())
+            zero = zeros[r.name if own else r.session]
             line = zero[0] + (zero[1] * r.at_rows("motor_position_rad") if len(zero) > 1 else 0.0)
             parts.append(m - line - carryover[r.name])
         return parts
@@ -336,7 +338,8 @@ class Problem:
         matrix = np.vstack(blocks)
         penalty = np.zeros((n_dep + sum(carried), matrix.shape[1]))
         moved = self.weighing.moved.get(channel, ())
-        departing = [1.0 / (spread * (MOVED_SD if r.name in moved else 1.0)) for r in self.evidence[:n_dep]]
+        anew = MOVED_SD * max(spread, sigma)
+        departing = [1.0 / (anew if r.name in moved else spread) for r in self.evidence[:n_dep]]
         penalty[:, own:] = np.diag(departing + [1.0 / CARRYOVER_SD] * sum(carried))
         Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
         return Zeros(Q, R, len(penalty))

@@ -83,9 +83,9 @@ class Order:
     tie: confounded.Case | None = None
 
 
-def order(wanted: Wanted, number: int) -> Order:
+def order(wanted: Wanted, number: int, again: int = 0) -> Order:
     """What trial `number` (from 0) is to hold: kinds in turn as they were given (one given twice comes twice as
-    often), and each kind's effects in turn."""
+    often), and each kind's effects in turn. `again`: another pair than those before, which no joint could show."""
     turn, within = divmod(number, len(wanted.kinds))
     kind = wanted.kinds[within]
     place = turn * wanted.kinds.count(kind) + wanted.kinds[:within].count(kind)
@@ -102,7 +102,7 @@ def order(wanted: Wanted, number: int) -> Order:
         return Order(number, kind, (form_of(wanted, effect, place),))
     if kind == "motor":
         return Order(number, kind, (form_of(wanted, MOTOR[0], place),))
-    return Order(number, kind, _pair(wanted, place))
+    return Order(number, kind, _pair(wanted, place, again))
 
 
 def form_of(wanted: Wanted, effect: Suspect, place: int) -> Suspect:
@@ -119,9 +119,9 @@ def _in_turn(seed: int, place: int, pool: Sequence[T], stream: int) -> T:
     return pool[int(np.random.default_rng([seed, stream, turn]).permutation(len(pool))[within])]
 
 
-def _pair(wanted: Wanted, place: int) -> tuple[Suspect, ...]:
+def _pair(wanted: Wanted, place: int, again: int) -> tuple[Suspect, ...]:
     """Two different effects that one course can show."""
-    rng = np.random.default_rng([wanted.seed, 2, place])
+    rng = np.random.default_rng([wanted.seed, 2, place, again] if again else [wanted.seed, 2, place])
     while True:
         first, second = (CATALOGUE[int(k)] for k in rng.choice(len(CATALOGUE), 2, replace=False))
         pair = (form_of(wanted, first, 2 * place), form_of(wanted, second, 2 * place + 1))

@@ -30,6 +30,7 @@ SAMPLES = (10_000, 12_000)
 RECORDINGS = {1: 0.2, 2: 0.5, 3: 0.3}
 CONFOUNDED_RECORDINGS = 2
 _ATTEMPTS = 80
+_PAIRS = 3
 
 
 @dataclass(frozen=True)
@@ -59,18 +60,21 @@ class World:
 def draw_world(wanted: Wanted, number: int) -> World:
     """Draw a trial; the same wish and number give the same trial, bit for bit.
 
-    Joints that cannot show what is asked for, or that go slack, are drawn anew. Raises PlantError if none of a
-    bounded number will do.
+    Joints that cannot show what is asked for, or that go slack, are drawn anew, and of two effects that no joint shows
+    together another pair. Raises PlantError if none of a bounded number will do.
     """
-    asked = order(wanted, number)
-    for attempt in range(_ATTEMPTS):
-        rng = np.random.default_rng([wanted.seed, 21, number, attempt])
-        try:
-            world = _draw_confounded(rng, asked, asked.tie) if asked.tie else _draw(rng, wanted, asked)
-        except PlantError:
-            continue
-        if world is not None:
-            return world
+    for again in range(_PAIRS):
+        asked = order(wanted, number, again)
+        for attempt in range(_ATTEMPTS):
+            rng = np.random.default_rng([wanted.seed, 21, number, attempt])
+            try:
+                world = _draw_confounded(rng, asked, asked.tie) if asked.tie else _draw(rng, wanted, asked)
+            except PlantError:
+                continue
+            if world is not None:
+                return world
+        if asked.kind != "pair":
+            break
     names = ", ".join(s.id for s in asked.suspects) or (asked.tie.name if asked.tie else "")
     raise PlantError(f"trial {number} ({asked.kind}: {names}): no joint of {_ATTEMPTS} can show it")
 

@@ -188,14 +188,21 @@ def test_of_many_recordings_in_which_nothing_is_missing_all_are_reported() -> No
     assert len(found.final) + len(found.traces) == len(parts)
 
 
-@pytest.mark.parametrize("sigmas", [8.0, 40.0])
+@pytest.mark.parametrize("sigmas", [8.0, 40.0, 1000.0])
 def test_a_zero_set_anew_between_recordings_is_no_slip(sigmas: float) -> None:
     """A drum that slips between two recordings would show the same, so no name is given."""
     first, second = recording([], seed=3), recording([], seed=4)
-    second["joint_position_rad"] += sigmas * SMALL_NOISE["joint_position_rad"]
+    apart = sigmas * SMALL_NOISE["joint_position_rad"]
+    second["joint_position_rad"] += apart
     found = diagnose(joint(), {"small/1": first, "small/2": second})
     assert not found.named
     assert found.verdict in ("consistent", "recalibrate")
+    if sigmas < 1000.0:
+        return
+    assert any("small/2: its zero lies" in line for line in found.warnings)
+    own = [s.values["joint_position_offset_rad"] for s in found.augmented_joint.session if s.recordings]
+    common = found.augmented_joint.sensors.joint_position_offset_rad
+    assert own == [pytest.approx(common + apart, rel=0.01)]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses, instants
 from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive
 
@@ -187,3 +188,34 @@ def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone()
 
     assert word(0.4) == "stiffening_per_Nm"
     assert word(1.8) == ""
+
+
+@pytest.mark.parametrize(
+    ("compliance", "lag_s", "decades", "word"),
+    [(0.0, 0.05, 0.0, "lag_s"), (0.0, 0.5, 0.0, ""), (0.0, 0.05, 2.0, ""), (1e-3, 0.05, 0.0, "")],
+)
+def test_a_coupling_that_follows_at_once_and_yields_no_other_way_is_better_called_a_late_reading(
+    compliance: float, lag_s: float, decades: float, word: str
+) -> None:
+    coupling = _of("series_compliance", "series_compliance:late_rad_per_Nm")
+    shown = {
+        "compliance_rad_per_Nm": compliance,
+        "late_rad_per_Nm": 1e-3,
+        "lag_s": lag_s,
+        "decades": decades,
+    }
+    values = {coupling.key(name): value for name, value in shown.items()}
+    problem = SimpleNamespace(parameters=())
+    fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
+    assert better_word(cast("Fit", fit), coupling) == word
+
+
+def test_where_the_load_is_read_at_the_motor_its_friction_is_asked_for_and_what_it_feels_is_not() -> None:
+    columns = {**recorded(), "motor_torque_Nm": recorded()["joint_torque_Nm"]}
+    for source, asked in (("joint_torque", True), ("motor_torque", False)):
+        read = JOINT.model_copy(update={"observer": JOINT.observer.model_copy(update={"load": source})})
+        one = gather(read, "one", columns, "a", fine_rows=400, judged_rows=60)
+        found = {h.effect.id for h in hypotheses(read, [one])}
+        assert "motor_friction" in found
+        for effect in ("bearing_friction", "gravity_load", "inertial_load"):
+            assert (effect in found) == asked

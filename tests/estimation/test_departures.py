@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from turning import JOINT, recorded
 
-from cablecomp.estimation.departures import departures
+from cablecomp.effects.catalogue import catalogue
+from cablecomp.estimation.departures import departures, set_anew
 from cablecomp.estimation.evidence import Evidence, gather
-from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.limits import FAR
+from cablecomp.estimation.parameter import of_drive, of_effect
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -71,9 +73,39 @@ def test_few_recordings_tell_neither(ten: Problem) -> None:
     found = departures(few, zeros(few, departed))
     assert found is not None
     assert found.sd == pytest.approx(float(np.sqrt(np.mean(departed**2))))
-    assert not found.moved
+    assert found.moved is None
 
 
 def test_one_recording_a_session_departs_from_nothing(ten: Problem) -> None:
     two = ten.with_evidence((ten.evidence[0], ten.evidence[9]))
     assert departures(two, zeros(two, np.zeros(2))) is None
+
+
+WITHIN = 2e-5
+"""RMS of what is left within recordings [rad]."""
+
+
+def apart_by(problem: Problem, apart: float) -> frozenset[str]:
+    """Which of two recordings of one session was set anew, where their zeros lie so far apart [rad]."""
+    rng = np.random.default_rng(1)
+    left = [WITHIN * rng.standard_normal(len(e.rows)) for e in problem.evidence]
+    return set_anew(problem, ANGLE, zeros(problem, np.array([0.0, apart])), left)
+
+
+def test_of_two_recordings_the_later_was_set_anew_where_nothing_within_moves_it_so(ten: Problem) -> None:
+    one = ten.evidence[0]
+    pair = ten.with_evidence((one, replace(one, name="1")))
+    assert apart_by(pair, 2.0 * FAR * WITHIN) == {"1"}
+    assert not apart_by(pair, 0.5 * FAR * WITHIN)
+
+
+def test_of_two_recordings_at_two_steady_loads_the_drive_may_yield(ten: Problem) -> None:
+    assert not apart_by(ten.with_evidence(ten.evidence[:2]), 100.0 * WITHIN)
+
+
+def test_beside_an_event_of_the_model_nothing_more_was_set_anew(ten: Problem) -> None:
+    one = ten.evidence[0]
+    slip = next(e for e in catalogue().values() if e.id == "clamp_slip")
+    instant = of_effect(slip, {"slip_m": 1e-4, "time_s": 5.0}, JOINT)
+    pair = Problem(JOINT, instant, (one, replace(one, name="1")), ten.weighing)
+    assert not apart_by(pair, 100.0 * WITHIN)

@@ -38,6 +38,17 @@ def test_kinds_come_in_turn_and_every_one_its_effects_in_turn() -> None:
     assert set(ties[: len(CASES)]) == {c.name for c in CASES}
 
 
+def test_another_pair_is_drawn_where_no_joint_shows_one_and_the_first_stays_what_it_was() -> None:
+    wanted = Wanted(670, ("single", "single", "single", "pair", "none"), "catalogue", "all")
+    pairs = [tuple(s.id for s in order(wanted, 18, again).suspects) for again in range(3)]
+    assert pairs[0] == (
+        "thermal_pretension:quadratic",
+        "pressure_dependent_friction",
+    )  # no joint of 80 showed it
+    assert len(set(pairs)) == 3
+    assert order(wanted, 0, 1) == order(wanted, 0)
+
+
 @pytest.mark.parametrize("kind", COURSES)
 def test_courses_stay_in_range_and_hold_reversals_rates_and_rests(kind: str) -> None:
     for seed in range(6):

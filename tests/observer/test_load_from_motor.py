@@ -7,10 +7,11 @@ import pytest
 from joints import WIDE
 
 from cablecomp.config import JointConfig, parse_joint
+from cablecomp.effects import with_effects
 from cablecomp.estimation.simulate import load_of
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
-from firmware_sim.plant import PlantConfig, simulate
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 TIME = np.arange(0.0, 4.0, 0.01)
 MOTOR = 0.6 * np.sin(1.3 * TIME)
@@ -56,3 +57,30 @@ def test_an_observer_of_the_motors_torque_is_made_ready_for_a_loop(circuit: str)
     before = observer.snapshot()
     observer.compile()
     assert observer.snapshot() == before
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("bearing_friction", {"torque_Nm": 0.1, "load_coefficient": 0.0, "presliding_rad": 1e-3}),
+        ("gravity_load", {"moment_Nm": 0.3, "phase_rad": 0.2}),
+        ("inertial_load", {"inertia_kgm2": 0.02}),
+        ("motor_friction", {"torque_Nm": 0.05, "presliding_rad": 1e-3}),
+    ],
+)
+def test_the_motor_feels_what_turns_or_holds_the_joint_and_its_own_friction(
+    effect: str, values: dict[str, float]
+) -> None:
+    """What the joint is held or turned by is in the motor's torque already; what holds the motor is taken off it."""
+    true = simulate(
+        PlantConfig.from_dict(drive("closed")), TIME, MOTOR, LOAD, effects=[EffectSpec(effect, values)]
+    ).channels()
+    plain = joint("closed", 0.0)
+    columns = {"time_s": TIME, "motor_position_rad": MOTOR, "motor_torque_Nm": true["motor_torque_Nm"]}
+    known = with_effects(plain, [(effect, values)])
+    angle = true["joint_position_rad"]
+    off = Observer(known).run(columns)["joint_position_rad"] - angle
+    deflection = np.ptp(angle - plain.drive.ratio * MOTOR)
+    assert np.max(np.abs(off)) < 0.01 * deflection
+    unknown = Observer(plain).run(columns)["joint_position_rad"] - angle
+    assert (np.max(np.abs(unknown)) > 0.05 * deflection) == (effect == "motor_friction")

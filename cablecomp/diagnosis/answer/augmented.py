@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cablecomp.config import Depends, Empirical, JointConfig, Session, claiming, with_values
+from cablecomp.config import Depends, Empirical, JointConfig, ObserverOptions, Session, claiming, with_values
 from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
 from cablecomp.estimation.least_squares import Fit, covariance
 from cablecomp.estimation.limits import EXACT
 from cablecomp.estimation.parameter import known_by_factor
@@ -39,6 +39,7 @@ def augmented_joint(
     common = _afterwards(_stood(config, fit, replace(first, apart={})), model, latest)
     joint = common.model_copy(
         update={
+            "observer": _loaded(config, [*fit.problem.evidence, *kept]),
             "empirical": (*config.empirical, *laws),
             "depends": (*config.depends, *_depends(model, first)),
         }
@@ -61,8 +62,9 @@ def augmented_joint(
             )
         for e in recordings:
             now = _meanwhile(_stood(config, fit, e), model, e)
-            if now != after:
-                values = {**own_zeros, **_own(now, common, fit)}
+            moved = e.name in zeros[JOINT] and e.name in fit.problem.weighing.moved.get(JOINT, ())
+            if now != after or moved:
+                values = {**(_zeros_of(zeros, e.name) if moved else own_zeros), **_own(now, common, fit)}
                 name = f"{label} {short(e.name)}"
                 entries.append(
                     Session(name=name, mounting=session, recordings=(short(e.name),), values=values)
@@ -72,6 +74,15 @@ def augmented_joint(
     if not entries:
         return joint
     return joint.model_copy(update={"session": (Session(own=tuple(config.session_own)), *entries)})
+
+
+def _loaded(config: JointConfig, recordings: Iterable[Evidence]) -> ObserverOptions:
+    """The observer's options; where no recording holds the load that it would read, the joint was taken as free, and
+    is so later on."""
+    free = all(load_channel(config, e.columns) is None for e in recordings)
+    if not free or config.observer.load == "both_encoders":
+        return config.observer
+    return config.observer.model_copy(update={"load": "none"})
 
 
 def _others(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from cablecomp.diagnosis.answer.alike import drag_alike
+from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, bears
@@ -75,4 +78,17 @@ def warnings_of(model: Model) -> tuple[str, ...]:
         )
     if any(isinstance(t, Hypothesis) and t.effect.id == "clock_skew" for t in model.terms):
         lines += filter(None, [drag_alike(model.fit)])
-    return tuple(lines)
+    return (*lines, *_set_anew(model.fit))
+
+
+def _set_anew(fit: Fit) -> Iterator[str]:
+    """Recordings with a zero of their own, each with how far it lies from its session's."""
+    zeros = fit.problem.zeros(fit.x)[JOINT]
+    for e in fit.problem.evidence:
+        if e.name in fit.problem.weighing.moved.get(JOINT, ()):
+            apart = 1e3 * float(zeros[e.name][0] - zeros[e.session][0])
+            yield (
+                f"{short(e.name)}: its zero lies {apart:+.3g} mrad from the others' of its session, and nothing within "
+                "the recordings moves it so: taken as set anew before it (several sessions: `--session each`, or "
+                "[[session]]); if nobody did, a clamp or a drum slipped there"
+            )

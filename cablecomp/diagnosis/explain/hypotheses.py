@@ -15,7 +15,7 @@ from cablecomp.diagnosis.explain.courses import Course
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.effects.base import Role
-from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
 
@@ -174,9 +174,10 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
     """All effects that the configuration does not hold yet and that these recordings could show."""
     held = {entry.id for entry in config.effect}
     told, vague = loaded(config, evidence), vague_drive(of_drive(config))
+    at_motor = load_channel(config, evidence[0].columns) == MOTOR
     found = []
     for effect in catalogue().values():
-        if effect.id in held:
+        if effect.id in held or (effect.felt_by_motor and at_motor):
             continue
         mute = {p.name for p in effect.parameters if (p.of_load and not told) or (p.of_known_drive and vague)}
         # a shape goes with its amount
@@ -326,9 +327,9 @@ def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
 
 def _tells(evidence: Sequence[Evidence], channel: str) -> bool:
     """Whether the recordings have the channel as an effect needs it."""
-    if channel in OUTPUTS:
+    if channel in OUTPUTS and any(channel in e.counted for e in evidence):
         return all(channel in e.counted for e in evidence)
-    return _varies(evidence, channel)
+    return (channel not in OUTPUTS or channel == MOTOR) and _varies(evidence, channel)
 
 
 def loaded(config: JointConfig, evidence: Sequence[Evidence]) -> bool:

@@ -17,6 +17,7 @@ from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.errors import InputError, SlackError
+from cablecomp.estimation.departures import set_anew
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
 from cablecomp.estimation.problem import Problem, Weighing
@@ -112,7 +113,15 @@ def searching(fit: Fit) -> Weighing:
     for c in problem.channels:
         usual = problem.weighing.zero_sd.get(c, 0.0) * (sigma[c] / problem.weighing.sigma[c] if told else 1.0)
         spread[c] = float(np.clip(usual, 0.1 * sigma[c], LIMITS.zero * sigma[c]))
-    return Weighing(sigma, spread, problem.weighing.moved)
+    return Weighing(sigma, spread, problem.weighing.moved if told else _moved(fit))
+
+
+def _moved(fit: Fit) -> dict[str, frozenset[str]]:
+    """Of few recordings those whose zero was set anew, now that less is left."""
+    problem = fit.problem
+    zeros = problem.zeros(fit.x)
+    before = problem.weighing.moved
+    return {c: set_anew(problem, c, zeros[c], problem.left(fit.x, c)) for c in before}
 
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:

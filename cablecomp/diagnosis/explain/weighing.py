@@ -122,7 +122,7 @@ def _weighed(
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
     elif (stretched := better_word(final.fit, term)) and not _alone_by_far(selection, term):
         confidence = min(confidence, LIMITS.beaten_told)
-        why_not = f"`{stretched}` is on the bound beyond which another effect is the better word"
+        why_not = f"with this `{stretched}` another effect is the better word"
     elif little := (
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
