@@ -139,16 +139,16 @@ def _judged(
         kept = without_effects(final, drive, found.groups)
     if kept is not final:
         remainder = case.remainder_of(kept.fit, rng) if kept.terms else before
-    laws = empirical_laws(final, found.groups) if named else []
     told = kept.fit.problem.left(kept.fit.x) if named else None
     repeated_rad = repeatability(drive.fit.problem.evidence, case.covariates, told)
     structured = is_structured(
         remainder.location, remainder.series, repeated_rad, usual_of(case.config, JOINT), bool(named)
     )
     pace.tell("counting errors on data left out", 0.95)
+    laws = empirical_laws(kept, found.groups) if named or structured else []
     if kept is not final or laws:
         again = [f.law for f in laws]
-        augmented = errors_of(kept.fit, case.body.final, by, again) if kept.terms else baseline
+        augmented = errors_of(kept.fit, case.body.final, by, again) if kept.terms or laws else baseline
     verdict = verdict_of(bool(named), structured, drive, kept)
     return Outcome(
         tuple(weighed), tuple(named), kept, tuple(laws), baseline, augmented, remainder, repeated_rad, structured,

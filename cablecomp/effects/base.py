@@ -204,8 +204,8 @@ class Effect:
     rates: bool = False
     """Its law knows rates within a stroke: a fit has to run it on every sample, not on rows thinned by travel."""
     felt_by_motor: bool = False
-    """It turns the joint or holds it, so that the motor feels it: a load that is read at the motor holds it already, and
-    the cables' tensions do not change by it."""
+    """It turns the joint or holds it, so that the motor feels it: a load that is read at the motor holds it already,
+    and the cables' tensions do not change by it."""
     posture: bool = False
     """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
     at_pretension: Callable[[Mapping[str, float], float], Restated] | None = None

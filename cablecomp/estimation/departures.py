@@ -14,7 +14,7 @@ import numpy as np
 
 from cablecomp.effects.catalogue import role_of
 from cablecomp.estimation.evidence import Evidence
-from cablecomp.estimation.limits import FAR, MOVED, TELLING
+from cablecomp.estimation.limits import FAR, MOVED, OF_HISTORY, TELLING
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
@@ -58,16 +58,21 @@ def departures(problem: Problem, zeros: Mapping[str, FloatArray]) -> Departures 
 
 
 def set_anew(
-    problem: Problem, channel: str, zeros: Mapping[str, FloatArray], left: Sequence[FloatArray]
+    problem: Problem,
+    channel: str,
+    zeros: Mapping[str, FloatArray],
+    left: Sequence[FloatArray],
+    history: float = 0.0,
 ) -> frozenset[str]:
     """Of few recordings those whose zero lies further from the others' of their session than all that is left within
-    recordings could move it. Where loads differ by more than they vary within, a drive that yields does it too; an
-    event in the model moves zeros apart itself, and nothing is found beside it.
+    recordings could move it, or a `history` that nobody recorded [the channel's unit]. Where loads differ by more than
+    they vary within, a drive that yields does it too; an event in the model moves zeros apart itself, and nothing is
+    found beside it.
 
     `left`: misfit of the channel on judged rows, by recording, its zero taken off [the channel's unit]."""
-    found = set(problem.weighing.moved.get(channel, ()))
     if any(role_of(p.base) == "instant" for p in problem.parameters):
-        return frozenset(found)
+        return problem.weighing.moved.get(channel, frozenset())
+    found: set[str] = set()
     for session in problem.repeated:
         seen = [
             (r, m[r.counted[channel]])
@@ -82,7 +87,7 @@ def set_anew(
         varies = float(np.sqrt(np.mean([np.var(v) for v in loads])))
         load = np.array([float(np.mean(v)) for v in loads])
         usual = int(np.argmin([np.median(np.abs(zero - z)) for z in zero]))
-        far = np.abs(zero - zero[usual]) > FAR * within
+        far = np.abs(zero - zero[usual]) > max(FAR * within, OF_HISTORY * history)
         alike = np.abs(load - load[usual]) <= varies
         found |= {r.name for (r, _), gone in zip(seen, far & alike, strict=True) if gone}
     return frozenset(found)

@@ -206,8 +206,9 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
         if scatter is not None:
             seen = min(scatter.sd, ZERO * size[c])
             zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
-            moved[c] = set_anew(problem, c, zeros, left[c]) if scatter.moved is None else scatter.moved
-    return Weighing(sigma, zero_sd, moved)
+            past = floor.history.get(c, 0.0)
+            moved[c] = set_anew(problem, c, zeros, left[c], past) if scatter.moved is None else scatter.moved
+    return Weighing(sigma, zero_sd, moved, floor.history)
 
 
 def refit(fit: Fit, weighing: Weighing, evaluations: int = 10) -> Fit:

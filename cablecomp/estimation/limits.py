@@ -30,6 +30,8 @@ MOVED: Final = 4.0
 FAR: Final = 6.0
 """How far the zero of one of few recordings has to lie from the others', in what is left within them (RMS), to have
 been set anew: a step within a recording, or what goes on through it, leaves as much within as it moves the zero."""
+OF_HISTORY: Final = 3.0
+"""The same, in what an unknown history moves zeros by."""
 MOVED_SD: Final = 30.0
 """Prior sd of such a zero, in what a row counts for."""
 CARRYOVER_SD: Final = 1.0

@@ -40,11 +40,13 @@ def of_recording(misfits: Misfits, place: int) -> dict[str, FloatArray]:
 @dataclass(frozen=True)
 class Weighing:
     """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero
-    departs from its session's; `moved`: recordings whose zero was set anew and may be anywhere."""
+    departs from its session's; `moved`: recordings whose zero was set anew and may be anywhere; `history`: how far one
+    that nobody recorded moves zeros [the channel's unit]."""
 
     sigma: Mapping[str, float]
     zero_sd: Mapping[str, float]
     moved: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    history: Mapping[str, float] = field(default_factory=dict)
 
 
 class Aside(NamedTuple):

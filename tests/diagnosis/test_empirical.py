@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cablecomp.config import Empirical
-from cablecomp.diagnosis.describe.empirical import _held, _Rows, refitted, value_of
+from cablecomp.diagnosis.describe.empirical import _held, _Rows, _wave, refitted, value_of
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.estimation.evidence import JOINT, Evidence, gather
 from cablecomp.estimation.simulate import simulator
@@ -70,3 +70,39 @@ def test_a_series_fitted_again_finds_the_curve_that_is_there() -> None:
     half = replace(here, counted={JOINT: here.counted[JOINT] & (np.arange(len(here.rows)) % 2 == 0)})
     (unseen,) = refitted([blank], [half], [value_of(LAW, half)])
     assert np.std(value_of(unseen, here) - there) < 0.05 * np.std(there)
+
+
+WAVE = Empirical(
+    id="wave_by_motor_angle", law="fourier", of="motor_position_rad", half_width=np.pi / 16.0,
+    coefficients_rad=(0.0, 1.6e-4, -1.2e-4),
+)  # fmt: skip
+
+
+def test_what_is_counted_for_a_wave_is_what_the_observer_adds() -> None:
+    here, plain = evidence(), joint()
+    kept = here.counted[JOINT]
+    waving = simulator(plain.model_copy(update={"empirical": (WAVE,)})).predict(here)[JOINT][kept]
+    added = waving - simulator(plain).predict(here)[JOINT][kept]
+    angle = here.at_rows("motor_position_rad")[kept]
+    np.testing.assert_allclose(
+        added, 1.6e-4 * np.sin(16.0 * angle) - 1.2e-4 * np.cos(16.0 * angle), atol=1e-12
+    )
+    np.testing.assert_allclose(value_of(WAVE, here), added, atol=1e-12)
+
+
+@pytest.mark.parametrize(("amplitude_rad", "found"), [(2e-4, True), (0.0, False)])
+def test_sixteen_teeth_a_turn_are_found_beside_noise_and_none_in_noise(
+    amplitude_rad: float, found: bool
+) -> None:
+    here = evidence()
+    angle = here.at_rows("motor_position_rad")[here.counted[JOINT]]
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(angle))
+    block = np.arange(len(angle)) * 24 // len(angle)
+    groups = Groups(block, block % 6, "block", np.zeros_like(block))
+    left = amplitude_rad * np.sin(16.0 * angle + 0.4) + noise
+    held = _wave(_Rows([here], left, np.ones(len(angle)), groups))
+    assert (held is not None) is found
+    if held is not None:
+        law = held.found.law
+        assert np.pi / law.half_width == pytest.approx(16.0, abs=0.05)
+        assert np.hypot(*law.coefficients_rad[1:]) == pytest.approx(amplitude_rad, rel=0.15)

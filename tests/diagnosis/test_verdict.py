@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cablecomp.diagnosis.answer import verdict
-from cablecomp.diagnosis.answer.verdict import is_structured, predicts, share_left, verdict_of
+from cablecomp.diagnosis.answer.verdict import is_structured, not_carried, predicts, share_left, verdict_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -142,3 +142,13 @@ def test_what_the_joint_is_known_to_leave_is_no_structure() -> None:
     assert not structured(6.0, follows=True, usual_rad=6.0 * NOISE)
     assert not structured(6.0, follows=True, repeated_rad=0.1 * NOISE, usual_rad=6.0 * NOISE)
     assert structured(6.0, follows=True, usual_rad=0.1 * NOISE)
+
+
+@pytest.mark.parametrize(("final_rad", "said"), [(4e-4, True), (2e-4, False), (5e-5, False)])
+def test_a_model_that_does_not_carry_to_what_was_kept_for_the_end_is_warned_of(
+    final_rad: float, said: bool
+) -> None:
+    lines = list(not_carried(Errors(9e-5, 1e-4, final_rad, 1e-4), 2e-5))
+    assert bool(lines) is said
+    assert not said or "4.0 times worse" in lines[0]
+    assert not list(not_carried(Errors(9e-6, 1e-5, 5e-5, 1e-5), 2e-5))  # within what sensors leave of either

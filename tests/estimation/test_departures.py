@@ -85,11 +85,12 @@ WITHIN = 2e-5
 """RMS of what is left within recordings [rad]."""
 
 
-def apart_by(problem: Problem, apart: float) -> frozenset[str]:
-    """Which of two recordings of one session was set anew, where their zeros lie so far apart [rad]."""
+def apart_by(problem: Problem, apart: float, history: float = 0.0) -> frozenset[str]:
+    """Which of two recordings of one session was set anew, where their zeros lie so far apart [rad] and an unknown
+    history moves them so far."""
     rng = np.random.default_rng(1)
     left = [WITHIN * rng.standard_normal(len(e.rows)) for e in problem.evidence]
-    return set_anew(problem, ANGLE, zeros(problem, np.array([0.0, apart])), left)
+    return set_anew(problem, ANGLE, zeros(problem, np.array([0.0, apart])), left, history)
 
 
 def test_of_two_recordings_the_later_was_set_anew_where_nothing_within_moves_it_so(ten: Problem) -> None:
@@ -97,6 +98,7 @@ def test_of_two_recordings_the_later_was_set_anew_where_nothing_within_moves_it_
     pair = ten.with_evidence((one, replace(one, name="1")))
     assert apart_by(pair, 2.0 * FAR * WITHIN) == {"1"}
     assert not apart_by(pair, 0.5 * FAR * WITHIN)
+    assert not apart_by(pair, 2.0 * FAR * WITHIN, FAR * WITHIN)
 
 
 def test_of_two_recordings_at_two_steady_loads_the_drive_may_yield(ten: Problem) -> None:

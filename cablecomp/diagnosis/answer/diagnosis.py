@@ -23,7 +23,7 @@ from cablecomp.diagnosis.answer.entries import (
     traces,
 )
 from cablecomp.diagnosis.answer.values import as_trials_say, drive_values
-from cablecomp.diagnosis.answer.verdict import warnings_of
+from cablecomp.diagnosis.answer.verdict import not_carried, warnings_of
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
 from cablecomp.diagnosis.locate.location import Location
@@ -71,7 +71,11 @@ def diagnosis_of(
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates)),
-        warnings=(*((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()), *warnings_of(kept)),
+        warnings=(
+            *((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()),
+            *warnings_of(kept),
+            *not_carried(outcome.augmented, drive.floor_rad),
+        ),
     )
 
 

@@ -81,6 +81,17 @@ def warnings_of(model: Model) -> tuple[str, ...]:
     return (*lines, *_set_anew(model.fit))
 
 
+def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
+    """That the model does not carry to what was kept for the end, where it predicts that far worse than what was left
+    out in turn."""
+    ratio = errors.final_rmse_rad / max(errors.heldout_rmse_rad, floor_rad, 1e-12)
+    if ratio > LIMITS.not_carried:
+        yield (
+            f"what was kept for the end is predicted {ratio:.1f} times worse than what was left out in turn: something "
+            "changed there, or the model does not carry that far; look at the recordings' last stretches"
+        )
+
+
 def _set_anew(fit: Fit) -> Iterator[str]:
     """Recordings with a zero of their own, each with how far it lies from its session's."""
     zeros = fit.problem.zeros(fit.x)[JOINT]

@@ -59,7 +59,7 @@ def calibrate_drive(
     for _ in range(PASSES):
         cut, constant = without_history(fit, evidence)
         zero_sd = {**sensors.zero_sd, JOINT: max(sensors.zero_sd[JOINT], constant)}
-        floor = Weighing(sensors.sigma, zero_sd)
+        floor = Weighing(sensors.sigma, zero_sd, history={JOINT: constant})
         fit = solve(fit.problem.with_evidence(cut), fit.x, 10)
         fit = refit(fit, weighed(fit, floor), 6)
     floor_rad = noise_floor(fit, rng)

@@ -14,7 +14,7 @@ from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import ScoreDifference, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import JOINT, BoolArray, Evidence
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 TERMS = 10
@@ -23,6 +23,14 @@ drum is."""
 RIDGE = 1e-3
 """Share of the terms' mean energy that holds their coefficients back."""
 CURVES_OVER = ("motor_position_rad", "joint_torque_Nm")
+WAVE_OVER = "motor_position_rad"
+"""What a wave is looked for over: teeth, poles, an encoder's graduation."""
+FEWEST_WAVES, MOST_PER_TURN = 2.0, 60.0
+"""Periods of a wave: so many at least in what its channel covers, so many at most per revolution."""
+PER_PERIOD = 4.0
+"""Steps of a wave's frequency, per period over what its channel covers."""
+SHORTEST = 3.0
+"""Judged rows per period, in the median, below which rows do not tell a wave."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +42,15 @@ class Found:
 
 
 def empirical_laws(model: Model, groups: Groups) -> list[Found]:
-    """The series that hold, best first, each fitted to what the ones before left."""
+    """The series and the wave that hold, best first, each fitted to what the ones before left."""
     rows = _joint_rows(model, groups)
     found: list[Found] = []
     while True:
-        others = [c for c in CURVES_OVER if all(f.law.of != c for f in found)]
-        held = [h for c in others if (h := _held(c, rows)) is not None]
+        had = {(f.law.law, f.law.of) for f in found}
+        curves = [c for c in CURVES_OVER if ("chebyshev", c) not in had]
+        held = [h for c in curves if (h := _held(c, rows)) is not None]
+        if ("fourier", WAVE_OVER) not in had and (wave := _wave(rows)) is not None:
+            held.append(wave)
         if not held:
             return found
         best = max(held, key=lambda h: h.found.difference.gain)
@@ -94,6 +105,63 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
     return _Held(Found(law, step), predicted)
 
 
+def _wave(rows: _Rows) -> _Held | None:
+    """The wave over the motor's angle, its frequency the best of a grid, chosen anew wherever data are left out; None
+    where it does not hold on these."""
+    x = np.concatenate([e.at_rows(WAVE_OVER)[e.counted[JOINT]] for e in rows.evidence])
+    grid = _frequencies(x, [e.at_rows(WAVE_OVER)[e.counted[JOINT]] for e in rows.evidence])
+    if not len(grid):
+        return None
+    every = [_waves(x, k) * rows.weight[:, None] for k in grid]
+    predicted = np.zeros(len(x))
+    for k in np.unique(rows.groups.fold):
+        out = rows.groups.fold == k
+        T = _waves(x, _best(grid, every, x, rows, ~out)) * rows.weight[:, None]
+        predicted[out] = T[out] @ _ridge(T[~out], rows.left[~out])
+    step = score_difference(rows.left - predicted, rows.left, rows.groups)
+    if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
+        return None
+    frequency = _best(grid, every, x, rows, np.ones(len(x), dtype=np.bool_))
+    law = Empirical(
+        id="wave_by_motor_angle", law="fourier", of=WAVE_OVER, half_width=np.pi / frequency,
+        coefficients_rad=(0.0, *(float(c) for c in _ridge(_waves(x, frequency) * rows.weight[:, None], rows.left))),
+    )  # fmt: skip
+    return _Held(Found(law, step), predicted)
+
+
+def _best(
+    grid: FloatArray, every: Sequence[FloatArray], x: FloatArray, rows: _Rows, seen: BoolArray
+) -> float:
+    """The frequency whose wave takes most off the rows seen, to a sixteenth of the grid's step."""
+    top = int(np.argmax([_taken_off(T[seen], rows.left[seen]) for T in every]))
+    near = grid[top] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, 33) if len(grid) > 1 else grid
+    fine = [_taken_off((_waves(x, k) * rows.weight[:, None])[seen], rows.left[seen]) for k in near]
+    return float(near[int(np.argmax(fine))])
+
+
+def _frequencies(x: FloatArray, parts: Sequence[FloatArray]) -> FloatArray:
+    """Frequencies [1/rad of the phase per rad] at which a wave is asked for: from two periods over what the channel
+    covers to as many as the rows resolve; none where it hardly moves."""
+    reach = float(np.ptp(x))
+    steps = np.concatenate([np.abs(np.diff(v)) for v in parts])
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    if reach <= 0.0 or usual <= 0.0:
+        return np.empty(0)
+    low, step = FEWEST_WAVES * 2.0 * np.pi / reach, 2.0 * np.pi / (PER_PERIOD * reach)
+    high = min(MOST_PER_TURN, 2.0 * np.pi / (SHORTEST * usual))
+    return np.arange(low, high, step)
+
+
+def _waves(x: FloatArray, frequency: float) -> FloatArray:
+    return np.column_stack((np.sin(frequency * x), np.cos(frequency * x)))
+
+
+def _taken_off(T: FloatArray, y: FloatArray) -> float:
+    """Square that the columns take off y."""
+    along = T.T @ y
+    return float(along @ np.linalg.solve(T.T @ T + 1e-12 * np.trace(T.T @ T) * np.eye(T.shape[1]), along))
+
+
 def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:
     """Whether the series helps on recordings that reach about as far in its channel, learnt from those that reach less
     and more, and on those that reach furthest: a curve over the load may be what another law does at these loads, and
@@ -123,9 +191,7 @@ def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:
 def value_of(law: Empirical, recording: Evidence) -> FloatArray:
     """What a law adds to the joint angle [rad] on a recording's counted rows, as the observer runs it."""
     x = recording.at_rows(law.of)[recording.counted[JOINT]]
-    return np.asarray(
-        _basis(x, law.centre, law.half_width) @ np.array(law.coefficients_rad[1:]), dtype=np.float64
-    )
+    return np.asarray(_of(law, x) @ np.array(law.coefficients_rad[1:]), dtype=np.float64)
 
 
 def refitted(
@@ -138,11 +204,18 @@ def refitted(
     found = []
     for law in laws:
         x = np.concatenate([e.at_rows(law.of)[e.counted[JOINT]] for e in recordings])
-        T = _basis(x, law.centre, law.half_width)
+        T = _of(law, x)
         c = _ridge(T * weight[:, None], rest * weight)
         rest = rest - T @ c
         found.append(law.model_copy(update={"coefficients_rad": (0.0, *(float(v) for v in c))}))
     return found
+
+
+def _of(law: Empirical, x: FloatArray) -> FloatArray:
+    """What a law's coefficients after the constant belong to."""
+    return (
+        _waves(x, np.pi / law.half_width) if law.law == "fourier" else _basis(x, law.centre, law.half_width)
+    )
 
 
 def _basis(x: FloatArray, centre: float, half: float) -> FloatArray:

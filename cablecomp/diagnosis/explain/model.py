@@ -113,15 +113,18 @@ def searching(fit: Fit) -> Weighing:
     for c in problem.channels:
         usual = problem.weighing.zero_sd.get(c, 0.0) * (sigma[c] / problem.weighing.sigma[c] if told else 1.0)
         spread[c] = float(np.clip(usual, 0.1 * sigma[c], LIMITS.zero * sigma[c]))
-    return Weighing(sigma, spread, problem.weighing.moved if told else _moved(fit))
+    before = problem.weighing
+    return Weighing(sigma, spread, before.moved if told else _moved(fit), before.history)
 
 
 def _moved(fit: Fit) -> dict[str, frozenset[str]]:
     """Of few recordings those whose zero was set anew, now that less is left."""
     problem = fit.problem
-    zeros = problem.zeros(fit.x)
-    before = problem.weighing.moved
-    return {c: set_anew(problem, c, zeros[c], problem.left(fit.x, c)) for c in before}
+    zeros, past = problem.zeros(fit.x), problem.weighing.history
+    return {
+        c: set_anew(problem, c, zeros[c], problem.left(fit.x, c), past.get(c, 0.0))
+        for c in problem.weighing.moved
+    }
 
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
