@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,67 +12,102 @@ from cablecomp.effects.base import Change, Effect, Parameter, term
 SLOTS = 256
 # The past is kept at steps of at least a 200th of the delay, so that the slots always reach back far enough.
 STEPS_PER_DELAY = 200.0
+LONGEST_S = 1.0
+EVENLY = 0.25
+"""Of what the speed changes by from row to row, how far off its mean may be where it bends evenly: at a corner half."""
+UNKNOWN = 1e300
+"""A speed that nothing bends evenly with."""
 
 
 @term(
-    parameters=("delay", "of_load"),
-    state=("count", "newest", "cursor", ("times", SLOTS), ("readings", SLOTS)),
+    parameters=("delay", "of_load", "drift", "since"),
+    state=(
+        "start",
+        "count",
+        "newest",
+        "cursor",
+        ("times", SLOTS),
+        ("readings", SLOTS),
+        ("angles", SLOTS),
+        ("rates", SLOTS),
+    ),
 )
 def _look_back(c: Any, p: Any, s: Any) -> None:
-    """p: delay [s], whether of the deflection alone; s: count, place of the newest, of the last one read, times and
-    readings in a ring.
+    """p: delay [s], whether of the deflection alone, by how much it grows in a second, since when [s] (none: with the
+    first sample); s: since when, count, place of the newest, of the last one read, times and readings in a ring, and of
+    the rigid drive's angle and speed.
 
-    Positive delay: straight interpolation of the past; before the first sample, that one. Negative delay: straight
+    Positive delay: straight interpolation of the past, the rigid drive's part of it by a cubic where its speed is known
+    and bends evenly (rows picked from many, some hundredths of a second apart: straight, a twentieth of a short delay
+    was lost); before the first sample, that one. Negative delay: straight
     on by the mean velocity over a delay's length, which hardly amplifies noise. A torque that is stamped late gives
     the right tensions late: the deflection is carried on as an early reading is. Were the torque itself carried on,
     each of its corners would leave a bump that never was.
     """
-    span = abs(p.delay)
-    if span == 0.0:
-        return
-    times, readings = s.times, s.readings
     now = c.time
+    start = s.start
+    if c.first:
+        start = now if math.isnan(p.since) else p.since
+    delay = min(max(p.delay + p.drift * (now - start), -LONGEST_S), LONGEST_S)
+    span = abs(delay)
+    times, readings = s.times, s.readings
     value = c.joint + c.reading if p.of_load == 0.0 else c.joint - c.rigid * c.motor
     count, newest, cursor = int(s.count), int(s.newest), int(s.cursor)
     wanted = now - span
+    angles, rates = s.angles, s.rates
+    angle, rate = c.rigid * c.motor, UNKNOWN if math.isnan(c.motor_rate) else c.rigid * c.motor_rate
     past, past_time = value, now
     if count > 0:
         while cursor != newest and times[(cursor + 1) % SLOTS] <= wanted:
             cursor = (cursor + 1) % SLOTS
         past, past_time = readings[cursor], times[cursor]
-        after_time, after = now, value
+        after_time, after, after_angle, after_rate = now, value, angle, rate
         if cursor != newest:
-            after_time, after = times[(cursor + 1) % SLOTS], readings[(cursor + 1) % SLOTS]
+            after_at = (cursor + 1) % SLOTS
+            after_time, after = times[after_at], readings[after_at]
+            after_angle, after_rate = angles[after_at], rates[after_at]
         if past_time < wanted and after_time > past_time:
-            past += (after - past) * (wanted - past_time) / (after_time - past_time)
+            length = after_time - past_time
+            part = (wanted - past_time) / length
+            past += (after - past) * part
             past_time = wanted
-    if p.delay > 0.0:
+            straight = (after_angle - angles[cursor]) / length
+            begins, ends = rates[cursor] - straight, after_rate - straight
+            if p.of_load == 0.0 and abs(begins + ends) <= EVENLY * abs(ends - begins):
+                past += length * part * (1.0 - part) * ((1.0 - part) * begins - part * ends)
+    if delay > 0.0:
         c.reading += past - value
     elif past_time < now:
         c.reading += (value - past) * span / (now - past_time)
     if c.commit:
+        s.start = start
         if count == 0:
-            s.count, times[0], readings[0] = 1.0, now, value
+            s.count, times[0], readings[0], angles[0], rates[0] = 1.0, now, value, angle, rate
             s.newest = s.cursor = 0.0
         elif now == times[newest]:
-            readings[newest] = value
+            readings[newest], angles[newest], rates[newest] = value, angle, rate
         elif now - times[newest] >= span / STEPS_PER_DELAY:
             newest = (newest + 1) % SLOTS
-            times[newest], readings[newest] = now, value
+            times[newest], readings[newest], angles[newest], rates[newest] = now, value, angle, rate
             s.newest, s.cursor = float(newest), float(cursor)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    delays = ((-values["load_delay_s"], 1.0), (values["delay_s"], 0.0))
-    return Change(terms=tuple(t for s, load in delays if s for t in _look_back(delay=s, of_load=load)))
+    drift, since = values["drift"], values["drift_since_s"]
+    load = _look_back(delay=-values["load_delay_s"], of_load=1.0, drift=0.0, since=math.nan)
+    joint = _look_back(delay=values["delay_s"], of_load=0.0, drift=drift, since=since)
+    late = values["delay_s"] or drift
+    return Change(terms=(*(load if values["load_delay_s"] else ()), *(joint if late else ())))
 
 
 EFFECT = Effect(
     id="clock_skew",
     statement="Channels are stamped late against each other, or filtered: what the joint encoder or the torque sensor "
-    "reads now was true a moment ago.",
-    equation="joint(t) = joint_true(t - Δ), M(t) = M_true(t - Δ_M)",
-    source="pure delay between channels; a negative one is met by extrapolation along the last Δ",
+    "reads now was true a moment ago; where two clocks run at unlike speed, ever longer ago.",
+    equation="joint(t) = joint_true(t - Δ - ρ (t - t0)), M(t) = M_true(t - Δ_M); t0 the recording's first sample "
+    "unless it is given (clocks that go on from recording to recording)",
+    source="pure delay between channels; a negative one is met by extrapolation along the last Δ; crystals of loggers "
+    "are off by 10 to 50 in a million",
     parameters=(
         Parameter(
             "delay_s",
@@ -94,6 +130,29 @@ EFFECT = Effect(
             maximum=1.0,
             omitted=0.0,
             of_load=True,
+        ),
+        Parameter(
+            "drift",
+            "-",
+            0.0,
+            -5e-4,
+            5e-4,
+            "ρ, seconds by which the joint's stamps fall back in a second; 0 if left out",
+            minimum=-0.01,
+            maximum=0.01,
+            omitted=0.0,
+        ),
+        Parameter(
+            "drift_since_s",
+            "s",
+            0.0,
+            0.0,
+            3600.0,
+            "t0, on the recordings' common clock; left out: the recording's first sample",
+            role="begin",
+            held=True,
+            omitted=math.nan,
+            of="drift",
         ),
     ),
     acts_through=("velocity", "load_rate"),

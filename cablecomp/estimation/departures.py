@@ -71,7 +71,7 @@ def set_anew(
 
     `left`: misfit of the channel on judged rows, by recording, its zero taken off [the channel's unit]."""
     if any(role_of(p.base) == "instant" for p in problem.parameters):
-        return problem.weighing.moved.get(channel, frozenset())
+        return frozenset(problem.weighing.moved.get(channel, ()))
     found: set[str] = set()
     for session in problem.repeated:
         seen = [

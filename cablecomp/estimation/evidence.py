@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -87,6 +88,13 @@ class Evidence:
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""
         return self.columns[name][self.rows]
+
+    @cached_property
+    def motor_rate(self) -> FloatArray:
+        """Speed of the motor on the fine rows [rad/s]; NaN where two of them have one time."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rate = np.gradient(self.columns[INPUT], self.columns["time_s"])
+        return np.asarray(np.where(np.isfinite(rate), rate, np.nan), dtype=np.float64)
 
     @property
     def group(self) -> float:

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from cablecomp.estimation.departures import departures, set_anew
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.limits import HOPELESS, ZERO
+from cablecomp.estimation.limits import HOPELESS, MOVED_SD, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray
@@ -206,8 +206,11 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
         if scatter is not None:
             seen = min(scatter.sd, ZERO * size[c])
             zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
-            past = floor.history.get(c, 0.0)
-            moved[c] = set_anew(problem, c, zeros, left[c], past) if scatter.moved is None else scatter.moved
+            if scatter.moved is None:
+                anew, far = set_anew(problem, c, zeros, left[c], floor.history.get(c, 0.0)), sigma[c]
+            else:
+                anew, far = scatter.moved, zero_sd[c]
+            moved[c] = dict.fromkeys(anew, MOVED_SD * far)
     return Weighing(sigma, zero_sd, moved, floor.history)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, MOVED_SD, STEP
+from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing, stood, with_common
@@ -40,12 +40,12 @@ def of_recording(misfits: Misfits, place: int) -> dict[str, FloatArray]:
 @dataclass(frozen=True)
 class Weighing:
     """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero
-    departs from its session's; `moved`: recordings whose zero was set anew and may be anywhere; `history`: how far one
-    that nobody recorded moves zeros [the channel's unit]."""
+    departs from its session's; `moved`: recordings whose zero was set anew, and how far it may be; `history`: how far
+    one that nobody recorded moves zeros [the channel's unit]."""
 
     sigma: Mapping[str, float]
     zero_sd: Mapping[str, float]
-    moved: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    moved: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     history: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -339,9 +339,8 @@ class Problem:
             blocks.append(block)
         matrix = np.vstack(blocks)
         penalty = np.zeros((n_dep + sum(carried), matrix.shape[1]))
-        moved = self.weighing.moved.get(channel, ())
-        anew = MOVED_SD * max(spread, sigma)
-        departing = [1.0 / (anew if r.name in moved else spread) for r in self.evidence[:n_dep]]
+        moved = self.weighing.moved.get(channel, {})
+        departing = [1.0 / moved.get(r.name, spread) for r in self.evidence[:n_dep]]
         penalty[:, own:] = np.diag(departing + [1.0 / CARRYOVER_SD] * sum(carried))
         Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
         return Zeros(Q, R, len(penalty))

@@ -80,6 +80,7 @@ class Simulator:
         read.time[before:], read.motor[before:] = columns["time_s"][kept], columns["motor_position_rad"][kept]
         read.load[before:] = load if isinstance(load, float) else load[kept]
         read.joint[before:] = columns[JOINT][kept]
+        read.motor_rate[before:] = recording.motor_rate[kept]
         if "temperature_degC" in columns:
             read.temperature[before:] = columns["temperature_degC"][kept]
         for k, name in enumerate(self.others):

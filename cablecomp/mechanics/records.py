@@ -226,6 +226,7 @@ CONTEXT = record(
         ("tension_l", "f8"),  # NaN in an open circuit
         ("radius", "f8"),  # of the output pulley
         ("temperature", "f8"),  # degC; NaN if not measured
+        ("motor_rate", "f8"),  # speed of the input pulley where it is known beside the samples, else NaN
         ("other", "f8", (OTHERS,)),  # further channels; NaN if not measured
         # what terms add to (sums start at 0, factors at 1)
         ("moment", "f8"),  # taken out of the load path at the output pulley

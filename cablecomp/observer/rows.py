@@ -23,6 +23,7 @@ READINGS = record(
         ("load", "f8"),  # of the joint torque sensor, as it reads
         ("joint", "f8"),  # of the joint encoder
         ("temperature", "f8"),  # degC
+        ("motor_rate", "f8"),  # of rows that were picked from many: what their spacing does not tell
         ("other", "f8", (OTHERS,)),  # further channels, as many as the joint's effects read; the rest 0
     ]
 )
@@ -70,6 +71,7 @@ class Readings(NamedTuple):
     load: Floats
     joint: Floats
     temperature: Floats
+    motor_rate: Floats
     other: Floats
 
 

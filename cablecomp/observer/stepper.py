@@ -107,6 +107,7 @@ def predict(d: Drive, terms: Terms, laws: Floats, read: Any, answer: Any) -> int
     raw = (read.load - d.sensor.offset) / d.sensor.gain
     motor, load = smooth(d, read.time - x.time, read.motor, raw)
     advance(d, read.time, motor, load, read.temperature)
+    x.motor_rate = read.motor_rate
     for j in range(OTHERS):
         x.other[j] = read.other[j]
     status = joint_solve(d, terms, laws)

@@ -193,6 +193,23 @@ def test_clock_skew_shifts_the_time_axis(delay: float) -> None:
     assert found == pytest.approx(late(columns, q, delay), abs=2e-5 * delay / 0.05 * np.ptp(q))
 
 
+@pytest.mark.parametrize("since", [None, -40.0])
+def test_a_clock_that_runs_slow_falls_back_ever_further(since: float | None) -> None:
+    config = joint()
+    columns = excitation(config, 3000)
+    time = columns["time_s"]
+    q = run(config, columns)["joint_position_rad"]
+    law = {"delay_s": -0.002, "drift": 1e-3, **({} if since is None else {"drift_since_s": since})}
+    found = run(config, columns, ("clock_skew", law))["joint_position_rad"]
+    passed = time - (time[0] if since is None else since)
+    delay = -0.002 + 1e-3 * passed
+    behind = delay > 0.0  # early readings are met by going straight on
+    expected = np.interp(time - delay, time, q)
+    effect = np.max(np.abs(q - expected))
+    assert effect > 1e-4
+    assert found[behind] == pytest.approx(expected[behind], abs=0.01 * effect)
+
+
 def test_a_late_encoder_is_exact_where_every_sample_is_kept() -> None:
     config = joint()
     columns = excitation(config, 300)

@@ -47,7 +47,7 @@ def test_zeros_projected_out_are_those_of_an_explicit_least_squares_fit(
     """min over zeros of |w (m - z)/s|^2 + |d/spread|^2, z = session's + recording's departure d; spread is larger for
     one that was set anew."""
     p = problem(three)
-    p = p.with_weighing(replace(p.weighing, moved={ANGLE: frozenset(moved)}))
+    p = p.with_weighing(replace(p.weighing, moved={ANGLE: dict.fromkeys(moved, MOVED_SD * SPREAD)}))
     misfits = p.misfits(p.start)[ANGLE]
     rows, design = [], []
     for k, (e, m) in enumerate(zip(three, misfits, strict=True)):

@@ -222,7 +222,7 @@ def _by_amount(
         Start(
             {
                 amount.name: size,
-                **{p.name: v for p, v in zip(shapes, point, strict=True)},
+                **{p.name: v for p, v in zip(shapes, point, strict=True) if not math.isnan(v)},
                 **{p.name: p.neutral for p in further},
                 **texts,
             }
@@ -271,6 +271,8 @@ def _grid(
             float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns
         ]
         return (float(np.mean(means)) if means else 20.0,)
+    if p.role == "begin":  # with each recording's first sample, or with the first of all
+        return (math.nan, min(float(e.columns["time_s"][0]) for e in evidence))
     if p.role == "length":
         return (0.02 * high, 0.25 * high)
     if p.role == "presliding":

@@ -20,6 +20,7 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.departures import set_anew
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
+from cablecomp.estimation.limits import MOVED_SD
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
@@ -114,7 +115,10 @@ def searching(fit: Fit) -> Weighing:
         usual = problem.weighing.zero_sd.get(c, 0.0) * (sigma[c] / problem.weighing.sigma[c] if told else 1.0)
         spread[c] = float(np.clip(usual, 0.1 * sigma[c], LIMITS.zero * sigma[c]))
     before = problem.weighing
-    return Weighing(sigma, spread, before.moved if told else _moved(fit), before.history)
+    anew = before.moved if told else _moved(fit)
+    far = spread if told else sigma
+    moved = {c: dict.fromkeys(names, MOVED_SD * far[c]) for c, names in anew.items()}
+    return Weighing(sigma, spread, moved, before.history)
 
 
 def _moved(fit: Fit) -> dict[str, frozenset[str]]:

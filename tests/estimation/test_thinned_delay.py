@@ -1,0 +1,46 @@
+"""A late encoder on rows picked from many: what their spacing hides of the motion is told by its speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from turning import JOINT, recorded
+
+from cablecomp.effects import with_effects
+from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.estimation.simulate import simulator
+from cablecomp.signal.smoothing import FloatArray
+
+
+def shift(e: Evidence, delay_s: float, *, every: bool) -> FloatArray:
+    """What a delay does to the joint's readings on the judged rows, run on these alone or on all fine rows [rad]."""
+    kept = np.arange(len(e.columns["time_s"])) if every else e.rows
+    late = simulator(with_effects(JOINT, [("clock_skew", {"delay_s": delay_s})])).run(e, kept)
+    plain = simulator(JOINT).run(e, kept)
+    found = late.joint - plain.joint
+    return found[e.rows] if every else found
+
+
+@pytest.mark.parametrize("delay_s", [2e-4, 5e-3, 0.03])
+def test_a_delay_between_thinned_rows_is_what_it_is_between_all(delay_s: float) -> None:
+    e = gather(JOINT, "one", recorded(), "a", fine_rows=2000, judged_rows=150)
+    assert np.median(np.diff(e.at_rows("time_s"))) > 0.03
+    true = shift(e, delay_s, every=True)
+    size = float(np.sqrt(np.mean(true**2)))
+    off = float(np.sqrt(np.mean((shift(e, delay_s, every=False) - true) ** 2)))
+    assert off < 0.03 * size
+    unknown = replace(e)
+    unknown.__dict__["motor_rate"] = np.full(len(e.columns["time_s"]), np.nan)
+    straight = float(np.sqrt(np.mean((shift(unknown, delay_s, every=False) - true) ** 2)))
+    assert straight > 2.0 * off  # by straight lines
+
+
+def test_the_motors_speed_is_unknown_where_two_rows_have_one_time() -> None:
+    e = gather(JOINT, "one", recorded(), "a", fine_rows=400, judged_rows=60)
+    time = e.columns["time_s"].copy()
+    time[11] = time[10] = time[9]
+    doubled = replace(e, columns={**e.columns, "time_s": time})
+    assert np.isnan(doubled.motor_rate[10])
+    assert np.isfinite(doubled.motor_rate[20:]).all()
