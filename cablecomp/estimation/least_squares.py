@@ -207,7 +207,8 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
             seen = min(scatter.sd, ZERO * size[c])
             zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
             if scatter.moved is None:
-                anew, far = set_anew(problem, c, zeros, left[c], floor.history.get(c, 0.0)), sigma[c]
+                anew = set_anew(problem, c, zeros, left[c], floor.history.get(c, 0.0))
+                far = max(sigma[c], zero_sd[c])
             else:
                 anew, far = scatter.moved, zero_sd[c]
             moved[c] = dict.fromkeys(anew, MOVED_SD * far)

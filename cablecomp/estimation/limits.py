@@ -33,7 +33,7 @@ been set anew: a step within a recording, or what goes on through it, leaves as 
 OF_HISTORY: Final = 3.0
 """The same, in what an unknown history moves zeros by."""
 MOVED_SD: Final = 30.0
-"""Prior sd of such a zero, in that of the others; of few recordings in what a row counts for."""
+"""Prior sd of such a zero, in that of the others; of few recordings in what a row counts for, if that is more."""
 CARRYOVER_SD: Final = 1.0
 """Prior sd of a recording's carry-over, in what the assumed histories add in the mean (RMS)."""
 HISTORY_CUTS: Final = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)

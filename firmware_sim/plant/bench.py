@@ -39,6 +39,7 @@ from firmware_sim.plant.config import EffectSpec, PlantConfig
 from firmware_sim.plant.effects import apply_effects
 from firmware_sim.plant.errors import PlantError
 from firmware_sim.plant.jit import njit, part
+from firmware_sim.plant.late import read_late
 from firmware_sim.plant.mesh import NORMAL, Resolution
 from firmware_sim.plant.readout import read_out
 from firmware_sim.plant.records import Drive, Floats
@@ -138,8 +139,7 @@ def simulate(
     )
     _raise_if_stuck(status, inputs)
     if joint.clock_delay_s != 0.0:
-        late = inputs[:, TIME] - joint.clock_delay_s
-        outputs[:, Q_OUT] = np.interp(late, inputs[:, TIME], outputs[:, Q_OUT])
+        outputs[:, Q_OUT] = read_late(inputs[:, TIME], outputs[:, Q_OUT], joint.clock_delay_s)
     for read in (*build.mounts, *build.encoders, *build.stamps):
         read(inputs, outputs)
     return _collect(inputs[history:], outputs[history:], joint, config)

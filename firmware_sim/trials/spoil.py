@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from firmware_sim.plant import PlantRun
+from firmware_sim.plant.late import read_late
 from firmware_sim.plant.records import Floats
 from firmware_sim.trials.imperfections import Imperfections
 from firmware_sim.trials.sensors import NEIGHBOUR_NOISE, TEMPERATURE_NOISE_K
@@ -83,7 +84,7 @@ def _delay(clean: dict[str, Floats], time_s: Floats, how: Imperfections) -> None
         clean[channel] = _low_passed(clean[channel], step, how["low_pass"]["lag_s"])
     if "late" in how:
         channel = how["late"]["channel"]
-        clean[channel] = np.interp(time_s - how["late"]["lag_s"], time_s, clean[channel])
+        clean[channel] = read_late(time_s, clean[channel], float(how["late"]["lag_s"]))
 
 
 def _low_passed(values: Floats, step_s: float, lag: float) -> Floats:

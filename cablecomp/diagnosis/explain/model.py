@@ -116,7 +116,7 @@ def searching(fit: Fit) -> Weighing:
         spread[c] = float(np.clip(usual, 0.1 * sigma[c], LIMITS.zero * sigma[c]))
     before = problem.weighing
     anew = before.moved if told else _moved(fit)
-    far = spread if told else sigma
+    far = spread if told else {c: max(spread[c], sigma[c]) for c in sigma}
     moved = {c: dict.fromkeys(names, MOVED_SD * far[c]) for c, names in anew.items()}
     return Weighing(sigma, spread, moved, before.history)
 

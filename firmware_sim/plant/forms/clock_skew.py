@@ -9,6 +9,7 @@ import numpy as np
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import JOINT_NM, Q_IN, Q_OUT, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.late import read_late
 from firmware_sim.plant.records import Floats
 
 _DELAY = Parameter("delay_s", "Δ", low=-1.0, high=1.0, neutral=0.0)
@@ -20,7 +21,7 @@ def _late(column: int, delay: Callable[[Floats, Mapping[str, float]], Floats]) -
     def apply(build: Build, p: Mapping[str, float]) -> None:
         def read(inputs: Floats, outputs: Floats) -> None:
             time = inputs[:, TIME]
-            outputs[:, column] = np.interp(time - delay(time, p), time, outputs[:, column])
+            outputs[:, column] = read_late(time, outputs[:, column], delay(time, p))
 
         build.stamps.append(read)
 
