@@ -267,6 +267,9 @@ class Thresholds:
     """The same where nothing is named: five times the noise is a mismatch, whether or not it follows anything."""
     recalibrate: float = 0.9
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
+    goes_on: float = 3.0
+    """Of its own deviations, below which an amount that goes on growing is dropped again: a drift of a clock by 2.5e-6
+    +- 5e-6, which predicted better while a weight was not in the model, would be 9 ms after an hour of control."""
     not_carried: float = 3.0
     """Error on data kept for the end over that on data left out in turn, beyond which a warning says so (trials seed
     671: 1.6 in nine of ten)."""

@@ -70,7 +70,8 @@ class Parameter:
     itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `ends_as_another`: whether, of the
     effect's values, another effect is the better word where it ends on `high`; `is_another`: wherever it ends.
     `of_known_drive`: beside a drive known
-    by order of magnitude it, and what is `of` it, are not asked for.
+    by order of magnitude it, and what is `of` it, are not asked for. `goes_on`: what it does grows without end, so that
+    a diagnosis keeps it only where it is told from none.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Parameter:
     ends_as_another: Callable[[Mapping[str, float]], bool] | None = None
     is_another: Callable[[Mapping[str, float]], bool] | None = None
     of_known_drive: bool = False
+    goes_on: bool = False
 
     @property
     def shape(self) -> bool:

@@ -141,6 +141,7 @@ EFFECT = Effect(
             minimum=-0.01,
             maximum=0.01,
             omitted=0.0,
+            goes_on=True,
         ),
         Parameter(
             "drift_since_s",

@@ -80,13 +80,17 @@ class Selection:
 
 
 def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:
-    """By loss on data left out, each set of terms once."""
+    """By loss on data left out, each set of terms once: of two that end alike (an effect asked for by two of its
+    amounts, of which one ends at none) that of fewer parameters."""
     found: dict[frozenset[str], Model] = {}
     if not models:
         return []
     size = common(models, groups)
     for m in sorted(models, key=lambda m: loss(m, size, groups)):
-        found.setdefault(m.added, m)
+        best = found.setdefault(m.added, m)
+        fewer = len(m.fit.problem.parameters) < len(best.fit.problem.parameters)
+        if fewer and loss(m, size, groups) <= (1.0 + LIMITS.tie) * loss(best, size, groups):
+            found[m.added] = m
     return list(found.values())
 
 

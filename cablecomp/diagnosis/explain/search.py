@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.body import spread
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.dependence import Dependence
@@ -30,9 +31,10 @@ from cablecomp.diagnosis.explain.ties import implausible
 from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.catalogue import catalogue, parameter_of
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
-from cablecomp.estimation.least_squares import Fit, derivative_of_part, refit, solve, weighed
+from cablecomp.estimation.least_squares import Fit, covariance, derivative_of_part, refit, solve, weighed
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,9 @@ def search(drive: Calibrated, pool: Sequence[Hypothesis], rng: np.random.Generat
     selection = select(calibrated, nominal, pool, groups, rng, pace)
     cut_short = pace.over
     pace.tell("last fit", 0.9)
-    final = _settled(selection.final.terms, selection.final.fit, drive, groups)
+    final = _without_idle_growth(
+        _settled(selection.final.terms, selection.final.fit, drive, groups), drive, groups
+    )
     selection = replace(selection, final=final)
     if not whole:
         groups = make_groups(drive.fit)
@@ -131,6 +135,37 @@ def _settled(terms: tuple[Term, ...], fit: Fit, drive: Calibrated, groups: Group
         except InputError:
             break
     return Model(terms, fit, left_out(fit, groups))
+
+
+def _without_idle_growth(model: Model, drive: Calibrated, groups: Groups) -> Model:
+    """The model without further amounts that go on growing and are not told from none: a controller would run away with
+    them."""
+    problem = model.fit.problem
+    own = {t.key(t.amount.name) for t in model.terms if isinstance(t, Hypothesis)}
+    sds = np.sqrt(np.diag(covariance(model.fit)))
+    idle: set[tuple[str, str]] = set()
+    for p, x, sd in zip(problem.parameters, model.fit.x, sds, strict=True):
+        known = parameter_of(p.base)
+        if known is not None and known.goes_on and p.base not in own and abs(x) < LIMITS.goes_on * sd:
+            effect, name = p.base.split(".")[1:]
+            shapes = (q.name for q in catalogue()[effect].parameters if q.of == name)
+            idle |= {(effect, n) for n in (name, *shapes)}
+    if not idle:
+        return model
+    entries = tuple(
+        EffectEntry(id=e.id, **{k: v for k, v in e.parameters.items() if (e.id, k) not in idle})
+        for e in problem.config.effect
+    )
+    smaller = replace(
+        problem,
+        config=problem.config.model_copy(update={"effect": entries}),
+        parameters=tuple(p for p in problem.parameters if tuple(p.base.split(".")[1:]) not in idle),
+    )
+    try:
+        fit = solve(smaller, placed(model.fit, smaller), LIMITS.settled, LIMITS.tolerance)
+    except InputError:
+        return model
+    return _settled(model.terms, fit, drive, groups)
 
 
 def without_effects(model: Model, drive: Calibrated, groups: Groups) -> Model:
