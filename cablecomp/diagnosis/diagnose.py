@@ -12,7 +12,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.answer.diagnosis import diagnosis_of
 from cablecomp.diagnosis.answer.errors import errors_of
-from cablecomp.diagnosis.answer.verdict import is_structured, predicts, share_left, verdict_of
+from cablecomp.diagnosis.answer.verdict import is_structured, not_carried, predicts, share_left, verdict_of
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
 from cablecomp.diagnosis.describe.empirical import empirical_laws
@@ -149,6 +149,7 @@ def _judged(
     if kept is not final or laws:
         again = [f.law for f in laws]
         augmented = errors_of(kept.fit, case.body.final, by, again) if kept.terms or laws else baseline
+    structured = structured or (not named and any(not_carried(augmented, drive.floor_rad)))
     verdict = verdict_of(bool(named), structured, drive, kept)
     return Outcome(
         tuple(weighed), tuple(named), kept, tuple(laws), baseline, augmented, remainder, repeated_rad, structured,

@@ -18,7 +18,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
-from cablecomp.estimation.least_squares import Fit, covariance
+from cablecomp.estimation.least_squares import Fit, covariance, rms_left
 from cablecomp.estimation.limits import EXACT
 from cablecomp.estimation.parameter import known_by_factor
 from cablecomp.estimation.standing import ON_THE_CLOCK, apart_of, on_the_clock, standing, value_of
@@ -62,7 +62,7 @@ def augmented_joint(
             )
         for e in recordings:
             now = _meanwhile(_stood(config, fit, e), model, e)
-            moved = e.name in zeros[JOINT] and e.name in fit.problem.weighing.moved.get(JOINT, ())
+            moved = _stands_apart(fit, zeros[JOINT], e)
             if now != after or moved:
                 values = {**(_zeros_of(zeros, e.name) if moved else own_zeros), **_own(now, common, fit)}
                 name = f"{label} {short(e.name)}"
@@ -74,6 +74,17 @@ def augmented_joint(
     if not entries:
         return joint
     return joint.model_copy(update={"session": (Session(own=tuple(config.session_own)), *entries)})
+
+
+def _stands_apart(fit: Fit, zeros: Mapping[str, FloatArray], e: Evidence) -> bool:
+    """Whether a recording has a zero of its own in the joint that is written: set anew, or, of few, moved by its
+    history further than all that is left."""
+    if e.name not in zeros:
+        return False
+    if e.name in fit.problem.weighing.moved.get(JOINT, ()):
+        return True
+    apart = abs(float(zeros[e.name][0] - zeros[e.session][0]))
+    return len(fit.problem.evidence) < LIMITS.recordings and apart > rms_left(fit)
 
 
 def _loaded(config: JointConfig, recordings: Iterable[Evidence]) -> ObserverOptions:

@@ -21,8 +21,9 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
-    """The three errors of a model and its laws without a name; zeros are the sessions', as `replay` takes them, or a
-    recording's where it was set anew; a recording's carry-over is estimated and taken off."""
+    """The three errors of a model and its laws without a name; zeros are the recordings' where the fit has seen them,
+    as far as their prior lets these depart (a history that nobody recorded moves them), else the sessions'; a
+    recording's carry-over is estimated and taken off."""
     inside = _rms(_left(fit, fit.problem.evidence, laws))
 
     def left_out(part: Part) -> list[FloatArray]:
@@ -44,11 +45,11 @@ def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
 
 
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
-    """Weighted misfit of the joint angle [rad] on counted rows; laws, the session's zero and the recording's carry-over
-    taken off (where the fit has not seen the session, or the recording: as these rows, or the first of them, tell)."""
+    """Weighted misfit of the joint angle [rad] on counted rows; laws, the zero and the recording's carry-over taken off
+    (where the fit has not seen the recording: the session's; nor the session: as these rows, or the first of them,
+    tell)."""
     problem = fit.problem
     zeros, carryover = problem.aside(fit.x)
-    moved = problem.weighing.moved.get(JOINT, ())
     try:
         misfits = problem.with_evidence(evidence).misfits(fit.x)[JOINT]
     except InputError:
@@ -59,7 +60,7 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
         if not kept.any():
             continue
         left = m[kept] - sum((value_of(law, e) for law in laws), np.zeros(int(kept.sum())))
-        own = e.name if e.name in moved and e.name in zeros else e.session
+        own = e.name if e.name in zeros else e.session
         left -= zeros[own][0] if own in zeros else float(np.mean(left))
         if e.name in carryover:
             parts.append(e.weight[kept] * (left - carryover[e.name][kept]))
