@@ -84,3 +84,20 @@ def test_the_motor_feels_what_turns_or_holds_the_joint_and_its_own_friction(
     assert np.max(np.abs(off)) < 0.01 * deflection
     unknown = Observer(plain).run(columns)["joint_position_rad"] - angle
     assert (np.max(np.abs(unknown)) > 0.05 * deflection) == (effect == "motor_friction")
+
+
+def test_a_motors_drag_in_grease_is_taken_off_its_torque() -> None:
+    """LuGre without Stribeck's fall, with a viscous part as large as the dry one at 2.5 rad/s."""
+    law = {"torque_Nm": 0.05, "presliding_rad": 1e-3, "stribeck_gain": 0.0, "viscous_Nms_per_rad": 0.02}
+    spec = EffectSpec("motor_friction:lugre", law)
+    true = simulate(PlantConfig.from_dict(drive("closed")), TIME, MOTOR, LOAD, effects=[spec]).channels()
+    columns = {"time_s": TIME, "motor_position_rad": MOTOR, "motor_torque_Nm": true["motor_torque_Nm"]}
+    angle = true["joint_position_rad"]
+    off = []
+    for viscous in (0.4, 0.0):
+        known = {"torque_Nm": 0.05, "presliding_rad": 1e-3, "viscous_s_per_rad": viscous}
+        config = with_effects(joint("closed", 0.0), [("motor_friction", known)])
+        off.append(np.std(Observer(config).run(columns)["joint_position_rad"] - angle))
+    deflection = np.ptp(angle - joint("closed", 0.0).drive.ratio * MOTOR)
+    assert off[0] < 0.005 * deflection
+    assert off[1] > 5.0 * off[0]
