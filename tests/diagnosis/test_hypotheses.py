@@ -12,11 +12,13 @@ from turning import JOINT, recorded
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses, instants
-from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording
+from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording, over_plausible
+from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.problem import Problem, Weighing
 
 
 def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_session() -> None:
@@ -219,3 +221,15 @@ def test_where_the_load_is_read_at_the_motor_its_friction_is_asked_for_and_what_
         assert "motor_friction" in found
         for effect in ("bearing_friction", "gravity_load", "inertial_load"):
             assert (effect in found) == asked
+
+
+def test_friction_of_the_motor_may_be_as_large_as_the_torques_it_was_seen_to_give() -> None:
+    """No cable bears it, so that a loose cable says nothing of it."""
+    torque = 50.0 * JOINT.drive.stage[0].input_radius_m * JOINT.drive.stage[0].pretension_N
+    given = {**recorded(), "motor_torque_Nm": torque * np.sin(recorded()["time_s"])}
+    one = gather(JOINT, "one", given, "a", fine_rows=400, judged_rows=60)
+    friction = next(h for h in hypotheses(JOINT, [one]) if h.effect.id == "motor_friction")
+    plain = Problem(JOINT, (), (one,), Weighing({"joint_position_rad": 1e-5}, {}))
+    problem = with_entry(plain, friction, friction.entry({"torque_Nm": 0.5 * torque, "presliding_rad": 1e-3}))
+    fit = Fit(problem, problem.start, np.empty(0), np.empty((0, len(problem.parameters))))
+    assert over_plausible(fit, friction) == pytest.approx(0.5, rel=0.02)

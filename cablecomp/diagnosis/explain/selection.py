@@ -95,8 +95,8 @@ def _carried(
     for, best first; with those weights. None where there is none. `before`: the best of earlier rounds; where the best
     now lacks an effect of it, what keeps these and predicts as well is carried on, too."""
     good = [t.model for t in tried if demanded(t.difference, first=before is None)]
-    fresh = ranked(good, groups)
-    fresh = [m for m in fresh if bears(m.fit)] or fresh
+    # first what has an answer: of one set of terms that come from two models, one may have none
+    fresh = ranked([m for m in good if bears(m.fit)] or good, groups)
     if not fresh:
         return None
     size = common([fresh[0]], groups)
