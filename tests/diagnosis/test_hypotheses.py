@@ -225,7 +225,7 @@ def test_where_the_load_is_read_at_the_motor_its_friction_is_asked_for_and_what_
 
 def test_friction_of_the_motor_may_be_as_large_as_the_torques_it_was_seen_to_give() -> None:
     """No cable bears it, so that a loose cable says nothing of it."""
-    torque = 50.0 * JOINT.drive.stage[0].input_radius_m * JOINT.drive.stage[0].pretension_N
+    torque = 8.0 * JOINT.drive.stage[0].input_radius_m * JOINT.drive.stage[0].pretension_N
     given = {**recorded(), "motor_torque_Nm": torque * np.sin(recorded()["time_s"])}
     one = gather(JOINT, "one", given, "a", fine_rows=400, judged_rows=60)
     friction = next(h for h in hypotheses(JOINT, [one]) if h.effect.id == "motor_friction")
