@@ -41,6 +41,14 @@ def test_two_others_that_take_off_a_little_more_than_one_do_not() -> None:
     assert reigning(model(1.0, "a"), model(0.95, "b", "c")) == "a"
 
 
+def test_two_others_that_take_off_a_little_more_do_where_the_one_is_not_plausible(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(selection, "implausible", lambda m: sum(t.name == "a" for t in m.terms))
+    assert reigning(model(1.0, "a"), model(0.9, "b", "c")) == "b + c"
+    assert reigning(model(1.0, "a"), model(1.1, "b", "c")) == "a"  # not without predicting better
+
+
 def test_two_others_that_take_off_much_more_do() -> None:
     assert reigning(model(1.0, "a"), model(0.5, "b", "c")) == "b + c"
 

@@ -123,15 +123,16 @@ def _reigning(
     best: Model, carried: Sequence[Model], baseline: Model, sharper: Weighing, groups: Groups
 ) -> Model:
     """The model to go by: the first of those carried on that is worth its further terms, if it extends the best so
-    far, or if it takes off much that this one leaves, and predicts clearly better than one that extends this. Laws
-    have other forms in reality, and two wrong ones can follow what is left of the right one a little more closely."""
+    far, or has fewer amounts that are not plausible, or takes off much that this one leaves, and predicts clearly
+    better than one that extends this. Laws have other forms in reality, and two wrong ones can follow what is left of
+    the right one a little more closely."""
     if best.fit.problem.fine != carried[0].fit.problem.fine:
         return carried[0]
     rival = reweighed(best, sharper, groups)
     base: Model | None = None
     worth = [m for m in carried if worth_its_terms(m, rival, groups)]
     for m in worth:
-        if keeps(m, best):
+        if keeps(m, best) or implausible(m) < implausible(best):
             return m
         base = base or reweighed(baseline, sharper, groups)
         if _dethrones(m, rival, base, groups):
