@@ -18,10 +18,10 @@ import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import BoolArray, Evidence
+from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 
 def cut(length: int, count: int) -> IntArray:

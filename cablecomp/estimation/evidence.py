@@ -12,15 +12,13 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
+from cablecomp.estimation.outliers import outliers
 from cablecomp.mechanics.jit import njit
 from cablecomp.signal.noise import channel_noise
-from cablecomp.signal.smoothing import FloatArray, IntArray, group_means, keep_corners
-
-BoolArray = NDArray[np.bool_]
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
 
 JOINT: Final = "joint_position_rad"
 INPUT: Final = "motor_position_rad"
@@ -43,10 +41,6 @@ DIED: Final = 10.0
 """Usual steps of such a channel beyond which it was not read for a while, or no more."""
 OVERFLOWN: Final = 1e15
 """From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
-ABSURD: Final = 20.0
-"""Ranges (2 to 98 %) from the middle beyond which no joint has been: counters that overflow, words for "no reading"."""
-SPIKE: Final = 8.0
-"""Deviations (scaled median) from the neighbours beyond which a reading is an outlier."""
 
 
 class Apart(NamedTuple):
@@ -148,7 +142,7 @@ def gather(
             raise InputError(f"{name}: channel `{key}` is missing; a diagnosis needs {', '.join(NEEDED)}")
     raw = _in_order(name, {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()})
     load = load_channel(config, raw)
-    good, outliers = _good(name, raw, load)
+    good, set_aside = _good(name, raw, load)
     unread = tuple(k for k in raw if k != "time_s" and k not in good)
     raw = {k: v for k, v in raw.items() if k not in unread}
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
@@ -165,7 +159,7 @@ def gather(
     share = np.gradient(time) if len(time) > 1 else np.ones(1)
     weight = np.sqrt(share / share.mean())
     return Evidence(
-        name, session, {}, means, rows, {k: v[rows] for k, v in counted.items()}, weight, noise, outliers,
+        name, session, {}, means, rows, {k: v[rows] for k, v in counted.items()}, weight, noise, set_aside,
         len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread,
     )  # fmt: skip
 
@@ -174,7 +168,7 @@ def _good(name: str, raw: Mapping[str, FloatArray], load: str | None) -> tuple[d
     """Which readings of each channel are to be trusted, and how many were set aside as outliers; without the channels
     that may be missing and were hardly read."""
     good = {k: np.abs(v) < OVERFLOWN for k, v in raw.items() if k != "time_s"}
-    outliers = 0
+    set_aside = 0
     for key, kept in list(good.items()):
         if kept.sum() < FEWEST:
             if key in NEEDED or key == load:
@@ -183,10 +177,10 @@ def _good(name: str, raw: Mapping[str, FloatArray], load: str | None) -> tuple[d
                 )
             del good[key]
             continue
-        spikes = _spikes(raw[key], kept)
-        outliers += int(spikes.sum())
+        spikes = outliers(raw[key], kept)
+        set_aside += int(spikes.sum())
         kept &= ~spikes
-    return good, outliers
+    return good, set_aside
 
 
 def _drivable(raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], load: str | None) -> BoolArray:
@@ -300,36 +294,6 @@ def _in_order(name: str, columns: dict[str, FloatArray]) -> dict[str, FloatArray
     if kept.sum() < FEWEST:
         raise InputError(f"{name}: {int(kept.sum())} samples with a time of their own; {FEWEST} are needed")
     return {k: v[kept] for k, v in columns.items()}
-
-
-def _spikes(values: FloatArray, good: BoolArray) -> BoolArray:
-    """Single readings far off the line through their neighbours, and off what differences usually are; runs of them
-    that lie nowhere near the rest."""
-    found = np.zeros(len(values), dtype=np.bool_)
-    place = np.flatnonzero(good)
-    v = values[place]
-    absurd = _absurd(v)
-    found[place[absurd]] = True
-    place, v = place[~absurd], v[~absurd]
-    before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
-    both = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-    usual = float(np.median(np.abs(np.diff(v, 2)))) / 0.6745 + 1e-300
-    found[place[1:-1]] |= (both > SPIKE * usual) & (both > SPIKE * float(np.quantile(both, 0.97)) / 2.0)
-    return found
-
-
-def _absurd(v: FloatArray) -> BoolArray:
-    """Runs of readings far outside of where all others lie, into which and out of which the channel leaps in one
-    sample: a quick motion after a long rest does not leap."""
-    low, high = np.quantile(v, (0.02, 0.98))
-    away = np.abs(v - 0.5 * (low + high))
-    far = (away > ABSURD * (high - low)) & (high > low)
-    edges = np.flatnonzero(np.diff(far.astype(np.int8), prepend=0, append=0))
-    leap = np.concatenate(([np.inf], np.abs(np.diff(v)), [np.inf]))
-    found = np.zeros(len(v), dtype=np.bool_)
-    for first, end in edges.reshape(-1, 2):
-        found[first:end] = min(leap[first], leap[end]) > 0.5 * away[first:end].max()
-    return found
 
 
 def _unresolved(

@@ -15,6 +15,7 @@ from cablecomp.mechanics.jit import njit
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 _GROUPED_WIDTH: Final = 32
 _GAP: Final = 10.0

@@ -11,7 +11,8 @@ from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses, instants
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
+from cablecomp.diagnosis.explain.instants import instants
 from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording, over_plausible
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS

@@ -18,9 +18,8 @@ from cablecomp.diagnosis.explain.scores import (
     selected_in,
 )
 from cablecomp.diagnosis.folds import Groups
-from cablecomp.estimation.evidence import BoolArray
 from cablecomp.estimation.parameter import Parameter
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray
 
 BLOCKS, ROWS = 30, 20
 

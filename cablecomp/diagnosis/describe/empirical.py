@@ -14,8 +14,8 @@ from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import ScoreDifference, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT, BoolArray, Evidence
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 TERMS = 10
 """Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a

@@ -12,7 +12,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import Course
-from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.diagnosis.explain.instants import instants
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.effects.base import Role
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
@@ -294,31 +294,6 @@ def _reach(evidence: Sequence[Evidence], channel: str) -> float:
     """Half of what a channel covers over all recordings."""
     readings = np.concatenate([e.columns[channel] for e in evidence if channel in e.columns])
     return 0.5 * float(np.nanmax(readings) - np.nanmin(readings))
-
-
-def instants(evidence: Sequence[Evidence], *, between: bool) -> tuple[float, ...]:
-    """Times at which an event is asked for: even over what counts, well inside of a recording, and, if `between`,
-    between recordings of one session; between sessions the joint was taken apart."""
-    spans = []
-    for k, e in enumerate(evidence):
-        spans.append(inside_of(e))
-        if between and k and evidence[k - 1].session == e.session:
-            last = float(evidence[k - 1].columns["time_s"][-1])
-            spans.append((last, float(e.columns["time_s"][0])))
-    inside = [s for s in spans if s[1] > s[0]]
-    length = sum(b - a for a, b in inside)
-    found = []
-    for a, b in inside:
-        count = max(1, round(LIMITS.instants * (b - a) / length))
-        found += [a + (b - a) * (k + 0.5) / count for k in range(count)]
-    return tuple(found)
-
-
-def inside_of(e: Evidence) -> tuple[float, float]:
-    """From when to when an event in a recording has a before and an after that show it [s]."""
-    time = e.columns["time_s"][e.rows[e.counted[JOINT]]] if e.counted[JOINT].any() else e.columns["time_s"]
-    margin = LIMITS.edge * float(time[-1] - time[0])
-    return float(time[0]) + margin, float(time[-1]) - margin
 
 
 def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:

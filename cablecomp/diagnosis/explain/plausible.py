@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, inside_of
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.instants import inside_of
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import MOTOR
 from cablecomp.estimation.least_squares import Fit
