@@ -42,6 +42,7 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     if not result["missing_physics"]:
         words += _without_a_name(result)
     words += page.paragraph(_left(result, unit))
+    words += page.paragraph(_nameless(result)) if result["empirical"] else ""
     trace = shown_first(d)
     picture = ""
     if trace is not None:
@@ -95,6 +96,15 @@ def _without_a_name(result: Mapping[str, Any]) -> str:
             f"Nearest: {plain(c['effect'])} ({100 * c['confidence']:.0f} %). Against it: {c['why_not_named']}."
         )
     return ""
+
+
+def _nameless(result: Mapping[str, Any]) -> str:
+    """What laws without a physical name take off what remains, one after the other."""
+    laws = (
+        f"{law['law'].replace('_', ' ')} {100.0 * known(law['heldout_gain']):.0f} %"
+        for law in result["empirical"]
+    )
+    return f"Of that, laws without a name take off {', then '.join(laws)}; they run in the augmented joint."
 
 
 def _left(result: Mapping[str, Any], unit: Scale) -> str:

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from diagnosis_example import NOISE, example, without_a_name
 
-from cablecomp.diagnosis.result import Diagnosis, Value, report_json
+from cablecomp.diagnosis.result import Diagnosis, Law, Value, report_json
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_tables import between, interval
@@ -73,6 +73,16 @@ def test_the_answer_stands_before_everything_else(found: Diagnosis) -> None:
     first = text_of(diagnosis_page(found).split("</section>")[0])
     for part in ("Partly explained", "Viscous slip", "97 %", "→", "What remains", "Kept for the end"):
         assert part in first, part
+
+
+def test_the_answer_says_what_a_law_without_a_name_takes_off_the_rest(found: Diagnosis) -> None:
+    law = Law("wave_by_motor_angle", "motor_angle", 0.91, 21.0)
+    for d in (
+        replace(found, empirical=(law,)),
+        replace(without_a_name(found, "unexplained"), empirical=(law,)),
+    ):
+        first = text_of(diagnosis_page(d).split("</section>")[0])
+        assert "Of that, laws without a name take off wave by motor angle 91 %" in " ".join(first.split())
 
 
 def test_the_terminal_answers_first(found: Diagnosis) -> None:

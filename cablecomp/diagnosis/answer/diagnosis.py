@@ -70,7 +70,7 @@ def diagnosis_of(
         notes=notes(case),
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
-        traces=tuple(traces(drive.fit, kept.fit, case.covariates)),
+        traces=tuple(traces(drive.fit, kept.fit, case.covariates, outcome.empirical)),
         warnings=(
             *((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()),
             *warnings_of(kept),

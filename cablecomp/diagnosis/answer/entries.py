@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from cablecomp.config import Empirical
 from cablecomp.diagnosis.answer.values import as_trials_say, effect_values
 from cablecomp.diagnosis.body import short
+from cablecomp.diagnosis.describe.empirical import value_of
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
@@ -266,8 +268,9 @@ def channel_word(channel: str) -> str:
     return {"motor_position_rad": "motor_angle", "joint_torque_Nm": "load"}.get(channel, channel)
 
 
-def traces(before: Fit, after: Fit, seen: Sequence[Covariates]) -> list[Traces]:
-    """What was measured, and what the drive predicts before and after, recording by recording."""
+def traces(before: Fit, after: Fit, seen: Sequence[Covariates], laws: Sequence[Empirical]) -> list[Traces]:
+    """What was measured, and what the drive predicts before and, with its laws without a name, after, recording by
+    recording."""
     ratio = before.problem.config.drive.ratio
     rows = []
     lefts = (before.problem.left(before.x, own_zero=False), after.problem.left(after.x, own_zero=False))
@@ -275,9 +278,10 @@ def traces(before: Fit, after: Fit, seen: Sequence[Covariates]) -> list[Traces]:
         measured = e.at_rows(JOINT)
         rigid = ratio * e.at_rows("motor_position_rad")
         zero = float(np.median(measured - rigid))
+        after_rad = measured - lefts[1][k] + sum(value_of(law, e) for law in laws)
         rows.append(
             Traces(
-                e.name, e.session, c.values, measured, measured - lefts[0][k], measured - lefts[1][k], rigid + zero,
+                e.name, e.session, c.values, measured, measured - lefts[0][k], after_rad, rigid + zero,
                 e.counted[JOINT],
             )
         )  # fmt: skip

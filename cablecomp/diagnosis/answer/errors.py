@@ -59,7 +59,7 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
         kept = e.counted[JOINT]
         if not kept.any():
             continue
-        left = m[kept] - sum((value_of(law, e) for law in laws), np.zeros(int(kept.sum())))
+        left = (m - sum(value_of(law, e) for law in laws))[kept]
         own = e.name if e.name in zeros else e.session
         left -= zeros[own][0] if own in zeros else float(np.mean(left))
         if e.name in carryover:

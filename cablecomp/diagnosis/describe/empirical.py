@@ -189,9 +189,10 @@ def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:
 
 
 def value_of(law: Empirical, recording: Evidence) -> FloatArray:
-    """What a law adds to the joint angle [rad] on a recording's counted rows, as the observer runs it."""
-    x = recording.at_rows(law.of)[recording.counted[JOINT]]
-    return np.asarray(_of(law, x) @ np.array(law.coefficients_rad[1:]), dtype=np.float64)
+    """What a law adds to the joint angle [rad] on a recording's judged rows, as the observer runs it."""
+    return np.asarray(
+        _of(law, recording.at_rows(law.of)) @ np.array(law.coefficients_rad[1:]), dtype=np.float64
+    )
 
 
 def refitted(
