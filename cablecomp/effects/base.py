@@ -55,6 +55,16 @@ on a drum [rad]; by how much another channel turns the joint; how much what is r
 shape."""
 
 
+def never(_values: Mapping[str, float], _on_high: bool) -> bool:
+    """`Parameter.is_another` of a shape that is always the effect's own."""
+    return False
+
+
+def at_most(_values: Mapping[str, float], on_high: bool) -> bool:
+    """`Parameter.is_another` where it ends on `high`, whatever the effect's other values are."""
+    return on_high
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
@@ -67,11 +77,10 @@ class Parameter:
     it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it leaves out at
     first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, or half of
     what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course it asks by
-    itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `ends_as_another`: whether, of the
-    effect's values, another effect is the better word where it ends on `high`; `is_another`: wherever it ends.
-    `of_known_drive`: beside a drive known
-    by order of magnitude it, and what is `of` it, are not asked for. `goes_on`: what it does grows without end, so that
-    a diagnosis keeps it only where it is told from none.
+    itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `is_another`: whether, by the
+    effect's values and by whether it ended on `high`, another effect is the better word. `of_known_drive`: beside a
+    drive known by order of magnitude it, and what is `of` it, are not asked for. `goes_on`: what it does grows without
+    end, so that a diagnosis keeps it only where it is told from none.
     """
 
     name: str
@@ -91,8 +100,7 @@ class Parameter:
     of: str = ""
     tries: tuple[float, ...] = ()
     reach: float = 30.0
-    ends_as_another: Callable[[Mapping[str, float]], bool] | None = None
-    is_another: Callable[[Mapping[str, float]], bool] | None = None
+    is_another: Callable[[Mapping[str, float], bool], bool] = never
     of_known_drive: bool = False
     goes_on: bool = False
 
@@ -114,11 +122,6 @@ class Parameter:
         """Prior range (low, high) for this joint, in the parameter's unit."""
         unit = 1.0 if self.scale is None else self.scale(config)
         return self.low * unit, self.high * unit
-
-
-def always(_values: Mapping[str, float]) -> bool:
-    """`Parameter.ends_as_another` whatever the effect's other values are."""
-    return True
 
 
 LEAST_PRETENSION = 0.05

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Floats, Parameter, always
+from cablecomp.effects.base import Change, Effect, Floats, Parameter, at_most
 from cablecomp.mechanics.change import Factor
 
 
@@ -89,7 +89,7 @@ EFFECT = Effect(
             of="amplitude",
             tries=(2.5, 4.0, 5.5, 7.0),
             reach=1.0,
-            ends_as_another=always,
+            is_another=at_most,
             of_known_drive=True,
         ),
         Parameter(

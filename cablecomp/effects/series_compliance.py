@@ -63,12 +63,12 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(terms=(*elastic, *late) if values["compliance_rad_per_Nm"] else late)
 
 
-def _stiffens(values: Mapping[str, float]) -> bool:
+def _stiffens(values: Mapping[str, float], on_high: bool) -> bool:
     """Ever more at once it is play; what softens over all of its load is a coupling."""
-    return values.get("power", HERTZ) < 1.0
+    return on_high and values.get("power", HERTZ) < 1.0
 
 
-def _reads_late(values: Mapping[str, float]) -> bool:
+def _reads_late(values: Mapping[str, float], _on_high: bool) -> bool:
     """What follows the load at once but for a tenth of a second, and yields no other way, is a channel that reads late
     or through a filter: the two differ by the square of the lag over the time in which the load changes."""
     alone = values["compliance_rad_per_Nm"] <= 0.01 * values["late_rad_per_Nm"]
@@ -131,7 +131,7 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(2.0, 7.0),
             reach=1.0,
-            ends_as_another=_stiffens,
+            is_another=_stiffens,
             of="compliance_rad_per_Nm",
         ),
         Parameter(

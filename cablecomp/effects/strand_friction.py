@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, always, pretension
+from cablecomp.effects.base import Change, Effect, Parameter, at_most, pretension
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -65,7 +65,7 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(0.1, 0.4),
             reach=1.0,
-            ends_as_another=always,
+            is_another=at_most,
         ),
         Parameter(
             "spread",

@@ -8,7 +8,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, always, pretension_moment, term, wrap_deflection
+from cablecomp.effects.base import (
+    Change,
+    Effect,
+    Parameter,
+    at_most,
+    pretension_moment,
+    term,
+    wrap_deflection,
+)
 from cablecomp.errors import InputError
 
 # Moment, as a share of R T0, within which the clearance is crossed: a step that is smooth can be fitted.
@@ -117,7 +125,7 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             reach=1.0,
-            ends_as_another=always,
+            is_another=at_most,
         ),
         Parameter(
             "preload_Nm",

@@ -187,7 +187,8 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
 
 
 def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypothesis]:
-    if not all(_tells(evidence, channel) for channel in effect.needs):
+    load = load_channel(config, evidence[0].columns)
+    if not all(_tells(evidence, channel, load) for channel in effect.needs):
         return []
     channels = [""] if not effect.texts or effect.texts_optional else []
     if effect.texts:
@@ -302,11 +303,12 @@ def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
     return replace(h, starts=tuple(Start({**base, h.instant: float(t)}) for t in instants))
 
 
-def _tells(evidence: Sequence[Evidence], channel: str) -> bool:
-    """Whether the recordings have the channel as an effect needs it."""
-    if channel in OUTPUTS and any(channel in e.counted for e in evidence):
+def _tells(evidence: Sequence[Evidence], channel: str, load: str | None) -> bool:
+    """Whether the recordings have the channel as an effect needs it; an output that the load is read from is an
+    input."""
+    if channel in OUTPUTS and channel != load:
         return all(channel in e.counted for e in evidence)
-    return (channel not in OUTPUTS or channel == MOTOR) and _varies(evidence, channel)
+    return _varies(evidence, channel)
 
 
 def loaded(config: JointConfig, evidence: Sequence[Evidence]) -> bool:

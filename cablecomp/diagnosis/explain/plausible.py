@@ -48,17 +48,13 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
 
 
 def better_word(fit: Fit, h: Hypothesis) -> str:
-    """The shape of an effect that stands where another effect is the better word: `Parameter.is_another`, or
-    `ends_as_another` on the most that is plausible, or near it; "" where none does. The least is the plain law."""
+    """The shape of an effect that stands where another effect is the better word (`Parameter.is_another`); "" where
+    none does. Near the most that is plausible it counts as on it; the least is the plain law."""
     own = {p.name: fit.values.get(h.key(p.name), p.omitted or p.neutral) for p in h.effect.parameters}
-    for p in h.effect.parameters:
-        if p.is_another is not None and p.is_another(own):
-            return p.name
-    ends = ((p.name, p.ends_as_another) for p in h.effect.parameters)
-    strict = {h.key(name): name for name, as_another in ends if as_another is not None and as_another(own)}
     at = zip(fit.problem.parameters, fit.x, strict=True)
-    at_most = (p.base for p, x in at if p.value(float(x)) > LIMITS.near_bound * p.high)
-    return next((strict[name] for name in at_most if name in strict), "")
+    on_high = {p.base for p, x in at if p.value(float(x)) > LIMITS.near_bound * p.high}
+    others = (p.name for p in h.effect.parameters if p.is_another(own, h.key(p.name) in on_high))
+    return next(others, "")
 
 
 def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
