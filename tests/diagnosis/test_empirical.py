@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cablecomp.config import Empirical
-from cablecomp.diagnosis.describe.empirical import _held, _Rows, _wave, refitted, value_of
+from cablecomp.diagnosis.describe.empirical import _curve, _Rows, _wave, refitted, value_of
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.estimation.evidence import JOINT, Evidence, gather
 from cablecomp.estimation.simulate import simulator
@@ -52,7 +52,7 @@ def test_a_law_by_load_has_to_hold_where_recordings_reach_further(by_level: bool
     owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
     groups = Groups(owner, owner, "recording", np.zeros_like(owner))
     rows = _Rows(parts, np.concatenate(left), np.ones(len(owner)), groups)
-    assert (_held("joint_torque_Nm", rows) is not None) is kept
+    assert (_curve("joint_torque_Nm", rows) is not None) is kept
 
 
 def scaled(level: float, seed: int) -> dict[str, FloatArray]:

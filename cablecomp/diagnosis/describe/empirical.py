@@ -3,8 +3,9 @@ data left out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -45,16 +46,14 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
     """The series and the wave that hold, best first, each fitted to what the ones before left."""
     rows = _joint_rows(model, groups)
     found: list[Found] = []
+    asked: list[Callable[[_Rows], _Held | None]] = [*(partial(_curve, c) for c in CURVES_OVER), _wave]
     while True:
-        had = {(f.law.law, f.law.of) for f in found}
-        curves = [c for c in CURVES_OVER if ("chebyshev", c) not in had]
-        held = [h for c in curves if (h := _held(c, rows)) is not None]
-        if ("fourier", WAVE_OVER) not in had and (wave := _wave(rows)) is not None:
-            held.append(wave)
+        held = [(h, ask) for ask in asked if (h := ask(rows)) is not None]
         if not held:
             return found
-        best = max(held, key=lambda h: h.found.difference.gain)
+        best, by = max(held, key=lambda pair: pair[0].found.difference.gain)
         found.append(best.found)
+        asked.remove(by)
         rows = replace(rows, left=rows.left - best.predicted)
 
 
@@ -84,7 +83,7 @@ def _joint_rows(model: Model, groups: Groups) -> _Rows:
     return _Rows(problem.evidence, model.left_out[rows].copy(), weight / problem.weighing.sigma[JOINT], here)
 
 
-def _held(channel: str, rows: _Rows) -> _Held | None:
+def _curve(channel: str, rows: _Rows) -> _Held | None:
     """The series in one channel, fitted to what is left; None where it does not hold on data left out."""
     if not all(channel in e.columns for e in rows.evidence):
         return None
@@ -95,7 +94,7 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
     T = _basis(x, centre, half) * rows.weight[:, None]
     predicted = _crossed(T, rows.left, rows.groups.fold)
     step = score_difference(rows.left - predicted, rows.left, rows.groups)
-    if not (step.z > LIMITS.z and step.gain > LIMITS.gain and _holds_elsewhere(x, channel, rows)):
+    if not (_holds(step) and _holds_elsewhere(x, channel, rows)):
         return None
     name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace("position", "angle")
     law = Empirical(
@@ -108,8 +107,8 @@ def _held(channel: str, rows: _Rows) -> _Held | None:
 def _wave(rows: _Rows) -> _Held | None:
     """The wave over the motor's angle, its frequency the best of a grid, chosen anew wherever data are left out; None
     where it does not hold on these."""
-    x = np.concatenate([e.at_rows(WAVE_OVER)[e.counted[JOINT]] for e in rows.evidence])
-    grid = _frequencies(x, [e.at_rows(WAVE_OVER)[e.counted[JOINT]] for e in rows.evidence])
+    parts = [e.at_rows(WAVE_OVER)[e.counted[JOINT]] for e in rows.evidence]
+    x, grid = np.concatenate(parts), _frequencies(parts)
     if not len(grid):
         return None
     every = [_waves(x, k) * rows.weight[:, None] for k in grid]
@@ -119,7 +118,7 @@ def _wave(rows: _Rows) -> _Held | None:
         T = _waves(x, _best(grid, every, x, rows, ~out)) * rows.weight[:, None]
         predicted[out] = T[out] @ _ridge(T[~out], rows.left[~out])
     step = score_difference(rows.left - predicted, rows.left, rows.groups)
-    if not (step.z > LIMITS.z and step.gain > LIMITS.gain):
+    if not _holds(step):
         return None
     frequency = _best(grid, every, x, rows, np.ones(len(x), dtype=np.bool_))
     law = Empirical(
@@ -139,10 +138,10 @@ def _best(
     return float(near[int(np.argmax(fine))])
 
 
-def _frequencies(x: FloatArray, parts: Sequence[FloatArray]) -> FloatArray:
+def _frequencies(parts: Sequence[FloatArray]) -> FloatArray:
     """Frequencies [1/rad of the phase per rad] at which a wave is asked for: from two periods over what the channel
     covers to as many as the rows resolve; none where it hardly moves."""
-    reach = float(np.ptp(x))
+    reach = float(np.ptp(np.concatenate(parts)))
     steps = np.concatenate([np.abs(np.diff(v)) for v in parts])
     usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     if reach <= 0.0 or usual <= 0.0:
@@ -160,6 +159,11 @@ def _taken_off(T: FloatArray, y: FloatArray) -> float:
     """Square that the columns take off y."""
     along = T.T @ y
     return float(along @ np.linalg.solve(T.T @ T + 1e-12 * np.trace(T.T @ T) * np.eye(T.shape[1]), along))
+
+
+def _holds(step: ScoreDifference) -> bool:
+    """Whether a law takes off enough on data left out."""
+    return step.z > LIMITS.z and step.gain > LIMITS.gain
 
 
 def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:

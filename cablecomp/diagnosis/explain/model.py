@@ -3,12 +3,12 @@ consists of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cablecomp.config import JointConfig
+from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.plausible import amount_of
@@ -217,6 +217,16 @@ def stripped(problem: Problem, term: Term) -> Problem:
         return term.undone(problem)
     entries = tuple(e for e in problem.config.effect if not _is(e.id, e.parameters, term))
     free = tuple(p for p in problem.parameters if not p.name.startswith(f"effect.{term.effect.id}."))
+    return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
+
+
+def left_off(problem: Problem, keys: Collection[str]) -> Problem:
+    """The problem without these parameters of effects (by full name): a configuration that leaves them out."""
+    entries = tuple(
+        EffectEntry(id=e.id, **{k: v for k, v in e.parameters.items() if f"effect.{e.id}.{k}" not in keys})
+        for e in problem.config.effect
+    )
+    free = tuple(p for p in problem.parameters if p.base not in keys)
     return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.body import spread
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.explain.dependence import Dependence
@@ -19,6 +18,7 @@ from cablecomp.diagnosis.explain.model import (
     amount_resolved,
     bears,
     common,
+    left_off,
     loss,
     placed,
     stripped,
@@ -31,7 +31,6 @@ from cablecomp.diagnosis.explain.ties import implausible
 from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.effects.catalogue import catalogue, parameter_of
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, covariance, derivative_of_part, refit, solve, weighed
@@ -141,26 +140,16 @@ def _without_idle_growth(model: Model, drive: Calibrated, groups: Groups) -> Mod
     """The model without further amounts that go on growing and are not told from none: a controller would run away with
     them."""
     problem = model.fit.problem
-    own = {t.key(t.amount.name) for t in model.terms if isinstance(t, Hypothesis)}
-    sds = np.sqrt(np.diag(covariance(model.fit)))
-    idle: set[tuple[str, str]] = set()
-    for p, x, sd in zip(problem.parameters, model.fit.x, sds, strict=True):
-        known = parameter_of(p.base)
-        if known is not None and known.goes_on and p.base not in own and abs(x) < LIMITS.goes_on * sd:
-            effect, name = p.base.split(".")[1:]
-            shapes = (q.name for q in catalogue()[effect].parameters if q.of == name)
-            idle |= {(effect, n) for n in (name, *shapes)}
+    free = {p.name: k for k, p in enumerate(problem.parameters)}
+    told = np.abs(model.fit.x) >= LIMITS.goes_on * np.sqrt(np.diag(covariance(model.fit)))
+    idle: set[str] = set()
+    for t in (t for t in model.terms if isinstance(t, Hypothesis)):
+        for p in (p for p in t.effect.parameters if p.goes_on and p is not t.amount):
+            if t.key(p.name) in free and not told[free[t.key(p.name)]]:
+                idle |= {t.key(q.name) for q in t.effect.parameters if p.name in (q.name, q.of)}
     if not idle:
         return model
-    entries = tuple(
-        EffectEntry(id=e.id, **{k: v for k, v in e.parameters.items() if (e.id, k) not in idle})
-        for e in problem.config.effect
-    )
-    smaller = replace(
-        problem,
-        config=problem.config.model_copy(update={"effect": entries}),
-        parameters=tuple(p for p in problem.parameters if tuple(p.base.split(".")[1:]) not in idle),
-    )
+    smaller = left_off(problem, idle)
     try:
         fit = solve(smaller, placed(model.fit, smaller), LIMITS.settled, LIMITS.tolerance)
     except InputError:
