@@ -124,6 +124,23 @@ class Parameter:
         return self.low * unit, self.high * unit
 
 
+def begun(name: str, *, of: str = "", tries: tuple[float, ...] = ()) -> Parameter:
+    """When a slow course began [s]: with each recording's first sample, or at one instant of them all."""
+    return Parameter(
+        name,
+        "s",
+        0.0,
+        0.0,
+        3600.0,
+        "t0, on the recordings' common clock; left out: the recording's first sample",
+        role="begin",
+        held=True,
+        omitted=math.nan,
+        of=of,
+        tries=tries,
+    )
+
+
 LEAST_PRETENSION = 0.05
 """Share of T0 below which no law of the pretension is followed further."""
 
@@ -200,6 +217,8 @@ class Effect:
     """Names of parameters that are text, such as the channel that loads the cable."""
     unbounded_by: tuple[str, ...] = ()
     """Parameters with which, other than neutral, it does not preserve that order all the same."""
+    unbounded_with: tuple[str, ...] = ()
+    """Where the load is read from (`[observer] load`), if it does not preserve that order then."""
     texts_optional: bool = False
     """They may be left out, and parameters of the role `tilt` then say nothing."""
     channel_ends: str = ""

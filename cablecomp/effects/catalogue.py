@@ -119,12 +119,13 @@ def is_bounded(config: JointConfig) -> bool:
     An empirical law does unless it depends on the joint angle itself.
     """
     lawful = all(law.of != "joint_position_rad" for law in config.empirical)
-    return lawful and all(_is_bounded(_look_up(entry.id), entry) for entry in config.effect)
+    return lawful and all(_is_bounded(_look_up(entry.id), entry, config) for entry in config.effect)
 
 
-def _is_bounded(effect: Effect, entry: EffectEntry) -> bool:
+def _is_bounded(effect: Effect, entry: EffectEntry, config: JointConfig) -> bool:
     found = ((entry.parameters.get(name), effect.parameter(name).neutral) for name in effect.unbounded_by)
-    return effect.bounded and all(value in (None, neutral) for value, neutral in found)
+    ordered = effect.bounded and config.observer.load not in effect.unbounded_with
+    return ordered and all(value in (None, neutral) for value, neutral in found)
 
 
 def _empirical(config: JointConfig) -> list[Term]:

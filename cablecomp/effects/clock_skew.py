@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.base import Change, Effect, Parameter, begun, term
 
 SLOTS = 256
 # The past is kept at steps of at least a 200th of the delay, so that the slots always reach back far enough.
 STEPS_PER_DELAY = 200.0
 LONGEST_S = 1.0
+"""What a delay grows to at most, however long a clock drifts."""
 EVENLY = 0.25
 """Of what the speed changes by from row to row, how far off its mean may be where it bends evenly: at a corner half."""
 UNKNOWN = 1e300
@@ -39,10 +40,10 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
 
     Positive delay: straight interpolation of the past, the rigid drive's part of it by a cubic where its speed is known
     and bends evenly (rows picked from many, some hundredths of a second apart: straight, a twentieth of a short delay
-    was lost); before the first sample, that one. Negative delay: straight
-    on by the mean velocity over a delay's length, which hardly amplifies noise. A torque that is stamped late gives
-    the right tensions late: the deflection is carried on as an early reading is. Were the torque itself carried on,
-    each of its corners would leave a bump that never was.
+    was lost); before the first sample, that one. Negative delay: straight on by the mean velocity over a delay's
+    length, which hardly amplifies noise. A torque that is stamped late gives the right tensions late: the deflection is
+    carried on as an early reading is. Were the torque itself carried on, each of its corners would leave a bump that
+    never was.
     """
     now = c.time
     start = s.start
@@ -143,18 +144,7 @@ EFFECT = Effect(
             omitted=0.0,
             goes_on=True,
         ),
-        Parameter(
-            "drift_since_s",
-            "s",
-            0.0,
-            0.0,
-            3600.0,
-            "t0, on the recordings' common clock; left out: the recording's first sample",
-            role="begin",
-            held=True,
-            omitted=math.nan,
-            of="drift",
-        ),
+        begun("drift_since_s", of="drift"),
     ),
     acts_through=("velocity", "load_rate"),
     bounded=False,

@@ -91,5 +91,8 @@ EFFECT = Effect(
     acts_through=("velocity", "reversal"),
     needs=("motor_torque_Nm",),
     bounded=True,
+    unbounded_with=(
+        "motor_torque",
+    ),  # the load then goes by which way the motor slid before the first sample
     change=_change,
 )

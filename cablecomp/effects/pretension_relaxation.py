@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, pretension_moment, term
+from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, begun, pretension_moment, term
 
 
 @term(parameters=("fraction", "time_constant", "power", "began", "hanging"), state=("start",))
@@ -94,18 +94,7 @@ EFFECT = Effect(
             tries=(-2.0, 0.5),
             of_known_drive=True,
         ),
-        Parameter(
-            "began_s",
-            "s",
-            0.0,
-            0.0,
-            3600.0,
-            "t0, on the recordings' common clock; left out: the recording's first sample",
-            role="begin",
-            held=True,
-            omitted=math.nan,
-            tries=(0.0,),
-        ),
+        begun("began_s", tries=(0.0,)),
     ),
     acts_through=("time",),
     bounded=True,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from cablecomp.estimation.departures import departures, set_anew
+from cablecomp.estimation.departures import FEWEST, departures, set_anew
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.limits import HOPELESS, MOVED_SD, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
@@ -193,7 +193,7 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
     for c in problem.channels:
         parts = []
         for r, m in zip(problem.evidence, left[c], strict=True):
-            if c in r.counted and r.counted[c].sum() > 8:
+            if c in r.counted and r.counted[c].sum() > FEWEST:
                 parts.append((r.weight * m)[r.counted[c]])
         whole = np.concatenate(parts)
         size[c] = float(np.sqrt(np.mean(np.minimum(whole**2, 16.0 * np.median(whole**2) / 0.455))))

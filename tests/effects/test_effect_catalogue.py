@@ -144,6 +144,10 @@ def test_bounds_are_promised_only_where_order_is_preserved() -> None:
     config = joint()
     assert is_bounded(with_effects(config, [("series_compliance", {"compliance_rad_per_Nm": 1e-3})]))
     assert not is_bounded(with_effects(config, [("bearing_friction", BEARING)]))
+    rubs = with_effects(config, [("motor_friction", {"torque_Nm": 0.1, "presliding_rad": 0.1})])
+    at_motor = rubs.observer.model_copy(update={"load": "motor_torque"})
+    assert is_bounded(rubs)
+    assert not is_bounded(rubs.model_copy(update={"observer": at_motor}))  # how it slid before is not known
     # by which parameters, where it depends on these
     for effect, plain, further in (
         ("clamp_slip", {"slip_m": 1e-4, "time_s": 1.0}, {"creep_m_per_Ns": 1e-6, "holds_N": 60.0}),
