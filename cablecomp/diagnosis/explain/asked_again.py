@@ -7,7 +7,7 @@ from dataclasses import replace
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.events import values_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
-from cablecomp.diagnosis.explain.linear import anchor, best_start
+from cablecomp.diagnosis.explain.linear import anchor, best_start, better_shaped
 from cablecomp.diagnosis.explain.model import Model, placed, stripped
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.screening import in_another_course, rough
@@ -17,8 +17,8 @@ from cablecomp.estimation.least_squares import Fit, derivative_of_rest
 
 
 def with_better_courses(model: Model, groups: Groups) -> Model:
-    """The model with each event that others were found beside in the course that takes off most now, where that leaves
-    `LIMITS.shaped` of the cost."""
+    """The model with each event that others were found beside in the course that takes off most now, where that is
+    worth it."""
     for term in model.terms[:-1]:
         if isinstance(term, Hypothesis) and _may_go_otherwise(model, term):
             better = _in_another_course(model.fit, term)
@@ -50,4 +50,4 @@ def _in_another_course(fit: Fit, term: Hypothesis) -> Fit | None:
     if other is None:
         return None
     found = rough([other], LIMITS.settled)
-    return found[0] if found and found[0].cost < LIMITS.shaped * fit.cost else None
+    return found[0] if found and better_shaped(found[0], fit) else None

@@ -10,7 +10,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.courses import Course, before_all, from_each, instants_of, likely
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start, at_instants
-from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start
+from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start, worth_a_shape
 from cablecomp.diagnosis.explain.steps import course_in, in_steps, moved_closer
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.signal.smoothing import FloatArray
@@ -21,39 +21,41 @@ def best_event(here: Anchor, h: Hypothesis) -> Best | None:
     best = best_start(here, h)
     if best is None:
         return None
-    t = float(best[1][h.instant])
+    t = float(best.values[h.instant])
     times = sorted(float(s.values[h.instant]) for s in h.starts)
     width = times[1] - times[0]
     for _ in range(2 if here.fit.problem.fine else 4):
         width *= 0.5
-        closer = best_start(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)), best[3])
-        if closer is not None and closer[0] < best[0]:
+        closer = best_start(here, at_instants(h, (t - 0.5 * width, t + 0.5 * width)), best.size)
+        if closer is not None and closer.cost < best.cost:
             best = closer
-            t = float(best[1][h.instant])
+            t = float(best.values[h.instant])
     if h.two_sided:  # the other cable is softer in its own way, not in the opposite one
         mirrored = replace(at_instants(h, (t,)), starts=(_turned(h, t),))
-        other = best_start(here, mirrored, -best[3])
+        other = best_start(here, mirrored, -best.size)
         # what one cable promises by the opposite of what it does is the other's
-        opposite = float(best[1][h.amount.name]) * best[3] < 0.0
-        if other is not None and (opposite or other[0] < best[0]):
+        opposite = float(best.values[h.amount.name]) * best.size < 0.0
+        if other is not None and (opposite or other.cost < best.cost):
             best = other
     return best
 
 
 def best_course(here: Anchor, h: Hypothesis, best: Best) -> Best | None:
     """The best linear answer over the likely courses of an event of this shape, of either cable."""
-    values, size = best[1], best[3]
+    values, size = best.values, best.size
     sizes = (size, -size) if h.two_sided else (size,)
     found: dict[str, Best] = {}
     for s in sizes:
         for c in _likely(here, h, values, s):
             start = Start({**values, h.amount.name: s, **h.course(c)})
             answer, kind = best_start(here, replace(h, starts=(start,))), _kind(c)
-            if answer is not None and (kind not in found or answer[0] < found[kind][0]):
+            if answer is not None and (kind not in found or answer.cost < found[kind].cost):
                 found[kind] = answer
     evenly, curved, stepped = (found.get(kind) for kind in ("", "curve", "steps"))
-    smooth = curved if curved and (evenly is None or curved[0] < LIMITS.shaped * evenly[0]) else evenly
-    if stepped and stepped[0] < LIMITS.stepped * min(best[0], best[0] if smooth is None else smooth[0]):
+    bends = curved and (evenly is None or worth_a_shape(curved.by_channel, evenly.by_channel))
+    smooth = curved if bends else evenly
+    other = best if smooth is None or best.cost < smooth.cost else smooth
+    if stepped and worth_a_shape(stepped.by_channel, other.by_channel, LIMITS.stepped):
         return stepped
     return smooth
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,16 @@ from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Misfits, Problem, of_recording
 from cablecomp.signal.smoothing import FloatArray
 
-Best = tuple[float, dict[str, float | str], FloatArray, float]
-"""Of the best start: cost, values with the linear amount, contribution of the size asked, that size."""
+
+class Best(NamedTuple):
+    """The best start: cost (and of each channel) after a linear step, values with the linear amount, contribution of
+    the size asked, that size."""
+
+    cost: float
+    values: dict[str, float | str]
+    d: FloatArray
+    size: float
+    by_channel: FloatArray
 
 
 @dataclass(frozen=True)
@@ -119,9 +128,29 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
         factor = min(max(factor, low), high)
         cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
         values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
-        if best is None or cost < best[0]:
-            best = (cost, values, d, size)
+        if best is None or cost < best.cost:
+            best = Best(cost, values, d, size, by_channel(here.fit.problem, left - factor * own))
     return best
+
+
+def by_channel(problem: Problem, residual: FloatArray) -> FloatArray:
+    """Half the sum of squares of each channel of a residual, with what priors and steps cost beside it."""
+    square = np.array([float(np.sum(residual[s] ** 2)) for s in problem.spans().values()])
+    beside = float(np.sum(residual**2) - np.sum(square))
+    return np.asarray(0.5 * (square + beside), dtype=np.float64)
+
+
+def worth_a_shape(shaped: FloatArray, plain: FloatArray, share: float = LIMITS.shaped) -> bool:
+    """Whether a shape leaves less than that share of some channel's cost without it (`by_channel`), and less in all: a
+    motor's torque in which an inertia is missing would hide what it wins."""
+    return bool(np.any(shaped < share * plain) and np.sum(shaped) < np.sum(plain))
+
+
+def better_shaped(shaped: Fit, plain: Fit) -> bool:
+    """The same of fits."""
+    return worth_a_shape(
+        by_channel(shaped.problem, shaped.residual), by_channel(plain.problem, plain.residual)
+    )
 
 
 def contribution(

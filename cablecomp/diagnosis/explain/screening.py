@@ -16,7 +16,15 @@ import numpy as np
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.asked_events import best_course, best_event
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
-from cablecomp.diagnosis.explain.linear import Anchor, Best, best_start, contribution
+from cablecomp.diagnosis.explain.linear import (
+    Anchor,
+    Best,
+    best_start,
+    better_shaped,
+    by_channel,
+    contribution,
+    worth_a_shape,
+)
 from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -28,12 +36,13 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Answer:
-    """What a hypothesis promises at its best start: cost after it (half the sum of squares), its problem with
-    the effect in it, points to begin from, the derivative there; `plain`: the same without a shape that it may do
-    without."""
+    """What a hypothesis promises at its best start: cost after it (half the sum of squares; of each channel), its
+    problem with the effect in it, points to begin from, the derivative there; `plain`: the same without a shape that
+    it may do without."""
 
     hypothesis: Hypothesis
     cost: float
+    by_channel: FloatArray
     problem: Problem
     starts: tuple[FloatArray, ...]
     J: FloatArray
@@ -57,8 +66,7 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     if found is None:
         return None
     plain, best = found
-    more = (h.further or h.has_instant) and not here.fit.problem.fine
-    other = _shaped(here, h, plain, best) if more else None
+    other = _shaped(here, h, plain, best) if h.further or h.has_instant else None
     return plain if other is None else replace(other, plain=plain)
 
 
@@ -80,33 +88,38 @@ def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best | None] | None:
 def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> Answer | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event is asked at
     every instant with each of them, then for its course."""
+    # where every run is dear, of an event its course alone, and of others no shape is asked for
+    further = () if here.fit.problem.fine else h.further
     if best is None:
-        found = [_ask_pair(here, h, f) for f in h.further]
+        found = [_ask_pair(here, h, f) for f in further]
         pair = min((a for a in found if a is not None), key=lambda a: a.cost, default=None)
-        return pair if pair is not None and pair.cost < LIMITS.shaped * plain.cost else None
+        return pair if pair is not None and worth_a_shape(pair.by_channel, plain.by_channel) else None
     if h.has_instant:
-        everywhere = (replace(h, starts=tuple(Start({**s.values, **f}) for s in h.starts)) for f in h.further)
+        everywhere = (replace(h, starts=tuple(Start({**s.values, **f}) for s in h.starts)) for f in further)
         otherwise = [best_event(here, e) for e in everywhere]
         lasting = (best, *otherwise) if h.duration else ()
         courses = [best_course(here, h, e) for e in lasting if e is not None]
         shaped = otherwise + courses
     else:
-        shaped = [best_start(here, replace(h, starts=tuple(Start({**best[1], **s}) for s in h.further)))]
-    other = min((f for f in shaped if f is not None), key=lambda f: f[0], default=None)
+        shaped = [best_start(here, replace(h, starts=tuple(Start({**best.values, **s}) for s in further)))]
+    other = min((f for f in shaped if f is not None), key=lambda f: f.cost, default=None)
+    if other is None:
+        return None
     # what an event promises may be out of reach of its fit, which then decides between the shapes
-    enough = 1.0 if h.has_instant else LIMITS.shaped
-    return _answer(here, h, other) if other is not None and other[0] < enough * best[0] else None
+    enough = other.cost < best.cost if h.has_instant else worth_a_shape(other.by_channel, best.by_channel)
+    return _answer(here, h, other) if enough else None
 
 
 def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
     """What an event promises in the best of its likely courses; None where that is not enough more than `now`."""
-    bare = {k: v for k, v in now[1].items() if k not in h.of_course}
-    other = best_course(here, h, (now[0], bare, *now[2:]))
-    return _answer(here, h, other) if other is not None and other[0] < LIMITS.shaped * now[0] else None
+    bare = {k: v for k, v in now.values.items() if k not in h.of_course}
+    other = best_course(here, h, now._replace(values=bare))
+    worth = other is not None and worth_a_shape(other.by_channel, now.by_channel)
+    return _answer(here, h, other) if other is not None and worth else None
 
 
 def _answer(here: Anchor, h: Hypothesis, best: Best) -> Answer:
-    cost, values, d, size = best
+    values, d, size = best.values, best.d, best.size
     problem = with_entry(here.fit.problem, h, h.entry(values))
     old = here.fit.problem.parameters
     count, new = len(old), problem.parameters[len(old) :]
@@ -123,7 +136,8 @@ def _answer(here: Anchor, h: Hypothesis, best: Best) -> Answer:
     J[data : data + count, :count] = here.fit.J[data:]
     J[:data, count + amount] = -d[:data] / size * new[amount].slope(x[count + amount])
     starts = (x, x + along, part + PART * along, part)
-    return Answer(h, cost, problem, tuple(inside(problem, s) for s in starts), J)
+    begin = tuple(inside(problem, s) for s in starts)
+    return Answer(h, best.cost, best.by_channel, problem, begin, J)
 
 
 def _ask_pair(here: Anchor, h: Hypothesis, shape: Mapping[str, float]) -> Answer | None:
@@ -146,13 +160,14 @@ def _pair(here: Anchor, h: Hypothesis, cosine: Start, sine: Start) -> Answer | N
     scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
     pair = np.linalg.lstsq(own / scale, left, rcond=1e-6)[0] / scale
     pair = pair * min(1.0, h.amount.maximum / max(float(np.hypot(*pair)), 1e-300))
-    cost = 0.5 * float(np.sum((left - own @ pair) ** 2))
+    rest = left - own @ pair
     size, phase = float(np.hypot(*pair)), float(np.arctan2(pair[1], pair[0]))
     if not size > 0.0:
         return None
     values = {**cosine.values, h.amount.name: size, h.phase: phase}
     d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
-    return _answer(here, h, (cost, values, d, size))
+    cost = 0.5 * float(np.sum(rest**2))
+    return _answer(here, h, Best(cost, values, d, size, by_channel(here.fit.problem, rest)))
 
 
 def _begun(a: Answer, evaluations: int) -> Fit | None:
@@ -168,7 +183,7 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
     plain = None if a.plain is None else _begun(a.plain, evaluations)
     if plain is None or fit is None:
         return fit or plain
-    as_good = fit.cost > LIMITS.shaped * plain.cost and not runs_away(plain, a.hypothesis)
+    as_good = not better_shaped(fit, plain) and not runs_away(plain, a.hypothesis)
     return plain if as_good else fit
 
 
