@@ -11,31 +11,37 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 from cablecomp.errors import InputError
 
 
-@term(parameters=("moment", "phase", "growth", "tilt", "channel"))
+@term(parameters=("moment", "phase", "growth", "tilt", "lean", "upright", "channel"))
 def _weigh(c: Any, p: Any, s: Any) -> None:
-    """p: greatest moment [N m], phase [rad], by what share it grows with the joint's angle [1/rad],
-    turn of the base [rad per unit of the channel], the channel's place among the others (-1: none)."""
-    angle = c.joint + p.phase
+    """p: greatest moment [N m], phase [rad], by what share it grows with the joint's angle [1/rad], turn of the base
+    about the joint's axis and of that axis out of the level [rad per unit of the channel], its slope where the channel
+    is 0 [rad], the channel's place among the others (-1: none)."""
+    angle, slope = c.joint + p.phase, p.upright
     if p.channel >= 0.0:
         other = c.other[int(p.channel)]
         if not math.isnan(other):
             angle += p.tilt * other
-    lever = p.moment * (1.0 + p.growth * c.joint)
+            slope += p.lean * other
+    moment = p.moment * math.cos(slope)
+    lever = moment * (1.0 + p.growth * c.joint)
     c.moment += lever * math.sin(angle)
-    c.moment_slope += lever * math.cos(angle) + p.moment * p.growth * math.sin(angle)
+    c.moment_slope += lever * math.cos(angle) + moment * p.growth * math.sin(angle)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    if values["tilt_rad_per_unit"] != 0.0 and values["channel"] < 0.0:
+    turned = [k for k in ("tilt_rad_per_unit", "lean_rad_per_unit") if values[k] != 0.0]
+    if turned and values["channel"] < 0.0:
         raise InputError(
             f"{config.name}: effect `gravity_load` lacks key `channel`, what turns the joint's base by "
-            "`tilt_rad_per_unit`: a channel `other_<name>`; add it"
+            f"`{turned[0]}`: a channel `other_<name>`; add it"
         )
     weight = _weigh(
         moment=values["moment_Nm"],
         phase=values["phase_rad"],
         growth=values["growth_per_rad"],
         tilt=values["tilt_rad_per_unit"],
+        lean=values["lean_rad_per_unit"],
+        upright=values["upright_rad"],
         channel=values["channel"],
     )
     return Change(terms=weight)
@@ -44,10 +50,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="gravity_load",
     statement="The link's weight turns the joint, more or less by its position, and by how another "
-    "joint has turned its base; on a linkage its lever grows or shrinks on the way. The torque channel "
+    "joint has turned its base about this joint's axis or out of its plane; on a linkage its lever grows or shrinks on the way. The torque channel "
     "does not show it.",
-    equation="M_cable = M - m g l (1 + p q_out) sin(q_out + φ + t other(t))",
-    source="statics of a pendulum; a linkage's lever to first order in the joint's angle",
+    equation="M_cable = M - m g l (1 + p q_out) cos(l0 + l other(t)) sin(q_out + φ + t other(t))",
+    source="statics of a pendulum, of which the share across a leaning axis turns it; a linkage's lever to first order "
+    "in the joint's angle",
     parameters=(
         Parameter(
             "moment_Nm",
@@ -82,6 +89,28 @@ EFFECT = Effect(
             role="tilt",
             omitted=0.0,
         ),
+        Parameter(
+            "lean_rad_per_unit",
+            "rad/unit",
+            0.0,
+            -1.5,
+            1.5,
+            "l, turn of the joint's axis out of the level per unit of the other channel",
+            role="tilt",
+            omitted=0.0,
+            of_known_drive=True,
+        ),
+        Parameter(
+            "upright_rad",
+            "rad",
+            0.0,
+            -0.5 * math.pi,
+            0.5 * math.pi,
+            "l0, slope of that axis where the other channel is 0",
+            role="shape",
+            omitted=0.0,
+            of="moment_Nm",
+        ),
     ),
     acts_through=("joint_angle", "motor_angle", "other"),
     texts=("channel",),
@@ -90,4 +119,5 @@ EFFECT = Effect(
     felt_by_motor=True,
     bounded=False,
     change=_change,
+    tries=tuple({"lean_rad_per_unit": turn, "upright_rad": 0.7} for turn in (-0.8, 0.8)),
 )

@@ -119,6 +119,22 @@ def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
     assert found == pytest.approx(expected, abs=1e-10)
 
 
+def test_gravity_leans_with_the_joint_that_carries_the_base() -> None:
+    """As a load that is the same weight's, of which the joint's axis feels the share across its slope."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    roll = 0.8 * np.sin(3.0 * columns["time_s"])
+    roll[50:60] = np.nan
+    columns["other_roll_rad"] = roll
+    weight = 0.4 * unit(config)
+    lean = {"lean_rad_per_unit": 1.1, "upright_rad": -0.4, "channel": "other_roll_rad"}
+    found = run(config, columns, ("gravity_load", {"moment_Nm": weight, "phase_rad": 0.7, **lean}))
+    angle = found["joint_position_rad"]
+    taken = weight * np.cos(1.1 * np.nan_to_num(roll) - 0.4) * np.sin(angle + 0.7)
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] - taken)
+    assert angle == pytest.approx(expected, abs=1e-10)
+
+
 @pytest.mark.parametrize("name", JOINTS)
 def test_inertia_takes_mass_times_acceleration(name: str) -> None:
     config = joint(name)

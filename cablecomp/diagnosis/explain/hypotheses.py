@@ -234,7 +234,8 @@ def _by_amount(
     name = ":".join(filter(None, (effect.id, channel, second)))
     names = {p.name for p in own}
     tried = [{p.name: v} for p in own for v in p.tries]
-    tried += [dict(values) for values in effect.tries if set(values) <= names]
+    mute = {p.name for p in own if p.role in aside}
+    tried += [dict(values) for values in effect.tries if set(values) <= names - mute]
     asked = tuple(
         {n: _absolute(effect, n, v, config, evidence, channel) for n, v in values.items()} for values in tried
     )
@@ -249,6 +250,8 @@ def _absolute(
     p = effect.parameter(name)
     if p.role == "bend":
         return tried / (_width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
+    if p.role == "tilt":
+        return tried / _width(evidence, channel)
     if p.role == "begin":
         return tried + min(float(e.columns["time_s"][0]) for e in evidence)
     return tried if p.scale is None else tried * p.scale(config)
