@@ -50,8 +50,8 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="gravity_load",
     statement="The link's weight turns the joint, more or less by its position, and by how another "
-    "joint has turned its base about this joint's axis or out of its plane; on a linkage its lever grows or shrinks on the way. The torque channel "
-    "does not show it.",
+    "joint has turned its base about this joint's axis or out of its plane; on a linkage its lever grows or shrinks on "
+    "the way. The torque channel does not show it.",
     equation="M_cable = M - m g l (1 + p q_out) cos(l0 + l other(t)) sin(q_out + φ + t other(t))",
     source="statics of a pendulum, of which the share across a leaning axis turns it; a linkage's lever to first order "
     "in the joint's angle",
