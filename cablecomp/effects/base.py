@@ -79,7 +79,8 @@ class Parameter:
     what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course it asks by
     itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `is_another`: whether, by the
     effect's values and by whether it ended on `high`, another effect is the better word. `of_known_drive`: beside a
-    drive known by order of magnitude it, and what is `of` it, are not asked for. `goes_on`: what it does grows without
+    drive known by order of magnitude it, and what is `of` it, are not asked for. `of_motor_load`:
+    it is asked for only where the load is read at the motor. `goes_on`: what it does grows without
     end, so that a diagnosis keeps it only where it is told from none.
     """
 
@@ -102,6 +103,7 @@ class Parameter:
     reach: float = 30.0
     is_another: Callable[[Mapping[str, float], bool], bool] = never
     of_known_drive: bool = False
+    of_motor_load: bool = False
     goes_on: bool = False
 
     @property

@@ -86,6 +86,7 @@ EFFECT = Effect(
             minimum=0.0,
             tries=(0.05, 0.5),
             of_known_drive=True,
+            of_motor_load=True,  # in a torque beside the load, what drags anywhere would be the motor's
         ),
     ),
     acts_through=("velocity", "reversal"),

@@ -234,3 +234,18 @@ def test_friction_of_the_motor_may_be_as_large_as_the_torques_it_was_seen_to_giv
     problem = with_entry(plain, friction, friction.entry({"torque_Nm": 0.5 * torque, "presliding_rad": 1e-3}))
     fit = Fit(problem, problem.start, np.empty(0), np.empty((0, len(problem.parameters))))
     assert over_plausible(fit, friction) == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize("load", ["joint_torque", "motor_torque"])
+def test_a_drag_of_the_motor_is_asked_for_where_the_load_is_read_there(load: str) -> None:
+    """In a torque that stands beside the load, any drag in the cable's path would be the motor's."""
+    config = JOINT.model_copy(update={"observer": JOINT.observer.model_copy(update={"load": load})})
+    columns = recorded()
+    columns["motor_torque_Nm"] = 0.3 * columns["joint_torque_Nm"]
+    (own,) = [
+        h
+        for h in hypotheses(config, gather_body(config, {"a/1": columns}).used)
+        if h.name == "motor_friction"
+    ]
+    drags = any("viscous_s_per_rad" in further for further in own.further)
+    assert drags == (load == "motor_torque")

@@ -179,7 +179,11 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
     for effect in catalogue().values():
         if effect.id in held or (effect.felt_by_motor and at_motor):
             continue
-        mute = {p.name for p in effect.parameters if (p.of_load and not told) or (p.of_known_drive and vague)}
+        mute = {
+            p.name
+            for p in effect.parameters
+            if (p.of_load and not told) or (p.of_known_drive and vague) or (p.of_motor_load and not at_motor)
+        }
         # a shape goes with its amount
         asked = tuple(p for p in effect.parameters if not mute & {p.name, p.of})
         found += _of_effect(replace(effect, parameters=asked), config, evidence)
