@@ -80,7 +80,8 @@ class Parameter:
     itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `is_another`: whether, by the
     effect's values and by whether it ended on `high`, another effect is the better word. `of_known_drive`: beside a
     drive known by order of magnitude it, and what is `of` it, are not asked for. `of_motor_load`:
-    it is asked for only where the load is read at the motor. `goes_on`: what it does grows without
+    it is asked for only where the load is read at the motor. `points`: at how many places of a log-spaced range a
+    diagnosis asks. `goes_on`: what it does grows without
     end, so that a diagnosis keeps it only where it is told from none.
     """
 
@@ -104,6 +105,7 @@ class Parameter:
     is_another: Callable[[Mapping[str, float], bool], bool] = never
     of_known_drive: bool = False
     of_motor_load: bool = False
+    points: int = 3
     goes_on: bool = False
 
     @property

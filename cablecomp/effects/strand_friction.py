@@ -14,16 +14,18 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         play_yield_N=values["yield_N"],
         play_time_s=values["yields_in_s"],
         play_spread=values["spread"],
+        play_pressed=values["pressed"],
     )
 
 
 EFFECT = Effect(
     id="strand_friction",
     statement="Wires rub inside the cable: part of its stretch follows the tension only after a change has "
-    "overcome their grip, of all wires at once or of one after the other.",
+    "overcome their grip, of all wires at once or of one after the other; the grip may grow with the tension, which "
+    "presses the wires together.",
     equation="free span's stretch = L/EA (T - T0 + s p), p = P_y[T - T0], the play operator of radius y, or the mean "
-    "of five with radii evenly from y (1 - u) to y (1 + u); greased, it yields in its own time: "
-    "t_y dp/dt = P_y[T - T0] - p",
+    "of five with radii evenly from y (1 - u) to y (1 + u), each times 1 + m (T/T0 - 1); greased, it yields in its own "
+    "time: t_y dp/dt = P_y[T - T0] - p",
     source="bending and axial hysteresis of spiral strands by interwire friction: K. O. Papailiou, On the "
     "bending stiffness of transmission line conductors, IEEE Trans. Power Delivery 12 (1997); play "
     "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989; many of them: W. D. Iwan, "
@@ -51,6 +53,7 @@ EFFECT = Effect(
             role="shape",
             scale=pretension,
             minimum=1e-9,
+            points=7,  # a grip that lets by the peaks of the load alone promises nothing by half of it or twice
         ),
         Parameter(
             "yields_in_s",
@@ -74,6 +77,20 @@ EFFECT = Effect(
             0.0,
             1.0,
             "u, how far the grips of the wires differ, over y; 0: all hold alike, 1: some yield at once",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+            tries=(1.0,),
+            of_known_drive=True,
+        ),
+        Parameter(
+            "pressed",
+            "-",
+            0.0,
+            0.0,
+            1.0,
+            "m, share of the grip at T0 that is in proportion to tension; 0: the tension does not change it",
             role="shape",
             omitted=0.0,
             minimum=0.0,

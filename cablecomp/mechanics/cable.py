@@ -14,6 +14,8 @@ from cablecomp.mechanics.records import IN, OUT, PLAYS
 from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 
+STEEPEST_PLAY = 0.95  # growth of a play's radius with its input, at most: the output follows it still
+
 
 class Stretch(NamedTuple):
     """How much longer a cable is than at T0."""
@@ -72,7 +74,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
             length *= cable.guide_place
             ends = 1
         else:
-            play, d_play = span_plays(d, c, tension - t0)
+            play, d_play = span_plays(d, c, tension - t0, t0)
             total = length * cable.play_share * play / t0
             slope = length * cable.play_share * d_play
     total += length * strain
@@ -92,15 +94,16 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
 
 
 @inlined_kernel
-def span_plays(d: Drive, c: int, x: float) -> tuple[float, float]:
-    """What the free span's play, or the mean of its plays, passes on at the change of tension x [N]; its derivative by
-    x."""
+def span_plays(d: Drive, c: int, x: float, t0: float) -> tuple[float, float]:
+    """What the free span's play, or the mean of its plays, passes on at the change of tension x from t0 [N]; its
+    derivative by x."""
     cable, state = d.cables[c], d.states[c]
     # so much of the way to where it would rest, within a sample
     slow = cable.play_time > 0.0 and not d.context.first
     part = -math.expm1(-d.context.dt / cable.play_time) if slow else 1.0
+    pressed = cable.play_pressed / t0
     if cable.play_spread <= 0.0:
-        play, slope = span_play(cable.play_yield, state.play, x)
+        play, slope = span_play(cable.play_yield, pressed, state.play, x)
         if slow:
             play, slope = state.play + part * (play - state.play), part * slope
         state.play_try = play
@@ -108,9 +111,8 @@ def span_plays(d: Drive, c: int, x: float) -> tuple[float, float]:
     play = slope = 0.0
     for k in range(PLAYS):
         of_it = d.plays[c, k]
-        one, by_x = span_play(
-            cable.play_yield * (1.0 + cable.play_spread * ((2 * k + 1) / PLAYS - 1.0)), of_it.rest, x
-        )
+        radius = cable.play_yield * (1.0 + cable.play_spread * ((2 * k + 1) / PLAYS - 1.0))
+        one, by_x = span_play(radius, pressed, of_it.rest, x)
         of_it.rest_try = of_it.rest + part * (one - of_it.rest) if slow else one
         play += of_it.rest_try / PLAYS
         slope += part * by_x / PLAYS
@@ -118,15 +120,17 @@ def span_plays(d: Drive, c: int, x: float) -> tuple[float, float]:
 
 
 @kernel
-def span_play(radius: float, z: float, x: float) -> tuple[float, float]:
-    """Play operator of the given radius: output follows the input x once it leaves the play; (output,
-    derivative by x)."""
+def span_play(radius: float, pressed: float, z: float, x: float) -> tuple[float, float]:
+    """Play operator of the given radius, which grows by the share `pressed` per unit of its input x: output follows x
+    once it leaves the play; (output, derivative by x)."""
     if radius <= 0.0:
         return 0.0, 0.0
-    if x - radius > z:
-        return x - radius, 1.0
-    if x + radius < z:
-        return x + radius, 1.0
+    growth = min(radius * pressed, STEEPEST_PLAY)
+    holds = radius + growth * x
+    if x - holds > z:
+        return x - holds, 1.0 - growth
+    if x + holds < z:
+        return x + holds, 1.0 + growth
     return z, 0.0
 
 

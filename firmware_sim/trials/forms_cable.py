@@ -101,6 +101,11 @@ def _pressed_strands(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"share": float(rng.uniform(0.03, 0.15))}, {"fraction": 1.0}, 0.3, 5.0)
 
 
+def _mixed_strands(rng: np.random.Generator, scene: Scene) -> Shape:
+    slow, pressed = _slow_strands(rng, scene), _pressed_strands(rng, scene)
+    return Shape({**slow.fixed, **pressed.fixed}, {"fraction": 1.0}, 0.3, 5.0)
+
+
 def _slip(scene: Scene) -> tuple[float, float]:
     """Slip for one loop width, and the most that may go: a quarter of the pretension; m."""
     stage = scene.joint.stage
@@ -206,6 +211,7 @@ CABLE = (
     Suspect("strand_friction:graded", ANY, _masing),
     Suspect("strand_friction:rate_dependent", ANY, _slow_strands),
     Suspect("strand_friction:proportional", ANY, _pressed_strands),
+    Suspect("strand_friction:mixed_lay", ANY, _mixed_strands),
     Suspect("clamp_slip:gradual", ANY, _sliding),
     Suspect("clamp_slip:in_steps", ANY, _letting_go),
     Suspect("clamp_slip:unequal_steps", ANY, _letting_go_unequally),

@@ -128,11 +128,11 @@ def test_runout_in_an_open_circuit_swings_the_hanging_load() -> None:
     assert found["tension_h_N"] * arm == pytest.approx(whole, abs=1e-11)
 
 
-def play(x: Floats, radius: float) -> Floats:
-    """The play operator, started at zero."""
+def play(x: Floats, radius: float | Floats) -> Floats:
+    """The play operator, started at zero; its radius may go along with x."""
     state, out = 0.0, []
-    for value in x:
-        state = min(max(state, value - radius), value + radius)
+    for value, held in zip(x, np.broadcast_to(radius, x.shape), strict=True):
+        state = min(max(state, value - held), value + held)
         out.append(state)
     return np.array(out)
 
@@ -161,6 +161,23 @@ def test_wires_that_yield_one_after_the_other_are_many_plays(spread: float) -> N
     radii = 4.0 * (1.0 + spread * (np.arange(400) / 199.5 - 1.0))
     expected = 0.7 * 3.0 / 1e8 * np.mean([play(change, r) for r in radii], axis=0)
     assert extra == pytest.approx(expected, abs=0.02 * np.ptp(expected))
+    alike = 0.7 * 3.0 / 1e8 * play(change, 4.0)
+    assert np.max(np.abs(extra - alike)) > 0.05 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("pressed", [0.4, 1.0])
+def test_a_grip_that_the_tension_makes_grows_with_it(pressed: float) -> None:
+    """A play between the lines x - r and x + r, of which r is in part in proportion to T."""
+    config = joint("snow-open-rig", EA_N=1e8, free_length_m=3.0)
+    stage = config.drive.stage[0]
+    columns = excitation(config, moving=False)
+    strands = {"fraction": 0.7, "yield_N": 4.0, "pressed": pressed}
+    found = run(config, columns, ("strand_friction", strands))
+    extra = (found["deflection_rad"] - run(config, columns)["deflection_rad"]) * stage.output_radius_m
+    change = found["tension_h_N"] - stage.pretension_N
+    radius = 4.0 * (1.0 + pressed * change / stage.pretension_N)
+    expected = 0.7 * 3.0 / 1e8 * play(change, radius)
+    assert extra == pytest.approx(expected, abs=1e-6 * np.ptp(expected))
     alike = 0.7 * 3.0 / 1e8 * play(change, 4.0)
     assert np.max(np.abs(extra - alike)) > 0.05 * np.ptp(expected)
 

@@ -185,6 +185,22 @@ def test_pressed_strands_hold_back_by_a_share_of_the_tension() -> None:
     assert np.max(np.abs(added - expected)) < 5e-3 * np.max(np.abs(expected))
 
 
+def test_a_pressed_core_and_a_greased_cover_stretch_by_halves() -> None:
+    """Slowly, the cover is a play as one that yields at once; the core three, of radii up to a share of the tension."""
+    law = {"fraction": 0.6, "share": 0.12, "yield_N": 6.0, "time_s": 0.3}
+    pull, added = _stretch(
+        EffectSpec("strand_friction:mixed_lay", law), course(0.0, 0.8, -0.4, 0.5, points=150), 1e3
+    )
+    T0, expected = 50.0, np.zeros(len(pull))
+    for share, radius in ((0.04, 0.0), (0.08, 0.0), (0.12, 0.0), (0.0, 6.0), (0.0, 6.0), (0.0, 6.0)):
+        at = T0
+        for k, tension in enumerate(pull + T0):
+            hold = share * tension + radius
+            at = min(max(at, tension - hold), tension + hold)
+            expected[k] += 0.1 * (at - T0)
+    assert np.max(np.abs(added - expected)) < 5e-3 * np.max(np.abs(expected))
+
+
 def _alone(effect: EffectSpec, circuit: str = "open", load: float = 0.5) -> PlantRun:
     """A steady load on a joint whose cables do not slip on their drums."""
     config = joint(circuit, mu_output=STICKS, mu_input=STICKS)

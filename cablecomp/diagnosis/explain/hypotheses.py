@@ -289,7 +289,7 @@ def _grid(
             float(v) for v in np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
         )
     if p.log:
-        return tuple(float(v) for v in np.geomspace(low, high, 5)[1:-1])
+        return tuple(float(v) for v in np.geomspace(low, high, p.points + 2)[1:-1])
     return (0.5 * (low + high),)
 
 

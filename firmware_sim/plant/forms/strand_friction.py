@@ -1,5 +1,5 @@
 """Friction between strands in other forms: many small plays (Masing), most of them weak (graded), one that takes time,
-one that grows with T."""
+one that grows with T, and half of either."""
 
 from __future__ import annotations
 
@@ -86,4 +86,29 @@ PROPORTIONAL = form(
     _proportional,
 )
 
-KINDS: tuple[EffectKind, ...] = (MASING, GRADED, RATE_DEPENDENT, PROPORTIONAL)
+
+def _mixed(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["plays"] = PLAYS
+    whole = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["compliance"] = whole[:, None] / PLAYS
+    core = PLAYS // 2
+    build.plays["share"][:, :core] = p["share"] * (np.arange(core) + 1.0) / core
+    build.plays["radius"][:, core:], build.plays["time_s"][:, core:] = p["yield_N"], p["time_s"]
+
+
+MIXED_LAY = form(
+    "strand_friction",
+    "mixed_lay",
+    "A core that the lay presses together, its radii shares of the tension up to one of them, in a greased cover that "
+    "yields in its own time: half of the stretch each.",
+    (
+        _FRACTION,
+        Parameter("share", "the core's greatest radius over tension", 0.1, 0.0, 0.9),
+        _YIELD,
+        Parameter("time_s", "t_y of the cover", 0.2, 0.0),
+    ),
+    (*_ACTS, "load_rate"),
+    _mixed,
+)
+
+KINDS: tuple[EffectKind, ...] = (MASING, GRADED, RATE_DEPENDENT, PROPORTIONAL, MIXED_LAY)
