@@ -23,10 +23,14 @@ from cablecomp.errors import InputError
 TRANSITION = 0.0005
 
 
-@term(parameters=("gap", "width", "middle"))
+@term(parameters=("gap", "width", "middle", "preloaded"))
 def _cross(c: Any, p: Any, s: Any) -> None:
-    """p: gap [rad], width of the transition [N m], moment amid it [N m]."""
-    c.reading += 0.5 * p.gap * math.tanh((c.load - c.moment - p.middle) / p.width)
+    """p: gap [rad], width of the transition [N m], moment amid what of it is preloaded [N m], share that is."""
+    path = c.load - c.moment
+    place = p.preloaded * math.tanh((path - p.middle) / p.width)
+    if p.preloaded < 1.0:
+        place += (1.0 - p.preloaded) * math.tanh(path / p.width)
+    c.reading += 0.5 * p.gap * place
 
 
 @term(parameters=("gap", "impulse", "drag"), state=("place", "time", "path", "pulley"))
@@ -49,25 +53,27 @@ def _cross_slowly(c: Any, p: Any, s: Any) -> None:
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     gap, impulse, drag = values["gap_rad"], values["impulse_Nms"], values["drag_Nm"]
-    closes, preload = values["closes_Nm"], values["preload_Nm"]
+    closes, preload, share = values["closes_Nm"], values["preload_Nm"], values["preloaded"]
     if impulse > 0.0 or drag > 0.0:
-        if closes or preload:
+        if closes or preload or share != 1.0:
             raise InputError(
-                f"{config.name}: effect `termination_backlash` has `impulse_Nms` or `drag_Nm`, and `closes_Nm` or "
-                "`preload_Nm`; one law is accepted: leave out either"
+                f"{config.name}: effect `termination_backlash` has `impulse_Nms` or `drag_Nm`, and `closes_Nm`, "
+                "`preload_Nm` or `preloaded`; one law is accepted: leave out either"
             )
         return Change(terms=_cross_slowly(gap=gap, impulse=impulse, drag=drag))
     width = closes or TRANSITION * pretension_moment(config)
-    return Change(terms=_cross(gap=gap, width=width, middle=preload))
+    return Change(terms=_cross(gap=gap, width=width, middle=preload, preloaded=share))
 
 
 EFFECT = Effect(
     id="termination_backlash",
-    statement="A hub key, pin or crimp has clearance: the joint falls from one flank to the other where "
-    "the load changes sign; bit by bit where springs hold it amid the gap, or several gaps open one by one.",
-    equation="q_out = q_drive + (b/2) tanh((M - M_0)/M_c), M the moment in the load path, M_c = 0.0005 R T0 where it "
-    "is not given: sgn M with a narrow transition; greased, the gap is crossed at the speed b M/J; a link that drags "
-    "stands still in space while |M| is less than its friction M_f, and the pulley turns under it",
+    statement="A hub key, pin or crimp has clearance: the joint falls from one flank to the other where the load "
+    "changes sign; bit by bit where springs hold it amid the gap, or several gaps open one by one; of two in a row one "
+    "may be preloaded.",
+    equation="q_out = q_drive + (b/2) (s tanh((M - M_0)/M_c) + (1 - s) tanh(M/M_c)), M the moment in the load path, "
+    "M_c = 0.0005 R T0 where it is not given: sgn M with a narrow transition; greased, the gap is crossed at the speed "
+    "b M/J; a link that drags stands still in space while |M| is less than its friction M_f, and the pulley turns under "
+    "it",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",
     parameters=(
@@ -138,10 +144,27 @@ EFFECT = Effect(
             scale=pretension_moment,
             omitted=0.0,
         ),
+        Parameter(
+            "preloaded",
+            "-",
+            1.0,
+            0.0,
+            1.0,
+            "s, share of the clearance that the washer preloads; the rest opens where the load changes sign",
+            role="shape",
+            omitted=1.0,
+            minimum=0.0,
+            maximum=1.0,
+            of_known_drive=True,
+        ),
     ),
     acts_through=("load", "load_direction"),
     bounded=True,
     change=_change,
-    tries=tuple({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),
+    tries=(
+        *({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),
+        # where a gap opens at once is found by looking there
+        *({"preload_Nm": 0.05 * k, "preloaded": 0.5} for k in (*range(-9, 0), *range(1, 10))),
+    ),
     rank=5,
 )

@@ -101,6 +101,12 @@ def _wedging_key(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"holds_Nm": holds}, {"gap_rad": 1.0}, 2.0 * scene.plain.loop_rad, 0.2)
 
 
+def _three_gaps(rng: np.random.Generator, scene: Scene) -> Shape:
+    up, down = (float(m) * scene.joint.load_Nm for m in rng.uniform(0.1, 0.5, 2))
+    fixed = {"share": float(rng.uniform(0.2, 0.6)), "up_Nm": up, "down_Nm": down}
+    return Shape(fixed, {"gap_rad": 1.0}, 2.0 * scene.plain.loop_rad, 0.2)
+
+
 def _two_gaps(rng: np.random.Generator, scene: Scene) -> Shape:
     fixed = {
         "share": float(rng.uniform(0.3, 0.7)),
@@ -241,6 +247,7 @@ JOINT = (
     Suspect("termination_backlash:greased", ANY, _greased_gap, two_sided=True),
     Suspect("termination_backlash:dragging_link", ANY, _dragging, two_sided=True),
     Suspect("termination_backlash:two_clearances", ANY, _two_gaps, two_sided=True),
+    Suspect("termination_backlash:both_ways", ANY, _three_gaps, two_sided=True),
     Suspect("termination_backlash:sprung", ANY, _sprung_key, two_sided=True),
     Suspect("termination_backlash:wedged", ANY, _wedging_key, two_sided=True),
     Suspect("pulley_runout:oval", TURNING, _eccentric),

@@ -116,7 +116,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         (
             "termination_backlash",
             Case({"gap_rad": 2e-3, "share": 0.4, "preload_Nm": 0.15}, form=":two_clearances"),
-            ("preload_Nm", 0.0, 0.15),
+            ("preload_Nm", 0.145, 0.155),
         ),
         (
             "series_compliance",

@@ -141,6 +141,19 @@ def test_springs_close_a_gap_bit_by_bit_about_their_preload() -> None:
     assert step == pytest.approx(expected, abs=1e-12)
 
 
+def test_of_two_gaps_in_a_row_one_opens_at_its_preload() -> None:
+    config = joint()
+    time = np.linspace(0.0, 1.0, 801)
+    columns = still(time, 0.6 * np.sin(12.0 * time))
+    law = {"gap_rad": 5e-4, "preload_Nm": 0.2, "preloaded": 0.3}
+    step = run(config, columns, ("termination_backlash", law))["deflection_rad"]
+    step -= run(config, columns)["deflection_rad"]
+    load = columns["joint_torque_Nm"]
+    apart = np.minimum(np.abs(load), np.abs(load - 0.2)) > 0.02
+    expected = 2.5e-4 * (0.7 * np.sign(load) + 0.3 * np.sign(load - 0.2))
+    assert step[apart] == pytest.approx(expected[apart], abs=1e-9)
+
+
 def test_a_gap_has_one_law() -> None:
     both = with_effects(
         joint(), [("termination_backlash", {"gap_rad": 1e-3, "drag_Nm": 0.1, "closes_Nm": 0.1})]

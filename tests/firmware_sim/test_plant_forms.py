@@ -39,6 +39,7 @@ SIZES = {
     "termination_backlash:greased": {"gap_rad": 1e-3, "damping_Nms_per_rad": 100.0},
     "termination_backlash:dragging_link": {"gap_rad": 1e-3, "drag_Nm": 0.1},
     "termination_backlash:two_clearances": {"gap_rad": 1e-3, "preload_Nm": 0.3},
+    "termination_backlash:both_ways": {"gap_rad": 1e-3, "up_Nm": 0.3, "down_Nm": 0.2},
     "nonlinear_cable:saturating": {"softness": 0.6},
     "nonlinear_cable:power_law": {"exponent": 0.3},
     "nonlinear_cable:knee": {"rise": 0.5},

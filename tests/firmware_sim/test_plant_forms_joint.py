@@ -123,6 +123,14 @@ def test_two_clearances_open_at_two_loads() -> None:
     np.testing.assert_allclose(added[apart], expected[apart], atol=1e-12)
 
 
+def test_a_coupling_sprung_both_ways_opens_at_three_loads() -> None:
+    load = course(-1.0, 1.0, points=200)
+    added = _crossing("both_ways", load, 0 * load, gap_rad=2e-3, share=0.4, up_Nm=0.5, down_Nm=0.2)
+    expected = 4e-4 * np.sign(load) + 3e-4 * (np.sign(load - 0.5) + np.sign(load + 0.2))
+    apart = np.min([np.abs(load - at) for at in (0.0, 0.5, -0.2)], axis=0) > 1e-6
+    np.testing.assert_allclose(added[apart], expected[apart], atol=1e-12)
+
+
 def test_runout_of_other_parts_bends_the_transmission(plain: PlantRun) -> None:
     config = joint()
     s, motor = config.stages[0], np.linspace(-2.0, 2.0, 200)

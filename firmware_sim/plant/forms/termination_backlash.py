@@ -1,5 +1,5 @@
-"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, a key on springs, one that
-wedges in its taper."""
+"""Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, three, a key on springs,
+one that wedges in its taper."""
 
 from __future__ import annotations
 
@@ -98,6 +98,31 @@ TWO = form(
 )
 
 
+def _both_ways(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        rest, path = 1.0 - p["share"], outputs[:, PATH]
+        dogs = np.sign(path - p["up_Nm"]) + np.sign(path + p["down_Nm"])
+        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * (p["share"] * np.sign(path) + 0.5 * rest * dogs)
+
+    build.mounts.append(shift)
+
+
+BOTH_WAYS = form(
+    "termination_backlash",
+    "both_ways",
+    "A coupling with a sprung dog for either way beside its key: one gap opens at zero, half of the others' at M_u, "
+    "half at −M_d.",
+    (
+        _GAP,
+        Parameter("share", "of the gap that opens at zero", 0.4, 0.0, 1.0),
+        Parameter("up_Nm", "M_u", 0.0, 0.0),
+        Parameter("down_Nm", "M_d", 0.0, 0.0),
+    ),
+    ("load",),
+    _both_ways,
+)
+
+
 def _sprung(build: Build, p: Mapping[str, float]) -> None:
     def shift(inputs: Floats, outputs: Floats) -> None:
         outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * np.clip(outputs[:, PATH] / p["closes_Nm"], -1.0, 1.0)
@@ -143,4 +168,4 @@ WEDGED = form(
     _wedging,
 )
 
-KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, SPRUNG, WEDGED)
+KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, BOTH_WAYS, SPRUNG, WEDGED)
