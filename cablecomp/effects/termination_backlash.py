@@ -72,8 +72,8 @@ EFFECT = Effect(
     "may be preloaded.",
     equation="q_out = q_drive + (b/2) (s tanh((M - M_0)/M_c) + (1 - s) tanh(M/M_c)), M the moment in the load path, "
     "M_c = 0.0005 R T0 where it is not given: sgn M with a narrow transition; greased, the gap is crossed at the speed "
-    "b M/J; a link that drags stands still in space while |M| is less than its friction M_f, and the pulley turns under "
-    "it",
+    "b M/J; a link that drags stands still in space while |M| is less than its friction M_f, and the pulley turns "
+    "under it",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",
     parameters=(
