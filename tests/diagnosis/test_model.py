@@ -10,9 +10,11 @@ from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
-from cablecomp.diagnosis.explain.model import amount_resolved, bears
+from cablecomp.diagnosis.explain.model import Model, amount_resolved, bears, ranked
 from cablecomp.diagnosis.explain.plausible import runs_away
+from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.screening import with_entry
+from cablecomp.diagnosis.folds import make_groups
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
@@ -36,6 +38,22 @@ def fitted(config: JointConfig, load_Nm: float) -> Fit:
     problem = Problem(config, (), (e,), Weighing({ANGLE: 1e-4}, {}))
     nothing = np.empty(0)
     return Fit(problem, nothing, problem.residual(nothing), np.empty((len(e.rows), 0)))
+
+
+def test_of_a_weight_with_a_turning_base_and_without_one_stands() -> None:
+    """A base that does not turn is none: two models alike would take both places that go on."""
+    fit = fitted(JOINT, 1.0)
+    time = fit.problem.evidence[0].columns["time_s"]
+    other = {**fit.problem.evidence[0].columns, "other_1_rad": np.sin(0.7 * time)}
+    evidence = (replace(fit.problem.evidence[0], columns=other),)
+    plain, turned = (h for h in hypotheses(JOINT, evidence) if h.effect.id == "gravity_load")
+    (leak,) = (h for h in hypotheses(JOINT, evidence) if h.effect.id == "crosstalk")
+    groups = make_groups(fit)
+    left = left_out(fit, groups)
+    models = [Model((turned,), fit, left), Model((plain,), fit, left), Model((leak,), fit, left)]
+    assert [m.name for m in ranked(models, groups)] == ["gravity_load:other_1_rad", "crosstalk:other_1_rad"]
+    better = Model((plain,), fit, 0.5 * left)
+    assert ranked([*models, better], groups)[0].name == "gravity_load"
 
 
 def beside(effect: str, amount: dict[str, float], config: JointConfig = JOINT) -> tuple[Fit, Hypothesis]:

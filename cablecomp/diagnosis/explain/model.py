@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 import numpy as np
 
@@ -48,6 +49,16 @@ class Model:
         """Names of what was added, in whatever order."""
         return frozenset(t.name for t in self.terms)
 
+    @property
+    def physics(self) -> frozenset[str]:
+        """The same, whatever channel an effect reads that may do without."""
+        return frozenset(t.name.replace(f":{t.channel}", "") if _may_read(t) else t.name for t in self.terms)
+
+
+def _may_read(term: Term) -> TypeGuard[Hypothesis]:
+    """Whether it is an effect that reads a channel and may do without."""
+    return isinstance(term, Hypothesis) and term.channel != "" and term.effect.texts_optional
+
 
 @dataclass(frozen=True)
 class Tried:
@@ -80,17 +91,17 @@ class Selection:
 
 
 def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:
-    """By loss on data left out, each set of terms once: of two that end alike (an effect asked for by two of its
-    amounts, of which one ends at none) that of fewer parameters."""
+    """By loss on data left out, each set of physics once: of two that end alike (an effect asked for by two of its
+    amounts, of which one ends at none; with a channel that it may do without, and without) that of fewer parameters."""
     found: dict[frozenset[str], Model] = {}
     if not models:
         return []
     size = common(models, groups)
     for m in sorted(models, key=lambda m: loss(m, size, groups)):
-        best = found.setdefault(m.added, m)
+        best = found.setdefault(m.physics, m)
         fewer = len(m.fit.problem.parameters) < len(best.fit.problem.parameters)
         if fewer and loss(m, size, groups) <= (1.0 + LIMITS.tie) * loss(best, size, groups):
-            found[m.added] = m
+            found[m.physics] = m
     return list(found.values())
 
 
