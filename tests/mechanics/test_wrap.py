@@ -110,8 +110,26 @@ def test_a_play_follows_outside_its_radius_and_keeps_what_it_has_within() -> Non
     z = 0.0
     for x in np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.0, -3.0, 61)]):
         before = z
-        z, slope = span_play(1.0, z, float(x))
+        z, slope = span_play(1.0, 0.0, z, float(x))
         assert abs(x - z) <= 1.0 + 1e-15
         assert slope == (1.0 if abs(x - before) > 1.0 else 0.0)
         assert slope == 1.0 or z == before
-    assert span_play(0.0, 0.7, 2.0) == (0.0, 0.0)  # no play at all
+    assert span_play(0.0, 0.3, 0.7, 2.0) == (0.0, 0.0)  # no play at all
+
+
+def test_a_pressed_play_holds_more_the_more_it_is_pressed() -> None:
+    z = 0.0
+    for x in np.concatenate(
+        [np.linspace(0.0, 2.0, 41), np.linspace(1.99, -2.0, 81), np.linspace(-1.99, 1.0, 61)]
+    ):
+        before = z
+        z, slope = span_play(0.5, 0.3, z, float(x))
+        holds = 0.5 * (1.0 + 0.3 * x)
+        assert abs(x - z) <= holds + 1e-15
+        assert z == before if abs(x - before) < holds else abs(x - z) == pytest.approx(holds)
+        step = 1e-6
+        assert slope == pytest.approx(
+            (span_play(0.5, 0.3, before, x + step)[0] - span_play(0.5, 0.3, before, x - step)[0])
+            / (2.0 * step),
+            abs=1e-8,
+        )
