@@ -33,15 +33,17 @@ def _cross(c: Any, p: Any, s: Any) -> None:
     c.reading += 0.5 * p.gap * place
 
 
-@term(parameters=("gap", "impulse", "drag"), state=("place", "time", "path", "pulley"))
+@term(parameters=("gap", "impulse", "drag", "wedges"), state=("place", "time", "path", "pulley"))
 def _cross_slowly(c: Any, p: Any, s: Any) -> None:
-    """p: gap [rad], impulse that crosses it [N m s], friction of the link [N m]; s: place in the gap, over half of it,
-    and the time, moment and pulley's angle of the sample before."""
+    """p: gap [rad], impulse that crosses it [N m s], friction of the link, of a key in its taper [N m]; s: place in the
+    gap, over half of it, and the time, moment and pulley's angle of the sample before."""
     path = c.load - c.moment
     flank = 1.0 if path > 0.0 else -1.0
     place = flank
     if not c.first:
-        if abs(path) < p.drag:
+        if abs(path) < p.wedges:
+            place = s.place
+        elif abs(path) < p.drag:
             place = s.place - 2.0 * (c.joint - s.pulley) / p.gap if p.gap > 0.0 else s.place
         elif p.impulse > 0.0:
             place = s.place + (path + s.path) * (c.time - s.time) / p.impulse
@@ -52,15 +54,15 @@ def _cross_slowly(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    gap, impulse, drag = values["gap_rad"], values["impulse_Nms"], values["drag_Nm"]
+    gap, impulse, drag, wedges = (values[n] for n in ("gap_rad", "impulse_Nms", "drag_Nm", "wedges_Nm"))
     closes, preload, share = values["closes_Nm"], values["preload_Nm"], values["preloaded"]
-    if impulse > 0.0 or drag > 0.0:
+    if impulse > 0.0 or drag > 0.0 or wedges > 0.0:
         if closes or preload or share != 1.0:
             raise InputError(
-                f"{config.name}: effect `termination_backlash` has `impulse_Nms` or `drag_Nm`, and `closes_Nm`, "
-                "`preload_Nm` or `preloaded`; one law is accepted: leave out either"
+                f"{config.name}: effect `termination_backlash` has `impulse_Nms`, `drag_Nm` or `wedges_Nm`, and "
+                "`closes_Nm`, `preload_Nm` or `preloaded`; one law is accepted: leave out either"
             )
-        return Change(terms=_cross_slowly(gap=gap, impulse=impulse, drag=drag))
+        return Change(terms=_cross_slowly(gap=gap, impulse=impulse, drag=drag, wedges=wedges))
     width = closes or TRANSITION * pretension_moment(config)
     return Change(terms=_cross(gap=gap, width=width, middle=preload, preloaded=share))
 
@@ -73,7 +75,7 @@ EFFECT = Effect(
     equation="q_out = q_drive + (b/2) (s tanh((M - M_0)/M_c) + (1 - s) tanh(M/M_c)), M the moment in the load path, "
     "M_c = 0.0005 R T0 where it is not given: sgn M with a narrow transition; greased, the gap is crossed at the speed "
     "b M/J; a link that drags stands still in space while |M| is less than its friction M_f, and the pulley turns "
-    "under it",
+    "under it; a key that wedges leaves its flank only where M is M_w and more the other way",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",
     parameters=(
@@ -116,6 +118,19 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             tries=(0.03, 0.1),
+        ),
+        Parameter(
+            "wedges_Nm",
+            "N m",
+            0.0,
+            1e-3,
+            1.0,
+            "M_w, moment that draws a key out of its taper; 0: it lies loose",
+            log=True,
+            role="shape",
+            scale=pretension_moment,
+            omitted=0.0,
+            minimum=0.0,
         ),
         Parameter(
             "closes_Nm",
@@ -163,7 +178,8 @@ EFFECT = Effect(
     change=_change,
     tries=(
         *({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),
-        # where a gap opens at once is found by looking there
+        # where a gap opens at once, or a key lets go, is found by looking there
+        *({"wedges_Nm": m} for m in (0.02, 0.04, 0.07, 0.11, 0.17, 0.25)),
         *({"preload_Nm": 0.05 * k, "preloaded": 0.5} for k in (*range(-9, 0), *range(1, 10))),
     ),
     rank=5,

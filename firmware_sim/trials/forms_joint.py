@@ -101,6 +101,16 @@ def _wedging_key(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"holds_Nm": holds}, {"gap_rad": 1.0}, 2.0 * scene.plain.loop_rad, 0.2)
 
 
+def _worn_teeth(rng: np.random.Generator, scene: Scene) -> Shape:
+    travel = scene.joint.travel_rad
+    fixed = {
+        "share": float(rng.uniform(0.5, 0.9)),
+        "place_rad": float(rng.uniform(-0.5, 0.5)) * travel,
+        "width_rad": float(rng.uniform(0.2, 0.6)) * travel,
+    }
+    return Shape(fixed, {"gap_rad": 1.0}, 3.0 * scene.plain.loop_rad, 0.2)
+
+
 def _three_gaps(rng: np.random.Generator, scene: Scene) -> Shape:
     up, down = (float(m) * scene.joint.load_Nm for m in rng.uniform(0.1, 0.5, 2))
     fixed = {"share": float(rng.uniform(0.2, 0.6)), "up_Nm": up, "down_Nm": down}
@@ -250,6 +260,7 @@ JOINT = (
     Suspect("termination_backlash:both_ways", ANY, _three_gaps, two_sided=True),
     Suspect("termination_backlash:sprung", ANY, _sprung_key, two_sided=True),
     Suspect("termination_backlash:wedged", ANY, _wedging_key, two_sided=True),
+    Suspect("termination_backlash:worn", TURNING, _worn_teeth, two_sided=True),
     Suspect("pulley_runout:oval", TURNING, _eccentric),
     Suspect("pulley_runout:input_pulley", TURNING, _eccentric),
     Suspect("pulley_runout:encoder_disc", TURNING, _disc),

@@ -37,8 +37,8 @@ ALIKE = frozenset({
     "strand_break:accelerating", "strand_break:fraying", "strand_break:in_steps", "strand_break:other_cable",
     "strand_break:unequal_steps", "strand_friction:masing", "strand_friction:proportional",
     "strand_friction:rate_dependent", "termination_backlash:dragging_link", "termination_backlash:greased",
-    "termination_backlash:sprung", "termination_backlash:two_clearances", "thermal_pretension:lagged",
-    "thermal_pretension:quadratic", "viscous_slip:one_drum",
+    "termination_backlash:sprung", "termination_backlash:two_clearances", "termination_backlash:wedged",
+    "thermal_pretension:lagged", "thermal_pretension:quadratic", "viscous_slip:one_drum",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
 FORMS = (*FRICTION, *CABLE, *JOINT)

@@ -119,6 +119,11 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ("preload_Nm", 0.145, 0.155),
         ),
         (
+            "termination_backlash",
+            Case({"gap_rad": 2e-3, "holds_Nm": 0.2}, form=":wedged"),
+            ("wedges_Nm", 0.17, 0.23),
+        ),
+        (
             "series_compliance",
             Case({"compliance_rad_per_Nm": 6e-3, "share": 0.7, "lag_s": 0.05}, form=":bushing"),
             ("decades", 0.8, 3.0),
@@ -166,6 +171,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "stiffens",
         "rubber",
         "two gaps",
+        "wedges",
         "creeps",
         "pressed through",
         "patch",

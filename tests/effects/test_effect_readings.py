@@ -154,6 +154,24 @@ def test_of_two_gaps_in_a_row_one_opens_at_its_preload() -> None:
     assert step[apart] == pytest.approx(expected[apart], abs=1e-9)
 
 
+def test_a_key_that_wedges_leaves_its_flank_only_where_it_is_drawn_out() -> None:
+    config = joint()
+    time = np.linspace(0.0, 3.0, 1201)
+    columns = still(time, np.where(time < 1.5, 0.6, 0.15) * np.cos(9.0 * time))
+    step = run(config, columns, ("termination_backlash", {"gap_rad": 5e-4, "wedges_Nm": 0.2}))[
+        "deflection_rad"
+    ]
+    step -= run(config, columns)["deflection_rad"]
+    flank, expected = 1.0, []
+    for load in columns["joint_torque_Nm"]:
+        if abs(load) >= 0.2:
+            flank = np.sign(load)
+        expected.append(2.5e-4 * flank)
+    assert np.ptp(expected) > 0.0
+    assert np.all(np.diff(expected[605:]) == 0.0)  # not drawn out again
+    assert step == pytest.approx(np.array(expected), abs=1e-9)
+
+
 def test_a_gap_has_one_law() -> None:
     both = with_effects(
         joint(), [("termination_backlash", {"gap_rad": 1e-3, "drag_Nm": 0.1, "closes_Nm": 0.1})]

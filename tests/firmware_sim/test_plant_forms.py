@@ -36,6 +36,7 @@ SIZES = {
     "series_compliance:bushing": {"compliance_rad_per_Nm": 1e-3},
     "termination_backlash:sprung": {"gap_rad": 1e-3, "closes_Nm": 0.3},
     "termination_backlash:wedged": {"gap_rad": 1e-3, "holds_Nm": 0.1},
+    "termination_backlash:worn": {"gap_rad": 1e-3, "share": 0.7, "place_rad": 0.1, "width_rad": 0.5},
     "termination_backlash:greased": {"gap_rad": 1e-3, "damping_Nms_per_rad": 100.0},
     "termination_backlash:dragging_link": {"gap_rad": 1e-3, "drag_Nm": 0.1},
     "termination_backlash:two_clearances": {"gap_rad": 1e-3, "preload_Nm": 0.3},

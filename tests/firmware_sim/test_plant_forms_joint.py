@@ -99,6 +99,22 @@ def test_a_wedged_key_changes_its_flank_only_when_pulled_over() -> None:
     np.testing.assert_allclose(rising, 1e-3 * np.where(load[120:] > 0.2, 1.0, -1.0), atol=1e-12)
 
 
+def test_a_worn_clearance_is_widest_where_it_has_worn() -> None:
+    motor = course(-1.0, 1.0, points=200)
+    load = np.where(np.arange(len(motor)) % 2 == 0, 0.4, -0.4)
+    config = joint()
+    law = {"gap_rad": 4e-3, "share": 0.75, "place_rad": 0.2, "width_rad": 0.3}
+    run = simulate(config, clock(load), motor, load, effects=(EffectSpec("termination_backlash:worn", law),))
+    apart = run.joint_position_rad - run.pulley_position_rad
+    half = 2e-3 * (0.25 + 0.75 * np.exp(-(((run.pulley_position_rad - 0.2) / 0.3) ** 2)))
+    np.testing.assert_allclose(apart, half * np.sign(load), atol=1e-12)
+    amid, far = (
+        np.argmin(np.abs(run.pulley_position_rad - 0.2)),
+        np.argmax(np.abs(run.pulley_position_rad - 0.2)),
+    )
+    assert abs(apart[amid]) > 3.0 * abs(apart[far])
+
+
 def test_a_dragging_link_stands_still_while_it_is_not_loaded() -> None:
     motor = np.concatenate([np.zeros(50), course(0.0, 2e-3, points=100), np.full(100, 2e-3)])
     load = np.concatenate([np.linspace(0.5, 0.0, 50), np.zeros(150), np.linspace(0.0, -0.5, 51)])

@@ -1,5 +1,5 @@
 """Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, three, a key on springs,
-one that wedges in its taper."""
+one that wedges in its taper, one that has worn its way where the joint mostly stands."""
 
 from __future__ import annotations
 
@@ -168,4 +168,28 @@ WEDGED = form(
     _wedging,
 )
 
-KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, BOTH_WAYS, SPRUNG, WEDGED)
+
+def _worn(build: Build, p: Mapping[str, float]) -> None:
+    def shift(inputs: Floats, outputs: Floats) -> None:
+        away = (outputs[:, PULLEY] - p["place_rad"]) / p["width_rad"]
+        worn = 1.0 - p["share"] + p["share"] * np.exp(-(away**2))
+        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * worn * np.sign(outputs[:, PATH])
+
+    build.mounts.append(shift)
+
+
+WORN = form(
+    "termination_backlash",
+    "worn",
+    "A toothed joint whose clearance is widest where it has worn most: b (1 − s + s exp(−((q − p)/w)²)).",
+    (
+        _GAP,
+        Parameter("share", "s, of the gap that is wear", 0.7, 0.0, 1.0),
+        Parameter("place_rad", "p", 0.0),
+        Parameter("width_rad", "w", 0.5, 1e-3),
+    ),
+    ("load", "joint_angle"),
+    _worn,
+)
+
+KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, BOTH_WAYS, SPRUNG, WEDGED, WORN)
