@@ -14,6 +14,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         play_yield_N=values["yield_N"],
         play_time_s=values["yields_in_s"],
         play_spread=values["spread"],
+        play_grading=values["grading"],
         play_pressed=values["pressed"],
     )
 
@@ -21,11 +22,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="strand_friction",
     statement="Wires rub inside the cable: part of its stretch follows the tension only after a change has "
-    "overcome their grip, of all wires at once or of one after the other; the grip may grow with the tension, which "
-    "presses the wires together.",
+    "overcome their grip, of all wires at once or of one after the other, most of them early where layers grip ever "
+    "less; the grip may grow with the tension, which presses the wires together.",
     equation="free span's stretch = L/EA (T - T0 + s p), p = P_y[T - T0], the play operator of radius y, or the mean "
-    "of five with radii evenly from y (1 - u) to y (1 + u), each times 1 + m (T/T0 - 1); greased, it yields in its own "
-    "time: t_y dp/dt = P_y[T - T0] - p",
+    "of five with radii y (1 + u (2 z^k - 1)), z evenly from 0 to 1, each times 1 + m (T/T0 - 1); greased, it yields "
+    "in its own time: t_y dp/dt = P_y[T - T0] - p",
     source="bending and axial hysteresis of spiral strands by interwire friction: K. O. Papailiou, On the "
     "bending stiffness of transmission line conductors, IEEE Trans. Power Delivery 12 (1997); play "
     "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989; many of them: W. D. Iwan, "
@@ -36,7 +37,7 @@ EFFECT = Effect(
             "-",
             0.0,
             1e-3,
-            1.0,
+            3.0,  # braided ropes are two to three times as stiff under small swings as under a load that comes and goes
             "s, stretch behind the play over the elastic one",
             log=True,
             minimum=0.0,
@@ -81,7 +82,20 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             maximum=1.0,
-            tries=(1.0,),
+            of_known_drive=True,
+        ),
+        Parameter(
+            "grading",
+            "-",
+            1.0,
+            1.0,
+            6.0,
+            "k, power by which the grips grow from the weakest wire's to the strongest one's; 1: evenly",
+            log=True,
+            role="shape",
+            omitted=1.0,
+            minimum=1.0,
+            maximum=10.0,
             of_known_drive=True,
         ),
         Parameter(
@@ -102,4 +116,9 @@ EFFECT = Effect(
     acts_through=("load_direction", "reversal", "load"),
     bounded=False,
     change=_change,
+    tries=(
+        {"spread": 1.0},
+        # layers of which most grip little are found by a strongest grip beyond what all of one grip have
+        *({"yield_N": y, "spread": 1.0, "grading": 3.0} for y in (0.03, 0.1, 0.3, 1.0)),
+    ),
 )

@@ -188,6 +188,7 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
             play_yield=extra.play_yield_N,
             play_time=extra.play_time_s,
             play_spread=extra.play_spread,
+            play_grading=extra.play_grading,
             play_pressed=extra.play_pressed,
             viscous=extra.viscous_Ns_per_m_rad,
             viscous_on=(1.0 + extra.viscous_skew, 1.0 - extra.viscous_skew),

@@ -111,7 +111,10 @@ def span_plays(d: Drive, c: int, x: float, t0: float) -> tuple[float, float]:
     play = slope = 0.0
     for k in range(PLAYS):
         of_it = d.plays[c, k]
-        radius = cable.play_yield * (1.0 + cable.play_spread * ((2 * k + 1) / PLAYS - 1.0))
+        place = (k + 0.5) / PLAYS
+        if cable.play_grading != 1.0:
+            place **= cable.play_grading
+        radius = cable.play_yield * (1.0 + cable.play_spread * (2.0 * place - 1.0))
         one, by_x = span_play(radius, pressed, of_it.rest, x)
         of_it.rest_try = of_it.rest + part * (one - of_it.rest) if slow else one
         play += of_it.rest_try / PLAYS

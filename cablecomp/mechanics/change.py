@@ -62,6 +62,7 @@ class Change:
     play_yield_N: float = 0.0
     play_time_s: float = 0.0
     play_spread: float = 0.0
+    play_grading: float = 1.0
     play_pressed: float = 0.0
     viscous_Ns_per_m_rad: float = 0.0
     viscous_skew: float = 0.0
@@ -90,6 +91,7 @@ def together(changes: Sequence[Change]) -> Change:
         play_yield_N=max((c.play_yield_N for c in changes), default=0.0),
         play_time_s=max((c.play_time_s for c in changes), default=0.0),
         play_spread=max((c.play_spread for c in changes), default=0.0),
+        play_grading=max((c.play_grading for c in changes), default=1.0),
         play_pressed=max((c.play_pressed for c in changes), default=0.0),
         viscous_Ns_per_m_rad=sum(c.viscous_Ns_per_m_rad for c in changes),
         viscous_skew=sum(c.viscous_skew for c in changes),

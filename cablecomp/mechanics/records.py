@@ -83,6 +83,7 @@ CABLE = record(
         ("play_yield", "f8"),  # radius of that play, N
         ("play_time", "f8"),  # in which it yields, s
         ("play_spread", "f8"),  # of `PLAYS` radii about that one, over it; 0: one play
+        ("play_grading", "f8"),  # power by which the radii grow from the least to the greatest; 1: evenly
         ("play_pressed", "f8"),  # share of a radius that grows with the tension
         ("viscous", "f8"),  # N s/m per rad
         ("viscous_on", "f8", (2,)),  # what of that each drum has

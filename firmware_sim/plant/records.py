@@ -190,13 +190,15 @@ SURROUND = np.dtype(
 )
 
 
-# A stretch of a cable's free span that follows the tension through a play: (compliance · (play − zero)).
+# A stretch of a cable's free span that follows the tension through a play: (compliance · (play − zero)), or less and
+# less of it, never more than compliance · seats.
 PLAY = np.dtype(
     [
         ("compliance", "f8"),  # m/N
         ("radius", "f8"),  # N
         ("share", "f8"),  # of the tension, adds to the radius
         ("time_s", "f8"),  # how long it takes to yield
+        ("seats", "f8"),  # N; 0: it goes on in proportion
         ("value", "f8"),  # N, state
         ("zero", "f8"),  # N
     ]

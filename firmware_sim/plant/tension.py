@@ -104,12 +104,13 @@ def play_at(p: Any, T: float, h: float) -> float:
 def lumped_extension(c: Any, plays: Any, T: float, h: float) -> float:
     """Extra length of the free span at tension T: strand friction as plays in the tension, and what was let go.
 
-    e = Σ compliance · (play(T) − zero) + released.
+    e = Σ compliance · (play(T) − zero) + released; S tanh((play − zero)/S) in place of play − zero where it seats.
     """
     extension: float = c.released_m
     for k in range(c.plays):
         p = plays[c.index, k]
-        extension += p.compliance * (play_at(p, T, h) - p.zero)
+        way = play_at(p, T, h) - p.zero
+        extension += p.compliance * (p.seats * math.tanh(way / p.seats) if p.seats > 0.0 else way)
     return extension
 
 
@@ -124,6 +125,8 @@ def lumped_slope(c: Any, plays: Any, T: float, h: float) -> float:
             part = 1.0 - p.share
         elif p.value > T + p.radius + p.share * T:
             part = 1.0 + p.share
+        if p.seats > 0.0:
+            part /= math.cosh((play_at(p, T, h) - p.zero) / p.seats) ** 2
         slope += p.compliance * part * h / (h + p.time_s)
     return slope
 

@@ -106,6 +106,11 @@ def _mixed_strands(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**slow.fixed, **pressed.fixed}, {"fraction": 1.0}, 0.3, 5.0)
 
 
+def _seating_strands(rng: np.random.Generator, scene: Scene) -> Shape:
+    grip, seats = (float(u) * _swing(scene) for u in (rng.uniform(0.1, 0.4), rng.uniform(0.2, 0.6)))
+    return Shape({"yield_N": grip, "seats_N": seats}, {"fraction": 1.0}, 0.3, 5.0)
+
+
 def _slip(scene: Scene) -> tuple[float, float]:
     """Slip for one loop width, and the most that may go: a quarter of the pretension; m."""
     stage = scene.joint.stage
@@ -212,6 +217,7 @@ CABLE = (
     Suspect("strand_friction:rate_dependent", ANY, _slow_strands),
     Suspect("strand_friction:proportional", ANY, _pressed_strands),
     Suspect("strand_friction:mixed_lay", ANY, _mixed_strands),
+    Suspect("strand_friction:seating", ANY, _seating_strands),
     Suspect("clamp_slip:gradual", ANY, _sliding),
     Suspect("clamp_slip:in_steps", ANY, _letting_go),
     Suspect("clamp_slip:unequal_steps", ANY, _letting_go_unequally),

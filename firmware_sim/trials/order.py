@@ -35,7 +35,7 @@ ALIKE = frozenset({
     "pretension_relaxation:power_law", "routing_friction:unlike_paths", "series_compliance:bushing",
     "series_compliance:one_way", "series_compliance:rubber", "series_compliance:softening",
     "strand_break:accelerating", "strand_break:fraying", "strand_break:in_steps", "strand_break:other_cable",
-    "strand_break:unequal_steps", "strand_friction:masing", "strand_friction:proportional",
+    "strand_break:unequal_steps", "strand_friction:graded", "strand_friction:masing", "strand_friction:proportional",
     "strand_friction:rate_dependent", "termination_backlash:dragging_link", "termination_backlash:greased",
     "termination_backlash:sprung", "termination_backlash:two_clearances", "termination_backlash:wedged",
     "thermal_pretension:lagged", "thermal_pretension:quadratic", "viscous_slip:one_drum",

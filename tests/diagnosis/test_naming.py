@@ -124,6 +124,11 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ("wedges_Nm", 0.17, 0.23),
         ),
         (
+            "strand_friction",
+            Case({"fraction": 2.0, "yield_N": 30.0}, form=":graded"),
+            ("grading", 3.0, 6.0),
+        ),
+        (
             "series_compliance",
             Case({"compliance_rad_per_Nm": 6e-3, "share": 0.7, "lag_s": 0.05}, form=":bushing"),
             ("decades", 0.8, 3.0),
@@ -172,6 +177,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "rubber",
         "two gaps",
         "wedges",
+        "graded",
         "creeps",
         "pressed through",
         "patch",

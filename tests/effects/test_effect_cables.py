@@ -165,6 +165,23 @@ def test_wires_that_yield_one_after_the_other_are_many_plays(spread: float) -> N
     assert np.max(np.abs(extra - alike)) > 0.05 * np.ptp(expected)
 
 
+@pytest.mark.parametrize("grading", [2.0, 3.5])
+def test_layers_may_grip_ever_less(grading: float) -> None:
+    """Contacts at z from 0 to 1, their limits 2 y z^k; five do as well within 3 %."""
+    config = joint("snow-open-rig", EA_N=1e8, free_length_m=3.0)
+    stage = config.drive.stage[0]
+    columns = excitation(config, moving=False)
+    strands = {"fraction": 0.7, "yield_N": 4.0, "spread": 1.0, "grading": grading}
+    found = run(config, columns, ("strand_friction", strands))
+    extra = (found["deflection_rad"] - run(config, columns)["deflection_rad"]) * stage.output_radius_m
+    change = found["tension_h_N"] - stage.pretension_N
+    radii = 8.0 * ((np.arange(400) + 0.5) / 400) ** grading
+    expected = 0.7 * 3.0 / 1e8 * np.mean([play(change, r) for r in radii], axis=0)
+    assert extra == pytest.approx(expected, abs=0.03 * np.ptp(expected))
+    evenly = 0.7 * 3.0 / 1e8 * np.mean([play(change, r) for r in np.linspace(0.0, 8.0, 400)], axis=0)
+    assert np.max(np.abs(extra - evenly)) > 0.05 * np.ptp(expected)
+
+
 @pytest.mark.parametrize("pressed", [0.4, 1.0])
 def test_a_grip_that_the_tension_makes_grows_with_it(pressed: float) -> None:
     """A play between the lines x - r and x + r, of which r is in part in proportion to T."""

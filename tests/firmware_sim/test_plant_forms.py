@@ -49,6 +49,7 @@ SIZES = {
     "strand_friction:rate_dependent": {"fraction": 0.3, "yield_N": 5.0},
     "strand_friction:proportional": {"fraction": 0.3},
     "strand_friction:mixed_lay": {"fraction": 0.3, "yield_N": 5.0},
+    "strand_friction:seating": {"fraction": 0.3, "yield_N": 5.0, "seats_N": 8.0},
     "pressure_dependent_friction:floor": {"floor": 0.4},
     "pressure_dependent_friction:exponential": {"rate": 0.6},
     "pressure_dependent_friction:worn_through": {"floor": 0.5},

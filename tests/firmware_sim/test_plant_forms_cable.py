@@ -201,6 +201,19 @@ def test_a_pressed_core_and_a_greased_cover_stretch_by_halves() -> None:
     assert np.max(np.abs(added - expected)) < 5e-3 * np.max(np.abs(expected))
 
 
+def test_wires_that_come_to_lie_yield_no_further() -> None:
+    law = {"fraction": 0.6, "yield_N": 4.0, "seats_N": 8.0}
+    pull, added = _stretch(
+        EffectSpec("strand_friction:seating", law), course(0.0, 0.8, -0.4, 0.5, points=150)
+    )
+    rest, expected = 0.0, []
+    for x in pull:
+        rest = min(max(rest, x - 4.0), x + 4.0)
+        expected.append(0.6 * 8.0 * np.tanh(rest / 8.0))
+    assert np.max(np.abs(added - expected)) < 5e-3 * np.max(np.abs(expected))
+    assert np.max(np.abs(added)) < 0.6 * 8.0
+
+
 def _alone(effect: EffectSpec, circuit: str = "open", load: float = 0.5) -> PlantRun:
     """A steady load on a joint whose cables do not slip on their drums."""
     config = joint(circuit, mu_output=STICKS, mu_input=STICKS)

@@ -27,6 +27,7 @@ EFFECTS = (
     (("routing_friction", {"mu_angle": 0.05, "arc_length_m": 0.0, "place": 0.02, "spread": 0.9}),),
     (("viscous_slip", {"coefficient_Ns_per_m_rad": 50.0, "drum": -1.0}),),
     (("strand_friction", {"fraction": 0.2, "yield_N": 2.0, "spread": 1.0}),),
+    (("strand_friction", {"fraction": 0.2, "yield_N": 2.0, "spread": 1.0, "grading": 3.0}),),
     (("strand_friction", {"fraction": 0.2, "yield_N": 2.0, "pressed": 0.7}),),
 )
 

@@ -1,5 +1,5 @@
 """Friction between strands in other forms: many small plays (Masing), most of them weak (graded), one that takes time,
-one that grows with T, and half of either."""
+one that grows with T, half of either, and one behind which the wires come to lie."""
 
 from __future__ import annotations
 
@@ -111,4 +111,20 @@ MIXED_LAY = form(
     _mixed,
 )
 
-KINDS: tuple[EffectKind, ...] = (MASING, GRADED, RATE_DEPENDENT, PROPORTIONAL, MIXED_LAY)
+
+def _seating(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["plays"] = 1
+    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    build.plays["radius"][:, 0], build.plays["seats"][:, 0] = p["yield_N"], p["seats_N"]
+
+
+SEATING = form(
+    "strand_friction",
+    "seating",
+    "Wires that come to lie against each other: what yields beyond the grip ends at S, as S tanh(play/S).",
+    (_FRACTION, _YIELD, Parameter("seats_N", "S", 10.0, 1e-6)),
+    _ACTS,
+    _seating,
+)
+
+KINDS: tuple[EffectKind, ...] = (MASING, GRADED, RATE_DEPENDENT, PROPORTIONAL, MIXED_LAY, SEATING)
