@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
 
+GAP = 5.0
+"""Steps of the last one's length beyond which the motion in between is not known."""
 
-@term(parameters=("inertia",), state=("seen", "angle", "angle_old", "speed", "speed_old", "step", "pull"))
+
+@term(
+    parameters=("inertia", "cosine", "sine"),
+    state=("seen", "angle", "angle_old", "speed", "speed_old", "step", "pull"),
+)
 def _accelerate(c: Any, p: Any, s: Any) -> None:
-    """p: inertia [kg m2]; s: samples seen (up to 2), angles, speeds, last step [s], last acceleration.
+    """p: inertia [kg m2], shares of it that go with cosine and sine of the angle; s: samples seen (up to 2), angles,
+    speeds, last step [s], last acceleration, last moment over the inertia.
 
     Acceleration by the two-step backward difference formula for uneven steps, implicit in the angle: the
     inertia swings on the drive's own stiffness, and noise of the inputs moves the load no more than a real
-    one would.
+    one would. Over a gap the mean speed is not that of its end: there by even acceleration from the last speed.
     """
     x, h = c.joint, c.dt
     if s.seen == 0.0:  # nothing is known yet: at rest or in even motion
@@ -33,14 +41,26 @@ def _accelerate(c: Any, p: Any, s: Any) -> None:
             s.seen, s.angle, s.angle_old = 2.0, x, s.angle
             s.speed, s.speed_old, s.step = speed, speed, h
         return
-    b0, b1, b2 = 1.0, -1.0, 0.0
-    if h <= 5.0 * s.step:  # after a longer gap, two-step differences would carry the old motion too far
+    if h <= GAP * s.step:
         w = h / s.step
         b0, b1, b2 = (1.0 + 2.0 * w) / (1.0 + w), -(1.0 + w), w * w / (1.0 + w)
-    speed = (b0 * x + b1 * s.angle + b2 * s.angle_old) / h
-    pull = (b0 * speed + b1 * s.speed + b2 * s.speed_old) / h
+        speed_by_angle = b0 / h
+        rate_by_angle = speed_by_angle**2
+        speed = (b0 * x + b1 * s.angle + b2 * s.angle_old) / h
+        rate = (b0 * speed + b1 * s.speed + b2 * s.speed_old) / h
+    else:
+        speed_by_angle, rate_by_angle = 2.0 / h, 2.0 / h**2
+        rate = rate_by_angle * (x - s.angle - s.speed * h)
+        speed = s.speed + rate * h
+    share, by_angle, curve = 1.0, 0.0, 0.0
+    if p.cosine != 0.0 or p.sine != 0.0:
+        cosine, sine = math.cos(x), math.sin(x)
+        curve = -p.cosine * cosine - p.sine * sine
+        share, by_angle = 1.0 - curve, p.sine * cosine - p.cosine * sine
+    pull = share * rate + 0.5 * by_angle * speed**2
     c.moment += p.inertia * pull
-    c.moment_slope += p.inertia * (b0 / h) ** 2
+    slope = share * rate_by_angle + by_angle * (rate + speed * speed_by_angle) + 0.5 * curve * speed**2
+    c.moment_slope += p.inertia * slope
     if c.commit:
         s.angle_old, s.angle = s.angle, x
         s.speed_old, s.speed = s.speed, speed
@@ -48,14 +68,33 @@ def _accelerate(c: Any, p: Any, s: Any) -> None:
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    return Change(terms=_accelerate(inertia=values["inertia_kgm2"]))
+    folds = {"cosine": values["by_cosine"], "sine": values["by_sine"]}
+    return Change(terms=_accelerate(inertia=values["inertia_kgm2"], **folds))
 
+
+def _folds(name: str, text: str) -> Parameter:
+    return Parameter(
+        name,
+        "-",
+        0.0,
+        -0.6,
+        0.6,
+        text,
+        role="shape",
+        omitted=0.0,
+        minimum=-0.7,
+        maximum=0.7,
+        of_known_drive=True,
+    )
+
+
+_WAYS = ((0.4, 0.0), (0.3, 0.3), (0.0, 0.4), (-0.3, 0.3), (-0.4, 0.0), (-0.3, -0.3), (0.0, -0.4), (0.3, -0.3))
 
 EFFECT = Effect(
     id="inertial_load",
     statement="The link's inertia pulls at the cables whenever the joint speeds up or slows down; the "
-    "torque channel does not show it.",
-    equation="M_cable = M - J d²q_out/dt²",
+    "torque channel does not show it. Of an arm that folds as the joint turns it changes with the angle.",
+    equation="M_cable = M - J(q) d²q/dt² - J'(q) (dq/dt)²/2, q = q_out, J(q) = J (1 + c cos q + s sin q)",
     source="Newton; two-step backward differences: E. Hairer and G. Wanner, Solving Ordinary Differential "
     "Equations II, 1996",
     parameters=(
@@ -70,10 +109,13 @@ EFFECT = Effect(
             scale=pretension_moment,
             minimum=0.0,
         ),
+        _folds("by_cosine", "c, of an arm that is stretched out at q = 0"),
+        _folds("by_sine", "s, of one that is stretched out a quarter turn on"),
     ),
     acts_through=("acceleration",),
     rates=True,
     felt_by_motor=True,
     bounded=False,
     change=_change,
+    tries=tuple({"by_cosine": c, "by_sine": s} for c, s in _WAYS),
 )

@@ -189,6 +189,15 @@ def _folding(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"inertia_kgm2": 1.0}, _inertia(scene), 100.0 * _inertia(scene))
 
 
+def _half_filled(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {
+        "share": float(rng.uniform(0.2, 0.6)),
+        "sways_rad_s": 2.0 * math.pi * log_uniform(rng, 0.2, 1.5),
+        "damping_ratio": float(rng.uniform(0.1, 0.6)),
+    }
+    return Shape(fixed, {"inertia_kgm2": 1.0}, _inertia(scene), 100.0 * _inertia(scene))
+
+
 def _sprung(rng: np.random.Generator, scene: Scene) -> Shape:
     fixed = {"phase_rad": angle(rng), "spring_share": float(rng.uniform(0.2, 1.0))}
     return Shape(fixed, {"moment_Nm": 1.0}, 1.5 * _torque(scene), 0.4 * scene.joint.load_Nm)
@@ -271,6 +280,7 @@ JOINT = (
     Suspect("clock_skew:stale", TURNING, _stale),
     Suspect("inertial_load:flexible_link", TURNING, _flexible),
     Suspect("inertial_load:folding_arm", TURNING, _folding),
+    Suspect("inertial_load:half_filled", TURNING, _half_filled),
     Suspect("gravity_load:sprung", TURNING, _sprung),
     Suspect("gravity_load:linkage", TURNING, _linkage),
     Suspect("gravity_load:tilting_base", TURNING, _tilting, neighbour=True, turned=True),

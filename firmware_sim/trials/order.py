@@ -29,8 +29,9 @@ IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
     "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:posed", "crosstalk:quadratic",
-    "gravity_load:leaning_base", "gravity_load:tilting_base", "position_dependent_friction:input_drum",
-    "position_dependent_friction:patch", "position_dependent_friction:threaded",
+    "gravity_load:leaning_base", "gravity_load:tilting_base", "inertial_load:folding_arm",
+    "position_dependent_friction:input_drum", "position_dependent_friction:patch",
+    "position_dependent_friction:threaded",
     "pressure_dependent_friction:worn_through", "pretension_relaxation:exponential",
     "pretension_relaxation:power_law", "routing_friction:unlike_paths", "series_compliance:bushing",
     "series_compliance:one_way", "series_compliance:rubber", "series_compliance:softening",

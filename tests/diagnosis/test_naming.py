@@ -124,6 +124,11 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ("wedges_Nm", 0.17, 0.23),
         ),
         (
+            "inertial_load",
+            Case({"inertia_kgm2": 0.2, "swing": 0.5, "phase_rad": 1.5708}, form=":folding_arm"),
+            ("by_sine", 0.45, 0.55),
+        ),
+        (
             "strand_friction",
             Case({"fraction": 2.0, "yield_N": 30.0}, form=":graded"),
             ("grading", 3.0, 6.0),
@@ -177,6 +182,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "rubber",
         "two gaps",
         "wedges",
+        "folds",
         "graded",
         "creeps",
         "pressed through",

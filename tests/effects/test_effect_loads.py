@@ -145,9 +145,40 @@ def test_inertia_takes_mass_times_acceleration(name: str) -> None:
     assert found == pytest.approx(fed_with(config, columns, load), abs=1e-9)
 
 
+def test_an_arm_that_folds_obeys_lagrange() -> None:
+    """d/dt (J(q) q') - J'(q) q'^2/2 is taken off the load."""
+    config = joint("tendon-finger")
+    columns = moved_motor(6401)
+    law = {"inertia_kgm2": 2e-4, "by_cosine": 0.4, "by_sine": -0.3}
+    found = run(config, columns, ("inertial_load", law))["joint_position_rad"]
+    time = columns["time_s"]
+    speed = np.gradient(found, time)
+    inertia = 2e-4 * (1.0 + 0.4 * np.cos(found) - 0.3 * np.sin(found))
+    by_angle = 2e-4 * (-0.4 * np.sin(found) - 0.3 * np.cos(found))
+    taken = np.gradient(inertia * speed, time) - 0.5 * by_angle * speed**2
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] - taken)
+    still_so = run(config, columns, ("inertial_load", {"inertia_kgm2": 2e-4}))["joint_position_rad"]
+    late = slice(100, -5)
+    moves = np.ptp((found - still_so)[late])
+    assert np.max(np.abs(found - expected)[late]) < 0.02 * moves
+
+
 def moved_motor(samples: int) -> Columns:
     time = np.linspace(0.0, 1.0, samples)
     return still(time, np.zeros(samples), motor=0.3 * np.sin(9.0 * time) ** 3)
+
+
+def test_a_gap_makes_no_pull_of_its_own() -> None:
+    """Steps left out of an even swing: what is predicted beyond the gap is what it would have been without."""
+    config = joint("tendon-finger")
+    effect = ("inertial_load", {"inertia_kgm2": 2e-4})
+    columns = moved_motor(1601)
+    whole = run(config, columns, effect)["deflection_rad"]
+    moves = np.ptp(whole - run(config, columns)["deflection_rad"])
+    for begin in (300, 640, 905, 1210):
+        kept = np.delete(np.arange(1601), slice(begin, begin + 12))
+        found = run(config, {name: v[kept] for name, v in columns.items()}, effect)["deflection_rad"]
+        assert np.max(np.abs(found - whole[kept])) < 0.04 * moves
 
 
 def test_inertia_converges_with_the_square_of_the_step() -> None:

@@ -223,6 +223,21 @@ def test_a_flexible_link_is_an_inertia_when_stiff_and_rings_by_its_own_frequency
     assert gain == pytest.approx(0.05 / (1 - (1.9 / 8.0) ** 2), rel=0.06)
 
 
+def test_what_sways_in_a_vessel_pulls_as_a_damped_swinger() -> None:
+    """At w the swaying part answers by s J (1 + 2 i z u)/(1 - u^2 + 2 i z u), u = w/w_s, beside (1 - s) J."""
+    motor = 0.8 * np.sin(4.0 * T) * (1 - np.exp(-2.0 * T))
+    law = {"inertia_kgm2": 0.05, "share": 0.4, "sways_rad_s": 2.0, "damping_ratio": 0.5}
+    run = simulate(joint(), T, motor, 0 * T, effects=(EffectSpec("inertial_load:half_filled", law),))
+    q = run.pulley_position_rad
+    late = T > 2.5
+    waves = np.column_stack((np.cos(4.0 * T), np.sin(4.0 * T), np.ones_like(T)))[late]
+    moved, pulled = (np.linalg.lstsq(waves, v[late])[0] for v in (q, -run.load_path_Nm))
+    found = complex(pulled[0], -pulled[1]) / (complex(moved[0], -moved[1]) * -16.0)
+    u = 4.0 / 2.0
+    expected = 0.05 * (0.6 + 0.4 * (1 + 1j * u) / (1 - u**2 + 1j * u))
+    assert abs(found - expected) < 0.04 * abs(expected)
+
+
 def test_a_folding_arm_obeys_lagrange(plain: PlantRun) -> None:
     run = play("inertial_load:folding_arm", inertia_kgm2=0.05, swing=0.6, phase_rad=0.3)
     q = run.pulley_position_rad

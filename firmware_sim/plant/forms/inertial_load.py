@@ -1,4 +1,4 @@
-"""Unseen inertia in other forms: at the end of a flexible link, and changing with the joint's angle."""
+"""Unseen inertia in other forms: at the end of a flexible link, changing with the joint's angle, in part a liquid's."""
 
 from __future__ import annotations
 
@@ -46,4 +46,26 @@ FOLDING = form(
     _folding,
 )
 
-KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING)
+
+def _liquid(build: Build, p: Mapping[str, float]) -> None:
+    sways, w = p["share"] * p["inertia_kgm2"], p["sways_rad_s"]
+    build.shafts[build.output]["inertia"] += p["inertia_kgm2"] - sways
+    if sways > 0.0:
+        build.tails.append(Tail(sways, sways * w**2, 2.0 * p["damping_ratio"] * sways * w, branch=True))
+
+
+LIQUID = form(
+    "inertial_load",
+    "half_filled",
+    "A vessel half filled: a share of the inertia sways in it at w, slowly, and follows the joint late.",
+    (
+        _INERTIA,
+        Parameter("share", "of the inertia that sways", 0.4, 0.0, 0.95),
+        Parameter("sways_rad_s", "w", 3.0, 1e-3),
+        Parameter("damping_ratio", "of the swaying", 0.3, 0.0),
+    ),
+    ("acceleration",),
+    _liquid,
+)
+
+KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING, LIQUID)
