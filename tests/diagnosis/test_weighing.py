@@ -81,25 +81,28 @@ def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float,
 
 
 @pytest.mark.parametrize(
-    ("name", "beside", "gain", "share", "slight"),
+    ("name", "beside", "gain", "z", "share", "slight"),
     [
-        ("bearing_friction", True, 0.2, 0.01, True),
-        ("bearing_friction", False, 0.2, 0.01, False),
-        ("bearing_friction", True, 0.6, 0.01, False),
-        ("bearing_friction", True, 0.2, 0.10, False),
-        ("clock_skew", True, 0.2, 0.01, False),
+        ("bearing_friction", True, 0.2, 4.0, 0.01, "1.0% of the mismatch, which the form"),
+        ("bearing_friction", False, 0.2, 4.0, 0.01, ""),
+        ("bearing_friction", True, 0.6, 4.0, 0.01, ""),
+        ("bearing_friction", True, 0.2, 1.0, 0.10, ""),
+        ("bearing_friction", True, 0.04, 1.0, 0.05, "5.0% of the mismatch, z = 1.0"),
+        ("bearing_friction", True, 0.04, 4.0, 0.05, ""),
+        ("bearing_friction", False, 0.04, 1.0, 0.05, ""),
+        ("clock_skew", True, 0.04, 1.0, 0.01, ""),
     ],
 )
 def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form(
-    name: str, beside: bool, gain: float, share: float, slight: bool
+    name: str, beside: bool, gain: float, z: float, share: float, slight: str
 ) -> None:
-    """Not alone, not where it takes off most of what was left, not a delay."""
+    """Not alone, not where it takes off most of what was left, not a delay; what takes off a little more may be chance's."""
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
     term = asked[name]
     model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
-    said = _slight(model, term, gain, share)
-    assert bool(said) is slight
-    assert not slight or "1.0% of the mismatch" in said
+    said = _slight(model, term, ScoreDifference(gain, z, z), share)
+    assert bool(said) is bool(slight)
+    assert slight in said
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:

@@ -127,7 +127,7 @@ def _weighed(
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
-    elif slight := _slight(final, term, own.gain, removes):
+    elif slight := _slight(final, term, own, removes):
         confidence, why_not = min(confidence, LIMITS.little_told), slight
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
@@ -150,14 +150,19 @@ def _too_little(removes: float, left: float) -> str:
     return f"it takes off {removes:.0%} of the mismatch, and {left:.0%} of it, beyond noise, is left"
 
 
-def _slight(final: Model, term: Hypothesis, gain: float, removes: float) -> str:
-    """What is to be said of an effect beside others whose form may do as well what it does, `removes` of the mismatch
-    and `gain` of what is left without it; "" of one that does more. What is late differs in time, which no form does.
+def _slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float) -> str:
+    """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
+    the mismatch and `own` of what is left without it; "" of one that does more. What is late differs in time, which no
+    form does.
     """
     alone = sum(isinstance(t, Hypothesis) for t in final.terms) < 2
-    if alone or term.amount.unit == "s" or removes >= LIMITS.slight or gain >= LIMITS.slight_gain:
+    if alone or term.amount.unit == "s":
         return ""
-    return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
+    if removes < LIMITS.slight and own.gain < LIMITS.slight_gain:
+        return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
+    if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
+        return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
+    return ""
 
 
 def _beyond_noise(fit: Fit) -> float:
