@@ -18,10 +18,15 @@ _YIELD = Parameter("yield_N", "radius of the play in tension", low=0.0)
 _ACTS = ("load_direction", "reversal")
 
 
+def _in_plays(build: Build, fraction: float, count: int) -> None:
+    """That much extra stretch, shared alike by so many plays of each free span."""
+    build.cables["plays"] = count
+    whole = fraction * build.cables["free_m"] / build.cables["EA"]
+    build.plays["compliance"][:, :count] = whole[:, None] / count
+
+
 def _masing(build: Build, p: Mapping[str, float]) -> None:
-    build.cables["plays"] = PLAYS
-    whole = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
-    build.plays["compliance"] = whole[:, None] / PLAYS
+    _in_plays(build, p["fraction"], PLAYS)
     build.plays["radius"] = p["yield_N"] * (np.arange(PLAYS) + 0.5) / PLAYS
 
 
@@ -39,9 +44,7 @@ _LESS = 3.0
 
 
 def _graded(build: Build, p: Mapping[str, float]) -> None:
-    build.cables["plays"] = PLAYS
-    whole = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
-    build.plays["compliance"] = whole[:, None] / PLAYS
+    _in_plays(build, p["fraction"], PLAYS)
     build.plays["radius"] = p["yield_N"] * _LESS ** -np.arange(float(PLAYS))
 
 
@@ -56,8 +59,7 @@ GRADED = form(
 
 
 def _slow(build: Build, p: Mapping[str, float]) -> None:
-    build.cables["plays"] = 1
-    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    _in_plays(build, p["fraction"], 1)
     build.plays["radius"][:, 0], build.plays["time_s"][:, 0] = p["yield_N"], p["time_s"]
 
 
@@ -72,8 +74,7 @@ RATE_DEPENDENT = form(
 
 
 def _proportional(build: Build, p: Mapping[str, float]) -> None:
-    build.cables["plays"] = 1
-    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    _in_plays(build, p["fraction"], 1)
     build.plays["share"][:, 0] = p["share"]
 
 
@@ -88,9 +89,7 @@ PROPORTIONAL = form(
 
 
 def _mixed(build: Build, p: Mapping[str, float]) -> None:
-    build.cables["plays"] = PLAYS
-    whole = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
-    build.plays["compliance"] = whole[:, None] / PLAYS
+    _in_plays(build, p["fraction"], PLAYS)
     core = PLAYS // 2
     build.plays["share"][:, :core] = p["share"] * (np.arange(core) + 1.0) / core
     build.plays["radius"][:, core:], build.plays["time_s"][:, core:] = p["yield_N"], p["time_s"]
@@ -113,8 +112,7 @@ MIXED_LAY = form(
 
 
 def _seating(build: Build, p: Mapping[str, float]) -> None:
-    build.cables["plays"] = 1
-    build.plays["compliance"][:, 0] = p["fraction"] * build.cables["free_m"] / build.cables["EA"]
+    _in_plays(build, p["fraction"], 1)
     build.plays["radius"][:, 0], build.plays["seats"][:, 0] = p["yield_N"], p["seats_N"]
 
 
