@@ -3,7 +3,7 @@ one that wedges in its taper, one that has worn its way where the joint mostly s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -13,6 +13,19 @@ from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 from firmware_sim.plant.records import Floats
 
 _GAP = Parameter("gap_rad", "b, total clearance", low=0.0, high=0.5, neutral=0.0)
+_Values = Mapping[str, float]
+
+
+def _behind_pulley(added: Callable[[Floats, Floats, _Values], Floats]) -> Callable[[Build, _Values], None]:
+    """Puts what a law adds to the joint's angle (of inputs, outputs, parameters) behind the pulley."""
+
+    def change(build: Build, p: _Values) -> None:
+        def shift(inputs: Floats, outputs: Floats) -> None:
+            outputs[:, Q_OUT] += added(inputs, outputs, p)
+
+        build.mounts.append(shift)
+
+    return change
 
 
 def squeezed(time: Floats, path: Floats, gap: float, damping: float) -> Floats:
@@ -27,13 +40,8 @@ def squeezed(time: Floats, path: Floats, gap: float, damping: float) -> Floats:
     return result
 
 
-def _greased(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        outputs[:, Q_OUT] += squeezed(
-            inputs[:, TIME], outputs[:, PATH], p["gap_rad"], p["damping_Nms_per_rad"]
-        )
-
-    build.mounts.append(shift)
+def _greased(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    return squeezed(inputs[:, TIME], outputs[:, PATH], p["gap_rad"], p["damping_Nms_per_rad"])
 
 
 GREASED = form(
@@ -42,7 +50,7 @@ GREASED = form(
     "A gap full of grease: the key crosses it at the speed M/d, and lies on a flank only then.",
     (_GAP, Parameter("damping_Nms_per_rad", "d", low=1e-9)),
     ("load", "load_rate"),
-    _greased,
+    _behind_pulley(_greased),
 )
 
 
@@ -57,11 +65,8 @@ def dragged(path: Floats, pulley: Floats, gap: float, drag: float) -> Floats:
     return result
 
 
-def _dragging(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        outputs[:, Q_OUT] += dragged(outputs[:, PATH], outputs[:, PULLEY], p["gap_rad"], p["drag_Nm"])
-
-    build.mounts.append(shift)
+def _dragging(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    return dragged(outputs[:, PATH], outputs[:, PULLEY], p["gap_rad"], p["drag_Nm"])
 
 
 DRAGGING = form(
@@ -70,18 +75,13 @@ DRAGGING = form(
     "A link that drags: while |M| is below its own friction it stands still in space and the pulley turns under it.",
     (_GAP, Parameter("drag_Nm", "the link's friction", low=0.0)),
     ("load", "motor_angle"),
-    _dragging,
+    _behind_pulley(_dragging),
 )
 
 
-def _two(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        first = 0.5 * p["gap_rad"] * p["share"]
-        second = 0.5 * p["gap_rad"] * (1.0 - p["share"])
-        path = outputs[:, PATH]
-        outputs[:, Q_OUT] += first * np.sign(path) + second * np.sign(path - p["preload_Nm"])
-
-    build.mounts.append(shift)
+def _two(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    share, path = p["share"], outputs[:, PATH]
+    return 0.5 * p["gap_rad"] * (share * np.sign(path) + (1.0 - share) * np.sign(path - p["preload_Nm"]))
 
 
 TWO = form(
@@ -94,17 +94,14 @@ TWO = form(
         Parameter("preload_Nm", "M_p", 0.0),
     ),
     ("load",),
-    _two,
+    _behind_pulley(_two),
 )
 
 
-def _both_ways(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        rest, path = 1.0 - p["share"], outputs[:, PATH]
-        dogs = np.sign(path - p["up_Nm"]) + np.sign(path + p["down_Nm"])
-        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * (p["share"] * np.sign(path) + 0.5 * rest * dogs)
-
-    build.mounts.append(shift)
+def _both_ways(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    share, path = p["share"], outputs[:, PATH]
+    dogs = np.sign(path - p["up_Nm"]) + np.sign(path + p["down_Nm"])
+    return 0.5 * p["gap_rad"] * (share * np.sign(path) + 0.5 * (1.0 - share) * dogs)
 
 
 BOTH_WAYS = form(
@@ -119,15 +116,12 @@ BOTH_WAYS = form(
         Parameter("down_Nm", "M_d", 0.0, 0.0),
     ),
     ("load",),
-    _both_ways,
+    _behind_pulley(_both_ways),
 )
 
 
-def _sprung(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * np.clip(outputs[:, PATH] / p["closes_Nm"], -1.0, 1.0)
-
-    build.mounts.append(shift)
+def _sprung(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    return 0.5 * p["gap_rad"] * np.clip(outputs[:, PATH] / p["closes_Nm"], -1.0, 1.0)
 
 
 SPRUNG = form(
@@ -136,7 +130,7 @@ SPRUNG = form(
     "A key that springs hold amid its gap: it moves with the load, + (b/2) M/M_c, until |M| = M_c closes the gap.",
     (_GAP, Parameter("closes_Nm", "M_c", low=1e-9)),
     ("load",),
-    _sprung,
+    _behind_pulley(_sprung),
 )
 
 
@@ -152,11 +146,8 @@ def wedged(path: Floats, holds: float) -> Floats:
     return result
 
 
-def _wedging(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * wedged(outputs[:, PATH], p["holds_Nm"])
-
-    build.mounts.append(shift)
+def _wedging(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    return 0.5 * p["gap_rad"] * wedged(outputs[:, PATH], p["holds_Nm"])
 
 
 WEDGED = form(
@@ -165,17 +156,14 @@ WEDGED = form(
     "A key that wedges in its taper: it lies on a flank until the moment has turned over and exceeds M_w.",
     (_GAP, Parameter("holds_Nm", "M_w", low=0.0)),
     ("load", "load_direction"),
-    _wedging,
+    _behind_pulley(_wedging),
 )
 
 
-def _worn(build: Build, p: Mapping[str, float]) -> None:
-    def shift(inputs: Floats, outputs: Floats) -> None:
-        away = (outputs[:, PULLEY] - p["place_rad"]) / p["width_rad"]
-        worn = 1.0 - p["share"] + p["share"] * np.exp(-(away**2))
-        outputs[:, Q_OUT] += 0.5 * p["gap_rad"] * worn * np.sign(outputs[:, PATH])
-
-    build.mounts.append(shift)
+def _worn(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    away = (outputs[:, PULLEY] - p["place_rad"]) / p["width_rad"]
+    worn = 1.0 - p["share"] + p["share"] * np.exp(-(away**2))
+    return 0.5 * p["gap_rad"] * worn * np.sign(outputs[:, PATH])
 
 
 WORN = form(
@@ -189,7 +177,7 @@ WORN = form(
         Parameter("width_rad", "w", 0.5, 1e-3),
     ),
     ("load", "joint_angle"),
-    _worn,
+    _behind_pulley(_worn),
 )
 
 KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, BOTH_WAYS, SPRUNG, WEDGED, WORN)
