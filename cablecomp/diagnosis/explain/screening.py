@@ -88,7 +88,7 @@ def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best | None] | None:
 def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> Answer | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event is asked at
     every instant with each of them, then for its course."""
-    # where every run is dear, of an event its course alone, of others no shape is asked for but by whom it is run so
+    # where every run is dear no shape is asked for but by laws that need it so; of an event, its course alone
     further = () if here.fit.problem.fine and not h.effect.rates else h.further
     if best is None:
         found = [_ask_pair(here, h, f) for f in further]
