@@ -16,7 +16,7 @@ import numpy as np
 
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.limits import HISTORY_CUTS, HISTORY_FAINT, HISTORY_LEG
+from cablecomp.estimation.limits import HISTORY_CUTS, HISTORY_FAINT, HISTORY_LEG, HISTORY_PARTS
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
@@ -63,20 +63,24 @@ def reaches(problem: Problem) -> tuple[Reach, ...]:
 
 
 def histories(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
-    """Assumed histories (motor angle, load) of a recording: loaded as far as it goes and back, either way; in from
-    either end of the stroke; loaded at that end and wound in under load; loaded, wound there and back."""
+    """Assumed histories (motor angle, load) of a recording, as far as it goes and a part of that: loaded and back,
+    either way; loaded one way, then a part as far the other; in from towards either end of the stroke; loaded there and
+    wound in under load; loaded, wound there and back."""
     q = float(recording.columns["motor_position_rad"][0])
     m = float(np.ravel(load_of(problem.config, recording.columns))[0])
     for reach in reaches(problem):
-        loads = [side for side in (reach.load_Nm, -reach.load_Nm) if reach.load_Nm > 0.0 and side != m]
-        ends = [end for end in (reach.high_rad, reach.low_rad) if abs(end - q) > 1e-9]
-        for side in loads:
-            yield _path([(q, 0.0), (q, side), (q, m)])
-        for end in ends:
-            yield _path([(end, m), (q, m)])
-            for side in loads:
-                yield _path([(end, 0.0), (end, side), (q, side), (q, m)])
-                yield _path([(q, 0.0), (q, side), (end, side), (q, m)])
+        for part in HISTORY_PARTS:
+            loads = [part * side for side in (reach.load_Nm, -reach.load_Nm) if reach.load_Nm > 0.0]
+            ends = [q + part * (end - q) for end in (reach.high_rad, reach.low_rad) if abs(end - q) > 1e-9]
+            for side in (s for s in loads if s != m):
+                yield _path([(q, 0.0), (q, side), (q, m)])
+                if part < 1.0:
+                    yield _path([(q, 0.0), (q, -side / part), (q, side), (q, m)])
+            for end in ends:
+                yield _path([(end, m), (q, m)])
+                for side in (s for s in loads if s != m):
+                    yield _path([(end, 0.0), (end, side), (q, side), (q, m)])
+                    yield _path([(q, 0.0), (q, side), (end, side), (q, m)])
 
 
 def _path(corners: Sequence[tuple[float, float]]) -> FloatArray:

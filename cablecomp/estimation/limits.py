@@ -38,6 +38,8 @@ CARRYOVER_SD: Final = 1.0
 """Prior sd of a recording's carry-over, in what the assumed histories add in the mean (RMS)."""
 HISTORY_CUTS: Final = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2)
 """Shares of a recording that may be given up to an unknown history: what lasts longer is estimated."""
+HISTORY_PARTS: Final = (1.0, 2.0 / 3.0, 1.0 / 3.0)
+"""Of its reach, how far a drive went in an assumed history."""
 HISTORY_LEG: Final = 12
 """Rows of one leg of an assumed history."""
 HISTORY_FAINT: Final = 0.02

@@ -1,0 +1,84 @@
+"""Histories that nobody recorded, against the plant's: what any of them adds lies within what is estimated of it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from joints import closed
+
+from cablecomp.config import parse_joint
+from cablecomp.estimation.evidence import JOINT, gather
+from cablecomp.estimation.history import forgotten
+from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import PlantConfig, simulate
+
+STEP_S, NOISE_RAD = 0.05, 2e-5
+LOAD_Nm, STROKE_rad = 1.4, 0.6
+LONG = {
+    "output_radius_m": 0.0365, "input_radius_m": 0.062, "free_length_m": 0.14, "EA_N": 16000.0, "pretension_N": 25.0,
+    "mu_output": 0.13, "mu_input": 0.15, "wrap_output_rad": 14.0, "wrap_input_rad": 11.0,
+}  # fmt: skip
+"""A drive of low pretension and much wrap: loads reach far into the drums, and what they left there lasts."""
+NESTED = (
+    [(0.0, 0.45), (0.0, -0.3)],
+    [(0.0, -0.8), (0.0, 0.4)],
+    [(0.4, 0.6), (0.4, -0.2), (0.0, -0.2)],
+    [(-0.7, -0.5), (0.2, -0.5), (0.2, 0.3)],
+)
+"""What went before: the motor's angle and the load one after another, in what the recording reaches."""
+
+
+def joined(corners: list[tuple[float, float]], rows: int = 40) -> FloatArray:
+    return np.concatenate([np.linspace(a, b, rows) for a, b in pairwise(corners)])
+
+
+def visible(circuit: str) -> tuple[FloatArray, FloatArray]:
+    """Motor angle [rad] and load [N m] of a recording that loads the joint ever more, its motor turning."""
+    time = np.arange(0.0, 30.0, STEP_S)
+    swell = 0.3 + 0.7 * time / time[-1]
+    return STROKE_rad * swell * np.sin(0.45 * time), torque(circuit, swell * np.sin(1.3 * time))
+
+
+def torque(circuit: str, share: FloatArray | float) -> FloatArray:
+    """Load [N m] of a share of its reach; an open circuit is pulled one way mostly, or its cable goes slack."""
+    return LOAD_Nm * np.asarray(0.35 + 0.65 * share if circuit == "open" else share)
+
+
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
+    raw = closed(LONG)
+    raw["drive"]["circuit"] = circuit
+    joint, plant = parse_joint(raw, "nested"), PlantConfig.from_dict(raw)
+    motor, load = visible(circuit)
+    angles = []
+    for before in ([], *NESTED):
+        # every run begins at rest and ends up where the recording begins
+        corners = joined(
+            [(0.0, 0.0), *((q, float(torque(circuit, m))) for q, m in before), (motor[0], load[0])]
+        )
+        drive, loads = (np.concatenate([corners[:, k], v]) for k, v in enumerate((motor, load)))
+        time = STEP_S * np.arange(len(drive))
+        angles.append(simulate(plant, time, drive, loads).channels()[JOINT][len(corners) :])
+    columns = {
+        "time_s": STEP_S * np.arange(len(motor)), "motor_position_rad": motor, "joint_torque_Nm": load,
+        JOINT: angles[0],
+    }  # fmt: skip
+    e = gather(joint, "a", columns, "one", fine_rows=2000, judged_rows=300)
+    p = Problem(joint, of_drive(joint), (e,), Weighing({JOINT: NOISE_RAD}, {}))
+    found = forgotten(p, p.start, e, {JOINT: NOISE_RAD}, 0.25)
+    told = np.column_stack((found.carryover[JOINT], np.ones(len(e.rows))))[found.first :]
+    prior = np.eye(told.shape[1]) * NOISE_RAD
+    prior[-1] = 0.0  # a zero
+    A = np.vstack((told, prior))
+    before, after = [], []
+    for angle in angles[1:]:
+        added = (angle - angles[0])[e.rows][found.first :]
+        step = np.linalg.lstsq(A, np.concatenate((added, np.zeros(len(prior)))), rcond=None)[0]
+        before.append(float(np.std(added)))
+        after.append(float(np.std(added - told @ step)))
+    assert max(before) > 4.0 * NOISE_RAD
+    assert max(after) < 0.1 * max(before) + 0.2 * NOISE_RAD
