@@ -82,7 +82,9 @@ class Parameter:
     drive known by order of magnitude it, and what is `of` it, are not asked for. `of_motor_load`:
     it is asked for only where the load is read at the motor. `points`: at how many places of a log-spaced range a
     diagnosis asks. `goes_on`: what it does grows without
-    end, so that a diagnosis keeps it only where it is told from none.
+    end, so that a diagnosis keeps it only where it is told from none. `by_itself`: an amount that is asked for without
+    the effect's others. `per_reading`: low..high are what the largest reading of the channel that the effect reads
+    does: what a unit of it means, no configuration tells.
     """
 
     name: str
@@ -107,6 +109,8 @@ class Parameter:
     of_motor_load: bool = False
     points: int = 3
     goes_on: bool = False
+    by_itself: bool = False
+    per_reading: bool = False
 
     @property
     def shape(self) -> bool:

@@ -105,6 +105,16 @@ def _neighbour(rng: Rng, tables: Sequence[Table], share: float) -> Change | None
     return _unseen_torque(tables, [sign * t[NEIGHBOUR] for t in tables], share)
 
 
+def _frame(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
+    """The neighbour moves the joint and loads no cable: its frame gives way, or this joint's cables pass its axis."""
+    parts = [t[NEIGHBOUR] for t in tables]
+    scatter = _scatter(parts)
+    if not scatter > 0.0:
+        return None
+    size, way = share * _spans(tables, JOINT), float(rng.choice((-1.0, 1.0)))
+    return Change(JOINT, tuple(way * size / scatter * p for p in parts), {"size": size})
+
+
 def _weight(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
     """A weight that hangs, or stands, upright at an angle that the joint passes: one far from there would pull with a
     torque many times what it changes by."""
@@ -203,6 +213,8 @@ PHYSICS = (
     Physics("slip", "clamp slips once", ("clamp_slip",), ("time",), _TRAVEL, "deg", _DEG, _slip),
     Physics("neighbour", "neighbour's torque", ("crosstalk",), ("other:concealed",), _TORQUE, "N m RMS", 1.0,
             _neighbour),
+    Physics("frame", "neighbour moves the joint", ("crosstalk",), ("other:concealed",), _TRAVEL, "deg RMS", _DEG,
+            _frame),
     Physics("weight", "weight unseen by the torque channel", ("gravity_load",), ("joint_angle", "motor_angle"), _TORQUE,
             "N m RMS", 1.0, _weight),
     Physics("inertia", "inertia unseen by the torque channel", ("inertial_load",), ("acceleration", "joint_angle"),

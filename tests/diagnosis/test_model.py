@@ -47,7 +47,7 @@ def test_of_a_weight_with_a_turning_base_and_without_one_stands() -> None:
     other = {**fit.problem.evidence[0].columns, "other_1_rad": np.sin(0.7 * time)}
     evidence = (replace(fit.problem.evidence[0], columns=other),)
     plain, turned = (h for h in hypotheses(JOINT, evidence) if h.effect.id == "gravity_load")
-    (leak,) = (h for h in hypotheses(JOINT, evidence) if h.effect.id == "crosstalk")
+    leak, _ = (h for h in hypotheses(JOINT, evidence) if h.effect.id == "crosstalk")
     groups = make_groups(fit)
     left = left_out(fit, groups)
     models = [Model((turned,), fit, left), Model((plain,), fit, left), Model((leak,), fit, left)]

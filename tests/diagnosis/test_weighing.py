@@ -14,9 +14,9 @@ from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.confidence import learnt
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
+from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.explain.weighing import (
     _against,
-    _alone_by_far,
     _at_bound,
     _follows,
     _slight,
@@ -90,13 +90,14 @@ def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float,
         ("bearing_friction", True, 0.04, 1.0, 0.05, "5.0% of the mismatch, z = 1.0"),
         ("bearing_friction", True, 0.04, 4.0, 0.05, ""),
         ("bearing_friction", False, 0.04, 1.0, 0.05, ""),
-        ("clock_skew", True, 0.04, 1.0, 0.01, ""),
+        ("clock_skew", True, 0.04, 1.0, 0.01, "1.0% of the mismatch, z = 1.0"),
+        ("clock_skew", True, 0.04, 4.0, 0.01, ""),
     ],
 )
 def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form(
     name: str, beside: bool, gain: float, z: float, share: float, slight: str
 ) -> None:
-    """Not alone, not where it takes off most of what was left, not a delay; a little more may be chance's."""
+    """Not alone, not where it takes off most of what was left, no delay's; a little more may be chance's, as a delay may."""
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
     term = asked[name]
     model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
@@ -192,9 +193,13 @@ def test_what_alone_explains_by_far_the_most_is_its_own_word(
         "series_compliance:late_rad_per_Nm": 0.3,
     }
     tried = [
-        SimpleNamespace(term=asked[name], difference=ScoreDifference(gain, 5.0, 5.0))
+        SimpleNamespace(
+            term=asked[name],
+            model=SimpleNamespace(terms=(asked[name],)),
+            difference=ScoreDifference(gain, 5.0, 5.0),
+        )
         for name, gain in gains.items()
     ]
     selection: Any = SimpleNamespace(rounds=[SimpleNamespace(tried=tried)])
-    assert _alone_by_far(selection, asked["termination_backlash"]) is by_far
-    assert not _alone_by_far(selection, asked["series_compliance:late_rad_per_Nm"])
+    assert alone_by_far(selection.rounds, asked["termination_backlash"]) is by_far
+    assert not alone_by_far(selection.rounds, asked["series_compliance:late_rad_per_Nm"])

@@ -46,6 +46,10 @@ def typical(name: str, config: JointConfig) -> dict[str, Any]:
         low, high = parameter.bounds(config)
         values[parameter.name] = np.sqrt(low * high) if parameter.log else 0.25 * low + 0.75 * high
         values[parameter.name] = IN_TWO_SECONDS.get(parameter.name, values[parameter.name])
+        if parameter.per_reading:
+            values[parameter.name] *= 0.5 / neighbour_Nm(config)
+        if effect.texts and parameter.role == "bend":
+            values[parameter.name] = 0.5 / neighbour_Nm(config)
     other = {k: v for k, v in OTHER_LAW.items() if k in values}
     return values | other | dict.fromkeys(effect.texts, "other_neighbour_Nm")
 
@@ -56,12 +60,17 @@ def neutral(name: str) -> dict[str, Any]:
     return {**effect.neutral(), **dict.fromkeys(effect.texts, "other_neighbour_Nm")}
 
 
+def neighbour_Nm(config: JointConfig) -> float:
+    """The largest load on the neighbouring joint: half of R T0."""
+    stage = config.drive.stage[-1]
+    return 0.5 * stage.output_radius_m * stage.pretension_N
+
+
 def excitation(config: JointConfig, samples: int = 400, moving: bool = True) -> Columns:
     """Two seconds of changing load with a hold, the motor turning if `moving`; all channels in use."""
     time = np.linspace(0.0, 2.0, samples)
-    stage = config.drive.stage[-1]
     ratio = np.prod([s.input_radius_m / s.output_radius_m for s in config.drive.stage])
-    unit = 0.5 * stage.output_radius_m * stage.pretension_N
+    unit = neighbour_Nm(config)
     load = (
         unit * np.sin(7.0 * np.minimum(time, 1.2) + 4.0 * np.maximum(time - 1.4, 0.0)) * np.exp(-0.3 * time)
     )

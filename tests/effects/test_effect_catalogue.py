@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_cases import excitation, joint, neutral, run, typical
+from effect_cases import excitation, joint, neighbour_Nm, neutral, run, typical
 
 from cablecomp.config import EffectEntry
 from cablecomp.effects import catalogue, extend, with_effects
@@ -169,6 +169,8 @@ def test_a_vanishing_value_changes_vanishingly(name: str) -> None:
     for parameter in catalogue()[name].parameters:
         if not parameter.shape:
             values[parameter.name] = 1e-9 * parameter.bounds(config)[1]
+            if parameter.per_reading:
+                values[parameter.name] /= neighbour_Nm(config)
     plain = run(config, columns)["deflection_rad"]
     slight = run(config, columns, (name, values))["deflection_rad"]
     assert np.abs(slight - plain).max() < 1e-5 * np.ptp(plain)

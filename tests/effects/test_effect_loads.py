@@ -104,6 +104,26 @@ def test_a_neighbours_load_may_count_more_one_way_than_the_other() -> None:
     )
 
 
+def test_a_neighbour_may_turn_the_joint_and_load_no_cable() -> None:
+    """d other (1 + b other) on the joint's angle, tensions as without it; where that is not read, nothing."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    other = columns["other_neighbour_Nm"].copy()
+    other[50:60] = np.nan
+    columns["other_neighbour_Nm"] = other
+    values = {"channel": "other_neighbour_Nm", "turn_rad_per_unit": 2e-3, "bend_per_unit": -0.7}
+    found, plain = run(config, columns, ("crosstalk", values)), run(config, columns)
+    turned = 2e-3 * np.nan_to_num(other * (1.0 - 0.7 * other))
+    assert np.ptp(turned) > 1e-3
+    assert found["joint_position_rad"] == pytest.approx(plain["joint_position_rad"] + turned, abs=1e-12)
+    assert found["tension_h_N"] == pytest.approx(plain["tension_h_N"], abs=1e-9)
+    both = run(config, columns, ("crosstalk", {**values, "load_coefficient": 0.3}))["joint_position_rad"]
+    loaded = run(
+        config, columns, ("crosstalk", {**values, "load_coefficient": 0.3, "turn_rad_per_unit": 0.0})
+    )
+    assert both == pytest.approx(loaded["joint_position_rad"] + turned, abs=1e-12)
+
+
 def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
     """As the same weight at the phase that the other joint's angle makes of it; where that is not read, as untilted."""
     config = joint(JOINTS[0])

@@ -64,7 +64,7 @@ def test_sizes_are_what_the_truth_says() -> None:
         elif t.physics.id in ("slip", "play"):
             assert np.ptp(delta) == pytest.approx(size, rel=0.02)
             assert size == pytest.approx(t.share * travel, rel=0.02)
-        elif t.physics.id == "drift":
+        elif t.physics.id in ("drift", "frame"):
             assert np.std(delta) == pytest.approx(size, rel=1e-6)
         elif t.physics.id == "late":
             late, own = t.recordings[0][JOINT], twin.recordings[0][JOINT]
@@ -124,7 +124,7 @@ def test_acceleration_of_a_sine_and_dahls_limits() -> None:
 
 def test_without_a_torque_channel_what_needs_one_is_left_out_and_said() -> None:
     found, missing = trials(torque=False, rounds=1)
-    assert {t.physics.id for t in found if t.physics is not None} == {"late", "slip", "drift"}
+    assert {t.physics.id for t in found if t.physics is not None} == {"late", "slip", "frame", "drift"}
     assert set(missing) == {"neighbour", "weight", "inertia", "friction", "play", "gain"}
     assert all(NEIGHBOUR in r for t in found for r in t.recordings)
 

@@ -198,8 +198,21 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
     if effect.texts:
         others = (n for n in _others(evidence) if n.endswith(effect.channel_ends))
         channels += [n for n in others if n not in config.condition.values()]
-    amounts = [p for p in effect.parameters if not p.shape and not p.held]
-    return [_by_amount(effect, p, c, config, evidence) for p in amounts for c in channels]
+    found = []
+    for c in channels:
+        read = _by_readings(effect, _width(evidence, c)) if c else effect
+        amounts = [p for p in read.parameters if not p.shape and not p.held]
+        found += [_by_amount(read, p, c, config, evidence) for p in amounts]
+    return found
+
+
+def _by_readings(effect: Effect, width: float) -> Effect:
+    """The effect with what its amounts range over by unit of a channel whose largest reading is `width`."""
+    width = max(width, 1e-300)
+    parameters = (
+        replace(p, low=p.low / width, high=p.high / width) if p.per_reading else p for p in effect.parameters
+    )
+    return replace(effect, parameters=tuple(parameters))
 
 
 def _by_amount(
@@ -213,7 +226,9 @@ def _by_amount(
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
     shaped = {p.of for p in effect.parameters if not p.tries and p.name not in asked_together}
-    further = [p for p in own if not p.shape and p is not amount and p.name not in shaped]
+    further = [
+        p for p in own if not (p.shape or p is amount or p.name in shaped or p.by_itself or amount.by_itself)
+    ]
     low, high = amount.bounds(config)
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0

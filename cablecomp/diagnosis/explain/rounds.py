@@ -75,7 +75,7 @@ class Beginning:
 
     def tell(self, what: str) -> None:
         """Say what is being done, and how far the search is."""
-        self.pace.tell(what, self.number / LIMITS.rounds)
+        self.pace.tell(what, self.number / (LIMITS.rounds + LIMITS.later_rounds))
 
     def trades(self, h: Hypothesis) -> bool:
         """Whether a hypothesis is tried whatever it promises: beside another effect it may trade places."""

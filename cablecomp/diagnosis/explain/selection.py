@@ -26,6 +26,7 @@ from cablecomp.diagnosis.explain.model import (
 from cablecomp.diagnosis.explain.rounds import Beginning, cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.ties import (
+    alone_by_far,
     implausible,
     in_order,
     keeps,
@@ -64,16 +65,20 @@ def select(
         nominal = Fit(problem, nominal.x, problem.residual(nominal.x), problem.jacobian(nominal.x))
     beam: list[tuple[Model, Fit | None]] = [(first, nominal)]
     rounds: list[Round] = []
+    latest: list[Round] = []
     cold = cold_starts(pool, baseline)
     best = first
-    for number in range(0 if quiet(baseline) else LIMITS.rounds):
-        if pace.over and number:
+    for number in range(0 if quiet(baseline) else LIMITS.rounds + LIMITS.later_rounds):
+        if number >= LIMITS.rounds:
+            pool, beam = _still_demanded(pool, latest, best), beam[:1]
+        if (pace.over and number) or not pool:
             break
-        tried: list[Tried] = []
+        latest = []
         for model, start in beam:
-            known = [t.model for r in rounds for t in r.tried]
-            rounds.append(one_round(Beginning(model, start, pool, groups, pace, number, cold, known), rng))
-            tried += rounds[-1].tried
+            known = [t.model for r in (*rounds, *latest) for t in r.tried]
+            latest.append(one_round(Beginning(model, start, pool, groups, pace, number, cold, known), rng))
+        rounds += latest
+        tried = [t for r in latest for t in r.tried]
         found = _carried(tried, groups, None if number == 0 else best)
         if found is None:
             break
@@ -84,8 +89,14 @@ def select(
         carried = sorted(carried, key=lambda m: m is not best)
         # a law that is run on every sample is a hundred times as dear: the best model alone goes on from there
         beam = [(m, None) for m in carried[: 1 if carried[0].fit.problem.fine else LIMITS.beam]]
-    final = _pruned(best, groups)
+    final = _pruned(best, rounds, groups)
     return Selection(first, tuple(rounds), with_the_first(final, rounds, groups) if rounds else final, groups)
+
+
+def _still_demanded(pool: Sequence[Hypothesis], latest: Sequence[Round], best: Model) -> list[Hypothesis]:
+    """What data left out demanded in the latest rounds and the best model has not: another took off more each time."""
+    names = {t.term.name for r in latest for t in r.tried if demanded(t.difference)} - best.added
+    return [h for h in pool if h.name in names]
 
 
 def _carried(
@@ -163,13 +174,16 @@ def quiet(fit: Fit) -> bool:
     )
 
 
-def _pruned(model: Model, groups: Groups) -> Model:
+def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
     """Leave out, weakest first, every term whose absence costs less than it had to bring: the first of all as the
-    first, the others as further ones. None whose part another takes up with an amount that is not plausible."""
+    first, the others as further ones. None whose part another takes up with an amount that is not plausible, nor what
+    alone explains by far the most: that several others together do as well is chance rather than physics."""
     while len(model.terms) > 1:
         weakest: tuple[float, Model] | None = None
         for term in model.terms[:-1]:
             if any(isinstance(t, Dependence) and t.belongs_to(term) for t in model.terms):
+                continue
+            if alone_by_far(rounds, term):
                 continue
             smaller = without(model, term, groups)
             if smaller is None or implausible(smaller) > implausible(model):

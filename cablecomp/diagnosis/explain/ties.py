@@ -133,6 +133,21 @@ def _in_its_place(
     return Model((*base.terms, other), fit, left_out(fit, groups))
 
 
+def alone_by_far(rounds: Sequence[Round], term: Term) -> bool:
+    """Whether any other effect, beside the calibrated drive, leaves far more of the loss on data left out: no other is
+    the better word then, and no two of them together."""
+    if not rounds:
+        return False
+    leaves = [
+        (t.term, 1.0 - t.difference.gain)
+        for t in rounds[0].tried
+        if len(t.model.terms) == 1 and isinstance(t.term, Hypothesis)
+    ]
+    own = min((left for h, left in leaves if h.name == term.name), default=1.0)
+    others = (left for h, left in leaves if isinstance(term, Hypothesis) and not h.same_as(term))
+    return own < LIMITS.by_far * min(others, default=1.0)
+
+
 def _of_one_effect(term: Term, other: Hypothesis) -> bool:
     """Whether both ask for one effect, by two amounts of it: a model has an effect once."""
     return isinstance(term, Hypothesis) and term.effect.id == other.effect.id

@@ -18,6 +18,7 @@ from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
+from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.explain.usual import lost_in_usual
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
@@ -120,7 +121,7 @@ def _weighed(
     removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif (stretched := better_word(final.fit, term)) and not _alone_by_far(selection, term):
+    elif (stretched := better_word(final.fit, term)) and not alone_by_far(selection.rounds, term):
         confidence = min(confidence, LIMITS.beaten_told)
         why_not = f"with this `{stretched}` another effect is the better word"
     elif little := (
@@ -153,12 +154,11 @@ def _too_little(removes: float, left: float) -> str:
 def _slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float) -> str:
     """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
     the mismatch and `own` of what is left without it; "" of one that does more. What is late differs in time, which no
-    form does.
+    form does, but chance may.
     """
-    alone = sum(isinstance(t, Hypothesis) for t in final.terms) < 2
-    if alone or term.amount.unit == "s":
+    if sum(isinstance(t, Hypothesis) for t in final.terms) < 2:
         return ""
-    if removes < LIMITS.slight and own.gain < LIMITS.slight_gain:
+    if removes < LIMITS.slight and own.gain < LIMITS.slight_gain and term.amount.unit != "s":
         return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
     if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
         return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
@@ -177,15 +177,6 @@ def _at_bound(model: Model, term: Hypothesis) -> bool:
     names = (name.partition("@")[0].partition("~")[0] for name in model.fit.at_bound())
     found = (parameter_of(n) for n in names if n.startswith(f"effect.{term.effect.id}."))
     return any(p is not None and p.role not in NO_SIZE and not p.is_share for p in found)
-
-
-def _alone_by_far(selection: Selection, term: Hypothesis) -> bool:
-    """Whether any other effect, beside the calibrated drive, leaves far more of the loss on data left out: no other is
-    the better word then."""
-    first = selection.rounds[0].tried
-    leaves = [(t.term, 1.0 - t.difference.gain) for t in first if isinstance(t.term, Hypothesis)]
-    own = min((left for h, left in leaves if h.name == term.name), default=1.0)
-    return own < LIMITS.by_far * min((left for h, left in leaves if not h.same_as(term)), default=1.0)
 
 
 def _selected(selection: Selection, term: Hypothesis) -> float:
