@@ -208,7 +208,6 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
 
 def _by_readings(effect: Effect, width: float) -> Effect:
     """The effect with what its amounts range over by unit of a channel whose largest reading is `width`."""
-    width = max(width, 1e-300)
     parameters = (
         replace(p, low=p.low / width, high=p.high / width) if p.per_reading else p for p in effect.parameters
     )
