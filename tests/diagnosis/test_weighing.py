@@ -97,7 +97,7 @@ def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float,
 def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form(
     name: str, beside: bool, gain: float, z: float, share: float, slight: str
 ) -> None:
-    """Not alone, nor where it takes off most of what was left, nor a delay; a little more may be chance's, a delay too."""
+    """Not alone, nor where it takes off most of what was left, nor a delay; more may be chance's, a delay too."""
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
     term = asked[name]
     model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
