@@ -268,7 +268,8 @@ class Thresholds:
     """The same where it follows nothing that can be shown (a single recording of few cycles) and physics is
     named: twice the noise is not noise."""
     far_beyond_noise: float = 25.0
-    """The same where nothing is named: five times the noise is a mismatch, whether or not it follows anything."""
+    """The same where nothing is named: five times the noise is a mismatch, whether or not it follows anything, if it is
+    twice what repeats (`beyond_noise`)."""
     recalibrate: float = 0.9
     """What calibration leaves over what the nominal drive leaves (RMS), below which *recalibrate* is said."""
     goes_on: float = 3.0
@@ -315,6 +316,9 @@ class Thresholds:
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""
+    z_unbeaten: float = 2.0
+    """Standard errors by which it is not beaten all the same, if it predicts better by that many where either may have
+    another form of its own (a made-up cable that stiffens in a law of its own: 2.6, the right one)."""
     rival_alone: float = 0.25
     """Share of what an effect takes off alone that such another one has to take off alone (the jaw's `L_4/13`: its path
     alone explains most by far, and in its place another friction takes up what the motor's leaves)."""

@@ -138,6 +138,13 @@ def test_what_the_machine_itself_does_not_repeat_is_no_structure() -> None:
     assert structured(6.0, follows=True, repeated_rad=0.1 * NOISE)
 
 
+def test_far_more_than_noise_is_structure_where_repeats_differ_less_than_half_as_much() -> None:
+    """Nothing named, nothing followed: an event makes repeats differ, too."""
+    times = 1.2 * LIMITS.far_beyond_noise**0.5
+    assert structured(times, follows=False, repeated_rad=0.4 * times * NOISE)
+    assert not structured(times, follows=False, repeated_rad=0.6 * times * NOISE)
+
+
 def test_what_the_joint_is_known_to_leave_is_no_structure() -> None:
     assert not structured(6.0, follows=True, usual_rad=6.0 * NOISE)
     assert not structured(6.0, follows=True, repeated_rad=0.1 * NOISE, usual_rad=6.0 * NOISE)

@@ -135,7 +135,7 @@ def _weighed(
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
     better = None
     beaten_by = _beaten(selection, term, against)
-    if beaten_by:
+    if beaten_by and of_rival.z < LIMITS.z_unbeaten:
         confidence = min(confidence, LIMITS.beaten_told)
         if depends is None and against[beaten_by].gain < -LIMITS.tie:
             better = instead.models.get(beaten_by)
