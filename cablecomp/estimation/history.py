@@ -9,14 +9,16 @@ with the zeros, each column with a prior.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.limits import HISTORY_CUTS, HISTORY_FAINT, HISTORY_LEG, HISTORY_PARTS
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
@@ -124,10 +126,41 @@ def forgotten(
     apart = np.stack([run[JOINT] for run in runs])
     first, left = _first_row(apart, share * size[JOINT], after)
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
-    carryover = {
-        c: _columns(np.column_stack([run[c] for run in runs]), first, HISTORY_FAINT * size[c]) for c in size
-    }
-    return Forgotten(first, left, constant, {c: t for c, t in carryover.items() if t.shape[1]})
+    return Forgotten(first, left, constant, _carried_over(runs, first, size))
+
+
+def with_own_carryover(fit: Fit) -> Fit:
+    """The fit about its recordings with what its own drive carries over: what the calibrated one does without the law
+    that is missing looks like events while a recording is young. Where every run is dear, as it is."""
+    problem = fit.problem
+    if problem.fine:
+        return fit
+    evidence = tuple(side_by_side(lambda e: _carried_over_anew(problem, fit.x, e), problem.evidence))
+    return replace(fit, problem=problem.with_evidence(evidence))
+
+
+def _carried_over_anew(problem: Problem, x: FloatArray, recording: Evidence) -> Evidence:
+    """The recording with the carry-over of the drive as it is here, in as many columns as it had: another law carries
+    over otherwise. As it was, where there was none or the drive can have had none of the assumed histories."""
+    known = recording.carryover
+    runs = _apart(problem, x, recording, tuple(known)) if known else []
+    if not runs:
+        return recording
+    first = int(np.argmax(recording.counted[JOINT]))
+    found = {c: _columns(_of(runs, c), first, 0.0, columns.shape[1]) for c, columns in known.items()}
+    return replace(recording, carryover=found)
+
+
+def _carried_over(
+    runs: Sequence[Mapping[str, FloatArray]], first: int, size: Mapping[str, float]
+) -> dict[str, FloatArray]:
+    """Columns by channel of what these runs add from row `first` on, where they are worth any."""
+    found = {c: _columns(_of(runs, c), first, HISTORY_FAINT * s) for c, s in size.items()}
+    return {c: columns for c, columns in found.items() if columns.shape[1]}
+
+
+def _of(runs: Sequence[Mapping[str, FloatArray]], channel: str) -> FloatArray:
+    return np.column_stack([run[channel] for run in runs])
 
 
 def _apart(
@@ -165,10 +198,15 @@ def _first_row(apart: FloatArray, enough: float, after: int) -> tuple[int, float
     return best
 
 
-def _columns(runs: FloatArray, first: int, faint: float) -> FloatArray:
-    """Principal columns of what the histories add from row `first` on, a constant apart; rotated, so that one prior
-    does for all, and over the root of their number, so that more of them say no more: one of these has been."""
+def _columns(runs: FloatArray, first: int, faint: float, count: int | None = None) -> FloatArray:
+    """Principal columns of what the histories add from row `first` on, a constant apart, those that are not faint or
+    so many; rotated, so that one prior does for all, and over the root of their number, so that more of them say no
+    more: one of these has been."""
     centred = (runs - runs[first:].mean(axis=0)) / np.sqrt(runs.shape[1])
     _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)
-    kept = s > faint * np.sqrt(len(centred) - first)
-    return np.asarray(centred @ Vt[kept].T, dtype=np.float64)
+    # in the history that has most of it: some directions few histories have
+    most = s * np.max(np.abs(Vt), axis=1) * np.sqrt(runs.shape[1])
+    kept = Vt[most > faint * np.sqrt(len(centred) - first)] if count is None else Vt[:count]
+    columns: FloatArray = centred @ kept.T
+    missing = 0 if count is None else count - columns.shape[1]
+    return np.pad(columns, ((0, 0), (0, missing))) if missing > 0 else columns

@@ -13,7 +13,7 @@ from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
-from cablecomp.estimation.history import forgotten, full_swing
+from cablecomp.estimation.history import forgotten, full_swing, with_own_carryover
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
 from cablecomp.estimation.limits import BY_TAPE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
@@ -27,9 +27,11 @@ REPLICAS = 2
 """Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
 BESIDE = 1e3
 """Times its sigma that a further channel has where the joint's angle is followed first."""
-PASSES = 2
-"""Times that histories are looked for: what is left over tells how faint a carry-over matters, and the first time it
+PASSES = 5
+"""Times at most that histories are looked for: what is left over tells how faint a carry-over matters, and at first it
 holds those."""
+NO_LESS = 0.9
+"""Share of what was left over (RMS) that is left after another time, from which on that was the last; two there are."""
 
 
 @dataclass(frozen=True)
@@ -56,17 +58,20 @@ def calibrate_drive(
     fit = _begun(problem, floor)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
     sensors = floor
-    for _ in range(PASSES):
+    for k in range(PASSES):
+        left = rms_left(fit)
         cut, constant = without_history(fit, evidence)
         zero_sd = {**sensors.zero_sd, JOINT: max(sensors.zero_sd[JOINT], constant)}
         floor = Weighing(sensors.sigma, zero_sd, history={JOINT: constant})
         fit = solve(fit.problem.with_evidence(cut), fit.x, 10)
         fit = refit(fit, weighed(fit, floor), 6)
+        if k > 0 and rms_left(fit) > NO_LESS * left:
+            break
     floor_rad = noise_floor(fit, rng)
     seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
     for _ in range(2):
-        fit = refit(fit, weighed(fit, floor), 8)
+        fit = refit(with_own_carryover(fit), weighed(fit, floor), 8)
     fit = _drums_exchanged(fit)
     here = fit.problem.start
     nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))

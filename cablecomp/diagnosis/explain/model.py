@@ -20,6 +20,7 @@ from cablecomp.effects import Parameter
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.departures import set_anew
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
+from cablecomp.estimation.history import with_own_carryover
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
 from cablecomp.estimation.limits import MOVED_SD
 from cablecomp.estimation.problem import Problem, Weighing
@@ -147,8 +148,8 @@ def _moved(fit: Fit) -> dict[str, frozenset[str]]:
 
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
-    """The model refitted with other weights."""
-    fit = refit(model.fit, weighing, LIMITS.settled)
+    """The model refitted with other weights, and with what its own drive carries over of unknown histories."""
+    fit = refit(with_own_carryover(model.fit), weighing, LIMITS.settled)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 

@@ -33,6 +33,7 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.history import with_own_carryover
 from cablecomp.estimation.least_squares import Fit, covariance, derivative_of_part, refit, solve, weighed
 
 
@@ -115,7 +116,8 @@ def _about_all(model: Model, drive: Calibrated, groups: Groups) -> Model:
     if not model.terms:
         return without_effects(model, drive, groups)
     everything = model.fit.problem.with_evidence(drive.fit.problem.evidence)
-    return _settled(model.terms, solve(everything, model.fit.x, 8), drive, groups)
+    fit = with_own_carryover(solve(everything, model.fit.x, 8))
+    return _settled(model.terms, fit, drive, groups)
 
 
 def _nominal(fit: Fit) -> Fit:
