@@ -94,8 +94,9 @@ def _weighed(
     case: Case, found: Search, rng: np.random.Generator
 ) -> tuple[Search, Remainder, Sequence[Weighed]]:
     """The search's model, what it leaves, its effects weighed. Where none of them is sure, without those that are not
-    missed beside the others, weakest first: of three that trade places none is missed while the others are there. Where
-    another effect in the place of one predicts better, with that."""
+    missed beside the others, weakest first: of three that trade places none is missed while the others are there; what
+    was put in another's place has to be missed as a further effect has. Where another effect in the place of one
+    predicts better, with that."""
     exchanges = 0
     while True:
         after = case.remainder_of(found.final.fit, rng)
@@ -106,7 +107,12 @@ def _weighed(
             exchanges += 1
             found = other
             continue
-        needless = [w for w in weighed if w.evidence["z"] < LIMITS.z_missed and w.depends is None]
+        needless = [
+            w
+            for w in weighed
+            if w.evidence["z"] < (LIMITS.z if w.term.name in found.put_in else LIMITS.z_missed)
+            and w.depends is None
+        ]
         sure = any(w.confidence >= LIMITS.name for w in weighed)
         if sure or not needless or len(weighed) < 2:
             return found, after, weighed
