@@ -313,14 +313,6 @@ class Thresholds:
     """Standard errors by which an effect that takes off so little has to be missed: of 107 names of trials seeds 675
     and 680, delays apart, three took off less by fewer, said with 0.52 to 0.69, all wrong. Of delays, which every trial
     has, one of some thirty of 682 did, right; a made-up bearing's drag by speed was one of 0.2 ms, said with 0.88."""
-    matched_share: float = 0.25
-    """Share of the mismatch up to which an effect beside others, as the last to come, has to be ahead of its nearest
-    rival by `z_matched`, either in any form, or it is held down like one that takes off little."""
-    matched_gain: float = 0.5
-    """And share of what is left without it."""
-    z_matched: float = 1.3
-    """Those standard errors (trials seeds 682 and 683, delays apart: nine such names, eight wrong, said with 0.51 to
-    0.92)."""
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""

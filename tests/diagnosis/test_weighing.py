@@ -19,7 +19,6 @@ from cablecomp.diagnosis.explain.weighing import (
     _against,
     _at_bound,
     _follows,
-    _matched,
     _slight,
     _too_little,
     _unfollowed,
@@ -177,33 +176,6 @@ def test_an_effect_in_whose_place_another_predicts_better_is_beaten_by_it(
     term = cast(Hypothesis, SimpleNamespace(name="a"))
     differences = {name: ScoreDifference(gain, 10.0 * gain, 0.0) for name, gain in scores.items()}
     assert weighing._beaten(cast(Any, None), term, differences) == by
-
-
-@pytest.mark.parametrize(
-    ("name", "beside", "vague", "share", "gain", "ahead", "matched"),
-    [
-        ("bearing_friction", True, False, 0.1, 0.2, 1.0, True),
-        ("bearing_friction", True, False, 0.1, 0.2, 1.6, False),
-        ("bearing_friction", True, False, 0.4, 0.2, 1.0, False),
-        ("bearing_friction", True, False, 0.1, 0.7, 1.0, False),
-        ("bearing_friction", False, False, 0.1, 0.2, 1.0, False),
-        ("bearing_friction", True, True, 0.1, 0.2, 1.0, False),
-        ("clock_skew", True, False, 0.1, 0.2, 1.0, False),
-    ],
-)
-def test_a_part_that_another_effect_of_any_form_takes_off_as_well_is_no_name(
-    name: str, beside: bool, vague: bool, share: float, gain: float, ahead: float, matched: bool
-) -> None:
-    """Not alone, not what takes off much, not beside a drive known by order of magnitude, nor a delay."""
-    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
-    term = asked[name]
-    free = SimpleNamespace(vague=vague, of_effect=False, base="EA_N")
-    model: Any = SimpleNamespace(
-        terms=(asked["series_compliance"], term) if beside else (term,),
-        fit=SimpleNamespace(problem=SimpleNamespace(parameters=(free,))),
-    )
-    own, of_rival = ScoreDifference(gain, 4.0, 4.0), ScoreDifference(0.1, ahead, ahead)
-    assert bool(_matched(model, term, own, share, of_rival)) is matched
 
 
 @pytest.mark.parametrize(

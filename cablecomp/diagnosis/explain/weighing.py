@@ -26,7 +26,6 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
-from cablecomp.estimation.parameter import vague_drive
 from cablecomp.signal.smoothing import FloatArray
 
 NO_SIZE: Final = ("length", "instant", "duration")
@@ -129,9 +128,7 @@ def _weighed(
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
-    elif slight := _slight(final, term, own, removes) or _matched(
-        final, term, own, evidence["share_total"], of_rival
-    ):
+    elif slight := _slight(final, term, own, removes):
         confidence, why_not = min(confidence, LIMITS.little_told), slight
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
@@ -166,22 +163,6 @@ def _slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float
     if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
         return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
     return ""
-
-
-def _matched(
-    final: Model, term: Hypothesis, own: ScoreDifference, last: float, of_rival: ScoreDifference
-) -> str:
-    """What is to be said of an effect beside others that takes off a part, `last` of the mismatch as the last to come
-    and `own` of what is left without it, which its nearest rival does as well where either may have another form; ""
-    of any other, of what is late, and beside a drive known by order of magnitude, with which all friction trades
-    places."""
-    alone = sum(isinstance(t, Hypothesis) for t in final.terms) < 2
-    if alone or term.amount.unit == "s" or vague_drive(final.fit.problem.parameters):
-        return ""
-    part = last < LIMITS.matched_share and own.gain < LIMITS.matched_gain
-    if not part or of_rival.z >= LIMITS.z_matched:
-        return ""
-    return f"it takes off {last:.1%} of the mismatch beside the others, and another effect of any form does as well"
 
 
 def _beyond_noise(fit: Fit) -> float:
