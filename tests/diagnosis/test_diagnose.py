@@ -206,21 +206,27 @@ def test_a_zero_set_anew_between_recordings_is_no_slip(sigmas: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("z", "surest", "kept"),
-    [([-2.7, -0.6, 0.2], 0.4, 1), ([-2.7, -0.6, 0.2], 0.6, 3), ([0.1, 0.2], 0.4, 2), ([-1.0], 0.1, 1)],
+    ("z", "surest", "put_in", "kept"),
+    [
+        ([-2.7, -0.6, 0.2], 0.4, "", 1),
+        ([-2.7, -0.6, 0.2], 0.6, "", 3),
+        ([0.1, 0.2], 0.4, "", 2),
+        ([2.2, 8.0], 0.4, "0", 1),
+        ([-1.0], 0.1, "", 1),
+    ],
 )
 def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_first(
-    monkeypatch: pytest.MonkeyPatch, z: list[float], surest: float, kept: int
+    monkeypatch: pytest.MonkeyPatch, z: list[float], surest: float, put_in: str, kept: int
 ) -> None:
     """Of three that trade places the last is missed (z = 5) once it is alone; where one is sure all stay, as one alone
-    does whatever it shows."""
+    does whatever it shows; what was put in another's place has to be missed as a further effect has."""
     shown = {str(k): v for k, v in enumerate(z)}
 
     def weighed(names: Sequence[str], *_: Any) -> list[Any]:
         alone = len(names) == 1 and len(z) > 1
         return [
             SimpleNamespace(
-                term=n,
+                term=SimpleNamespace(name=n),
                 depends=None,
                 confidence=surest,
                 evidence={"z": 5.0 if alone else shown[n]},
@@ -229,9 +235,9 @@ def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_fi
             for n in names
         ]
 
-    def less(found: Any, term: str, drive: Any) -> Any:
-        final = [n for n in found.final.fit if n != term]
-        return SimpleNamespace(final=SimpleNamespace(fit=final))
+    def less(found: Any, term: Any, drive: Any) -> Any:
+        final = [n for n in found.final.fit if n != term.name]
+        return SimpleNamespace(final=SimpleNamespace(fit=final), put_in=put_in)
 
     case: Any = SimpleNamespace(
         remainder_of=lambda fit, rng: SimpleNamespace(location=None), locate=None, drive=None
@@ -239,12 +245,12 @@ def test_where_none_is_sure_what_is_not_missed_beside_the_others_goes_weakest_fi
     monkeypatch.setattr(diagnose_module, "weigh", lambda found, *_: weighed(found.final.fit))
     monkeypatch.setattr(diagnose_module, "share_left", lambda drive, final: 0.0)
     monkeypatch.setattr(diagnose_module, "done_without", less)
-    begin: Any = SimpleNamespace(final=SimpleNamespace(fit=list(shown)))
+    begin: Any = SimpleNamespace(final=SimpleNamespace(fit=list(shown)), put_in=put_in)
     found, _, last = diagnose_module._weighed(case, begin, np.random.default_rng(0))
     assert len(last) == kept
-    assert [w.term for w in last] == list(found.final.fit)
+    assert [w.term.name for w in last] == list(found.final.fit)
     strongest = max(shown, key=lambda n: shown[n])
-    assert strongest in [w.term for w in last]
+    assert strongest in [w.term.name for w in last]
 
 
 @pytest.mark.parametrize(("follows", "came_to"), [(True, 1 + LIMITS.exchanges), (False, 1)])
@@ -257,14 +263,14 @@ def test_what_predicts_better_in_the_place_of_an_effect_is_put_there_a_few_times
     def weighed(found: Any, *_: Any) -> list[Any]:
         return [
             SimpleNamespace(
-                term=f"{k}", depends=None, confidence=0.9, evidence={"z": 5.0},
+                term=SimpleNamespace(name=f"{k}"), depends=None, confidence=0.9, evidence={"z": 5.0},
                 difference=SimpleNamespace(z=-float(k)), better=(*found.final.fit, f"in place of {k}"),
             )
             for k in range(3)
         ]  # fmt: skip
 
     def exchanged(found: Any, model: Any, drive: Any) -> Any:
-        return SimpleNamespace(final=SimpleNamespace(fit=model)) if follows else None
+        return SimpleNamespace(final=SimpleNamespace(fit=model), put_in="") if follows else None
 
     case: Any = SimpleNamespace(
         remainder_of=lambda fit, rng: SimpleNamespace(location=None), locate=None, drive=None
@@ -272,7 +278,7 @@ def test_what_predicts_better_in_the_place_of_an_effect_is_put_there_a_few_times
     monkeypatch.setattr(diagnose_module, "weigh", weighed)
     monkeypatch.setattr(diagnose_module, "share_left", lambda drive, final: 0.0)
     monkeypatch.setattr(diagnose_module, "exchanged", exchanged)
-    begin: Any = SimpleNamespace(final=SimpleNamespace(fit=("begun",)))
+    begin: Any = SimpleNamespace(final=SimpleNamespace(fit=("begun",)), put_in="")
     found, _, last = diagnose_module._weighed(case, begin, np.random.default_rng(0))
     assert found.final.fit == ("begun", *["in place of 2"] * (came_to - 1))
     assert len(last) == 3

@@ -160,6 +160,7 @@ def test_what_trials_say_not_to_exclude_is_told_where_nothing_has_a_name(
     [
         ({"a": 0.6, "b": 0.5}, {"b": -0.1}, "b"),
         ({"a": 0.6, "b": 0.5}, {"b": 0.1}, ""),
+        ({"a": 0.6, "b": 0.5}, {"b": -0.007}, ""),  # a tie
         ({"a": 0.6, "b": 0.1}, {"b": -0.1}, ""),  # what explains most by far alone stands
         ({"a": 0.0}, {"b": -0.1}, "b"),  # what nobody tried alone does not
         ({"a": 0.6, "b": 0.5, "c": 0.5}, {"b": -0.1, "c": -0.4}, "c"),

@@ -137,7 +137,7 @@ def _weighed(
     beaten_by = _beaten(selection, term, against)
     if beaten_by and of_rival.z < LIMITS.z_unbeaten:
         confidence = min(confidence, LIMITS.beaten_told)
-        if depends is None and against[beaten_by].gain < -LIMITS.tie:
+        if depends is None:
             better = instead.models.get(beaten_by)
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
@@ -191,15 +191,15 @@ def _selected(selection: Selection, term: Hypothesis) -> float:
 
 
 def _beaten(selection: Selection, term: Hypothesis, differences: Mapping[str, ScoreDifference]) -> str:
-    """What predicts data left out better in the effect's place, by most standard errors, of what alone takes off a part
-    of what the effect does; "" where nothing does: what explains by far the most alone stands, though what is left
-    beside it goes to another."""
+    """What predicts data left out better in the effect's place, by more than a tie, by most standard errors, of what
+    alone takes off a part of what the effect does; "" where nothing does: what explains by far the most alone stands,
+    though what is left beside it goes to another."""
 
     def alone(name: str) -> float:
         return max((_share(selection, gone) for gone in _alone(selection, name)), default=0.0)
 
     least = LIMITS.rival_alone * alone(term.name)
-    ahead = [name for name, d in differences.items() if d.gain < 0.0 and alone(name) >= least]
+    ahead = [name for name, d in differences.items() if d.gain < -LIMITS.tie and alone(name) >= least]
     return min(ahead, key=lambda name: differences[name].z, default="")
 
 
