@@ -12,6 +12,7 @@ from grouped import GROUPS, NOISE, WAVE
 from cablecomp.diagnosis.explain import selection, ties
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.signal.smoothing import FloatArray
 
 
@@ -118,3 +119,31 @@ def test_a_drive_mounted_anew_with_an_effect_of_its_own_takes_nobodys_place() ->
     effect = model(1.0, "effect")
     assert first_of(effect, mounted_anew(NOISE + 0.02 * WAVE, "other")) == effect.name
     assert first_of(effect, mounted_anew(NOISE + 0.02 * WAVE, "effect")) == effect.name
+
+
+@pytest.mark.parametrize(("by_far", "left"), [("", "c"), ("a", "a + c")])
+def test_what_alone_explains_by_far_the_most_is_not_left_out(
+    monkeypatch: pytest.MonkeyPatch, by_far: str, left: str
+) -> None:
+    """Of three effects the first two are not missed beside the others; the last to come stays."""
+
+    def without(m: Model, term: Any, groups: Any) -> Model:
+        return replace(m, terms=tuple(t for t in m.terms if t is not term))
+
+    monkeypatch.setattr(selection, "without", without)
+    monkeypatch.setattr(selection, "implausible", lambda m: 0)
+    monkeypatch.setattr(selection, "alone_by_far", lambda rounds, term: term.name == by_far)
+    assert selection._pruned(model(1.0, "a", "b", "c"), [], GROUPS).name == left
+
+
+def test_what_the_last_round_demanded_and_the_best_lacks_is_asked_for_again() -> None:
+    def tried(name: str, gain: float, z: float) -> Any:
+        return SimpleNamespace(term=SimpleNamespace(name=name), difference=ScoreDifference(gain, z, z))
+
+    latest: Any = [
+        SimpleNamespace(tried=(tried("a", 0.3, 6.0), tried("b", 0.1, 4.0))),
+        SimpleNamespace(tried=(tried("c", 0.01, 6.0), tried("d", 0.3, 1.0))),
+    ]
+    pool: Any = [SimpleNamespace(name=n) for n in "abcde"]
+    again = selection._still_demanded(pool, latest, model(1.0, "a"))
+    assert [h.name for h in again] == ["b"]
