@@ -156,6 +156,10 @@ class Thresholds:
     """The second model is carried on where its loss on data left out is less than this many times the best one's."""
     part: float = 0.4
     """Part of its amount with which an effect of the model begins beside one that was found without it."""
+    far: float = 0.7
+    """Part of its largest plausible amount with which an effect that trades places is begun as well, where that is a
+    share (a cable whose stiffness goes with its tension: from a twentieth of that no step led there, on two of three
+    wrist pitches of a jaw)."""
     shaped: float = 0.9
     """Cost with a shape that an effect may do without (an event that takes its time, a mount that yields more one way)
     over that of the best without it, after a linear step (not of an event) and after a rough fit, above which it does

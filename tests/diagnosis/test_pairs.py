@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joints import SMALL, SMALL_NOISE, closed
@@ -9,6 +11,7 @@ from joints import SMALL, SMALL_NOISE, closed
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import first_weights
+from cablecomp.diagnosis.explain import dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
 from cablecomp.diagnosis.explain.screening import with_entry
@@ -72,3 +75,19 @@ def test_a_session_of_one_recording_has_no_pretension_of_its_own_where_whole_one
 ) -> None:
     problem, bearing = begun
     assert with_own_pretensions(problem, bearing, {"pretension_N": 60.0}, COLD, "recording") is None
+
+
+@pytest.mark.parametrize(("third", "by", "own"), [(1, "recording", 0), (2, "recording", 1), (1, "block", 1)])
+def test_a_friction_of_each_sessions_own_is_not_asked_for_where_one_recording_alone_would_judge_it(
+    third: int, by: str, own: int, begun: tuple[Problem, Hypothesis]
+) -> None:
+    """Two sessions of two recordings, a third of one or two: of few recordings blocks are left out, and any will do."""
+    problem, _ = begun
+    path = next(h for h in hypotheses(problem.config, problem.evidence) if h.name == "routing_friction")
+    tight, loose = problem.evidence
+    sessions = [(tight, 2), (loose, 2), (replace(loose, session="third"), third)]
+    several = [replace(e, name=f"{e.session}/{k}") for e, count in sessions for k in range(count)]
+    problem = with_entry(problem, path, path.entry(path.starts[0].values)).with_evidence(several)
+    p = next(q for q in problem.parameters if q.name == path.key("mu_angle"))
+    ways = dependence._ways(problem, p, np.ones(10), np.zeros(10), by)
+    assert [d.name for d, _, _ in ways] == ["effect.routing_friction.mu_angle by session"] * own

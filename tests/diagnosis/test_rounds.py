@@ -6,10 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from joints import SMALL, closed
 
+from cablecomp.config import parse_joint
 from cablecomp.diagnosis.explain import rounds
 from cablecomp.diagnosis.explain.dependence import Dependence, tell_a_gain
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 
@@ -76,3 +78,23 @@ def test_a_gain_by_a_condition_wants_three_values_or_two_of_two_recordings_each(
     values: list[float], told: bool
 ) -> None:
     assert tell_a_gain(values) is told
+
+
+@pytest.mark.parametrize(
+    ("effect", "share"), [("nonlinear_cable", 0.63), ("bearing_friction", None), ("routing_friction", None)]
+)
+def test_a_share_with_a_bound_is_begun_with_most_of_it_as_well(effect: str, share: float | None) -> None:
+    """0.7 of the 0.9 that is plausible of a cable's stiffening; a moment, or a coefficient without a bound, is not."""
+    config = parse_joint({**closed(SMALL, "small"), "tolerance": {"EA_N": 1.0}}, "small")
+    law = catalogue()[effect]
+    amount = law.parameters[0]
+    h = Hypothesis(law, effect, amount, (Start({p.name: p.neutral for p in law.parameters}),), False)
+    fit: Any = SimpleNamespace(values={"EA_N": 2e4}, problem=SimpleNamespace(config=config))
+    at: Any = SimpleNamespace(model=SimpleNamespace(fit=fit))
+    found = rounds._far(h, at)
+    if share is None:
+        assert found == []
+    else:
+        (values,) = found
+        assert values["EA_N"] == 2e4
+        assert values[h.key(amount.name)] == pytest.approx(share)

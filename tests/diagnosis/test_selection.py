@@ -147,3 +147,39 @@ def test_what_the_last_round_demanded_and_the_best_lacks_is_asked_for_again() ->
     pool: Any = [SimpleNamespace(name=n) for n in "abcde"]
     again = selection._still_demanded(pool, latest, model(1.0, "a"))
     assert [h.name for h in again] == ["b"]
+
+
+def test_of_a_drive_in_several_sessions_the_plausible_model_that_lies_lowest_is_carried_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of those that extend the one below: what extends another, or is not plausible, or has no answer, is not."""
+
+    def of_cost(cost: float, *names: str) -> Model:
+        bare = model(1.0, *names)
+        fit: Any = SimpleNamespace(problem=bare.fit.problem, cost=cost)
+        return replace(bare, fit=fit)
+
+    plausible, bearing = {"wild": 1}, {"broken": False}
+    monkeypatch.setattr(selection, "implausible", lambda m: max(plausible.get(t.name, 0) for t in m.terms))
+    monkeypatch.setattr(selection, "bears", lambda fit: bearing.get(fit.name, True))
+    monkeypatch.setattr(selection, "amount_resolved", lambda fit, term: term.name != "none")
+    below, other = of_cost(50.0, "a"), of_cost(50.0, "z")
+
+    def rounds_of(*found: tuple[float, str]) -> Any:
+        models = [of_cost(cost, "a", name) for cost, name in found]
+        for m, (_, name) in zip(models, found, strict=True):
+            m.fit.__dict__["name"] = name
+        theirs = [SimpleNamespace(model=of_cost(1.0, "z", "b"))]
+        return [
+            SimpleNamespace(base=below, tried=[SimpleNamespace(model=m) for m in models]),
+            SimpleNamespace(base=other, tried=theirs),
+        ]
+
+    def further(*found: tuple[float, str]) -> str | None:
+        weights: Any = None
+        lower = selection._further_down(below, rounds_of(*found), weights, GROUPS)
+        return None if lower is None else lower.name
+
+    assert further((30.0, "b"), (20.0, "c"), (5.0, "wild"), (4.0, "broken")) == "a + c"
+    assert further((30.0, "b"), (3.0, "none")) is None
+    assert further((5.0, "wild")) is None

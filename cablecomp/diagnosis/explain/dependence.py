@@ -122,7 +122,9 @@ def _ways(
     sessions = problem.sessions
     place = problem.parameters.index(p)
     shown = sessions if by == "block" else problem.repeated
-    if len(shown) > 1 and _along_path(p.base) and not problem.states(p.base):
+    # one recording alone shows how tight its cables are, but nothing is left of it that would judge a law of its own
+    judged = len(shown) > 1 and not (p.of_effect and len(shown) < len(sessions))
+    if judged and _along_path(p.base) and not problem.states(p.base):
         cut = []
         for s in sessions[1:]:
             mine = np.array([e.session == s for e in problem.evidence])

@@ -272,13 +272,23 @@ def _further(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
     model, cold = at.model, at.cold
     having = [m for m in at.known if h.name in m.added and len(m.terms) <= len(model.terms)]
     if not having:
-        return [cold] if cold is not None and model.terms else []
+        return [cold, *_far(h, at)] if cold is not None and model.terms else []
     best = max(having, key=lambda m: len(model.added & m.added))
     values = dict(best.fit.values)
     amounts = {t.key(t.amount.name) for t in model.terms if isinstance(t, Hypothesis)}
     for name, value in model.fit.values.items():
         values.setdefault(name, LIMITS.part * value if name in amounts else value)
     return [values]
+
+
+def _far(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
+    """The drive as it stands with most of a share that has a bound: a little of it sits in another valley."""
+    amount, values = h.amount, at.model.fit.values
+    if amount.log or not 0.0 < amount.maximum <= 1.0:
+        return []
+    starts = {h.key(k): v for k, v in h.starts[0].values.items() if not isinstance(v, str)}
+    far = LIMITS.far * amount.bounds(at.model.fit.problem.config)[1]
+    return [{**starts, **values, h.key(amount.name): far}]
 
 
 def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
