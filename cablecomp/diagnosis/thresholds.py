@@ -297,7 +297,9 @@ class Thresholds:
     """Share of the calibrated drive's mean square on data left out that an event has to take off which they do not
     place (of the same, beyond `event_size`: below it 4 of 6 were wrong, above it 4 of 14)."""
     event_untold: float = 0.2
-    """Confidence at most in an event that lacks either (6 of 26 of these names were right)."""
+    """Confidence at most in an event that lacks either (6 of 26 of these names were right), unless it is ahead of none
+    and of its nearest rival by `z_sure` each (seeds 685 and 690: of 17 that lack either the two that are so far ahead
+    were right, and two of the others)."""
     little: float = 0.2
     """Share of what is left beyond noise that an effect has to take off, beside the others or alone: what is left of a
     machine has forms of its own, and a little of it fits any law (trials seeds 620 to 633, 911 names: below it 7 of 13

@@ -26,7 +26,7 @@ def course_of(fit: Fit, term: Hypothesis) -> Course:
     return term.course_by(values_of(fit, term))
 
 
-def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
+def untold(fit: Fit, term: Hypothesis, removes: float, ahead_z: float = 0.0) -> str:
     """What of an event the data do not tell, in words; "" where they do, for what is no event, and where
     anything of the drive is known by order of magnitude only: there a size trades places with it, and its deviation
     says little.
@@ -34,10 +34,12 @@ def untold(fit: Fit, term: Hypothesis, removes: float) -> str:
     Its size has to stand out of none by `LIMITS.event_size` stated deviations (noise has its best of many instants,
     too); of one that still goes on when the last recording ends, that is how fast it goes: how long it would have gone
     on is nobody's; nor is a share that trades with it (of a slip that the other cable takes up). Where its instant may
-    be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated drive's mean square, `removes`."""
+    be any within reach, it has to take off `LIMITS.event_anywhere` of the calibrated drive's mean square, `removes`.
+    Neither is asked of one that is ahead of none and of its nearest rival by `LIMITS.z_sure` each, `ahead_z` the less:
+    that its size trades with another's says little then."""
     found = amount_of(fit, term)
     loosely = any(p.vague and not p.of_effect for p in fit.problem.parameters)
-    if not term.has_instant or found is None or loosely:
+    if not term.has_instant or found is None or loosely or ahead_z >= LIMITS.z_sure:
         return ""
     amount, value = found
     sd = np.sqrt(np.maximum(np.diag(covariance(_held(fit, term))), 0.0))

@@ -119,7 +119,7 @@ def _weighed(
         why_not = _against((*instead.effects, *instead.plain), own, evidence)
     most = max(ways, key=lambda gone: _share(selection, gone))
     removes = _share(selection, most)
-    if lacks := untold(final.fit, term, removes):
+    if lacks := untold(final.fit, term, removes, min(ahead.z, of_rival.z)):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
     elif (stretched := better_word(final.fit, term)) and not alone_by_far(selection.rounds, term):
         confidence = min(confidence, LIMITS.beaten_told)
