@@ -96,7 +96,9 @@ def test_a_share_that_trades_with_a_slips_size_is_not_held_against_it() -> None:
     trades = replace(fitted((size, when, other), told), x=fit.x)
     assert "of its own deviations" in untold(trades, term, 0.1)
     assert "of its own deviations" in untold(trades, term, 0.1, 4.9)
-    assert untold(trades, term, 0.1, 5.0) == ""  # ahead of none and of every rival, whatever its size trades with
+    assert (
+        untold(trades, term, 0.1, 5.0) == ""
+    )  # ahead of none and of every rival, whatever its size trades with
 
 
 def test_what_is_no_event_has_nothing_to_place() -> None:

@@ -183,3 +183,16 @@ def test_of_a_drive_in_several_sessions_the_plausible_model_that_lies_lowest_is_
     assert further((30.0, "b"), (20.0, "c"), (5.0, "wild"), (4.0, "broken")) == "a + c"
     assert further((30.0, "b"), (3.0, "none")) is None
     assert further((5.0, "wild")) is None
+
+
+def test_the_plausible_one_is_carried_on_beside_one_that_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(selection, "implausible", lambda m: sum(t.name == "wild" for t in m.terms))
+    sure, wild, below = model(1.0, "a", "b"), model(1.0, "a", "wild"), model(1.0, "a", "c")
+
+    def carried(*models: Model, lower: Model | None = below) -> list[str]:
+        return [m.name for m in selection._beside_doubtful(list(models), lower)]
+
+    assert carried(sure, wild) == ["a + b", "a + wild", "a + c"]
+    assert carried(sure) == ["a + b"]
+    assert carried(wild, below) == ["a + wild", "a + c"]
+    assert carried(wild, lower=None) == ["a + wild"]

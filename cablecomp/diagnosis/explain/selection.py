@@ -93,10 +93,17 @@ def select(
         carried = carried[: 1 if carried[0].fit.problem.fine else LIMITS.beam]
         if below is not None and not carried[0].fit.problem.fine:
             below = carried[0] if number == 0 else _further_down(below, latest, sharper, groups)
-            carried += [below] if below and all(m.added != below.added for m in carried) else []
+            carried = _beside_doubtful(carried, below)
         beam = [(m, None) for m in carried]
     final = _pruned(best, rounds, groups)
     return Selection(first, tuple(rounds), with_the_first(final, rounds, groups) if rounds else final, groups)
+
+
+def _beside_doubtful(carried: list[Model], below: Model | None) -> list[Model]:
+    """The models carried on, with the plausible one that lies lowest beside them where one of them is not plausible."""
+    doubtful = any(implausible(m) for m in carried)
+    known = below is None or any(m.added == below.added for m in carried)
+    return [*carried, below] if below is not None and doubtful and not known else carried
 
 
 def _further_down(below: Model, latest: Sequence[Round], sharper: Weighing, groups: Groups) -> Model | None:
