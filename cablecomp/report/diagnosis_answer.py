@@ -46,7 +46,7 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     trace = shown_first(d)
     picture = ""
     if trace is not None:
-        seen = _unseen(result) if not np.all(trace.counted) else ""
+        seen = _unseen(result) if figures.end_is_shaded(trace) else ""
         picture = page.figure(figures.at_a_glance(trace, unit), f"The end of {short(trace.name)}.{seen}")
     return Section("Answer", f'<div class="answer"><div>{words}</div><div>{picture}</div></div>'
                    + page.facts(_facts(result, unit)) + page.bullets(d.warnings))  # fmt: skip

@@ -38,10 +38,23 @@ def unit_of(covariate: str) -> str:
     return UNITS.get(covariate, "")
 
 
-def at_a_glance(trace: Traces, unit: Scale, share: float = 0.35) -> Any:
-    """Deflection over the end of a recording: measured, before, after; the errors below."""
+_END: Final = 0.35
+"""Share of a recording that is shown at a glance: its end."""
+
+
+def _end_of(trace: Traces) -> Any:
     time = trace.covariates["time"]
-    shown = time >= time[-1] - share * (time[-1] - time[0])
+    return time >= time[-1] - _END * (time[-1] - time[0])
+
+
+def end_is_shaded(trace: Traces) -> bool:
+    """Whether nothing was fitted to a stretch of the end that is shown at a glance."""
+    return bool(_stretches(trace, _end_of(trace)))
+
+
+def at_a_glance(trace: Traces, unit: Scale) -> Any:
+    """Deflection over the end of a recording: measured, before, after; the errors below."""
+    shown = _end_of(trace)
     fig = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06)
     fig.update_layout(template=style.template(), height=400, margin={"l": 60, "r": 44, "t": 34, "b": 46})
     _deflections(fig, trace, shown, unit)

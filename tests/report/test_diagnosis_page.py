@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from diagnosis_example import NOISE, example, without_a_name
 
-from cablecomp.diagnosis.result import Diagnosis, Law, Value, report_json
+from cablecomp.diagnosis.result import Diagnosis, Law, Traces, Value, report_json
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_tables import between, interval
@@ -83,6 +83,25 @@ def test_the_answer_says_what_a_law_without_a_name_takes_off_the_rest(found: Dia
     ):
         first = text_of(diagnosis_page(d).split("</section>")[0])
         assert "Of that, laws without a name take off wave by motor angle 91 %" in " ".join(first.split())
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"), [((0.7, 0.9), True), ((0.0, 0.3), False), ((0.8, 0.801), False)]
+)
+def test_the_answer_speaks_of_shading_where_the_end_that_it_shows_is_shaded(
+    missing: tuple[float, float], said: bool, found: Diagnosis
+) -> None:
+    """Nothing fitted to a part of the end; to the beginning alone (an unknown history); to a reading set aside."""
+    begin, end = missing
+
+    def traced(t: Traces) -> Traces:
+        place = np.linspace(0.0, 1.0, len(t.counted))
+        return replace(t, counted=~((place >= begin) & (place <= end)))
+
+    first = diagnosis_page(replace(found, traces=tuple(traced(t) for t in found.traces))).split("</section>")[
+        0
+    ]
+    assert ("Shaded" in text_of(first)) is said
 
 
 def test_the_terminal_answers_first(found: Diagnosis) -> None:
