@@ -28,12 +28,18 @@ _EXPLAINED = (
 
 
 def concealed_table(answer: Mapping[str, Any]) -> Table:
-    """What size of each physics was found, for the terminal."""
+    """What size of each physics was found, which names were wrong or given to twins, for the terminal."""
     trials, twins = counted(answer["of"], "trial"), counted(answer["twins"], "twin")
-    table = Table(title=f"{answer['done']} of {trials}, {twins}", title_justify="left")
+    wrong, given = answer["wrong_names"], ", ".join(f"{n} {k}" for n, k in _given(answer)) or "none"
+    table = Table(
+        title=f"{answer['done']} of {trials}, {twins}",
+        title_justify="left",
+        caption=f"a wrong name beside: {wrong['hits']} of {wrong['of']}; any name in twins: {given}",
+        caption_justify="left",
+    )
     for name in ("concealed", "sizes: found of put", "found from"):
         table.add_column(name)
-    table.add_column("named in twins", justify="right")
+    table.add_column("this name in twins", justify="right")
     for c in answer["curves"]:
         sizes = ", ".join(
             f"{_size(p['size'], '')}: {p['found']['hits']}/{p['found']['of']}" for p in c["points"]
@@ -45,6 +51,11 @@ def concealed_table(answer: Mapping[str, Any]) -> Table:
             _twins(c),
         )
     return table
+
+
+def _given(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Each name that twins were given, and how many of them."""
+    return [(plain(n), f"{k} of {answer['twins']}") for n, k in sorted(answer["names_in_twins"].items())]
 
 
 def write_concealed_page(answer: Mapping[str, Any], path: Path) -> None:
@@ -66,7 +77,7 @@ def concealed_page(answer: Mapping[str, Any]) -> str:
             Fact("twins", str(answer["twins"]), "with nothing concealed"),
         ]
     )
-    given = [(plain(n), f"{k} of {answer['twins']}") for n, k in sorted(answer["names_in_twins"].items())]
+    given = _given(answer)
     names = (
         page.table(("named in twins", "twins"), given)
         if given
@@ -93,7 +104,7 @@ def concealed_page(answer: Mapping[str, Any]) -> str:
 def concealed_section(answer: Mapping[str, Any], before: str = "") -> Section:
     """The curves and their table as a section of a page."""
     rows = [(c["words"], _names(c), _from(c), _twins(c)) for c in answer["curves"]]
-    heads = ("concealed", "right name", "found from", "named in twins")
+    heads = ("concealed", "right name", "found from", "this name in twins")
     body = page.figure(found_by_size(answer), _EXPLAINED) + page.table(heads, rows)
     lead = (
         f"What size of known physics the diagnosis found in these recordings ({answer['done']} blind trials)."

@@ -118,7 +118,11 @@ def test_page_table_and_section_hold_it() -> None:
     text = concealed_page(answer)
     for words in ("no luck", "abababababab", "6 of 40", "a.csv"):
         assert words in text
-    assert concealed_table(answer).row_count == 2
+    table = concealed_table(answer)
+    assert table.row_count == 2
+    assert table.caption == "a wrong name beside: 1 of 5; any name in twins: strand friction 1 of 1"
+    nameless = concealed_table({**answer, "names_in_twins": {}})
+    assert str(nameless.caption).endswith("any name in twins: none")
     assert "2 ms" in concealed_section(answer).body
 
 
