@@ -67,8 +67,7 @@ def select(
     rounds: list[Round] = []
     latest: list[Round] = []
     cold = cold_starts(pool, baseline)
-    several = len(baseline.problem.repeated) > 1
-    below = first if cold is not None and several else None
+    below = first if cold is not None and len(baseline.problem.repeated) > 1 else None
     best = first
     for number in range(0 if quiet(baseline) else LIMITS.rounds + LIMITS.later_rounds):
         if number >= LIMITS.rounds:
@@ -101,9 +100,9 @@ def select(
 
 def _beside_doubtful(carried: list[Model], below: Model | None) -> list[Model]:
     """The models carried on, with the plausible one that lies lowest beside them where one of them is not plausible."""
-    doubtful = any(implausible(m) for m in carried)
-    known = below is None or any(m.added == below.added for m in carried)
-    return [*carried, below] if below is not None and doubtful and not known else carried
+    if below is None or any(m.added == below.added for m in carried) or not any(map(implausible, carried)):
+        return carried
+    return [*carried, below]
 
 
 def _further_down(below: Model, latest: Sequence[Round], sharper: Weighing, groups: Groups) -> Model | None:
