@@ -109,7 +109,7 @@ def approach(
 def inside(problem: Problem, x: FloatArray) -> FloatArray:
     """The point itself, or the nearest one well inside of the bounds."""
     low, high = problem.bounds()
-    margin = 1e-6 * (high - low)
+    margin = 1e-6 * np.minimum(high - low, 1.0)  # coordinates are about 1, however far the bounds
     return np.asarray(np.clip(x, low + margin, high - margin), dtype=np.float64)
 
 

@@ -15,7 +15,7 @@ from cablecomp.mechanics.jit import inner_kernel
 from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
-STIFFEST = 1e3  # diffusion number per step beyond which slip is as good as quasi-static
+STIFFEST = 1e7  # diffusion number per step at which slip on a grid of WET_NODES is over within it
 LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 
 

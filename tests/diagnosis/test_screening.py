@@ -6,14 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_drive import TOLERANT, calibrated, recorded
+from joints import SMALL, SMALL_NOISE, closed
+from small_drive import TOLERANT, calibrated, course, recorded
 
+from cablecomp.config import parse_joint
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
-from cablecomp.diagnosis.explain.screening import ask
-from firmware_sim.plant import EffectSpec
+from cablecomp.diagnosis.explain.screening import ask, rough
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 EVENT_S = 11.0
 
@@ -93,3 +95,29 @@ def test_an_event_of_a_law_that_knows_no_duration_is_asked_at_once_alone() -> No
     answer = ask(anchor(drive.fit), sudden)
     assert answer is not None
     assert "duration_s" not in answer.problem.config.effect[-1].parameters
+
+
+@pytest.mark.parametrize("share", [1e-3, 3e-3])
+def test_an_amount_known_by_orders_of_magnitude_is_begun_about_where_it_is(share: float) -> None:
+    """A hundredfold viscous slip delays what slides no hundredfold: a part of a large one tells nothing of a small."""
+    long = {**SMALL, "wrap_output_rad": 18.0, "wrap_input_rad": 18.0, "mu_output": 0.06, "mu_input": 0.06}
+    stated = parse_joint({**closed(long, "long"), "tolerance": {"pretension_N": 0.06}}, "long")
+    stage = stated.drive.stage[-1]
+    true = share * stage.EA_N / stage.output_radius_m
+    slip = [EffectSpec("viscous_slip", {"coefficient_Ns_per_m_rad": true})]
+    time, motor, load = course(20.0)
+    channels = simulate(PlantConfig.from_dict(closed(long)), time, motor, load, effects=slip).channels()
+    noise = {
+        name: sd * np.random.default_rng(3).standard_normal(len(time)) for name, sd in SMALL_NOISE.items()
+    }
+    columns = {"time_s": time, **{name: channels[name] + noise[name] for name in noise}}
+    body = gather_body(stated, {"long/1": columns}, None)
+    drive = calibrate_drive(stated, body.used, np.random.default_rng(0))
+    (viscous,) = (h for h in hypotheses(stated, body.used) if h.effect.id == "viscous_slip")
+    answer = ask(anchor(drive.fit), viscous)
+    assert answer is not None
+    amount = "effect.viscous_slip.coefficient_Ns_per_m_rad"
+    assert 0.2 * true < answer.problem.values(answer.starts[0])[amount] < 3.0 * true
+    (fit, *_) = rough([answer], 8)
+    assert fit.cost < 0.9 * drive.fit.cost
+    assert fit.values[amount] == pytest.approx(true, rel=0.5)

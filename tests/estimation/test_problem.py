@@ -11,7 +11,7 @@ from turning import JOINT, recorded
 from cablecomp.config import JointConfig, Limits, with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
-from cablecomp.estimation.least_squares import covariance, solve, weighed
+from cablecomp.estimation.least_squares import covariance, inside, solve, weighed
 from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -230,3 +230,13 @@ def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
         moved = x.copy()
         moved[k] += STEP
         np.testing.assert_allclose(J[:, k], (p.residual(moved) - p.residual(x)) / STEP, rtol=1e-9, atol=1e-9)
+
+
+def test_an_amount_is_begun_where_it_was_seen_however_far_its_bounds(three: tuple[Evidence, ...]) -> None:
+    """Viscous slip is known by orders of magnitude: a millionth of its range is far more than what was seen."""
+    amount = Parameter("effect.viscous_slip.coefficient_Ns_per_m_rad", 30.0, 0.0, 4e9, False, 2e3)
+    p = replace(problem(three), parameters=(*of_drive(JOINT), amount))
+    for value in (30.0, 0.3):
+        begun = inside(p, np.append(p.start[:-1], amount.x(value)))
+        assert amount.value(float(begun[-1])) == pytest.approx(value, rel=1e-9)
+        assert np.allclose(begun[:-1], p.start[:-1])

@@ -3,7 +3,7 @@ that no step of the model's own parameters can do."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -106,31 +106,44 @@ def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
 
 def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best | None:
     """The best linear answer over the hypothesis's starts; `about`: a size that is known to be worth seeing."""
-    left = here.beyond(here.fit.residual)
-    energy = float(left @ left)
-    best = None
+    answers: list[Best | None] = []
     size = about  # what was worth seeing at one start is about that at the next
     # an event's instants are looked at coarsely where every run is dear
     for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
         found = contribution(here, h, start, size)
-        if found is None:
-            continue
-        d, size = found
-        own = here.beyond(d)
-        square = float(own @ own)
-        if square <= 1e-12 * energy:
-            continue
-        factor = float(left @ own) / square
-        if not h.two_sided:
-            factor = max(factor, 0.0)
-        # a mirrored event's size is negative
-        low, high = sorted((h.amount.minimum / size, h.amount.maximum / size))
-        factor = min(max(factor, low), high)
-        cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
-        values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
-        if best is None or cost < best.cost:
-            best = Best(cost, values, d, size, by_channel(here.fit.problem, left - factor * own))
-    return best
+        if found is not None:
+            d, size = found
+            answers.append(_linearly(here, h, start, d, size))
+    best = _lowest(answers)
+    if best is None or not h.saturates:
+        return best
+    answers = [best]
+    for part in LIMITS.less:
+        less = difference(here, h, {**best.values, h.amount.name: part * best.size})
+        if less is not None:
+            answers.append(_linearly(here, h, Start(best.values), less, part * best.size))
+    return _lowest(answers)
+
+
+def _lowest(answers: Sequence[Best | None]) -> Best | None:
+    return min((a for a in answers if a is not None), key=lambda a: a.cost, default=None)
+
+
+def _linearly(here: Anchor, h: Hypothesis, start: Start, d: FloatArray, size: float) -> Best | None:
+    """The linear answer by what a start adds at a size; None where that is nothing that the anchor cannot do."""
+    left, own = here.beyond(here.fit.residual), here.beyond(d)
+    energy, square = float(left @ left), float(own @ own)
+    if square <= 1e-12 * energy:
+        return None
+    factor = float(left @ own) / square
+    if not h.two_sided:
+        factor = max(factor, 0.0)
+    # a mirrored event's size is negative
+    low, high = sorted((h.amount.minimum / size, h.amount.maximum / size))
+    factor = min(max(factor, low), high)
+    cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
+    values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
+    return Best(cost, values, d, size, by_channel(here.fit.problem, left - factor * own))
 
 
 def by_channel(problem: Problem, residual: FloatArray) -> FloatArray:

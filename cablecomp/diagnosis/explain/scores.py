@@ -106,7 +106,7 @@ def movable(fit: Fit) -> IntArray:
     """Parameters that a fold left out may move: those that are not on a bound; when an event happens is read from all
     rows, a block left out cannot place it."""
     low, high = fit.problem.bounds()
-    margin = 1e-4 * (high - low)
+    margin = np.minimum(1e-4 * (high - low), 1e-2)  # of usual size, too, where bounds are decades away
     when = ("instant", "duration")
     instant = np.array([role_of(p.base) in when for p in fit.problem.parameters], dtype=np.bool_)
     return np.flatnonzero((fit.x > low + margin) & (fit.x < high - margin) & ~instant)

@@ -1,0 +1,27 @@
+"""With hardly any viscosity what slides is the plain law, on wraps so long that all of a grid has to slide at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from observer_joints import joint, pull_unit, run
+
+from cablecomp.effects import with_effects
+from cablecomp.observer import Observer
+
+LONG = {"wrap_output_rad": 20.0, "wrap_input_rad": 18.0, "mu_output": 0.078, "mu_input": 0.17}
+
+
+@pytest.mark.parametrize("drum", [-1.0, 0.0, 1.0])
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+def test_hardly_any_viscosity_is_none(circuit: str, drum: float) -> None:
+    config = joint(circuit, LONG)
+    count = 3000
+    peak = 0.9 * pull_unit(config)
+    load = peak * np.interp(np.arange(count), [0, 600, 620, 2000, 2300, 2999], [0, 1, -0.3, 0.9, 0.9, -0.8])
+    plain = run(Observer(config), load, np.zeros(count))["joint_position_rad"]
+    stage = config.drive.stage[-1]
+    least = {"coefficient_Ns_per_m_rad": 1e-9 * stage.EA_N / stage.output_radius_m, "drum": drum}
+    viscous = with_effects(config, (("viscous_slip", least),))
+    found = run(Observer(viscous), load, np.zeros(count))["joint_position_rad"]
+    assert np.max(np.abs(found - plain)) < 1e-3 * np.ptp(plain)
