@@ -160,6 +160,16 @@ def of_effect(effect: Effect, values: Mapping[str, float], config: JointConfig) 
     return tuple(found)
 
 
+def reach_of(amount: EffectParameter, config: JointConfig) -> tuple[float, float]:
+    """Between what an effect's amount is looked for, in its unit: beyond what is plausible of it, inside of what its
+    law can take."""
+    low, high = amount.bounds(config)
+    one_sided = amount.log or low >= 0.0
+    # a share needs no room for a scale that is known roughly
+    most = high * (1.0 if amount.unit == "-" else 10.0)
+    return max(0.0 if one_sided else low * 3.0, amount.minimum), min(most, amount.maximum)
+
+
 def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig) -> Parameter:
     low, high = p.bounds(config)
     span = max(abs(low), abs(high))
@@ -176,10 +186,7 @@ def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig)
                          (low * high) ** 0.5, 1.5 * DECADE)  # fmt: skip
     if p.shape:
         return Parameter(name, value, max(low, p.minimum), min(high, p.maximum), False, max(span, 1e-12))
-    one_sided = p.log or low >= 0.0
-    least = max(0.0 if one_sided else low * 3.0, p.minimum)
-    # a share needs no room for a scale that is known roughly
-    most = min(high * (1.0 if p.unit == "-" else 10.0), p.maximum)
+    least, most = reach_of(p, config)
     scale = abs(value) if value else 0.05 * span
     return Parameter(name, value, least, most, False, max(scale, 1e-300))
 

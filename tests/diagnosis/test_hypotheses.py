@@ -18,7 +18,7 @@ from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.parameter import of_drive, reach_of
 from cablecomp.estimation.problem import Problem, Weighing
 
 
@@ -249,3 +249,14 @@ def test_a_drag_of_the_motor_is_asked_for_where_the_load_is_read_there(load: str
     ]
     drags = any("viscous_s_per_rad" in further for further in own.further)
     assert drags == (load == "motor_torque")
+
+
+def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
+    """Below zero an event's size means cable l, of which an open circuit has none."""
+    open_circuit = JOINT.model_copy(update={"drive": JOINT.drive.model_copy(update={"circuit": "open"})})
+    for config, sides in ((JOINT, True), (open_circuit, False)):
+        pool = hypotheses(config, gather_body(config, {"a/1": recorded()}).used)
+        events = [h for h in pool if h.has_instant]
+        assert {h.effect.id for h in events} == {"clamp_slip", "strand_break"}
+        assert all(h.two_sided is sides for h in events)
+        assert all((reach_of(h.amount, config)[0] < 0.0) is sides for h in events)

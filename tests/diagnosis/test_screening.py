@@ -13,8 +13,9 @@ from cablecomp.config import parse_joint
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, hypotheses
-from cablecomp.diagnosis.explain.linear import anchor
+from cablecomp.diagnosis.explain.linear import anchor, contribution
 from cablecomp.diagnosis.explain.screening import ask, rough
+from cablecomp.estimation.parameter import reach_of
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 EVENT_S = 11.0
@@ -121,3 +122,14 @@ def test_an_amount_known_by_orders_of_magnitude_is_begun_about_where_it_is(share
     (fit, *_) = rough([answer], 8)
     assert fit.cost < 0.9 * drive.fit.cost
     assert fit.values[amount] == pytest.approx(true, rel=0.5)
+
+
+def test_an_effect_is_asked_for_at_no_size_that_its_fit_may_not_reach() -> None:
+    """What shows next to nothing (an event just before the last rows) is not blown up until it does."""
+    body, drive = calibrated(recorded([], 20.0))
+    here = anchor(drive.fit)
+    for h in hypotheses(TOLERANT, body.used):
+        found = contribution(here, h, h.starts[-1])
+        if found is not None:
+            low, high = reach_of(h.amount, TOLERANT)
+            assert low <= found[1] <= high, h.name

@@ -206,6 +206,7 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
     found = []
     for c in channels:
         read = _by_readings(effect, _width(evidence, c)) if c else effect
+        read = _of_one_cable(read) if config.drive.circuit == "open" else read
         amounts = [p for p in read.parameters if not p.shape and not p.held]
         found += [_by_amount(read, p, c, config, evidence) for p in amounts]
     return found
@@ -217,6 +218,19 @@ def _by_readings(effect: Effect, width: float) -> Effect:
         replace(p, low=p.low / width, high=p.high / width) if p.per_reading else p for p in effect.parameters
     )
     return replace(effect, parameters=tuple(parameters))
+
+
+def _of_one_cable(effect: Effect) -> Effect:
+    """The effect where there is no cable l to which an event may happen instead: below zero its size means that one."""
+    if effect.of_role("instant") is None:
+        return effect
+    return replace(
+        effect,
+        parameters=tuple(
+            replace(p, low=max(p.low, 0.0), minimum=max(p.minimum, 0.0)) if not p.shape and p.low < 0.0 else p
+            for p in effect.parameters
+        ),
+    )
 
 
 def _by_amount(

@@ -14,6 +14,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parameter import reach_of
 from cablecomp.estimation.problem import Misfits, Problem, of_recording
 from cablecomp.signal.smoothing import FloatArray
 
@@ -139,7 +140,7 @@ def _linearly(here: Anchor, h: Hypothesis, start: Start, d: FloatArray, size: fl
     if not h.two_sided:
         factor = max(factor, 0.0)
     # a mirrored event's size is negative
-    low, high = sorted((h.amount.minimum / size, h.amount.maximum / size))
+    low, high = sorted(end / size for end in reach_of(h.amount, here.fit.problem.config))
     factor = min(max(factor, low), high)
     cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
     values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
@@ -166,6 +167,10 @@ def better_shaped(shaped: Fit, plain: Fit) -> bool:
     )
 
 
+NOTHING = 1e6
+"""How many times as large a contribution has to be to be worth seeing, so that it counts as none."""
+
+
 def contribution(
     here: Anchor, h: Hypothesis, start: Start, about: float | None = None
 ) -> tuple[FloatArray, float] | None:
@@ -173,10 +178,10 @@ def contribution(
     from `about` on, or from the start's own."""
     wanted = max(float(np.linalg.norm(here.fit.residual)), 1.0)
     size = float(start.values[h.amount.name]) if about is None else about
-    low, high = h.amount.minimum, h.amount.maximum
+    low, high = reach_of(h.amount, here.fit.problem.config)
     result = None
+    size = min(max(size, low), high) if size else size
     for _ in range(4):
-        size = min(max(size, low), high) if size else size
         d = difference(here, h, {**start.values, h.amount.name: size})
         if d is None:
             size *= 0.1
@@ -184,9 +189,11 @@ def contribution(
         result = (d, size)
         length = float(np.linalg.norm(here.beyond(d))) + 0.1 * float(np.linalg.norm(d))
         ratio = wanted / max(length, 1e-9 * wanted)
-        if 0.4 < ratio < 2.5 or abs(size * ratio) >= high * 3.0:
+        wider = min(max(size * float(np.clip(ratio, 1e-3, 1e3)), low), high)
+        # what shows nothing at a plausible size (an event before all rows) shows nothing at any
+        if 0.4 < ratio < 2.5 or ratio > NOTHING or wider == size:
             break
-        size *= float(np.clip(ratio, 1e-3, 1e3))
+        size = wider
     return result
 
 
