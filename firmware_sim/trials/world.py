@@ -29,6 +29,7 @@ SAMPLES = (10_000, 12_000)
 
 RECORDINGS = {1: 0.2, 2: 0.5, 3: 0.3}
 CONFOUNDED_RECORDINGS = 2
+FAR_SMALLER = 1.0 / 3.0  # at most so large is a companion meant to be, of what the trial is about
 _ATTEMPTS = 80
 _PAIRS = 3
 
@@ -221,7 +222,9 @@ def _conceal(
         found.append(Hidden(sized, "main"))
     if "companions" in how:
         taken = {h.sized.spec.id.partition(":")[0] for h in found}
-        for size in how["companions"]["sizes"]:
+        least = min(h.sized.size for h in found)
+        for drawn in how["companions"]["sizes"]:
+            size = min(drawn, FAR_SMALLER * least)
             suspect = _companion(rng, wanted, scene, taken)
             sized = _sized(rng, suspect, size, (0.3 * size, 1.5 * size), scene, plain)
             if sized is not None:  # what cannot show here is no company

@@ -105,6 +105,16 @@ def test_a_neighbour_that_turns_the_base_is_known_by_its_angle_and_one_that_load
         assert draw_world(wanted, number).other == f"other_neighbour_{unit}"
 
 
+def test_a_companion_is_smaller_than_what_the_trial_is_about() -> None:
+    wanted, accompanied = Wanted(4, ("single",), "other", "all"), 0
+    for number in range(8):
+        main, *companions = draw_world(wanted, number).hidden
+        assert main.role == "main"
+        assert all(c.role == "companion" and c.sized.size <= 0.5 * main.sized.size for c in companions)
+        accompanied += len(companions)
+    assert accompanied >= 6
+
+
 @pytest.mark.parametrize("laws", ["catalogue", "other"])
 def test_friction_of_the_motor_is_in_its_torque_alone(laws: str, tmp_path: Path) -> None:
     make(Wanted(5, ("motor",), laws, "none"), 3, tmp_path)
