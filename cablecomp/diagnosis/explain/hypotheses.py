@@ -14,7 +14,7 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import Course
 from cablecomp.diagnosis.explain.instants import instants
 from cablecomp.effects import Effect, Parameter, catalogue
-from cablecomp.effects.base import Role
+from cablecomp.effects.base import Role, wrap_deflection
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
@@ -317,9 +317,11 @@ def _grid(
     if p.role == "length":
         return (0.02 * high, 0.25 * high)
     if p.role == "presliding":
+        # from what is as good as none, beside what friction of the wraps makes, to a part of the joint's travel
         reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
+        least = min(1e-3 * reach, 1e-3 * wrap_deflection(config))
         return tuple(
-            float(v) for v in np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
+            float(v) for v in np.geomspace(max(low, least), max(0.05 * reach, 3.0 * least, 3.0 * low), 4)
         )
     if p.log:
         return tuple(float(v) for v in np.geomspace(low, high, p.points + 2)[1:-1])

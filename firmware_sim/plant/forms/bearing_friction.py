@@ -1,4 +1,5 @@
-"""Bearing friction in other forms: Dahl, LuGre with Stribeck's fall and a viscous part, unlike by direction."""
+"""Bearing friction in other forms: Dahl, LuGre with Stribeck's fall and a viscous part, unlike by direction, a plain
+journal."""
 
 from __future__ import annotations
 
@@ -71,4 +72,20 @@ UNLIKE = form(
     _unlike,
 )
 
-KINDS: tuple[EffectKind, ...] = (DAHL, LUGRE, UNLIKE)
+
+def _journal(build: Build, p: Mapping[str, float]) -> None:
+    shaft = build.shafts[build.output]
+    shaft["load_coefficient"] = p["load_coefficient"]
+    shaft["presliding"] = max(p["presliding_rad"], MIN_PRESLIDING_RAD)
+
+
+JOURNAL = form(
+    "bearing_friction",
+    "journal",
+    "A shaft in a plain bush: κ R (T_h + T_l) against its motion, nothing without load.",
+    (Parameter("load_coefficient", "κ", low=0.0, high=1.0, neutral=0.0), _PRESLIDING),
+    _ACTS,
+    _journal,
+)
+
+KINDS: tuple[EffectKind, ...] = (DAHL, LUGRE, UNLIKE, JOURNAL)
