@@ -54,6 +54,7 @@ EFFECT = Effect(
             role="shape",
             scale=pretension,
             minimum=1e-9,
+            least_is_another=True,  # wires that nothing holds are plain compliance
             points=7,  # a grip that lets by the peaks of the load alone promises nothing by half of it or twice
         ),
         Parameter(

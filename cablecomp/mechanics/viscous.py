@@ -16,6 +16,7 @@ from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
 STIFFEST = 1e7  # diffusion number per step at which slip on a grid of WET_NODES is over within it
+EVEN = 1e-13  # change of a node, over T0, up to which a step is balanced
 LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 
 
@@ -137,12 +138,13 @@ def _relax(s: Slide) -> tuple[int, float]:
     it knows which faces do. One that only rounding moves may change its side for ever, so it is balance that counts.
     """
     first, moved = s.nodes, Moved(False, 0.0, 0.0)
+    even = EVEN * max(1.0, s.rate / (1e4 * s.h * s.h))  # rounding grows with what is weighed up
     for _ in range(60):
         first = _front(s)
         if first == s.nodes:
             return first, 0.5 * s.gap
         moved = _newton(s, first)
-        if moved.done or _unbalanced(s, max(first - 1, 0)) <= 1e-13:
+        if moved.done or _unbalanced(s, max(first - 1, 0)) <= even:
             break
     return first, moved.slope
 

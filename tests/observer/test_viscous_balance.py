@@ -53,6 +53,6 @@ def test_what_slides_in_and_out_of_a_node_is_what_it_stretches_by(coefficient: f
             rate = min(rate, 1e7 * h * h)  # beyond that slip is over within the step
             gained = rate / length * np.diff(flow, prepend=0.0)
             stiff = 1.0 + 2.0 * rate / (h * min(h, gap))
-            assert np.max(np.abs(new - old[:count] - gained)) <= 1e-13 * count * stiff  # each node rounds
+            assert np.max(np.abs(new - old[:count] - gained)) <= 2e-13 * count * stiff  # each node rounds
             moved += int(np.any(flow != 0.0))
     assert moved > 200

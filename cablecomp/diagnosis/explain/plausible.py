@@ -49,12 +49,16 @@ def over_plausible(fit: Fit, h: Hypothesis) -> float:
 
 def better_word(fit: Fit, h: Hypothesis) -> str:
     """The shape of an effect that stands where another effect is the better word (`Parameter.is_another`); "" where
-    none does. Near the most that is plausible it counts as on it; the least is the plain law."""
+    none does. Near the most that is plausible it counts as on it; the least is the plain law but where that is said to
+    be another (`Parameter.least_is_another`)."""
     own = {p.name: fit.values.get(h.key(p.name), p.omitted or p.neutral) for p in h.effect.parameters}
     at = zip(fit.problem.parameters, fit.x, strict=True)
     on_high = {p.base for p, x in at if p.value(float(x)) > LIMITS.near_bound * p.high}
-    others = (p.name for p in h.effect.parameters if p.is_another(own, h.key(p.name) in on_high))
-    return next(others, "")
+    for p in h.effect.parameters:
+        below = p.least_is_another and own[p.name] < p.bounds(fit.problem.config)[0]
+        if below or p.is_another(own, h.key(p.name) in on_high):
+            return p.name
+    return ""
 
 
 def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
