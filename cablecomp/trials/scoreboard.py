@@ -134,6 +134,7 @@ def _of_names(rows: Sequence[Row]) -> Iterable[Target]:
     motor = [r for r in rows if r.kind == "motor"]
     yield _share("single effect named first, catalogue's law, decidable", rate(known, _first), 0.97)
     yield _share("single effect named first, another law, decidable", rate(other, _first), 0.90)
+    yield _share("single effect named, whatever stands before it, decidable", rate(decidable, _told))
     yield _share("single effect: a wrong name", rate(single, lambda r: r.wrong), None, 0.02)
     yield _share("nothing missing: a wrong name", rate(clean, lambda r: r.wrong), None, 0.01)
     yield _share("pairs: both named, decidable", rate(pairs, lambda r: r.all_right), 0.80)
@@ -204,6 +205,10 @@ def _at(what: str, values: Sequence[float], q: float, most: float | None, unit: 
 
 def _first(row: Row) -> bool:
     return row.first_right
+
+
+def _told(row: Row) -> bool:
+    return set(row.truth) <= {n.effect for n in row.named}
 
 
 def _raw_location(rows: Sequence[Row]) -> Rate:

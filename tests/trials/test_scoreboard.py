@@ -65,6 +65,11 @@ def test_laws_are_told_apart_and_companions_and_imperfections_are_no_wrong_names
     both = row(other, verdict("termination_backlash", "clock_skew"))
     assert (both.first_right, both.wrong, both.all_right) == (True, False, True)
     assert not row(other, verdict("clock_skew")).first_right
+    behind = row(other, verdict("clock_skew", "termination_backlash"))
+    assert target([behind, both], "named first, another law") == 0.5
+    assert target(
+        [behind, both, row(other, verdict("clock_skew"))], "whatever stands before it"
+    ) == pytest.approx(2 / 3)
     assert target([both], "named first, another law") == 1.0
     assert isnan(target([both], "named first, catalogue"))
     late = truth("none", late={"channel": "joint_position", "acts_as": ["clock_skew"]})
