@@ -43,16 +43,6 @@ def _lip_seal(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"torque_Nm": 1.0}, _torque(scene), 0.3 * scene.joint.load_Nm)
 
 
-def _journal(rng: np.random.Generator, scene: Scene) -> Shape:
-    stage = scene.joint.true.stages[-1]
-    moment = (
-        stage.output_radius_m * stage.pretension_N * (2.0 if scene.joint.true.circuit == "closed" else 1.0)
-    )
-    return Shape(
-        {"presliding_rad": _presliding(rng, scene)}, {"load_coefficient": 1.0}, _torque(scene) / moment, 0.5
-    )
-
-
 def _stiffening(rng: np.random.Generator, scene: Scene) -> Shape:
     first = 1.5 * scene.plain.loop_rad / scene.plain.load_rms
     fixed = {"knee_Nm": float(rng.uniform(0.1, 0.4)) * scene.joint.load_Nm}
@@ -267,7 +257,6 @@ JOINT = (
     Suspect("bearing_friction:dahl", ANY, _dahl),
     Suspect("bearing_friction:lugre", TURNING, _lugre),
     Suspect("bearing_friction:unlike_ways", ANY, _lip_seal),
-    Suspect("bearing_friction:journal", ANY, _journal),
     Suspect("series_compliance:stiffening", ANY, _stiffening),
     Suspect("series_compliance:softening", ANY, _softening),
     Suspect("series_compliance:staged", ANY, _staged),

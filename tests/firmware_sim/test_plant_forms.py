@@ -28,7 +28,6 @@ SIZES = {
     "bearing_friction:dahl": {"torque_Nm": 0.1, "presliding_rad": 1e-4},
     "bearing_friction:lugre": {"torque_Nm": 0.1, "presliding_rad": 1e-4, "viscous_Nms_per_rad": 0.02},
     "bearing_friction:unlike_ways": {"torque_Nm": 0.1, "presliding_rad": 1e-4},
-    "bearing_friction:journal": {"load_coefficient": 0.1, "presliding_rad": 1e-4},
     "series_compliance:stiffening": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.5},
     "series_compliance:softening": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4},
     "series_compliance:staged": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.2},

@@ -68,23 +68,6 @@ def test_a_lip_seal_holds_back_more_one_way() -> None:
     np.testing.assert_allclose(_carried(run)[220:395], 0.05 * 0.6, rtol=1e-3)
 
 
-def test_a_plain_bush_holds_back_by_what_presses_the_shaft_in_it() -> None:
-    """In an open circuit more where the load pulls the cable."""
-    config = joint(circuit="open")
-    motor = course(0.0, 1.0, -1.0, points=200)
-    load = 0.3 * np.sin(np.linspace(0.0, 12.0, len(motor)))
-    law = {"load_coefficient": 0.1, "presliding_rad": 1e-4}
-    run = simulate(config, clock(motor), motor, load, effects=(EffectSpec("bearing_friction:journal", law),))
-    radius = config.stages[0].output_radius_m
-    plain = simulate(config, clock(motor), motor, load)
-    held = load + radius * config.stages[0].pretension_N - radius * run.tension_h_N
-    way = np.sign(np.diff(plain.pulley_position_rad, prepend=0.0))
-    np.testing.assert_allclose(
-        np.abs(held)[[60, 150, 300]], 0.1 * radius * run.tension_h_N[[60, 150, 300]], rtol=5e-3
-    )
-    assert np.all(np.sign(held[[60, 150, 300]]) == way[[60, 150, 300]])
-
-
 def _crossing(form: str, load: np.ndarray, motor: np.ndarray, **parameters: float) -> np.ndarray:
     """What a form of backlash adds to the joint's angle."""
     config = joint()

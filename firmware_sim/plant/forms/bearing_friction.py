@@ -1,5 +1,4 @@
-"""Bearing friction in other forms: Dahl, LuGre with Stribeck's fall and a viscous part, unlike by direction, a plain
-journal."""
+"""Bearing friction in other forms: Dahl, LuGre with Stribeck's fall and a viscous part, unlike by direction."""
 
 from __future__ import annotations
 
@@ -72,20 +71,4 @@ UNLIKE = form(
     _unlike,
 )
 
-
-def _journal(build: Build, p: Mapping[str, float]) -> None:
-    shaft = build.shafts[build.output]
-    shaft["load_coefficient"] = p["load_coefficient"]
-    shaft["presliding"] = max(p["presliding_rad"], MIN_PRESLIDING_RAD)
-
-
-JOURNAL = form(
-    "bearing_friction",
-    "journal",
-    "A shaft in a plain bush: κ R (T_h + T_l) against its motion, nothing without load.",
-    (Parameter("load_coefficient", "κ", low=0.0, high=1.0, neutral=0.0), _PRESLIDING),
-    _ACTS,
-    _journal,
-)
-
-KINDS: tuple[EffectKind, ...] = (DAHL, LUGRE, UNLIKE, JOURNAL)
+KINDS: tuple[EffectKind, ...] = (DAHL, LUGRE, UNLIKE)
