@@ -317,12 +317,12 @@ def _grid(
     if p.role == "length":
         return (0.02 * high, 0.25 * high)
     if p.role == "presliding":
-        # from what is as good as none, beside what friction of the wraps makes, to a part of the joint's travel
         reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
-        least = min(1e-3 * reach, 1e-3 * wrap_deflection(config))
-        return tuple(
-            float(v) for v in np.geomspace(max(low, least), max(0.05 * reach, 3.0 * least, 3.0 * low), 4)
-        )
+        wide = np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
+        # as good as none, beside what friction of the wraps makes; of a loose drive the path's friction is as much
+        least = max(low, min(1e-3 * reach, 1e-3 * wrap_deflection(config)))
+        none = () if vague_drive(of_drive(config)) or least > 0.5 * wide[0] else (least,)
+        return tuple(float(v) for v in (*none, *wide))
     if p.log:
         return tuple(float(v) for v in np.geomspace(low, high, p.points + 2)[1:-1])
     return (0.5 * (low + high),)
