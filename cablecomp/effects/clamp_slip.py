@@ -131,6 +131,7 @@ EFFECT = Effect(
             minimum=-0.1,
             maximum=0.1,
             omitted=0.0,
+            below_of_l=True,
         ),
         Parameter(
             "time_s",

@@ -221,16 +221,12 @@ def _by_readings(effect: Effect, width: float) -> Effect:
 
 
 def _of_one_cable(effect: Effect) -> Effect:
-    """The effect where there is no cable l to which an event may happen instead: below zero its size means that one."""
-    if effect.of_role("instant") is None:
-        return effect
-    return replace(
-        effect,
-        parameters=tuple(
-            replace(p, low=max(p.low, 0.0), minimum=max(p.minimum, 0.0)) if not p.shape and p.low < 0.0 else p
-            for p in effect.parameters
-        ),
+    """The effect where there is no cable l."""
+    parameters = (
+        replace(p, low=max(p.low, 0.0), minimum=max(p.minimum, 0.0)) if p.below_of_l else p
+        for p in effect.parameters
     )
+    return replace(effect, parameters=tuple(parameters))
 
 
 def _by_amount(
