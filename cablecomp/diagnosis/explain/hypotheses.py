@@ -12,10 +12,10 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import Course
-from cablecomp.diagnosis.explain.instants import instants
+from cablecomp.diagnosis.explain.starts import absolute, grid, width
 from cablecomp.effects import Effect, Parameter, catalogue
-from cablecomp.effects.base import Role, wrap_deflection
-from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
+from cablecomp.effects.base import Role
+from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
 
@@ -205,17 +205,18 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
         channels += [n for n in others if n not in config.condition.values()]
     found = []
     for c in channels:
-        read = _by_readings(effect, _width(evidence, c)) if c else effect
+        read = _by_readings(effect, width(evidence, c)) if c else effect
         read = _of_one_cable(read) if config.drive.circuit == "open" else read
         amounts = [p for p in read.parameters if not p.shape and not p.held]
         found += [_by_amount(read, p, c, config, evidence) for p in amounts]
     return found
 
 
-def _by_readings(effect: Effect, width: float) -> Effect:
-    """The effect with what its amounts range over by unit of a channel whose largest reading is `width`."""
+def _by_readings(effect: Effect, largest: float) -> Effect:
+    """The effect with what its amounts range over by unit of a channel whose largest reading is that."""
     parameters = (
-        replace(p, low=p.low / width, high=p.high / width) if p.per_reading else p for p in effect.parameters
+        replace(p, low=p.low / largest, high=p.high / largest) if p.per_reading else p
+        for p in effect.parameters
     )
     return replace(effect, parameters=tuple(parameters))
 
@@ -247,7 +248,7 @@ def _by_amount(
     size = math.sqrt(low * high) if amount.log and low > 0.0 else 0.05 * max(abs(low), abs(high))
     two_sided = not amount.log and low < 0.0
     texts: dict[str, float | str] = {effect.texts[0]: channel} if channel else {}
-    grids = {p.name: _grid(p, config, evidence, channel) for p in shapes}
+    grids = {p.name: grid(p, config, evidence, channel) for p in shapes}
     widths: dict[str, tuple[float, ...]] = {}
     if any(p.role == "place" for p in shapes):  # first where, by a usual width; then how wide
         widths = {p.name: grids[p.name] for p in shapes if p.role != "place"}
@@ -270,69 +271,10 @@ def _by_amount(
     mute = {p.name for p in own if p.role in aside}
     tried += [dict(values) for values in effect.tries if set(values) <= names - mute]
     asked = tuple(
-        {n: _absolute(effect, n, v, config, evidence, channel) for n, v in values.items()} for values in tried
+        {n: absolute(effect, n, v, config, evidence, channel) for n, v in values.items()} for values in tried
     )
     other = ({n: v} for n, values in widths.items() for v in values if v not in grids[n])
     return Hypothesis(effect, name, amount, starts, two_sided, channel, (*other, *asked))
-
-
-def _absolute(
-    effect: Effect, name: str, tried: float, config: JointConfig, evidence: Sequence[Evidence], channel: str
-) -> float:
-    """A value to try in the parameter's unit."""
-    p = effect.parameter(name)
-    if p.role == "bend":
-        return tried / (_width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
-    if p.role == "tilt":
-        return tried / _width(evidence, channel)
-    if p.role == "begin":
-        return tried + min(float(e.columns["time_s"][0]) for e in evidence)
-    return tried if p.scale is None else tried * p.scale(config)
-
-
-def _grid(
-    p: Parameter, config: JointConfig, evidence: Sequence[Evidence], channel: str = ""
-) -> tuple[float, ...]:
-    low, high = p.bounds(config)
-    if p.role == "place":
-        stood = np.concatenate([e.columns[JOINT] for e in evidence])
-        return tuple(float(v) for v in np.nanquantile(stood, (0.1, 0.3, 0.5, 0.7, 0.9)))
-    if p.role == "tilt":
-        return tuple(turn / _width(evidence, channel) for turn in (-1.2, -0.4, 0.4, 1.2))
-    if p.role == "phase":
-        return (0.0, 0.5 * math.pi)
-    if p.role == "instant":
-        return instants(evidence, between=not vague_drive(of_drive(config)))
-    if p.role == "reference":
-        means = [
-            float(np.mean(e.columns["temperature_degC"])) for e in evidence if "temperature_degC" in e.columns
-        ]
-        return (float(np.mean(means)) if means else 20.0,)
-    if p.role == "begin":  # with each recording's first sample, or with the first of all
-        return (math.nan, min(float(e.columns["time_s"][0]) for e in evidence))
-    if p.role == "length":
-        return (0.02 * high, 0.25 * high)
-    if p.role == "presliding":
-        reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
-        wide = np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
-        # as good as none, beside what friction of the wraps makes; of a loose drive the path's friction is as much
-        least = max(low, min(1e-3 * reach, 1e-3 * wrap_deflection(config)))
-        none = () if vague_drive(of_drive(config)) or least > 0.5 * wide[0] else (least,)
-        return tuple(float(v) for v in (*none, *wide))
-    if p.log:
-        return tuple(float(v) for v in np.geomspace(low, high, p.points + 2)[1:-1])
-    return (0.5 * (low + high),)
-
-
-def _width(evidence: Sequence[Evidence], channel: str) -> float:
-    """The largest reading of a channel, of either sign."""
-    return max(float(np.nanmax(np.abs(e.columns[channel]))) for e in evidence)
-
-
-def _reach(evidence: Sequence[Evidence], channel: str) -> float:
-    """Half of what a channel covers over all recordings."""
-    readings = np.concatenate([e.columns[channel] for e in evidence if channel in e.columns])
-    return 0.5 * float(np.nanmax(readings) - np.nanmin(readings))
 
 
 def at_instants(h: Hypothesis, instants: Sequence[float]) -> Hypothesis:
