@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from joints import SMALL, SMALL_NOISE, closed
 
-from cablecomp.config import parse_joint
+from cablecomp.config import JointConfig, parse_joint
 from cablecomp.diagnosis.body import Body, gather_body
 from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
 from cablecomp.signal.smoothing import FloatArray
@@ -29,13 +29,20 @@ def course(seconds: float, loads: float = 1.0) -> tuple[FloatArray, FloatArray, 
 
 
 def recorded(
-    effects: Sequence[EffectSpec], seconds: float, loads: float = 1.0, *, locked: bool = False
+    effects: Sequence[EffectSpec],
+    seconds: float,
+    loads: float = 1.0,
+    *,
+    locked: bool = False,
+    stage: Mapping[str, float] = SMALL,
 ) -> dict[str, FloatArray]:
     """What the plant with these effects shows, with noise on every channel; `locked`: the motor does not move."""
     rng = np.random.default_rng(3)
     time, motor, load = course(seconds, loads)
     motor = 0.0 * motor if locked else motor
-    found = simulate(PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=effects).channels()
+    found = simulate(
+        PlantConfig.from_dict(closed(dict(stage))), time, motor, load, effects=effects
+    ).channels()
     columns: dict[str, FloatArray] = {"time_s": time}
     for name, noise in SMALL_NOISE.items():
         turned = 0.0 if locked and name == "motor_position_rad" else noise
@@ -43,7 +50,7 @@ def recorded(
     return columns
 
 
-def calibrated(columns: dict[str, FloatArray]) -> tuple[Body, Calibrated]:
+def calibrated(columns: dict[str, FloatArray], stated: JointConfig = TOLERANT) -> tuple[Body, Calibrated]:
     """The recording gathered, and the drive calibrated on it."""
-    body = gather_body(TOLERANT, {"small/1": columns}, None)
-    return body, calibrate_drive(TOLERANT, body.used, np.random.default_rng(0))
+    body = gather_body(stated, {"small/1": columns}, None)
+    return body, calibrate_drive(stated, body.used, np.random.default_rng(0))
