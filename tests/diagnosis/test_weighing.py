@@ -129,11 +129,11 @@ def test_confidence_goes_the_way_that_each_sign_points() -> None:
     middle = learnt().centre
     usual = learnt().probability(middle)
     for sign, better in {
-        "form_z": 1,
-        "form_margin_z": 1,
+        "lead": 1,
         "selected_in": 1,
         "unfollowed_rest": -1,
-        "tries": -1,
+        "tries_rest": -1,
+        "in_wake": -1,
     }.items():
         moved = {**middle, sign: middle[sign] + learnt().scale[sign]}
         assert (learnt().probability(moved) - usual) * better > 0.01, sign

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from cablecomp.diagnosis.explain.confidence import FEATURES, features_of_tried, logistic
+from cablecomp.diagnosis.explain.confidence import derived, features_of_tried, logistic
 from cablecomp.diagnosis.explain.conformal import conformal_level, conformal_set, deficits
 from cablecomp.errors import InputError
 from cablecomp.trials.calibrated import calibration_error, risk_area, risk_coverage
-from cablecomp.trials.learn import fit_logistic, learnt_from, main
+from cablecomp.trials.learn import fit_logistic, judged_in, learnt_from, main
 
 LAWS = [f"effect_{k}:law" for k in range(20)]
 
@@ -46,11 +46,25 @@ def board(effects: int = 1500, seed: int = 1) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
     rows = []
     for k in range(effects):
-        evidence = dict(zip(FEATURES, rng.standard_normal(len(FEATURES)).tolist(), strict=True))
-        p = 1.0 / (1.0 + np.exp(-(0.3 + 1.5 * evidence["form_margin_z"] - 1.0 * evidence["share_left"])))
-        name = {"evidence": {**evidence, "z": float(rng.uniform(2, 9))}, "right": bool(rng.uniform() < p)}
+        form_z, margin, selected = rng.standard_normal(3)
+        evidence = {
+            "log_gain": float(rng.uniform(-2.0, 0.0)),
+            "selected_in": float(selected),
+            "form_z": float(form_z),
+            "form_margin_z": float(margin),
+            "share_total": float(rng.uniform()),
+            "unfollowed": float(rng.uniform()),
+            "tries": float(rng.uniform(0.0, 2.0)),
+        }
+        p = 1.0 / (1.0 + np.exp(-(0.3 + 1.5 * min(form_z, margin) - 1.0 * selected)))
+        name = {
+            "effect": "crosstalk:other",
+            "evidence": {**evidence, "z": float(rng.uniform(2, 9))},
+            "right": bool(rng.uniform() < p),
+        }
         seen = float(rng.uniform(2, 9))
         left = {
+            "effect": "clock_skew",
             "evidence": {"gain": 0.2, "z": seen, "selected_in": 0.1},
             "right": bool(rng.uniform() < 0.05 * seen),
         }
@@ -60,6 +74,39 @@ def board(effects: int = 1500, seed: int = 1) -> dict[str, Any]:
         )  # fmt: skip
     wish = {"trials": effects, "seed": seed, "kinds": "single", "laws": "mixed", "imperfections": "some"}
     return {"schema": 2, "sha256": "ab", **wish, "rows": rows}
+
+
+def as_weighed(evidence: dict[str, float]) -> dict[str, float]:
+    """The evidence of an effect in whose model no other takes off more."""
+    return {**evidence, **derived(evidence), "in_wake": 0.0}
+
+
+def test_only_a_larger_effect_that_acts_first_through_the_same_covariate_makes_a_wake() -> None:
+    """Of a slip, a coupling and a gap beside it that takes off less, as a scoreboard has them; what was tried and left
+    makes none."""
+    whole = {
+        "log_gain": -1.0,
+        "selected_in": 1.0,
+        "form_z": 3.0,
+        "form_margin_z": 2.0,
+        "unfollowed": 0.5,
+        "tries": 1.0,
+    }
+    names: list[dict[str, Any]] = [
+        {"effect": effect, "evidence": {**whole, "share_total": share, "z": 3.0}, "right": True}
+        for effect, share in (("clamp_slip", 0.3), ("series_compliance", 0.2), ("termination_backlash", 0.1))
+    ]
+    tried = {
+        "effect": "nonlinear_cable",
+        "evidence": {"gain": 0.9, "z": 9.0, "selected_in": 1.0},
+        "right": False,
+    }
+    weighed, left = judged_in({"rows": [{"forms": ["a"], "kind": "single", "weighed": [*names, tried]}]})
+    assert [j.evidence["in_wake"] for j in weighed] == [0.0, 0.0, 1.0]
+    assert [j.evidence["lead"] for j in weighed] == [2.0] * 3
+    np.testing.assert_allclose(weighed[0].evidence["tries_rest"], 0.9)
+    np.testing.assert_allclose(weighed[0].evidence["unfollowed_rest"], 0.45)
+    assert len(left) == 1
 
 
 def test_what_is_learnt_holds_on_laws_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -73,7 +120,7 @@ def test_what_is_learnt_holds_on_laws_left_out(tmp_path: Path, capsys: pytest.Ca
     assert found["learnt_on"]["laws"] == len(LAWS)
     assert found["learnt_on"]["runs"][0]["seed"] == 1
     fresh = board(2000, 2)["rows"]
-    named = [(r["weighed"][0]["evidence"], r["weighed"][0]["right"]) for r in fresh]
+    named = [(as_weighed(r["weighed"][0]["evidence"]), r["weighed"][0]["right"]) for r in fresh]
     left = [(features_of_tried(**r["weighed"][1]["evidence"]), r["weighed"][1]["right"]) for r in fresh]
     for model, told in ((logistic(found), named), (logistic(found["tried"]), left)):
         assert calibration_error([model.probability(e) for e, _ in told], [r for _, r in told]) < 0.05
