@@ -79,9 +79,9 @@ class Parameter:
     what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course it asks by
     itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `is_another`: whether, by the
     effect's values and by whether it ended on `high`, another effect is the better word; `least_is_another`: whether
-    that is so below `low`, where other shapes are the plain law. `below_of_l`: below zero it is cable l's, of which an
-    open circuit has none. `of_known_drive`: beside a
-    drive known by order of magnitude it, and what is `of` it, are not asked for. `of_motor_load`:
+    that is so below `low`, where other shapes are the plain law. `of_cable_l`: whether it is cable l's, of which
+    an open circuit has none: never, below zero, or always. `of_known_drive`: beside a drive known by order of magnitude
+    it, and what is `of` it, are not asked for. `of_motor_load`:
     it is asked for only where the load is read at the motor. `points`: at how many places of a log-spaced range a
     diagnosis asks. `goes_on`: what it does grows without
     end, so that a diagnosis keeps it only where it is told from none. `by_itself`: an amount that is asked for without
@@ -108,7 +108,7 @@ class Parameter:
     reach: float = 30.0
     is_another: Callable[[Mapping[str, float], bool], bool] = never
     least_is_another: bool = False
-    below_of_l: bool = False
+    of_cable_l: Literal["never", "below zero", "always"] = "never"
     of_known_drive: bool = False
     of_motor_load: bool = False
     points: int = 3

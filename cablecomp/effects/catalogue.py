@@ -191,6 +191,13 @@ def _number(value: object, parameter: Parameter, config: JointConfig) -> float:
         raise InputError(
             f"{key}; {parameter.minimum:g} to {parameter.maximum:g} [{parameter.unit}] is accepted"
         )
+    of_l = {"never": False, "below zero": value < 0.0, "always": value != 0.0}[parameter.of_cable_l]
+    if of_l and config.drive.circuit == "open":
+        most = parameter.maximum if parameter.of_cable_l == "below zero" else 0.0
+        raise InputError(
+            f"{key}, which is of cable l; an open circuit has none: {f'0 to {most:g}' if most else '0'} "
+            f"[{parameter.unit}] is accepted"
+        )
     return float(value)
 
 

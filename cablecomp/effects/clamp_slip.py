@@ -91,6 +91,7 @@ def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
             minimum=0.0,
             maximum=0.1,
             omitted=0.0,
+            of_cable_l="always" if cable == "l" else "never",
             of_known_drive=True,
         ),
         Parameter(
@@ -131,7 +132,7 @@ EFFECT = Effect(
             minimum=-0.1,
             maximum=0.1,
             omitted=0.0,
-            below_of_l=True,
+            of_cable_l="below zero",
         ),
         Parameter(
             "time_s",

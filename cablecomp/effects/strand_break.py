@@ -45,7 +45,7 @@ EFFECT = Effect(
             "f, share of the cross-section lost: of cable h, below 0 of cable l",
             minimum=-0.95,
             maximum=0.95,
-            below_of_l=True,
+            of_cable_l="below zero",
         ),
         Parameter("time_s", "s", 0.0, 0.0, 3600.0, "t*, on the recording's clock", role="instant"),
         DURATION,

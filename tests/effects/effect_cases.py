@@ -43,6 +43,8 @@ def typical(name: str, config: JointConfig) -> dict[str, Any]:
     values: dict[str, Any] = {}
     effect = catalogue()[name]
     for parameter in effect.parameters:
+        if parameter.of_cable_l == "always" and config.drive.circuit == "open":
+            continue
         low, high = parameter.bounds(config)
         values[parameter.name] = np.sqrt(low * high) if parameter.log else 0.25 * low + 0.75 * high
         values[parameter.name] = IN_TWO_SECONDS.get(parameter.name, values[parameter.name])

@@ -43,6 +43,23 @@ def test_what_a_law_needs_beside_its_amount_is_named() -> None:
     assert "lacks key `holds_l_N`, the tension" in refusal(("clamp_slip", {"creep_l_m_per_Ns": 1e-6}))
 
 
+@pytest.mark.parametrize(
+    ("effect", "given", "accepted"),
+    [
+        ("strand_break", {"fraction": -0.2, "time_s": 1.0}, "`effect.fraction` is -0.2.*0 to 0.95"),
+        ("clamp_slip", {"slip_m": -1e-4, "time_s": 1.0}, "`effect.slip_m` is -0.0001.*0 to 0.1"),
+        ("clamp_slip", {"creep_l_m_per_Ns": 1e-6, "holds_l_N": 9.0}, "creep_l_m_per_Ns` is 1e-06.* 0 "),
+    ],
+)
+def test_an_open_circuit_has_no_cable_l_to_which_something_happens(
+    effect: str, given: dict[str, Any], accepted: str
+) -> None:
+    """In a closed circuit the same is taken."""
+    extend(with_effects(joint(), [(effect, given)]))
+    with pytest.raises(InputError, match=rf"{accepted}.*is accepted"):
+        extend(with_effects(joint("snow-open-rig"), [(effect, given)]))
+
+
 def test_an_effect_has_to_say_how_much_even_where_each_of_its_amounts_may_be_left_out() -> None:
     """A groove may be rough on either drum alone, so neither amplitude is asked for by itself."""
     text = refusal(("position_dependent_friction", {"phase_rad": 0.5}))

@@ -224,8 +224,9 @@ def _by_readings(effect: Effect, largest: float) -> Effect:
 def _of_one_cable(effect: Effect) -> Effect:
     """The effect where there is no cable l."""
     parameters = (
-        replace(p, low=max(p.low, 0.0), minimum=max(p.minimum, 0.0)) if p.below_of_l else p
+        replace(p, low=max(p.low, 0.0), minimum=max(p.minimum, 0.0)) if p.of_cable_l == "below zero" else p
         for p in effect.parameters
+        if p.of_cable_l != "always"
     )
     return replace(effect, parameters=tuple(parameters))
 
