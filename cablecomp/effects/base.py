@@ -47,12 +47,13 @@ Role = Literal[
     "place",
     "tilt",
     "bend",
+    "slack",
 ]
 """An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s], how
 long it takes [s], how curved, when a further step comes [s] and how large it is; when a slow course began [s]; the
 reference of what the law reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; a place
-on a drum [rad]; by how much another channel turns the joint; how much what is read grows with itself; any other
-shape."""
+on a drum [rad]; by how much another channel turns the joint; how much what is read grows with itself, up to which
+reading nothing happens; any other shape."""
 
 
 def never(_values: Mapping[str, float], _on_high: bool) -> bool:
@@ -70,23 +71,23 @@ class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
 
     `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a scale is
-    given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`: a diagnosis leaves
-    it where it starts, because another parameter takes its part. `minimum`..`maximum`, in the parameter's unit, is
-    what the law can take; beyond it a configuration is refused. `omitted`: its value where a configuration leaves it
-    out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`: the amount whose shape
-    it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it leaves out at
-    first (a begin's count from the first of all samples, a bend's are over the channel's largest reading, or half of
-    what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course it asks by
-    itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `is_another`: whether, by the
-    effect's values and by whether it ended on `high`, another effect is the better word; `least_is_another`: whether
-    that is so below `low`, where other shapes are the plain law. `of_cable_l`: whether it is cable l's, of which
-    an open circuit has none: never, below zero, or always. `of_known_drive`: beside a drive known by order of magnitude
-    it, and what is `of` it, are not asked for. `of_motor_load`:
-    it is asked for only where the load is read at the motor. `points`: at how many places of a log-spaced range a
-    diagnosis asks. `goes_on`: what it does grows without
-    end, so that a diagnosis keeps it only where it is told from none. `by_itself`: an amount that is asked for without
-    the effect's others. `per_reading`: low..high are what the largest reading of the channel that the effect reads
-    does: what a unit of it means, no configuration tells.
+    given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`: a diagnosis
+    leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in the parameter's
+    unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a configuration
+    leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`: the amount
+    whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it
+    leaves out at first (a begin's count from the first of all samples, a bend's are over the channel's largest
+    reading, a slack's shares of it, or half of what a channel that it needs covers, others' are in units of
+    `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of a log-spaced shape
+    may leave low..high. `is_another`: whether, by the effect's values and by whether it ended on `high`, another
+    effect is the better word; `least_is_another`: whether that is so below `low`, where other shapes are the plain
+    law. `of_cable_l`: whether it is cable l's, of which an open circuit has none: never, below zero, or always.
+    `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
+    `of_motor_load`: it is asked for only where the load is read at the motor. `points`: at how many places of a
+    log-spaced range a diagnosis asks. `goes_on`: what it does grows without end, so that a diagnosis keeps it only
+    where it is told from none. `by_itself`: an amount that is asked for without the effect's others. `per_reading`:
+    low..high are what the largest reading of the channel that the effect reads does (of a slack: shares of that
+    reading): what a unit of it means, no configuration tells.
     """
 
     name: str

@@ -8,48 +8,66 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_deflection
-from cablecomp.mechanics.change import Term
 
 
-@term(parameters=("load_coefficient", "growth", "bend", "channel"))
-def _leak(c: Any, p: Any, s: Any) -> None:
-    """p: load coefficient [N m per unit of the channel], its growth with the joint's angle [1/rad] and with the channel
-    itself [1/unit], place of the channel among the others."""
+@term(
+    parameters=("load_coefficient", "growth", "turn", "bend", "slack", "lag", "channel"),
+    state=("known", "late", "other", "time"),
+)
+def _arrive(c: Any, p: Any, s: Any) -> None:
+    """p: load coefficient [N m per unit of the channel], its growth with the joint's angle [1/rad], turn of the joint
+    [rad per unit], growth of what arrives with itself [1/unit], what is taken up before anything arrives [unit], lag
+    [s], place of the channel among the others; s: whether a reading came before, what had arrived of it late, that
+    reading and its time. The channel goes straight from sample to sample; without a reading nothing arrives."""
     other = c.other[int(p.channel)]
+    late = other
+    if p.lag > 0.0:
+        fresh = c.first or s.known == 0.0
+        if math.isnan(other):
+            if c.commit and c.first:
+                s.known = 0.0
+        else:
+            passed = 0.0 if fresh else c.time - s.time
+            if passed > 0.0:
+                behind = p.lag * (other - s.other) / passed
+                late = other - behind + (s.late - s.other + behind) * math.exp(-passed / p.lag)
+            elif not fresh:
+                late = s.late
+            if c.commit:
+                s.known, s.late, s.other, s.time = 1.0, late, other, c.time
     if not math.isnan(other):
-        other *= 1.0 + p.bend * other
-        c.moment -= p.load_coefficient * (1.0 + p.growth * c.joint) * other
-        c.moment_slope -= p.load_coefficient * p.growth * other
-
-
-@term(parameters=("turn", "bend", "channel"))
-def _turn(c: Any, p: Any, s: Any) -> None:
-    """p: turn of the joint [rad per unit of the channel], its growth with the channel itself [1/unit], place of the
-    channel among the others."""
-    other = c.other[int(p.channel)]
-    if not math.isnan(other):
-        c.reading += p.turn * (1.0 + p.bend * other) * other
+        arrives = late - min(max(late, -p.slack), p.slack)
+        arrives *= 1.0 + p.bend * arrives
+        c.moment -= p.load_coefficient * (1.0 + p.growth * c.joint) * arrives
+        c.moment_slope -= p.load_coefficient * p.growth * arrives
+        c.reading += p.turn * arrives
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    terms: list[Term] = []
-    bend, channel = values["bend_per_unit"], values["channel"]
-    if values["load_coefficient"] != 0.0:
-        growth = values["growth_per_rad"]
-        terms += _leak(load_coefficient=values["load_coefficient"], growth=growth, bend=bend, channel=channel)
-    if values["turn_rad_per_unit"] != 0.0:
-        terms += _turn(turn=values["turn_rad_per_unit"], bend=bend, channel=channel)
-    return Change(terms=tuple(terms))
+    return Change(
+        terms=_arrive(
+            load_coefficient=values["load_coefficient"],
+            growth=values["growth_per_rad"],
+            turn=values["turn_rad_per_unit"],
+            bend=values["bend_per_unit"],
+            slack=values["slack_units"],
+            lag=values["lag_s"],
+            channel=values["channel"],
+        )
+    )
 
 
 EFFECT = Effect(
     id="crosstalk",
     statement="A neighbouring joint loads this joint's cables, or turns the joint (its cables pass the other's axis, "
-    "or the frame between them gives way): what the other does appears here.",
-    equation="M_cable = M + k (1 + p q_out) (1 + b other(t)) other(t); q_out + d (1 + b other(t)) other(t)",
+    "or the frame between them gives way): what the other does appears here, at once or through something soft and "
+    "damped, all of it or what goes beyond a slack.",
+    equation="M_cable = M + k (1 + p q_out) (1 + b z) z; q_out + d (1 + b z) z; z = y - clip(y, -s, s), "
+    "t_l dy/dt = other - y",
     source="cables routed past or over a neighbouring axis carry part of its load, or lengthen on one side by its "
     "turn, and a frame bends under its load; linear as first order, in the joint's angle too, with which the lever "
-    "arm changes; quadratic where it counts more one way than the other",
+    "arm changes; quadratic where it counts more one way than the other; a first lag for rubber, grease or a sheath "
+    "between them; a dead zone where parts touch only beyond a clearance",
     parameters=(
         Parameter(
             "load_coefficient",
@@ -99,6 +117,32 @@ EFFECT = Effect(
             role="bend",
             omitted=0.0,
             tries=(-0.6, 0.6),
+        ),
+        Parameter(
+            "lag_s",
+            "s",
+            0.0,
+            0.03,
+            3.0,
+            "t_l, how late it arrives: 63 % of it after a step of the other; 0: at once",
+            log=True,
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.1, 0.4),
+        ),
+        Parameter(
+            "slack_units",
+            "unit",
+            0.0,
+            0.0,
+            0.9,
+            "s, reading of the other up to which nothing arrives",
+            role="slack",
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.35,),
+            per_reading=True,
         ),
     ),
     acts_through=("other",),

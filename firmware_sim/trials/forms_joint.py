@@ -249,6 +249,16 @@ def _touching_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"slack_units": slack}, {"load_coefficient": sign(rng)}, 1.5 * _cross(scene), 0.6)
 
 
+def _dragged_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
+    friction = float(rng.uniform(0.15, 0.5)) * _most(scene)
+    return Shape({"friction_units": friction}, {"load_coefficient": sign(rng)}, 1.2 * _cross(scene), 0.6)
+
+
+def _stopped_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
+    stop = float(rng.uniform(0.2, 0.6)) * _most(scene)
+    return Shape({"stop_units": stop}, {"load_coefficient": sign(rng)}, 1.5 * _cross(scene), 0.8)
+
+
 def _posed_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"phase_rad": angle(rng)}, {"load_coefficient": sign(rng)}, 1.5 * _cross(scene), 0.6)
 
@@ -289,4 +299,6 @@ JOINT = (
     Suspect("crosstalk:quadratic", ANY, _bent_neighbour, neighbour=True),
     Suspect("crosstalk:touching", ANY, _touching_neighbour, neighbour=True),
     Suspect("crosstalk:posed", TURNING, _posed_neighbour, neighbour=True),
+    Suspect("crosstalk:dragged", ANY, _dragged_neighbour, neighbour=True),
+    Suspect("crosstalk:stopped", ANY, _stopped_neighbour, neighbour=True),
 )

@@ -28,7 +28,8 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
-    "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:posed", "crosstalk:quadratic",
+    "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:lagged", "crosstalk:posed",
+    "crosstalk:quadratic", "crosstalk:touching",
     "gravity_load:leaning_base", "gravity_load:tilting_base", "inertial_load:folding_arm",
     "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "position_dependent_friction:threaded",

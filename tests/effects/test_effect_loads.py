@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from effect_cases import Columns, Floats, excitation, joint, run, second_differences, still
+from scipy.signal import lsim
 
 from cablecomp.config import JointConfig
 
@@ -102,6 +103,46 @@ def test_a_neighbours_load_may_count_more_one_way_than_the_other() -> None:
     assert np.ptp(found - straight) > 0.1 * np.ptp(
         straight - fed_with(config, columns, columns["joint_torque_Nm"])
     )
+
+
+@pytest.mark.parametrize("amount", ["load_coefficient", "turn_rad_per_unit"])
+def test_what_a_neighbour_does_may_arrive_late_and_beyond_a_slack_alone(amount: str) -> None:
+    """Of a first lag, started at rest, what goes beyond the slack."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    time, other = columns["time_s"], columns["other_neighbour_Nm"]
+    lag, slack, k = 0.3, 0.2 * float(np.max(np.abs(other))), 0.4
+    _, y, _ = lsim(([1.0], [lag, 1.0]), other - other[0], time)
+    y = y + other[0]
+    z = np.where(y > slack, y - slack, np.where(y < -slack, y + slack, 0.0))
+    values = {"channel": "other_neighbour_Nm", amount: k, "lag_s": lag, "slack_units": slack}
+    found = run(config, columns, ("crosstalk", values))["joint_position_rad"]
+    if amount == "load_coefficient":
+        expected = fed_with(config, columns, columns["joint_torque_Nm"] + k * z)
+    else:
+        expected = run(config, columns)["joint_position_rad"] + k * z
+    assert found == pytest.approx(expected, abs=1e-9)
+    at_once = run(config, columns, ("crosstalk", {**values, "lag_s": 0.0, "slack_units": 0.0}))
+    plainly = at_once["joint_position_rad"] - run(config, columns)["joint_position_rad"]
+    assert np.ptp(found - at_once["joint_position_rad"]) > 0.3 * np.ptp(plainly)
+
+
+def test_a_late_neighbour_goes_on_from_where_it_stood_after_readings_that_are_missing() -> None:
+    """Straight from the reading before the gap to the one after it; in the gap nothing arrives."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    time, other = columns["time_s"], columns["other_neighbour_Nm"].copy()
+    gap = slice(len(time) // 3, len(time) // 3 + 40)
+    kept = np.ones(len(time), dtype=bool)
+    kept[gap] = False
+    _, y, _ = lsim(([1.0], [0.3, 1.0]), np.interp(time, time[kept], other[kept]) - other[0], time)
+    values = {"channel": "other_neighbour_Nm", "turn_rad_per_unit": 0.4, "lag_s": 0.3}
+    holed = {**columns, "other_neighbour_Nm": np.where(kept, other, np.nan)}
+    turned = (
+        run(config, holed, ("crosstalk", values))["joint_position_rad"]
+        - run(config, columns)["joint_position_rad"]
+    )
+    assert turned == pytest.approx(np.where(kept, 0.4 * (y + other[0]), 0.0), abs=1e-9)
 
 
 def test_a_neighbour_may_turn_the_joint_and_load_no_cable() -> None:

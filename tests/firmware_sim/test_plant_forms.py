@@ -95,6 +95,8 @@ SIZES = {
     "crosstalk:quadratic": {"load_coefficient": 0.3, "bend_per_unit": 0.5},
     "crosstalk:touching": {"load_coefficient": 0.3, "slack_units": 0.2},
     "crosstalk:posed": {"load_coefficient": 0.3},
+    "crosstalk:dragged": {"load_coefficient": 0.3, "friction_units": 0.3},
+    "crosstalk:stopped": {"load_coefficient": 0.3, "stop_units": 0.4},
     "motor_friction:lugre": {"torque_Nm": 0.02, "viscous_Nms_per_rad": 0.01},
     "motor_friction:gear": {"torque_Nm": 0.02, "share": 0.1},
     "motor_friction:uneven": {"torque_Nm": 0.02, "order": 2.0},

@@ -256,6 +256,9 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
     for x in np.interp(fine, T, OTHER)[1:]:
         follower.append(follower[-1] + (x - follower[-1]) * (fine[1] / smooth))
     late = np.asarray(follower)[::40]
+    drawn = [OTHER[0]]  # 0.3 behind the reading where that has come 0.3 or more from it
+    for x in OTHER[1:]:
+        drawn.append(max(x - 0.3, drawn[-1]) if x > drawn[-1] else min(x + 0.3, drawn[-1]))
     cases = {
         "gravity_load:sprung": (
             {"moment_Nm": 0.3, "phase_rad": 0.2, "spring_share": 0.5},
@@ -282,6 +285,11 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
             {"load_coefficient": 0.3, "slack_units": 0.4},
             0.3 * np.sign(OTHER) * np.maximum(np.abs(OTHER) - 0.4, 0.0),
         ),
+        "crosstalk:dragged": (
+            {"load_coefficient": 0.3, "friction_units": 0.3},
+            0.3 * np.asarray(drawn),
+        ),
+        "crosstalk:stopped": ({"load_coefficient": 0.3, "stop_units": 0.4}, 0.12 * np.tanh(OTHER / 0.4)),
         "crosstalk:posed": ({"load_coefficient": 0.3, "phase_rad": 0.4}, 0.3 * OTHER * np.cos(pose + 0.4)),
     }
     for name, (parameters, expected) in cases.items():

@@ -93,12 +93,12 @@ def test_a_neighbour_that_turns_the_base_is_known_by_its_angle_and_one_that_load
     turns = [_turns(rng, (forms["gravity_load:tilting_base"],)) for _ in range(50)]
     assert min(turns) >= 0.4
     assert max(turns) <= 1.4
-    assert {_turns(rng, (forms["crosstalk:lagged"],)) for _ in range(50)} == {0.0}
+    assert {_turns(rng, (forms["crosstalk:dragged"],)) for _ in range(50)} == {0.0}
     any_of_them = [_turns(rng, (forms["bearing_friction:dahl"],)) for _ in range(200)]
     assert 60 < sum(t > 0.0 for t in any_of_them) < 140
     for form, unit, laws in (
         ("gravity_load:leaning_base", "rad", "catalogue"),
-        ("crosstalk:touching", "Nm", "other"),
+        ("crosstalk:stopped", "Nm", "other"),
     ):
         wanted = Wanted(7, ("single",), laws, "some")
         number = next(k for k in range(400) if order(wanted, k).suspects[0].id == form)

@@ -214,11 +214,12 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
 
 def _by_readings(effect: Effect, largest: float) -> Effect:
     """The effect with what its amounts range over by unit of a channel whose largest reading is that."""
-    parameters = (
-        replace(p, low=p.low / largest, high=p.high / largest) if p.per_reading else p
-        for p in effect.parameters
-    )
-    return replace(effect, parameters=tuple(parameters))
+
+    def read(p: Parameter) -> Parameter:
+        unit = largest if p.role == "slack" else 1.0 / largest
+        return replace(p, low=p.low * unit, high=p.high * unit) if p.per_reading else p
+
+    return replace(effect, parameters=tuple(read(p) for p in effect.parameters))
 
 
 def _of_one_cable(effect: Effect) -> Effect:

@@ -22,6 +22,8 @@ def absolute(
     p = effect.parameter(name)
     if p.role == "bend":
         return tried / (width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
+    if p.role == "slack":
+        return tried * width(evidence, channel)
     if p.role == "tilt":
         return tried / width(evidence, channel)
     if p.role == "begin":

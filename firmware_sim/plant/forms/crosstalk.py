@@ -1,4 +1,5 @@
-"""A neighbour's load in other forms: late, bent, beyond a slack, and by the pose of this joint."""
+"""A neighbour's load in other forms: late, bent, beyond a slack, by the pose of this joint, through friction, and up to
+a stop."""
 
 from __future__ import annotations
 
@@ -94,4 +95,50 @@ POSED = form(
     _posed,
 )
 
-KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TOUCHING, POSED)
+
+def dragged_along(other: Floats, friction: float) -> Floats:
+    """What follows a reading through friction: it stays where it is until the reading is `friction` away."""
+    place, result = float(other[0]), np.empty_like(other)
+    for k, value in enumerate(other.tolist()):
+        place = min(max(place, value - friction), value + friction)
+        result[k] = place
+    return result
+
+
+def _dragged(build: Build, p: Mapping[str, float]) -> None:
+    _loading(
+        build,
+        lambda inputs: p["load_coefficient"] * dragged_along(inputs[:, OTHER], p["friction_units"]),
+    )
+
+
+DRAGGED = form(
+    "crosstalk",
+    "dragged",
+    "The neighbour's load arrives through friction of its own: M + k y, y stays while |other_1 − y| < r, and is drawn "
+    "along then.",
+    (_GAIN, Parameter("friction_units", "r", 0.0, 0.0)),
+    ("other:1",),
+    _dragged,
+)
+
+
+def _stopped(build: Build, p: Mapping[str, float]) -> None:
+    def moment(inputs: Floats) -> Floats:
+        most = p["stop_units"]
+        return np.asarray(p["load_coefficient"] * most * np.tanh(inputs[:, OTHER] / most))
+
+    _loading(build, moment)
+
+
+STOPPED = form(
+    "crosstalk",
+    "stopped",
+    "What is soft between the neighbour and this joint runs against a stop, which bears the rest: "
+    "M + k s tanh(other_1/s).",
+    (_GAIN, Parameter("stop_units", "s", 1.0, 1e-9)),
+    ("other:1",),
+    _stopped,
+)
+
+KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TOUCHING, POSED, DRAGGED, STOPPED)
