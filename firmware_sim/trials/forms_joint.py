@@ -198,6 +198,21 @@ def _half_filled(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"inertia_kgm2": 1.0}, _inertia(scene), 100.0 * _inertia(scene))
 
 
+def _two_modes(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {
+        "share": float(rng.uniform(0.3, 0.7)),
+        "swings_rad_s": 2.0 * math.pi * log_uniform(rng, 0.8, 2.5),
+        "apart": float(rng.uniform(2.5, 5.0)),
+        "damping_ratio": float(rng.uniform(0.15, 0.5)),
+    }
+    return Shape(fixed, {"inertia_kgm2": 1.0}, _inertia(scene), 100.0 * _inertia(scene))
+
+
+def _fluid_coupling(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {"share": float(rng.uniform(0.3, 0.9)), "lag_s": log_uniform(rng, 0.05, 0.4)}
+    return Shape(fixed, {"inertia_kgm2": 1.0}, _inertia(scene), 100.0 * _inertia(scene))
+
+
 def _sprung(rng: np.random.Generator, scene: Scene) -> Shape:
     fixed = {"phase_rad": angle(rng), "spring_share": float(rng.uniform(0.2, 1.0))}
     return Shape(fixed, {"moment_Nm": 1.0}, 1.5 * _torque(scene), 0.4 * scene.joint.load_Nm)
@@ -291,6 +306,8 @@ JOINT = (
     Suspect("inertial_load:flexible_link", TURNING, _flexible),
     Suspect("inertial_load:folding_arm", TURNING, _folding),
     Suspect("inertial_load:half_filled", TURNING, _half_filled),
+    Suspect("inertial_load:two_modes", TURNING, _two_modes),
+    Suspect("inertial_load:dragged_along", TURNING, _fluid_coupling),
     Suspect("gravity_load:sprung", TURNING, _sprung),
     Suspect("gravity_load:linkage", TURNING, _linkage),
     Suspect("gravity_load:tilting_base", TURNING, _tilting, neighbour=True, turned=True),

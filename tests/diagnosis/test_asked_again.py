@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from small_drive import TOLERANT, calibrated, recorded
 
-from cablecomp.diagnosis.explain.asked_again import with_better_courses
+from cablecomp.diagnosis.explain.asked_again import with_better_forms
 from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.linear import anchor
@@ -37,12 +37,26 @@ def test_an_event_takes_the_course_that_another_effect_had_hidden() -> None:
     (fit,) = rough([answer], 20)
     groups = make_groups(drive.fit)
     model = Model((slip, friction), fit, left_out(fit, groups))
-    better = with_better_courses(model, groups)
+    better = with_better_forms(model, groups)
     course = course_of(better.fit, slip)
     assert better.name == model.name
     assert better.fit.cost < 0.2 * model.fit.cost
     assert course.instant_s == pytest.approx(10.0, abs=0.4)
     assert [after for after, _ in course.steps] == pytest.approx([22.0 / 2.5, 22.0], abs=0.4)
     assert better.fit.values["effect.clamp_slip.slip_m"] == pytest.approx(6e-5, rel=0.05)
-    again = with_better_courses(better, groups)
+    again = with_better_forms(better, groups)
     assert again is better
+
+
+def test_a_law_takes_the_shape_that_it_has_once_it_is_fitted() -> None:
+    """The plant's mount rests on a stop one way; the model has one that yields in proportion."""
+    yields = EffectSpec("series_compliance:one_way", {"compliance_rad_per_Nm": 2e-3, "skew": -0.6})
+    body, drive = calibrated(recorded([yields], 30.0))
+    mount = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "series_compliance")
+    begun = with_entry(drive.fit.problem, mount, mount.entry({"compliance_rad_per_Nm": 2e-3}))
+    plain = solve(begun, begun.start, 10)
+    groups = make_groups(drive.fit)
+    better = with_better_forms(Model((mount,), plain, left_out(plain, groups)), groups)
+    assert better.fit.cost < 0.2 * plain.cost
+    assert better.fit.values["effect.series_compliance.skew"] == pytest.approx(-0.6, abs=0.05)
+    assert with_better_forms(better, groups) is better

@@ -224,6 +224,24 @@ def test_an_arm_that_folds_obeys_lagrange() -> None:
     assert np.max(np.abs(found - expected)[late]) < 0.02 * moves
 
 
+@pytest.mark.parametrize(("share", "pulsation"), [(1.0, 40.0), (0.4, 6.0)])
+def test_what_swings_after_the_joint_is_an_oscillator_on_it(share: float, pulsation: float) -> None:
+    """x'' = w^2 (q - x) + 2 z w (q' - x') as a filter of q'', of the joint's own course."""
+    config = joint("tendon-finger")
+    columns = moved_motor(6401)
+    swings = {"swings": share, "swings_rad_s": pulsation, "damping_ratio": 0.2}
+    found = run(config, columns, ("inertial_load", {"inertia_kgm2": 2e-4, **swings}))["joint_position_rad"]
+    time = columns["time_s"]
+    drag, stiff = 0.4 * pulsation, pulsation**2
+    rigid = np.gradient(np.gradient(found, time), time)
+    _, rate, _ = lsim(([drag, stiff], [1.0, drag, stiff]), rigid, time)
+    taken = 2e-4 * ((1.0 - share) * rigid + share * rate)
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] - taken)
+    still_so = run(config, columns, ("inertial_load", {"inertia_kgm2": 2e-4}))["joint_position_rad"]
+    late = slice(100, -5)
+    assert np.max(np.abs(found - expected)[late]) < 0.02 * np.ptp((found - still_so)[late])
+
+
 def moved_motor(samples: int) -> Columns:
     time = np.linspace(0.0, 1.0, samples)
     return still(time, np.zeros(samples), motor=0.3 * np.sin(9.0 * time) ** 3)

@@ -73,6 +73,8 @@ SIZES = {
     },
     "inertial_load:folding_arm": {"inertia_kgm2": 0.05},
     "inertial_load:half_filled": {"inertia_kgm2": 0.05},
+    "inertial_load:two_modes": {"inertia_kgm2": 0.05},
+    "inertial_load:dragged_along": {"inertia_kgm2": 0.05},
     "gravity_load:sprung": {"moment_Nm": 0.3, "phase_rad": 0.2},
     "gravity_load:linkage": {"moment_Nm": 0.3, "phase_rad": 0.2},
     "gravity_load:tilting_base": {"moment_Nm": 0.3, "phase_rad": 0.2, "tilt_rad_per_unit": 0.4},

@@ -223,19 +223,40 @@ def test_a_flexible_link_is_an_inertia_when_stiff_and_rings_by_its_own_frequency
     assert gain == pytest.approx(0.05 / (1 - (1.9 / 8.0) ** 2), rel=0.06)
 
 
-def test_what_sways_in_a_vessel_pulls_as_a_damped_swinger() -> None:
-    """At w the swaying part answers by s J (1 + 2 i z u)/(1 - u^2 + 2 i z u), u = w/w_s, beside (1 - s) J."""
+def _swinger(w: float, own: float, ratio: float) -> complex:
+    """What an inertia on a spring answers by at w, over the rigid one: (1 + 2 i z u)/(1 - u^2 + 2 i z u), u = w/w_s."""
+    u = w / own
+    return (1 + 2j * ratio * u) / (1 - u**2 + 2j * ratio * u)
+
+
+@pytest.mark.parametrize(
+    ("form", "law", "expected"),
+    [
+        (
+            "half_filled",
+            {"share": 0.4, "sways_rad_s": 2.0, "damping_ratio": 0.5},
+            0.6 + 0.4 * _swinger(4.0, 2.0, 0.5),
+        ),
+        (
+            "two_modes",
+            {"share": 0.3, "swings_rad_s": 3.0, "apart": 4.0, "damping_ratio": 0.4},
+            0.7 * _swinger(4.0, 3.0, 0.4) + 0.3 * _swinger(4.0, 12.0, 0.4),
+        ),
+        ("dragged_along", {"share": 0.7, "lag_s": 0.3}, 0.3 + 0.7 / (1 + 1.2j)),
+    ],
+)
+def test_what_does_not_keep_up_with_the_joint_pulls_by_its_frequency(
+    form: str, law: dict[str, float], expected: complex
+) -> None:
     motor = 0.8 * np.sin(4.0 * T) * (1 - np.exp(-2.0 * T))
-    law = {"inertia_kgm2": 0.05, "share": 0.4, "sways_rad_s": 2.0, "damping_ratio": 0.5}
-    run = simulate(joint(), T, motor, 0 * T, effects=(EffectSpec("inertial_load:half_filled", law),))
+    hidden = EffectSpec(f"inertial_load:{form}", {"inertia_kgm2": 0.05, **law})
+    run = simulate(joint(), T, motor, 0 * T, effects=(hidden,))
     q = run.pulley_position_rad
     late = T > 2.5
     waves = np.column_stack((np.cos(4.0 * T), np.sin(4.0 * T), np.ones_like(T)))[late]
     moved, pulled = (np.linalg.lstsq(waves, v[late])[0] for v in (q, -run.load_path_Nm))
     found = complex(pulled[0], -pulled[1]) / (complex(moved[0], -moved[1]) * -16.0)
-    u = 4.0 / 2.0
-    expected = 0.05 * (0.6 + 0.4 * (1 + 1j * u) / (1 - u**2 + 1j * u))
-    assert abs(found - expected) < 0.04 * abs(expected)
+    assert abs(found - 0.05 * expected) < 0.04 * abs(0.05 * expected)
 
 
 def test_a_folding_arm_obeys_lagrange(plain: PlantRun) -> None:

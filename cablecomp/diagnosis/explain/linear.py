@@ -110,7 +110,8 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
     answers: list[Best | None] = []
     size = about  # what was worth seeing at one start is about that at the next
     # an event's instants are looked at coarsely where every run is dear
-    for start in h.starts[1::3] if len(h.starts) > 9 and here.fit.problem.fine else h.starts:
+    dear = h.has_instant and here.fit.problem.fine
+    for start in h.starts[1::3] if len(h.starts) > 9 and dear else h.starts:
         found = contribution(here, h, start, size)
         if found is not None:
             d, size = found

@@ -118,6 +118,15 @@ def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
     return _answer(here, h, other) if other is not None and worth else None
 
 
+def in_another_shape(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
+    """What a law promises in the best of the shapes that it is asked for by itself; None where that is not enough more
+    than `now`."""
+    shapes = tuple(Start({**now.values, **f}) for f in h.further)
+    other = best_start(here, replace(h, starts=shapes), float(now.values[h.amount.name]))
+    worth = other is not None and worth_a_shape(other.by_channel, now.by_channel)
+    return _answer(here, h, other) if other is not None and worth else None
+
+
 def _answer(here: Anchor, h: Hypothesis, best: Best) -> Answer:
     values, d, size = best.values, best.d, best.size
     problem = with_entry(here.fit.problem, h, h.entry(values))

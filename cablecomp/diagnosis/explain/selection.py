@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.asked_again import with_better_courses
+from cablecomp.diagnosis.explain.asked_again import with_better_forms
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
@@ -145,7 +145,7 @@ def _carried(
         if others and not any(others[0] is m for m in kept) and not outdoes(fresh[0], others[0], groups):
             kept.append(others[0])
     sharper = searching(fresh[0].fit)
-    again = [with_better_courses(reweighed(m, sharper, groups), groups) for m in kept]
+    again = [with_better_forms(reweighed(m, sharper, groups), groups) for m in kept]
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
     if not carried:
         return None

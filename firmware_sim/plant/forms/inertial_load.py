@@ -1,4 +1,5 @@
-"""Unseen inertia in other forms: at the end of a flexible link, changing with the joint's angle, in part a liquid's."""
+"""Unseen inertia in other forms: at the end of a flexible link, changing with the joint's angle, in part a liquid's, on
+two springs, behind a damper alone."""
 
 from __future__ import annotations
 
@@ -68,4 +69,49 @@ LIQUID = form(
     _liquid,
 )
 
-KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING, LIQUID)
+
+def _on_two_springs(build: Build, p: Mapping[str, float]) -> None:
+    for share, w in ((1.0 - p["share"], p["swings_rad_s"]), (p["share"], p["swings_rad_s"] * p["apart"])):
+        J = share * p["inertia_kgm2"]
+        if J > 0.0:
+            build.tails.append(Tail(J, J * w**2, 2.0 * p["damping_ratio"] * J * w, branch=True))
+
+
+TWO_MODES = form(
+    "inertial_load",
+    "two_modes",
+    "A link that swings in two modes: a share of the inertia at w, the rest at a multiple of it.",
+    (
+        _INERTIA,
+        Parameter("share", "of the inertia that swings in the quicker mode", 0.5, 0.0, 1.0),
+        Parameter("swings_rad_s", "w", 6.0, 1e-3),
+        Parameter("apart", "the quicker mode's pulsation over w", 4.0, 1.0),
+        Parameter("damping_ratio", "of either", 0.3, 0.0),
+    ),
+    ("acceleration",),
+    _on_two_springs,
+)
+
+
+def _dragged_along(build: Build, p: Mapping[str, float]) -> None:
+    follows = p["share"] * p["inertia_kgm2"]
+    build.shafts[build.output]["inertia"] += p["inertia_kgm2"] - follows
+    if follows > 0.0:
+        build.tails.append(Tail(follows, 1e-6 * follows, follows / p["lag_s"], branch=True))
+
+
+DRAGGED = form(
+    "inertial_load",
+    "dragged_along",
+    "A share of the inertia follows through a damper alone, as a wheel on a fluid coupling: J_s ẍ = d (q̇ − ẋ), "
+    "d = J_s/t.",
+    (
+        _INERTIA,
+        Parameter("share", "of the inertia that is dragged along", 0.6, 0.0, 1.0),
+        Parameter("lag_s", "t", 0.2, 1e-4),
+    ),
+    ("acceleration",),
+    _dragged_along,
+)
+
+KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING, LIQUID, TWO_MODES, DRAGGED)
