@@ -152,6 +152,9 @@ def test_a_weight_is_asked_for_on_a_base_that_each_further_channel_turns() -> No
         (most,) = {float(np.max(np.abs(e.columns[leak.channel]))) for e in body.used}
         bends = [v["bend_per_unit"] for v in leak.further if "bend_per_unit" in v]
         assert bends == pytest.approx([-0.6 / most, 0.6 / most])
+        # and a slack by a share of that
+        assert [v["slack_units"] for v in leak.further if "slack_units" in v] == pytest.approx([0.35 * most])
+        assert leak.effect.parameter("slack_units").high == pytest.approx(0.9 * most)
     assert "other:roll_rad" in tilted.acts_through
     assert not any(name.startswith("other") for name in plain.acts_through)
 
