@@ -98,7 +98,9 @@ def test_slcan_over_a_terminal() -> None:
     with terminal() as (master, path):
         port = can_port("slcan", path, 1_000_000, {"sleep_after_open": 0})
         port.open()
-        assert heard(master, b"O\r").startswith(b"C\rS8\r")
+        assert heard(master, b"O\rO\r").startswith(b"C\rS8\r"), (
+            "opened twice: with its bit rate, and as it is"
+        )
         assert port.send(0x100, b"\x11\x33")
         assert heard(master, b"\r") == b"t10021133\r"
         os.write(master, b"z\r\at0011AA\rT1ABCDEF080000000000000000\rr7F70\rt99\r")
