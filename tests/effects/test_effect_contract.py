@@ -24,7 +24,7 @@ ROWS = {
 }  # fmt: skip
 UNITS = {
     "_s": "s",
-    "_rad_s": "rad/s", "_rad": "rad", "_Nm": "N m", "_N": "N", "_m": "m", "_degC": "degC", "_per_K": "1/K",
+    "_rad": "rad", "_Nm": "N m", "_N": "N", "_m": "m", "_degC": "degC", "_per_K": "1/K",
     "_kgm2": "kg m2", "_rad_s": "rad/s",
 }  # fmt: skip
 JOINTS = ("snow-closed-rig", "snow-open-rig", "two-stage-parallel", "two-stage-series")
