@@ -28,10 +28,8 @@ from cablecomp.diagnosis.explain.confidence import (
     Logistic,
     derived,
     features_of_tried,
-    in_wake,
 )
 from cablecomp.diagnosis.explain.conformal import conformal_level
-from cablecomp.effects.catalogue import catalogue
 from cablecomp.errors import InputError, printable
 from cablecomp.trials.calibrated import brier, calibration_error, risk_area
 from cablecomp.trials.shares import write_json
@@ -39,7 +37,7 @@ from cablecomp.trials.shares import write_json
 Floats = NDArray[np.float64]
 SHIPPED = Path(confidence.__file__).with_name("confidence.json")
 WEIGHED = frozenset((
-    "log_gain", "selected_in", "form_z", "form_margin_z", "share_total", "unfollowed", "tries", "z",
+    "log_gain", "selected_in", "form_z", "form_margin_z", "unfollowed", "tries", "z",
 ))  # fmt: skip
 """What the evidence of a weighed effect holds, from which all else that is learnt from follows."""
 FOLDS, FEWEST, MISS = 5, 30, 0.1
@@ -141,26 +139,14 @@ def judged_in(board: Mapping[str, Any]) -> tuple[list[Judged], list[Judged]]:
     weighed, left = [], []
     for row in board["rows"]:
         law = "+".join(row["forms"]) or row["kind"]
-        told = [{k: v for k, v in n["evidence"].items() if v is not None} for n in row["weighed"]]
-        acts = [
-            (_acts_through(n["effect"]), e["share_total"]) if "share_total" in e else None
-            for n, e in zip(row["weighed"], told, strict=True)
-        ]
-        for k, (name, evidence) in enumerate(zip(row["weighed"], told, strict=True)):
-            right, mine = bool(name["right"]), acts[k]
-            if mine is not None and evidence.keys() >= WEIGHED:
-                wake = in_wake(mine, (a for a in (*acts[:k], *acts[k + 1 :]) if a))
-                weighed.append(Judged({**evidence, **derived(evidence), "in_wake": float(wake)}, right, law))
+        for name in row["weighed"]:
+            evidence = {k: v for k, v in name["evidence"].items() if v is not None}
+            if evidence.keys() >= WEIGHED:
+                weighed.append(Judged({**evidence, **derived(evidence)}, bool(name["right"]), law))
             elif evidence.keys() == {"gain", "z", "selected_in"}:
-                of_tried = {**features_of_tried(**evidence), "z": evidence["z"]}
-                left.append(Judged(of_tried, right, law))
+                told = {**features_of_tried(**evidence), "z": evidence["z"]}
+                left.append(Judged(told, bool(name["right"]), law))
     return weighed, left
-
-
-def _acts_through(name: str) -> str:
-    """The covariate that an effect acts through first; the name itself of one that the catalogue has not."""
-    effect = catalogue().get(name.partition(":")[0])
-    return effect.acts_through[0] if effect else name
 
 
 def _best(judged: Sequence[Judged], names: Sequence[str]) -> tuple[float, Checked]:

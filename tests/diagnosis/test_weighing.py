@@ -133,7 +133,6 @@ def test_confidence_goes_the_way_that_each_sign_points() -> None:
         "selected_in": 1,
         "unfollowed_rest": -1,
         "tries_rest": -1,
-        "in_wake": -1,
     }.items():
         moved = {**middle, sign: middle[sign] + learnt().scale[sign]}
         assert (learnt().probability(moved) - usual) * better > 0.01, sign

@@ -52,19 +52,16 @@ def board(effects: int = 1500, seed: int = 1) -> dict[str, Any]:
             "selected_in": float(selected),
             "form_z": float(form_z),
             "form_margin_z": float(margin),
-            "share_total": float(rng.uniform()),
             "unfollowed": float(rng.uniform()),
             "tries": float(rng.uniform(0.0, 2.0)),
         }
         p = 1.0 / (1.0 + np.exp(-(0.3 + 1.5 * min(form_z, margin) - 1.0 * selected)))
         name = {
-            "effect": "crosstalk:other",
             "evidence": {**evidence, "z": float(rng.uniform(2, 9))},
             "right": bool(rng.uniform() < p),
         }
         seen = float(rng.uniform(2, 9))
         left = {
-            "effect": "clock_skew",
             "evidence": {"gain": 0.2, "z": seen, "selected_in": 0.1},
             "right": bool(rng.uniform() < 0.05 * seen),
         }
@@ -76,14 +73,8 @@ def board(effects: int = 1500, seed: int = 1) -> dict[str, Any]:
     return {"schema": 2, "sha256": "ab", **wish, "rows": rows}
 
 
-def as_weighed(evidence: dict[str, float]) -> dict[str, float]:
-    """The evidence of an effect in whose model no other takes off more."""
-    return {**evidence, **derived(evidence), "in_wake": 0.0}
-
-
-def test_only_a_larger_effect_that_acts_first_through_the_same_covariate_makes_a_wake() -> None:
-    """Of a slip, a coupling and a gap beside it that takes off less, as a scoreboard has them; what was tried and left
-    makes none."""
+def test_what_is_learnt_from_follows_from_the_evidence_of_a_scoreboard() -> None:
+    """Of an effect that was weighed; what was tried and left has its own."""
     whole = {
         "log_gain": -1.0,
         "selected_in": 1.0,
@@ -92,21 +83,15 @@ def test_only_a_larger_effect_that_acts_first_through_the_same_covariate_makes_a
         "unfollowed": 0.5,
         "tries": 1.0,
     }
-    names: list[dict[str, Any]] = [
-        {"effect": effect, "evidence": {**whole, "share_total": share, "z": 3.0}, "right": True}
-        for effect, share in (("clamp_slip", 0.3), ("series_compliance", 0.2), ("termination_backlash", 0.1))
+    names = [
+        {"evidence": {**whole, "z": 3.0}, "right": True},
+        {"evidence": {"gain": 0.9, "z": 9.0, "selected_in": 1.0}, "right": False},
     ]
-    tried = {
-        "effect": "nonlinear_cable",
-        "evidence": {"gain": 0.9, "z": 9.0, "selected_in": 1.0},
-        "right": False,
-    }
-    weighed, left = judged_in({"rows": [{"forms": ["a"], "kind": "single", "weighed": [*names, tried]}]})
-    assert [j.evidence["in_wake"] for j in weighed] == [0.0, 0.0, 1.0]
-    assert [j.evidence["lead"] for j in weighed] == [2.0] * 3
-    np.testing.assert_allclose(weighed[0].evidence["tries_rest"], 0.9)
-    np.testing.assert_allclose(weighed[0].evidence["unfollowed_rest"], 0.45)
-    assert len(left) == 1
+    (weighed,), (left,) = judged_in({"rows": [{"forms": ["a"], "kind": "single", "weighed": names}]})
+    found = [weighed.evidence[name] for name in ("lead", "tries_rest", "unfollowed_rest")]
+    np.testing.assert_allclose(found, [2.0, 0.9, 0.45])
+    assert weighed.right
+    assert not left.right
 
 
 def test_what_is_learnt_holds_on_laws_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -120,7 +105,7 @@ def test_what_is_learnt_holds_on_laws_left_out(tmp_path: Path, capsys: pytest.Ca
     assert found["learnt_on"]["laws"] == len(LAWS)
     assert found["learnt_on"]["runs"][0]["seed"] == 1
     fresh = board(2000, 2)["rows"]
-    named = [(as_weighed(r["weighed"][0]["evidence"]), r["weighed"][0]["right"]) for r in fresh]
+    named = [({**(e := r["weighed"][0]["evidence"]), **derived(e)}, r["weighed"][0]["right"]) for r in fresh]
     left = [(features_of_tried(**r["weighed"][1]["evidence"]), r["weighed"][1]["right"]) for r in fresh]
     for model, told in ((logistic(found), named), (logistic(found["tried"]), left)):
         assert calibration_error([model.probability(e) for e, _ in told], [r for _, r in told]) < 0.05

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.confidence import features, in_wake, learnt
+from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
@@ -68,31 +68,23 @@ def weigh(
     able = {t.term.name for r in selection.rounds for t in r.tried if t.difference.gain > 0.0}
     pool = [h for h in found.pool if h.name in able]
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
-    bare = {t.name: without(final, t, selection.groups) for t in terms}
-    share = {t.name: _share(selection, _gone(selection, bare[t.name], final)) for t in terms}
-    acts = {t.name: (t.effect.acts_through[0], share[t.name]) for t in terms}
-    wake = {n: in_wake(acts[n], (a for other, a in acts.items() if other != n)) for n in acts}
-    weighed = [
-        _weighed(found, t, bare[t.name], wake[t.name], pool, left, locate, share_left, rng) for t in terms
-    ]
+    weighed = [_weighed(found, t, pool, left, locate, share_left, rng) for t in terms]
     return sorted(weighed, key=lambda w: -w.confidence)
 
 
 def _weighed(
     found: Search,
     term: Hypothesis,
-    bare: Model | None,
-    wake: bool,
     pool: Sequence[Hypothesis],
     left: Location,
     locate: Locate,
     share_left: float,
     rng: np.random.Generator,
 ) -> Weighed:
-    """One effect of the final model; `bare`: the model without it, `wake`: `confidence.in_wake`, `pool`: what may stand
-    in for it."""
+    """One effect of the final model, `pool`: what may stand in for it."""
     selection = found.selection
     final, groups = selection.final, selection.groups
+    bare = without(final, term, groups)
     own, instead = ALONE, Rivals()
     if bare is not None:
         others = [t for t in bare.terms if isinstance(t, Hypothesis)]
@@ -119,7 +111,6 @@ def _weighed(
         at_bound=_at_bound(final, term),
         tries=len(term.starts),
         terms=sum(isinstance(t, Hypothesis) for t in final.terms),
-        in_wake=wake,
     )
     depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
     confidence, why_not = 0.0, "its amount is not told from none"
