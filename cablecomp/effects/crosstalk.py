@@ -8,6 +8,7 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_deflection
+from cablecomp.effects.lag import lagged
 
 
 @term(
@@ -20,22 +21,15 @@ def _arrive(c: Any, p: Any, s: Any) -> None:
     [s], place of the channel among the others; s: whether a reading came before, what had arrived of it late, that
     reading and its time. The channel goes straight from sample to sample; without a reading nothing arrives."""
     other = c.other[int(p.channel)]
-    late = other
-    if p.lag > 0.0:
-        fresh = c.first or s.known == 0.0
-        if math.isnan(other):
-            if c.commit and c.first:
-                s.known = 0.0
-        else:
-            passed = 0.0 if fresh else c.time - s.time
-            if passed > 0.0:
-                behind = p.lag * (other - s.other) / passed
-                late = other - behind + (s.late - s.other + behind) * math.exp(-passed / p.lag)
-            elif not fresh:
-                late = s.late
-            if c.commit:
-                s.known, s.late, s.other, s.time = 1.0, late, other, c.time
-    if not math.isnan(other):
+    if math.isnan(other):
+        if c.first and c.commit:
+            s.known = 0.0
+    else:
+        late = other
+        if p.lag > 0.0 and s.known != 0.0 and not c.first:
+            late = lagged(s.late, s.other, other, c.time - s.time, p.lag) if c.time > s.time else s.late
+        if c.commit:
+            s.known, s.late, s.other, s.time = 1.0, late, other, c.time
         arrives = late - min(max(late, -p.slack), p.slack)
         arrives *= 1.0 + p.bend * arrives
         c.moment -= p.load_coefficient * (1.0 + p.growth * c.joint) * arrives

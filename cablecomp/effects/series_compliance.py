@@ -3,12 +3,12 @@ loaded more, or in their own time."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_compliance
+from cablecomp.effects.lag import lagged
 
 HERTZ = 2.0 / 3.0
 """Power of the load by which a contact yields."""
@@ -34,13 +34,12 @@ def _give_way_late(c: Any, p: Any, s: Any) -> None:
     straight from sample to sample."""
     path = c.load - c.moment
     passed = 0.0 if c.first else c.time - s.time
-    slope = (path - s.path) / passed if passed > 0.0 else 0.0
     parts = 3 if p.decades > 0.0 else 1
     for k in range(parts):
         lag = p.lag * 10.0 ** (0.5 * p.decades * (k - 1))
         late = path if c.first else s.late[k]
         if passed > 0.0:
-            late = path - slope * lag + (late - s.path + slope * lag) * math.exp(-passed / lag)
+            late = lagged(late, s.path, path, passed, lag)
         c.reading += p.compliance * late / parts
         if c.commit:
             s.late[k] = late
