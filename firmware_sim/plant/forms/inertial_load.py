@@ -11,6 +11,12 @@ from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 _INERTIA = Parameter("inertia_kgm2", "J", low=0.0, neutral=0.0)
 
 
+def _swinger(build: Build, inertia: float, w: float, ratio: float) -> None:
+    """Hang an inertia on the pulley that swings at w, damped by that ratio; none of none."""
+    if inertia > 0.0:
+        build.tails.append(Tail(inertia, inertia * w**2, 2.0 * ratio * inertia * w, branch=True))
+
+
 def _flexible(build: Build, p: Mapping[str, float]) -> None:
     if p["inertia_kgm2"] > 0.0:
         build.tails.append(
@@ -49,10 +55,9 @@ FOLDING = form(
 
 
 def _liquid(build: Build, p: Mapping[str, float]) -> None:
-    sways, w = p["share"] * p["inertia_kgm2"], p["sways_rad_s"]
+    sways = p["share"] * p["inertia_kgm2"]
     build.shafts[build.output]["inertia"] += p["inertia_kgm2"] - sways
-    if sways > 0.0:
-        build.tails.append(Tail(sways, sways * w**2, 2.0 * p["damping_ratio"] * sways * w, branch=True))
+    _swinger(build, sways, p["sways_rad_s"], p["damping_ratio"])
 
 
 LIQUID = form(
@@ -71,10 +76,9 @@ LIQUID = form(
 
 
 def _on_two_springs(build: Build, p: Mapping[str, float]) -> None:
-    for share, w in ((1.0 - p["share"], p["swings_rad_s"]), (p["share"], p["swings_rad_s"] * p["apart"])):
-        J = share * p["inertia_kgm2"]
-        if J > 0.0:
-            build.tails.append(Tail(J, J * w**2, 2.0 * p["damping_ratio"] * J * w, branch=True))
+    quick, w = p["share"] * p["inertia_kgm2"], p["swings_rad_s"]
+    _swinger(build, p["inertia_kgm2"] - quick, w, p["damping_ratio"])
+    _swinger(build, quick, w * p["apart"], p["damping_ratio"])
 
 
 TWO_MODES = form(
