@@ -138,3 +138,13 @@ def second_differences(time: Floats, q: Floats) -> Floats:
 
 def resting(time: Floats, **more: Floats) -> dict[str, Floats]:
     return still(time, np.zeros_like(time), **more)
+
+
+def fed_with(config: JointConfig, columns: Columns, load: Floats) -> Floats:
+    """Joint angle of the plain drive under another load."""
+    return run(config, {**columns, "joint_torque_Nm": load})["joint_position_rad"]
+
+
+def unit(config: JointConfig) -> float:
+    """R T0 of the last stage [N m]."""
+    return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N

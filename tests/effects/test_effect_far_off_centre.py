@@ -7,19 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_cases import joint, register_alone, run, second_differences, still
+from effect_cases import joint, register_alone, run, second_differences, still, unit
 from scipy.optimize import brentq
 
-from cablecomp.config import JointConfig
 from cablecomp.effects import term, with_effects
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
 
 PHASE = 0.6
-
-
-def unit(config: JointConfig) -> float:
-    return config.drive.stage[-1].output_radius_m * config.drive.stage[-1].pretension_N
 
 
 @pytest.mark.parametrize("share", [0.01, 0.25, 0.6, 0.9, -0.9])

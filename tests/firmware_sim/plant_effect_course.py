@@ -18,3 +18,8 @@ def play(name: str | None, **parameters: float) -> PlantRun:
     """The moving test run with one effect."""
     effects = () if name is None else (EffectSpec(name, parameters),)
     return simulate(joint(), T, MOTOR, LOAD, effects=effects, temperature_degC=WARM, other_1=OTHER)
+
+
+def carried(run: PlantRun) -> np.ndarray:
+    """What the cables carry, N·m."""
+    return np.asarray(joint().stages[0].output_radius_m * (run.tension_h_N - run.tension_l_N))

@@ -6,16 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from plant_effect_course import LOAD, MOTOR, OTHER, WARM, T, play
+from plant_effect_course import LOAD, MOTOR, OTHER, WARM, T, carried, play
 from plant_joints import clock, course, joint
 from scipy.interpolate import CubicSpline
 
 from firmware_sim.plant import EffectSpec, PlantRun, simulate
-
-
-def _carried(run: PlantRun) -> np.ndarray:
-    """What the cables carry, N·m."""
-    return np.asarray(joint().stages[0].output_radius_m * (run.tension_h_N - run.tension_l_N))
 
 
 def _swept(effect: EffectSpec, motor: np.ndarray, dt: float = 0.01) -> PlantRun:
@@ -26,11 +21,11 @@ def test_dahls_friction_comes_to_its_limit_exponentially() -> None:
     motor = course(0.0, 0.02, points=400)
     run = _swept(EffectSpec("bearing_friction:dahl", {"torque_Nm": 0.05, "presliding_rad": 1e-3}), motor)
     turned = run.pulley_position_rad - run.pulley_position_rad[0]
-    np.testing.assert_allclose(_carried(run), 0.05 * np.expm1(-turned / 1e-3), atol=3e-5)
+    np.testing.assert_allclose(carried(run), 0.05 * np.expm1(-turned / 1e-3), atol=3e-5)
     back = course(0.0, 0.02, 0.0, points=400)
     run = _swept(EffectSpec("bearing_friction:dahl", {"torque_Nm": 0.05, "presliding_rad": 1e-3}), back)
     turned = run.pulley_position_rad[400] - run.pulley_position_rad[400:]
-    np.testing.assert_allclose(_carried(run)[400:], 0.05 * (1 - 2 * np.exp(-turned / 1e-3)), atol=5e-4)
+    np.testing.assert_allclose(carried(run)[400:], 0.05 * (1 - 2 * np.exp(-turned / 1e-3)), atol=5e-4)
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.4, 2.0])
@@ -45,7 +40,7 @@ def test_lugre_slides_at_stribecks_curve_with_a_viscous_part(speed: float) -> No
     dt = 1.0 / 400 / speed  # the pulley turns by one radian
     run = _swept(EffectSpec("bearing_friction:lugre", law), course(0.0, 2.0, points=400), dt)
     expected = 0.05 * (1 + 0.5 * math.exp(-((speed / 0.3) ** 2))) + 0.01 * speed
-    np.testing.assert_allclose(-_carried(run)[200:395], expected, rtol=2e-3)
+    np.testing.assert_allclose(-carried(run)[200:395], expected, rtol=2e-3)
 
 
 def test_lugre_gives_before_it_slides_and_never_gives_back_more_than_it_took() -> None:
@@ -54,8 +49,8 @@ def test_lugre_gives_before_it_slides_and_never_gives_back_more_than_it_took() -
     run = _swept(EffectSpec("bearing_friction:lugre", law), motor)
     turned = run.pulley_position_rad
     first = slice(1, 40)
-    np.testing.assert_allclose(-_carried(run)[first], 0.05 / 1e-3 * turned[first], rtol=0.03)
-    work = np.cumsum(-0.5 * (_carried(run)[1:] + _carried(run)[:-1]) * np.diff(turned))
+    np.testing.assert_allclose(-carried(run)[first], 0.05 / 1e-3 * turned[first], rtol=0.03)
+    work = np.cumsum(-0.5 * (carried(run)[1:] + carried(run)[:-1]) * np.diff(turned))
     assert np.min(work) > -1e-9
     assert work[-1] > 0.04 * 0.015
 
@@ -64,8 +59,8 @@ def test_a_lip_seal_holds_back_more_one_way() -> None:
     motor = course(0.0, 1.0, -1.0, points=200)
     law = {"torque_Nm": 0.05, "presliding_rad": 1e-4, "skew": 0.4}
     run = _swept(EffectSpec("bearing_friction:unlike_ways", law), motor)
-    np.testing.assert_allclose(_carried(run)[20:195], -0.05 * 1.4, rtol=1e-3)
-    np.testing.assert_allclose(_carried(run)[220:395], 0.05 * 0.6, rtol=1e-3)
+    np.testing.assert_allclose(carried(run)[20:195], -0.05 * 1.4, rtol=1e-3)
+    np.testing.assert_allclose(carried(run)[220:395], 0.05 * 0.6, rtol=1e-3)
 
 
 def _crossing(form: str, load: np.ndarray, motor: np.ndarray, **parameters: float) -> np.ndarray:
@@ -197,127 +192,6 @@ def test_packets_wait_as_long_as_they_should_on_average(plain: PlantRun) -> None
         quick = np.abs(speed) > 0.5
         ages.append(np.mean(((plain.joint_position_rad - shown) / speed)[quick][5:]))
     assert np.mean(ages) == pytest.approx(0.03, rel=0.15)
-
-
-def test_a_flexible_link_is_an_inertia_when_stiff_and_rings_by_its_own_frequency() -> None:
-    rigid = play("inertial_load", inertia_kgm2=0.02)
-    stiff = play(
-        "inertial_load:flexible_link", inertia_kgm2=0.02, stiffness_Nm_per_rad=1e5, damping_Nms_per_rad=10.0
-    )
-    added = rigid.load_path_Nm - LOAD
-    assert np.max(np.abs(stiff.load_path_Nm - rigid.load_path_Nm)[20:]) < 0.03 * np.max(np.abs(added))
-    # a sine at w meets the inertia J/(1 − (w/w0)²) of an undamped swinger with w0² = k/J; the pulley turns at 1.9 rad/s
-    motor = 0.8 * np.sin(1.9 * T)
-    swing = {"inertia_kgm2": 0.05, "stiffness_Nm_per_rad": 0.05 * 8.0**2, "damping_Nms_per_rad": 0.02}
-    run = simulate(
-        joint(),
-        T,
-        motor * (1 - np.exp(-T)),
-        0 * T,
-        effects=(EffectSpec("inertial_load:flexible_link", swing),),
-    )
-    q = run.pulley_position_rad
-    reaction, acceleration = -run.load_path_Nm, np.gradient(np.gradient(q, T), T)
-    late = T > 1.0
-    gain = float(reaction[late] @ acceleration[late] / (acceleration[late] @ acceleration[late]))
-    assert gain == pytest.approx(0.05 / (1 - (1.9 / 8.0) ** 2), rel=0.06)
-
-
-def _swinger(w: float, own: float, ratio: float) -> complex:
-    """What an inertia on a spring answers by at w, over the rigid one: (1 + 2 i z u)/(1 - u^2 + 2 i z u), u = w/w_s."""
-    u = w / own
-    return (1 + 2j * ratio * u) / (1 - u**2 + 2j * ratio * u)
-
-
-@pytest.mark.parametrize(
-    ("form", "law", "expected"),
-    [
-        (
-            "half_filled",
-            {"share": 0.4, "sways_rad_s": 2.0, "damping_ratio": 0.5},
-            0.6 + 0.4 * _swinger(4.0, 2.0, 0.5),
-        ),
-        (
-            "two_modes",
-            {"share": 0.3, "swings_rad_s": 3.0, "apart": 4.0, "damping_ratio": 0.4},
-            0.7 * _swinger(4.0, 3.0, 0.4) + 0.3 * _swinger(4.0, 12.0, 0.4),
-        ),
-        ("dragged_along", {"share": 0.7, "lag_s": 0.3}, 0.3 + 0.7 / (1 + 1.2j)),
-    ],
-)
-def test_what_does_not_keep_up_with_the_joint_pulls_by_its_frequency(
-    form: str, law: dict[str, float], expected: complex
-) -> None:
-    motor = 0.8 * np.sin(4.0 * T) * (1 - np.exp(-2.0 * T))
-    hidden = EffectSpec(f"inertial_load:{form}", {"inertia_kgm2": 0.05, **law})
-    run = simulate(joint(), T, motor, 0 * T, effects=(hidden,))
-    q = run.pulley_position_rad
-    late = T > 2.5
-    waves = np.column_stack((np.cos(4.0 * T), np.sin(4.0 * T), np.ones_like(T)))[late]
-    moved, pulled = (np.linalg.lstsq(waves, v[late])[0] for v in (q, -run.load_path_Nm))
-    found = complex(pulled[0], -pulled[1]) / (complex(moved[0], -moved[1]) * -16.0)
-    assert abs(found - 0.05 * expected) < 0.04 * abs(0.05 * expected)
-
-
-def test_a_folding_arm_obeys_lagrange(plain: PlantRun) -> None:
-    run = play("inertial_load:folding_arm", inertia_kgm2=0.05, swing=0.6, phase_rad=0.3)
-    q = run.pulley_position_rad
-    speed = np.gradient(q, T)
-    momentum = 0.05 * (1 + 0.6 * np.cos(q - 0.3)) * speed
-    expected = -(np.gradient(momentum, T) + 0.5 * 0.05 * 0.6 * np.sin(q - 0.3) * speed**2)
-    change = run.load_path_Nm - LOAD
-    assert np.max(np.abs(change - expected)[20:-5]) < 0.03 * np.max(np.abs(expected))
-
-
-def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) -> None:
-    q = plain.pulley_position_rad
-    pose = 0.5 * MOTOR
-    smooth, follower = 0.15, [OTHER[0]]
-    fine = np.linspace(0, T[-1], 40 * (len(T) - 1) + 1)
-    for x in np.interp(fine, T, OTHER)[1:]:
-        follower.append(follower[-1] + (x - follower[-1]) * (fine[1] / smooth))
-    late = np.asarray(follower)[::40]
-    drawn = [OTHER[0]]  # 0.3 behind the reading where that has come 0.3 or more from it
-    for x in OTHER[1:]:
-        drawn.append(max(x - 0.3, drawn[-1]) if x > drawn[-1] else min(x + 0.3, drawn[-1]))
-    cases = {
-        "gravity_load:sprung": (
-            {"moment_Nm": 0.3, "phase_rad": 0.2, "spring_share": 0.5},
-            -0.3 * np.sin(q + 0.2) - 0.15 * q,
-        ),
-        "gravity_load:linkage": (
-            {"moment_Nm": 0.3, "phase_rad": 0.2, "second": 0.5, "second_phase_rad": 1.0},
-            -0.3 * (np.sin(q + 0.2) + 0.5 * np.sin(2 * q + 1.0)),
-        ),
-        "gravity_load:tilting_base": (
-            {"moment_Nm": 0.3, "phase_rad": 0.2, "tilt_rad_per_unit": 0.7},
-            -0.3 * np.sin(q + 0.2 + 0.7 * OTHER),
-        ),
-        "gravity_load:leaning_base": (
-            {"moment_Nm": 0.3, "phase_rad": 0.2, "lean_rad_per_unit": 0.7, "upright_rad": 0.3},
-            -0.3 * np.cos(0.3 + 0.7 * OTHER) * np.sin(q + 0.2),
-        ),
-        "crosstalk:lagged": ({"load_coefficient": 0.3, "lag_s": smooth}, 0.3 * late),
-        "crosstalk:quadratic": (
-            {"load_coefficient": 0.3, "bend_per_unit": -0.5},
-            0.3 * OTHER * (1 - 0.5 * OTHER),
-        ),
-        "crosstalk:touching": (
-            {"load_coefficient": 0.3, "slack_units": 0.4},
-            0.3 * np.sign(OTHER) * np.maximum(np.abs(OTHER) - 0.4, 0.0),
-        ),
-        "crosstalk:dragged": (
-            {"load_coefficient": 0.3, "friction_units": 0.3},
-            0.3 * np.asarray(drawn),
-        ),
-        "crosstalk:stopped": ({"load_coefficient": 0.3, "stop_units": 0.4}, 0.12 * np.tanh(OTHER / 0.4)),
-        "crosstalk:posed": ({"load_coefficient": 0.3, "phase_rad": 0.4}, 0.3 * OTHER * np.cos(pose + 0.4)),
-    }
-    for name, (parameters, expected) in cases.items():
-        run = play(name, **parameters)
-        change = run.load_path_Nm - LOAD
-        assert np.max(np.abs(change - expected)[2:]) < 0.01 * np.max(np.abs(expected)), name
-        np.testing.assert_allclose(_carried(run), run.load_path_Nm, atol=2e-5)
 
 
 def test_strangers_follow_their_equations(plain: PlantRun) -> None:
