@@ -87,7 +87,7 @@ class Parameter:
     log-spaced range a diagnosis asks. `goes_on`: what it does grows without end, so that a diagnosis keeps it only
     where it is told from none. `by_itself`: an amount that is asked for without the effect's others. `per_reading`:
     low..high are what the largest reading of the channel that the effect reads does (of a slack: shares of that
-    reading): what a unit of it means, no configuration tells.
+    reading): what a unit of it means, no configuration tells. `needs`: a channel without which it says nothing.
     """
 
     name: str
@@ -116,6 +116,7 @@ class Parameter:
     goes_on: bool = False
     by_itself: bool = False
     per_reading: bool = False
+    needs: str = ""
 
     @property
     def shape(self) -> bool:

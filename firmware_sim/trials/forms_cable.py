@@ -40,6 +40,18 @@ def _creep_in_two(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"fraction": 1.0}, 0.1, 0.5 / (share + (1.0 - share) * _WHOLE))
 
 
+def _run_in(rng: np.random.Generator, scene: Scene) -> Shape:
+    way = float(np.abs(np.diff(scene.course.seen.motor_rad)).sum())
+    return Shape({"travel_rad": log_uniform(rng, 0.3, 2.0) * way}, {"fraction": 1.0}, 0.12, 0.4)
+
+
+def _under_load(rng: np.random.Generator, scene: Scene) -> Shape:
+    usual = max(float(np.mean(np.abs(scene.course.seen.load_Nm))), 1e-9)
+    return Shape(
+        {"usual_Nm": usual, "time_constant_s": _span(scene)}, {"fraction": 1.0}, 0.1, 0.5 / np.cbrt(_WHOLE)
+    )
+
+
 def _reach(scene: Scene, reference: float) -> float:
     return max(float(np.max(np.abs(scene.course.temperature_degC - reference))), 1e-3)
 
@@ -205,6 +217,8 @@ CABLE = (
     Suspect("pretension_relaxation:exponential", ANY, _bedding_in, closed=True),
     Suspect("pretension_relaxation:warm_creep", ANY, _warm_creep, warm=True, closed=True),
     Suspect("pretension_relaxation:in_two", ANY, _creep_in_two, closed=True),
+    Suspect("pretension_relaxation:by_travel", ANY, _run_in, closed=True),
+    Suspect("pretension_relaxation:under_load", ANY, _under_load, closed=True),
     Suspect("thermal_pretension:lagged", ANY, _late_frame, warm=True, closed=True),
     Suspect("thermal_pretension:quadratic", ANY, _bent, warm=True, closed=True),
     Suspect("thermal_pretension:transient", ANY, _transient, warm=True, closed=True),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from effect_cases import Floats, excitation, joint, resting, run, still
+from scipy.integrate import quad
 
 from cablecomp.effects import catalogue
 
@@ -29,6 +31,37 @@ def test_relaxation_lowers_the_tensions_by_its_law(name: str) -> None:
     assert found["tension_h_N"] == pytest.approx(expected, rel=1e-9)
     assert found["tension_l_N"] == pytest.approx(expected, rel=1e-9)
     assert found["deflection_rad"] == pytest.approx(np.zeros_like(time), abs=1e-12)
+
+
+def test_creep_goes_on_evenly_where_its_first_stage_has_come_to_rest() -> None:
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 60.0, 601)
+    law = {"fraction": 0.04, "time_constant_s": 3.0, "power": -20.0, "steady": 0.1}
+    found = run(config, resting(time), ("pretension_relaxation", law))["tension_h_N"]
+    first = 21.0 / 20.0 * (1.0 - (1.0 + time / 63.0) ** -20.0)
+    expected = config.drive.stage[0].pretension_N * (1.0 - 0.04 * (first + 0.1 * time / 3.0))
+    assert found == pytest.approx(late_by_one(expected), rel=1e-9)
+    assert -np.gradient(found, time)[-1] == pytest.approx(33.54 * 0.04 * 0.1 / 3.0, rel=1e-3)
+
+
+def test_warmth_quickens_creep_and_a_missing_reading_does_not() -> None:
+    """The material's own time by an integral of its own."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 20.0, 2001)
+    warm = 20.0 + 10.0 * np.sin(0.5 * time)
+    law = {"fraction": 0.04, "time_constant_s": 3.0, "quickening_per_K": 0.1}
+    columns = resting(time) | {"temperature_degC": warm}
+    found = run(config, columns, ("pretension_relaxation", law))["tension_h_N"]
+    own = [quad(lambda t: math.exp(math.sin(0.5 * t)), 0.0, end, limit=200)[0] for end in time[::200]]
+    expected = config.drive.stage[0].pretension_N * (1.0 - 0.04 * np.log1p(np.array(own) / 3.0))
+    assert found[201::200] == pytest.approx(expected[1:-1], rel=1e-4)  # within a sample
+    unread = resting(time) | {"temperature_degC": np.full_like(time, np.nan)}
+    plain = run(config, resting(time), ("pretension_relaxation", {**law, "quickening_per_K": 0.0}))
+    assert run(config, unread, ("pretension_relaxation", law))["tension_h_N"] == pytest.approx(
+        plain["tension_h_N"], rel=1e-12
+    )
+    hot = resting(time) | {"temperature_degC": np.full_like(time, 1e5)}
+    assert np.all(np.isfinite(run(config, hot, ("pretension_relaxation", law))["tension_h_N"]))
 
 
 def test_creep_that_began_before_the_recording_goes_on() -> None:

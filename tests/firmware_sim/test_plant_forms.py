@@ -21,6 +21,8 @@ SIZES = {
     "pretension_relaxation:exponential": {"fraction": 0.05, "time_constant_s": 2.0},
     "pretension_relaxation:warm_creep": {"fraction": 0.05, "time_constant_s": 0.5},
     "pretension_relaxation:in_two": {"fraction": 0.05, "time_constant_s": 0.5, "lasts_s": 5.0},
+    "pretension_relaxation:by_travel": {"fraction": 0.05, "travel_rad": 2.0},
+    "pretension_relaxation:under_load": {"fraction": 0.05, "time_constant_s": 2.0},
     "thermal_pretension:lagged": {"coefficient_per_K": 0.02, "lag_s": 1.0},
     "thermal_pretension:quadratic": {"coefficient_per_K": 0.02, "bend_per_K": 0.1},
     "thermal_pretension:transient": {"coefficient_per_K": 0.02, "quick_s": 0.1, "slow_s": 2.0},

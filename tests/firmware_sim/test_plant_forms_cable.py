@@ -52,6 +52,31 @@ def test_a_termination_beds_in_while_the_cable_creeps_on() -> None:
         np.testing.assert_allclose(_still(law, 0 * T + 20.0, start), expected, rtol=1e-6)
 
 
+def _run(effect: EffectSpec, motor: np.ndarray, load: np.ndarray, start_s: float = 0.0) -> np.ndarray:
+    """Mean tension over T0 of a joint that is run; what one cable gains the other loses."""
+    config = joint()
+    run = simulate(config, T + start_s, motor, load, effects=(effect,))
+    return np.asarray(0.5 * (run.tension_h_N + run.tension_l_N) / config.stages[0].pretension_N)
+
+
+def test_a_new_cable_beds_in_by_the_way_that_it_is_run() -> None:
+    law = EffectSpec("pretension_relaxation:by_travel", {"fraction": 0.08, "travel_rad": 3.0})
+    there_and_back = 0.8 * np.abs((T - 1.0) % 2.0 - 1.0)  # 0.8 rad in every second
+    for start in (0.0, 5.0):
+        expected = 1 - 0.08 * (1 - np.exp(-0.8 * (T + start) / 3.0))
+        np.testing.assert_allclose(_run(law, there_and_back, 0.0 * T, start), expected, atol=3e-4)
+
+
+def test_a_cable_creeps_as_it_is_loaded() -> None:
+    law = EffectSpec(
+        "pretension_relaxation:under_load", {"fraction": 0.05, "usual_Nm": 0.2, "time_constant_s": 4.0}
+    )
+    load = np.where(T < 1.0, 0.2, 0.0)  # then nothing more
+    without = _run(EffectSpec("pretension_relaxation:under_load", {"fraction": 0.0}), 0.0 * T, load)
+    lost = without - _run(law, 0.0 * T, load)
+    np.testing.assert_allclose(lost, 0.05 * np.cbrt(np.minimum(T, 1.0) / 4.0), atol=6e-4)
+
+
 def test_a_frame_that_closes_a_gap_pulls_from_then_on() -> None:
     law = EffectSpec("thermal_pretension:from_contact", {"coefficient_per_K": -0.02, "contact_degC": 21.0})
     expected = np.where(WARM > 21.0, 1 - 0.02 * (WARM - 21.0), 1.0)

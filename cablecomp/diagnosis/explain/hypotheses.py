@@ -179,7 +179,8 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
     """All effects that the configuration does not hold yet and that these recordings could show."""
     held = {entry.id for entry in config.effect}
     told, vague = loaded(config, evidence), vague_drive(of_drive(config))
-    at_motor = load_channel(config, evidence[0].columns) == MOTOR
+    load = load_channel(config, evidence[0].columns)
+    at_motor = load == MOTOR
     found = []
     for effect in catalogue().values():
         if effect.id in held or (effect.felt_by_motor and at_motor):
@@ -187,7 +188,10 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
         mute = {
             p.name
             for p in effect.parameters
-            if (p.of_load and not told) or (p.of_known_drive and vague) or (p.of_motor_load and not at_motor)
+            if (p.of_load and not told)
+            or (p.of_known_drive and vague)
+            or (p.of_motor_load and not at_motor)
+            or (p.needs and not _tells(evidence, p.needs, load))
         }
         # a shape goes with its amount
         asked = tuple(p for p in effect.parameters if not mute & {p.name, p.of})

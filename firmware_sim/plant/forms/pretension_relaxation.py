@@ -7,7 +7,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import PRETENSION_H, PRETENSION_L, TEMPERATURE, TIME
+from firmware_sim.plant.columns import (
+    JOINT_TORQUE,
+    MOTOR_ANGLE,
+    PRETENSION_H,
+    PRETENSION_L,
+    TEMPERATURE,
+    TIME,
+)
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 from firmware_sim.plant.records import Floats
 
@@ -120,4 +127,51 @@ IN_TWO = form(
     _in_two,
 )
 
-KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM, IN_TWO)
+
+def _by_travel(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        time = inputs[:, TIME]
+        went = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(inputs[:, MOTOR_ANGLE])))])
+        # before the recording it went as it goes in it
+        before = max(time[0], 0.0) * went[-1] / max(time[-1] - time[0], 1e-9)
+        return np.asarray(-p["fraction"] * np.expm1(-(before + went) / p["travel_rad"]))
+
+    lowered(build, loss)
+
+
+BY_TRAVEL = form(
+    "pretension_relaxation",
+    "by_travel",
+    "A new cable beds in as it is run: T0 (1 − a (1 − e^(−s/s_c))), s the way of the motor since the clock's zero.",
+    (_FRACTION, Parameter("travel_rad", "s_c", 20.0, 1e-3)),
+    ("time",),
+    _by_travel,
+)
+
+
+def _under_load(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        time = np.maximum(inputs[:, TIME], 0.0)
+        load = np.abs(inputs[:, JOINT_TORQUE]) / p["usual_Nm"]
+        steps = 0.5 * (load[1:] + load[:-1]) * np.diff(time)
+        borne = time[0] * float(np.mean(load)) + np.concatenate([[0.0], np.cumsum(steps)])
+        return np.asarray(p["fraction"] * np.cbrt(borne / p["time_constant_s"]))
+
+    lowered(build, loss)
+
+
+UNDER_LOAD = form(
+    "pretension_relaxation",
+    "under_load",
+    "Creep that the load drives: T0 (1 − a (∫|M| dt/(M_u t_c))^(1/3)) since the clock's zero, before the recording "
+    "under its mean load.",
+    (
+        _FRACTION,
+        Parameter("usual_Nm", "M_u", 1.0, 1e-9),
+        Parameter("time_constant_s", "t_c", 30.0, 1e-3),
+    ),
+    ("time", "load"),
+    _under_load,
+)
+
+KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM, IN_TWO, BY_TRAVEL, UNDER_LOAD)
