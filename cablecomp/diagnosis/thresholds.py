@@ -325,6 +325,14 @@ class Thresholds:
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""
+    less_by_angle: float = 0.2
+    """Share of a joint's friction that the joint's angle alone would not have, from which on it counts that the motor's
+    torque would have more of it: what the motor feels of it the cable bears (trials seeds 703 to 710, of 40 such names:
+    five that were looked at again disagree by two deviations, four of them wrong)."""
+    z_channels: float = 2.0
+    """Standard deviations by which the two have to disagree for that."""
+    told_by_torque: float = 0.1
+    """Part of what tells it that the torque has to hold for that."""
     z_unbeaten: float = 2.0
     """Standard errors by which it is not beaten all the same, if it predicts better by that many where either may have
     another form of its own (a made-up cable that stiffens in a law of its own: 2.6, the right one)."""

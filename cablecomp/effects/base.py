@@ -88,6 +88,8 @@ class Parameter:
     where it is told from none. `by_itself`: an amount that is asked for without the effect's others. `per_reading`:
     low..high are what the largest reading of the channel that the effect reads does (of a slack: shares of that
     reading): what a unit of it means, no configuration tells. `needs`: a channel without which it says nothing.
+    `within_recording`: a time that a diagnosis asks up to the longest recording's; from there on what follows is a
+    drift, whatever it follows, and another effect the better word.
     """
 
     name: str
@@ -117,6 +119,7 @@ class Parameter:
     by_itself: bool = False
     per_reading: bool = False
     needs: str = ""
+    within_recording: bool = False
 
     @property
     def shape(self) -> bool:
@@ -244,6 +247,8 @@ class Effect:
     felt_by_motor: bool = False
     """It turns the joint or holds it, so that the motor feels it: a load that is read at the motor holds it already,
     and the cables' tensions do not change by it."""
+    drags_joint: bool = False
+    """It is a friction of the joint itself: what the motor feels of it, the cable bears and yields to."""
     posture: bool = False
     """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
     at_pretension: Callable[[Mapping[str, float], float], Restated] | None = None

@@ -112,6 +112,7 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             tries=(5.0, 20.0, 60.0),
+            within_recording=True,
         ),
         Parameter(
             "bend_per_K",

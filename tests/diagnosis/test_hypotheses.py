@@ -16,7 +16,7 @@ from cablecomp.diagnosis.explain.instants import instants
 from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording, over_plausible
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive, reach_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -273,3 +273,32 @@ def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
         assert {h.effect.id for h in events} == {"clamp_slip", "strand_break"}
         assert all(h.two_sided is sides for h in events)
         assert all((reach_of(h.amount, config)[0] < 0.0) is sides for h in events)
+
+
+def _recorded(*, warm: bool) -> tuple[Evidence, ...]:
+    columns = recorded()
+    if warm:
+        columns["temperature_degC"] = 20.0 + np.sin(columns["time_s"])
+    return gather_body(JOINT, {"a/1": columns}).used
+
+
+@pytest.mark.parametrize("warm", [True, False])
+def test_that_warmth_quickens_creep_is_asked_where_a_temperature_moves(warm: bool) -> None:
+    (creep,) = [h for h in hypotheses(JOINT, _recorded(warm=warm)) if h.effect.id == "pretension_relaxation"]
+    asked = {name for further in creep.further for name in further}
+    assert {"power", "steady"} <= asked
+    assert ("quickening_per_K" in asked) is warm
+
+
+def test_a_pretension_that_follows_later_than_a_recording_lasts_is_better_called_a_drift() -> None:
+    used = _recorded(warm=True)
+    longest = max(float(np.ptp(e.columns["time_s"])) for e in used)
+    (thermal,) = [h for h in hypotheses(JOINT, used) if h.effect.id == "thermal_pretension"]
+    tried = [further["lag_s"] for further in thermal.further if "lag_s" in further]
+    assert max(thermal.entry({"coefficient_per_K": 0.01, "lag_s": t}).lag_s for t in tried) <= longest
+    (lag,) = [p for p in thermal.free({"lag_s": 5.0}, JOINT) if p.base.endswith("lag_s")]
+    assert lag.high == longest
+    for lag_s, word in ((0.5 * longest, ""), (longest, "lag_s")):
+        problem = SimpleNamespace(parameters=[lag], config=JOINT)
+        fit = SimpleNamespace(problem=problem, x=np.array([lag.x(lag_s)]), values={lag.name: lag_s})
+        assert better_word(cast("Fit", fit), thermal) == word

@@ -14,7 +14,7 @@ from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import Course
 from cablecomp.diagnosis.explain.starts import absolute, grid, width
 from cablecomp.effects import Effect, Parameter, catalogue
-from cablecomp.effects.base import Role
+from cablecomp.effects.base import Role, at_most
 from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
@@ -211,6 +211,7 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
     for c in channels:
         read = _by_readings(effect, width(evidence, c)) if c else effect
         read = _of_one_cable(read) if config.drive.circuit == "open" else read
+        read = _within(read, max(float(np.ptp(e.columns["time_s"])) for e in evidence))
         amounts = [p for p in read.parameters if not p.shape and not p.held]
         found += [_by_amount(read, p, c, config, evidence) for p in amounts]
     return found
@@ -232,6 +233,15 @@ def _of_one_cable(effect: Effect) -> Effect:
         replace(p, low=max(p.low, 0.0), minimum=max(p.minimum, 0.0)) if p.of_cable_l == "below zero" else p
         for p in effect.parameters
         if p.of_cable_l != "always"
+    )
+    return replace(effect, parameters=tuple(parameters))
+
+
+def _within(effect: Effect, longest_s: float) -> Effect:
+    """The effect with its times that have to show within a recording of that length (`Parameter.within_recording`)."""
+    parameters = (
+        replace(p, maximum=min(p.maximum, longest_s), is_another=at_most) if p.within_recording else p
+        for p in effect.parameters
     )
     return replace(effect, parameters=tuple(parameters))
 

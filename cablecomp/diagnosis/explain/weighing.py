@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.by_channel import borne_by_torque
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
@@ -124,6 +125,8 @@ def _weighed(
     elif (stretched := better_word(final.fit, term)) and not alone_by_far(selection.rounds, term):
         confidence = min(confidence, LIMITS.beaten_told)
         why_not = f"with this `{stretched}` another effect is the better word"
+    elif torque := borne_by_torque(final.fit, term):
+        confidence, why_not = min(confidence, LIMITS.beaten_told), torque
     elif little := (
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
