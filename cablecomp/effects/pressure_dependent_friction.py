@@ -1,5 +1,5 @@
-"""Pressure-dependent friction: the coefficient falls as the cable is pressed harder against the pulley, by a power, or
-where a coat is pressed through."""
+"""Pressure-dependent friction: the coefficient falls as the cable is pressed harder against the pulley, by a power, to
+a floor, or where a coat is pressed through."""
 
 from __future__ import annotations
 
@@ -15,32 +15,45 @@ NEUTRAL_PLACE: Final = 1.0
 """Tension over T0 at which it gives way, where none is given."""
 SUDDEN: Final = 10.0
 """Power of the pressure by which a coat gives way: from a tenth to nine tenths of it within a factor of 1.55."""
+NEUTRAL_POWER: Final = 1.0
+"""Power of the pressure by which a coat that sticks as much under any pressure lowers the coefficient."""
+LEAST_PRESSED: Final = 0.1
+"""Tension over T0 below which what sticks holds no more of each newton: no table of the law would resolve it."""
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     exponent, lost, place = values["exponent"], values["lost"], values["place"]
+    adhesion, power = values["adhesion"], values["adhesion_power"]
 
     def factor(tau: Floats) -> Floats:
         by_power = tau**-exponent
-        return np.asarray(by_power * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
+        stuck = 1.0 + adhesion * (np.maximum(tau, LEAST_PRESSED) ** -power - 1.0)
+        return np.asarray(by_power * stuck * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
 
     return Change(tension_factor=factor)
 
 
 def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
-    """mu0 (T/T0)^-n keeps its values: mu0 -> mu0 t^-n, t = T0'/T0; a place in T/T0 is t times as near."""
+    """mu0 (T/T0)^-n (1 - a + a (T/T0)^-k) keeps its values: mu0 -> mu0 t^-n g, g = 1 - a + a t^-k, a -> a t^-k/g, t =
+    T0'/T0; a place in T/T0 is t times as near."""
     place = {"place": values.get("place", NEUTRAL_PLACE) / factor} if "lost" in values else {}
-    return Restated({**values, **place}, mu=factor ** -values.get("exponent", 0.0))
+    adhesion = values.get("adhesion", 0.0)
+    sticks = adhesion * factor ** -values.get("adhesion_power", NEUTRAL_POWER)
+    gain = 1.0 - adhesion + sticks
+    stuck = {"adhesion": sticks / gain} if "adhesion" in values else {}
+    return Restated({**values, **place, **stuck}, mu=gain * factor ** -values.get("exponent", 0.0))
 
 
 EFFECT = Effect(
     id="pressure_dependent_friction",
     statement="The coefficient of friction falls (or rises) with the pressure between cable and pulley, as "
-    "polymer coats do; or it is another one beyond a pressure at which a coat or a film of grease is pressed through.",
-    equation="mu = mu0 (T/T0)^-n (1 - w/(1 + (T0 u/T)^10)) at every place; pressure goes with T/R",
+    "polymer coats do; or to a floor, where part of it sticks and does not grow with the pressure; or it is another "
+    "one beyond a pressure at which a coat or a film of grease is pressed through.",
+    equation="mu = mu0 (T/T0)^-n (1 - a + a (T/T0)^-k) (1 - w/(1 + (T0 u/T)^10)) at every place, of a: from T = T0/10 "
+    "on; pressure goes with T/R",
     source="n = 1/3 for elastic contact of a soft coat (F. P. Bowden and D. Tabor, The Friction and "
     "Lubrication of Solids, 1950); capstans with mu as a power of pressure: H. G. Howell, J. "
-    "Textile Inst. 44 (1953)",
+    "Textile Inst. 44 (1953); friction beside adhesion, F = mu (N + A): B. V. Derjaguin, Z. Phys. 88 (1934)",
     parameters=(
         Parameter(
             "exponent",
@@ -52,6 +65,33 @@ EFFECT = Effect(
             minimum=-0.9,
             maximum=0.9,
             omitted=0.0,
+        ),
+        Parameter(
+            "adhesion",
+            "-",
+            0.0,
+            0.0,
+            0.8,
+            "a, share of mu at T0 that falls with the pressure, to the rest as a floor",
+            minimum=0.0,
+            maximum=0.95,
+            omitted=0.0,
+            of_known_drive=True,
+        ),
+        Parameter(
+            "adhesion_power",
+            "-",
+            NEUTRAL_POWER,
+            0.5,
+            2.5,
+            "k, power by which it falls; 1: what sticks does so under any pressure",
+            log=True,
+            role="shape",
+            minimum=0.2,
+            maximum=4.0,
+            omitted=NEUTRAL_POWER,
+            of="adhesion",
+            reach=2.0,
         ),
         Parameter(
             "lost",

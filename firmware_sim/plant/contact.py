@@ -36,7 +36,7 @@ def _grip(x: float) -> float:
 @part
 def pressure_factor(c: Any, tau: float) -> float:
     """mu/mu0 at T/T0: τ^−n, or floor + (1 − floor) τ^−n, or e^(−n (τ − 1)), or a fall from 1 to the floor around
-    τ = 1 + n."""
+    τ = 1 + n, or (1 + n)/(1 + n τ)."""
     n, floor = c.pressure_exponent, c.pressure_floor
     if c.pressure_kind == 1:
         mixed: float = floor + (1.0 - floor) * tau**-n
@@ -46,6 +46,9 @@ def pressure_factor(c: Any, tau: float) -> float:
     if c.pressure_kind == 3:
         worn: float = floor + (1.0 - floor) * 0.5 * (1.0 - math.tanh((tau - 1.0 - n) / 0.15))
         return worn
+    if c.pressure_kind == 4:
+        flat: float = (1.0 + n) / (1.0 + n * tau)
+        return flat
     plain: float = tau**-n
     return plain
 
@@ -65,6 +68,9 @@ def pressure_slope(c: Any, tau: float) -> float:
         t = math.tanh((tau - 1.0 - n) / 0.15)
         worn: float = -tau * (1.0 - floor) * 0.5 * (1.0 - t * t) / 0.15 / pressure_factor(c, tau)
         return worn
+    if c.pressure_kind == 4:
+        flat: float = -n * tau / (1.0 + n * tau)
+        return flat
     plain: float = -n
     return plain
 

@@ -72,6 +72,10 @@ def _exponential(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({}, {"rate": way}, 2.0, 1.4 if way > 0 else 0.5)
 
 
+def _pressed_flat(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape({}, {"rate": 1.0}, 2.0, 15.0)
+
+
 def _worn_through(rng: np.random.Generator, scene: Scene) -> Shape:
     fixed = {"place": float(rng.uniform(-0.25, 0.4))}
     return Shape(fixed, {"floor": -1.0}, 1.2, 0.85, base={"floor": 1.0})
@@ -118,6 +122,7 @@ FRICTION = (
     Suspect("pressure_dependent_friction:floor", ANY, _floor),
     Suspect("pressure_dependent_friction:exponential", ANY, _exponential),
     Suspect("pressure_dependent_friction:worn_through", ANY, _worn_through),
+    Suspect("pressure_dependent_friction:pressed_flat", ANY, _pressed_flat),
     Suspect("position_dependent_friction:patch", TURNING, _patch),
     Suspect("position_dependent_friction:threaded", TURNING, _threaded),
     Suspect("position_dependent_friction:input_drum", TURNING, _input_drum),

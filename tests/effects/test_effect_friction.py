@@ -88,6 +88,27 @@ def test_a_coat_that_is_pressed_through_loses_its_friction_there(lost: float, ex
         assert found[k] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize(("adhesion", "power"), [(0.6, 1.0), (0.3, 2.5)])
+def test_friction_with_a_part_that_sticks_falls_to_a_floor(adhesion: float, power: float) -> None:
+    config = joint("snow-open-rig")
+    stage = config.drive.stage[0]
+    columns = unloading(config)
+    values = {"adhesion": adhesion, "adhesion_power": power}
+    found = run(config, columns, ("pressure_dependent_friction", values))["deflection_rad"]
+
+    def factor(tau: float) -> float:
+        return 1.0 - adhesion + adhesion * max(tau, 0.1) ** -power
+
+    for k in (20, 50, 79):
+        expected = expected_deflection(
+            config,
+            columns["joint_torque_Nm"][k],
+            lambda tau, _: stage.mu_output * factor(tau),
+            lambda tau, _: stage.mu_input * factor(tau),
+        )
+        assert found[k] == pytest.approx(expected, rel=1e-6)
+
+
 def test_pressure_dependence_in_a_full_loop_against_a_grid() -> None:
     """Nested reversals on one pulley: grid points that slip in turn, mu by their own tension."""
     config = joint("snow-open-rig", input_radius_m=1e-6, free_length_m=1e-6, wrap_output_rad=9.0)

@@ -44,12 +44,14 @@ def stiffness(config: JointConfig) -> np.ndarray:
 
 
 def friction(config: JointConfig, key: str) -> np.ndarray:
-    """mu(T) = mu0 (T/T0)^-n, less where T is far above T0 u."""
+    """mu(T) = mu0 (T/T0)^-n (1 - a + a (T/T0)^-k), less where T is far above T0 u."""
     stage = config.drive.stage[0]
     (coat,) = [e.parameters for e in config.effect if e.id == "pressure_dependent_friction"]
     tau = TENSIONS / stage.pretension_N
     n, lost, place = (float(coat.get(k, v)) for k, v in (("exponent", 0.0), ("lost", 0.0), ("place", 1.0)))
-    return np.asarray(getattr(stage, key) * tau**-n * (1.0 - lost * tau**10 / (tau**10 + place**10)))
+    a, k = (float(coat.get(name, v)) for name, v in (("adhesion", 0.0), ("adhesion_power", 1.0)))
+    stuck = 1.0 - a + a * tau**-k
+    return np.asarray(getattr(stage, key) * tau**-n * stuck * (1.0 - lost * tau**10 / (tau**10 + place**10)))
 
 
 @pytest.mark.parametrize(
@@ -57,6 +59,8 @@ def friction(config: JointConfig, key: str) -> np.ndarray:
     [
         {},
         {"steady": 0.4},
+        {"adhesion": 0.5},
+        {"adhesion": 0.3, "adhesion_power": 2.0, "lost": 0.4, "place": 0.8},
         {"knee": 1.2},
         {"steady": 0.4, "knee": 0.8},
         {"lost": 0.6, "place": 1.3},

@@ -55,6 +55,7 @@ SIZES = {
     "pressure_dependent_friction:floor": {"floor": 0.4},
     "pressure_dependent_friction:exponential": {"rate": 0.6},
     "pressure_dependent_friction:worn_through": {"floor": 0.5},
+    "pressure_dependent_friction:pressed_flat": {"rate": 2.0},
     "position_dependent_friction:patch": {"height": 1.0},
     "position_dependent_friction:input_drum": {"amplitude": 0.5},
     "position_dependent_friction:threaded": {"amplitude": 0.5},

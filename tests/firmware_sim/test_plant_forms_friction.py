@@ -137,6 +137,7 @@ def test_grease_on_one_drum_acts_where_it_is() -> None:
         ("floor", {"exponent": 1.5, "floor": 0.4}, lambda t: 0.4 + 0.6 * t**-1.5),
         ("exponential", {"rate": 0.7}, lambda t: math.exp(-0.7 * (t - 1.0))),
         ("worn_through", {"place": 0.4, "floor": 0.5}, lambda t: 0.75 - 0.25 * math.tanh((t - 1.4) / 0.15)),
+        ("pressed_flat", {"rate": 3.0}, lambda t: 4.0 / (1.0 + 3.0 * t)),
     ],
 )
 def test_a_coefficient_by_pressure_sets_the_affected_wrap(

@@ -1,4 +1,4 @@
-"""A coefficient that falls with pressure, in other forms: with a floor, exponential, worn through."""
+"""A coefficient that falls with pressure, in other forms: with a floor, exponential, worn through, pressed flat."""
 
 from __future__ import annotations
 
@@ -49,4 +49,13 @@ WORN_THROUGH = form(
     _law(3, "place", "floor"),
 )
 
-KINDS: tuple[EffectKind, ...] = (FLOOR, EXPONENTIAL, WORN_THROUGH)
+PRESSED_FLAT = form(
+    "pressure_dependent_friction",
+    "pressed_flat",
+    "A rough coat that is pressed flat, so that its area of contact saturates: mu = mu0 (1 + k)/(1 + k T/T0).",
+    (Parameter("rate", "k", low=0.0, high=20.0, neutral=0.0),),
+    ("load",),
+    _law(4, "rate", None),
+)
+
+KINDS: tuple[EffectKind, ...] = (FLOOR, EXPONENTIAL, WORN_THROUGH, PRESSED_FLAT)
