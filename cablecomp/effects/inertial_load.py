@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
 
 GAP = 5.0
 """Steps of the last one's length beyond which the motion in between is not known."""
+WHOLE: Final = 0.98
+"""Share that swings after the joint beyond which none of it is on the joint itself."""
+SLOW_RAD_S: Final = 1.0
+"""What follows more slowly follows no joint that is moved once in six seconds."""
 
 
 @term(
@@ -92,6 +96,13 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(terms=_accelerate(inertia=values["inertia_kgm2"], **folds, **swings))
 
 
+def _swings_away(values: Mapping[str, float], _on_high: bool) -> bool:
+    """What swings as a whole, and after nothing that a joint does in less than seconds, leaves the joint its drag and
+    its spring: no inertia."""
+    follows = values["swings_rad_s"] * max(1.0, 2.0 * values["damping_ratio"])
+    return values["swings"] > WHOLE and follows < SLOW_RAD_S
+
+
 def _folds(name: str, text: str) -> Parameter:
     return Parameter(
         name,
@@ -152,6 +163,7 @@ EFFECT = Effect(
             omitted=0.0,
             minimum=0.0,
             maximum=1.0,
+            is_another=_swings_away,
             of_known_drive=True,
         ),
         Parameter(

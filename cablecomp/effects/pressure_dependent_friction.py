@@ -71,7 +71,7 @@ EFFECT = Effect(
             "-",
             0.0,
             0.0,
-            0.8,
+            0.9,
             "a, share of mu at T0 that falls with the pressure, to the rest as a floor",
             minimum=0.0,
             maximum=0.95,

@@ -110,6 +110,7 @@ def test_beside_a_drive_known_by_order_of_magnitude_laws_are_asked_for_plainly()
         "clamp_slip:creep_m_per_Ns",
         "clamp_slip:creep_l_m_per_Ns",
         "position_dependent_friction:patch",
+        "pressure_dependent_friction:adhesion",
         "pressure_dependent_friction:lost",
         "series_compliance:late_rad_per_Nm",
     }
@@ -273,6 +274,28 @@ def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
         assert {h.effect.id for h in events} == {"clamp_slip", "strand_break"}
         assert all(h.two_sided is sides for h in events)
         assert all((reach_of(h.amount, config)[0] < 0.0) is sides for h in events)
+
+
+@pytest.mark.parametrize(
+    ("swings", "rad_s", "damping_ratio", "word"),
+    [
+        (1.0, 0.4, 0.5, "swings"),  # a drag of 2 z w J and a spring
+        (1.0, 30.0, 0.2, ""),  # at the end of a flexible link
+        (1.0, 0.4, 6.0, ""),  # dragged along
+        (0.7, 0.4, 0.5, ""),  # the rest is on the joint
+    ],
+)
+def test_an_inertia_that_swings_away_as_a_whole_is_none(
+    swings: float, rad_s: float, damping_ratio: float, word: str
+) -> None:
+    load = _of("inertial_load", "inertial_load")
+    given = {"swings": swings, "swings_rad_s": rad_s, "damping_ratio": damping_ratio}
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(parameters=(), config=JOINT),
+        x=np.empty(0),
+        values={load.key(name): value for name, value in given.items()},
+    )
+    assert better_word(cast("Fit", fit), load) == word
 
 
 def _recorded(*, warm: bool) -> tuple[Evidence, ...]:
