@@ -250,6 +250,29 @@ def test_friction_of_the_motor_may_be_as_large_as_the_torques_it_was_seen_to_giv
     assert over_plausible(fit, friction) == pytest.approx(0.5, rel=0.02)
 
 
+def test_a_neighbour_may_load_the_cable_as_much_as_what_is_measured() -> None:
+    """Loads may be many times R T0; then so may what the channel does not see."""
+    columns = recorded()
+    columns["joint_torque_Nm"] *= 10.0
+    columns["other_arm_Nm"] = 0.2 * np.sin(columns["time_s"])
+    (one,) = gather_body(JOINT, {"a/1": columns}).used
+    neighbour = next(h for h in hypotheses(JOINT, [one]) if h.name == "crosstalk:other_arm_Nm")
+    largest = max(abs(b) for b in neighbour.amount.bounds(JOINT)) * np.max(
+        np.abs(one.columns["other_arm_Nm"])
+    )
+    load = float(np.max(np.abs(one.columns["joint_torque_Nm"])))
+    assert load > 3.0 * largest
+    plain = Problem(JOINT, (), (one,), Weighing({"joint_position_rad": 1e-5}, {}))
+    coefficient = 0.5 * load / float(np.max(np.abs(one.columns["other_arm_Nm"])))
+    problem = with_entry(
+        plain,
+        neighbour,
+        neighbour.entry({"channel": "other_arm_Nm", "load_coefficient": coefficient}),
+    )
+    fit = Fit(problem, problem.start, np.empty(0), np.empty((0, len(problem.parameters))))
+    assert over_plausible(fit, neighbour) == pytest.approx(0.5, rel=0.02)
+
+
 @pytest.mark.parametrize("load", ["joint_torque", "motor_torque"])
 def test_a_drag_of_the_motor_is_asked_for_where_the_load_is_read_there(load: str) -> None:
     """In a torque that stands beside the load, any drag in the cable's path would be the motor's."""

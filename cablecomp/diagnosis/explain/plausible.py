@@ -8,6 +8,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.instants import inside_of
+from cablecomp.diagnosis.explain.starts import width
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import MOTOR
 from cablecomp.estimation.least_squares import Fit
@@ -73,13 +74,18 @@ def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
 
 
 def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:
-    """The largest plausible amount of an effect; a load that its channel does not see may be as large as those that it
-    does, and what holds the motor, which no cable bears, as the torques that it was seen to give."""
+    """The largest plausible amount of an effect; a load that its channel does not see, a weight's or a neighbour's, may
+    be as large as those that it does, and what holds the motor, which no cable bears, as the torques that it was seen
+    to give."""
     most = max(abs(b) for b in h.amount.bounds(joint))
     if MOTOR in h.effect.needs:
         given = (np.max(np.abs(e.columns[MOTOR])) for e in fit.problem.evidence if MOTOR in e.columns)
         return max(most, *(float(torque) for torque in given))
-    if not (h.has_phase and h.amount.unit == "N m"):
+    if h.has_phase and h.amount.unit == "N m":
+        per_load = 1.0
+    elif h.amount.per_reading and h.amount.unit == "N m/unit":
+        per_load = 1.0 / width(fit.problem.evidence, h.channel)
+    else:
         return most
     loads = (np.max(np.abs(load_of(joint, e.columns))) for e in fit.problem.evidence)
-    return max(most, *(float(load) for load in loads))
+    return max(most, *(per_load * float(load) for load in loads))
