@@ -70,4 +70,6 @@ def borne_by_torque(fit: Fit, term: Hypothesis) -> str:
         or motor.part < LIMITS.told_by_torque
     ):
         return ""
-    return f"the joint's angle alone would have {-joint.change:.0%} less of it than the motor's torque"
+    if joint.change <= -1.0:
+        return "the motor's torque bears it, the joint's angle alone would have none of it"
+    return f"the motor's torque bears it, the joint's angle alone would have {-joint.change:.0%} less of it"
