@@ -76,6 +76,7 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=0.95,
             omitted=0.0,
+            by_itself=True,
             of_known_drive=True,
         ),
         Parameter(
