@@ -23,7 +23,7 @@ more of laws left out (seven sets of trials, seeds 685 to 706: Brier score 0.108
 `tries` in place of `lead` and `tries_rest`, and `share_left` besides, 0.116; boosted trees that ask for all, 0.105).
 Whether a larger effect acts first through the same covariate says more there (0.103), and would have cost a jaw the
 name of its path: frictions that trade places each take off little as the last to come. Learnt anew on 1483 effects of
-fifteen sets (685 to 715) the weights are what they were on 762, within a tenth where they count, the score 0.106."""
+fifteen sets (685 to 715) `lead` and `tries_rest` weigh what they did on 762, within a tenth, and the score is 0.106."""
 OF_TRIED: Final = ("log_gain", "log_z", "selected_in")
 _FILE: Final = Path(__file__).with_name("confidence.json")
 
