@@ -128,8 +128,10 @@ def found_by_size(answer: Mapping[str, Any]) -> Any:
         vertical_spacing=100 / drawn_px,
     )
     for k, c in enumerate(shown):
-        series = (("found", style.PREDICTED, "found"), ("wrong name", style.CABLE_H, "wrong_name"))
-        for label, colour, key in series:
+        # a wrong name is hollow and wider: where both are at one place, both show
+        found = ("found", style.PREDICTED, "found", {"symbol": "circle"})
+        wrong = ("wrong name", style.CABLE_H, "wrong_name", {"symbol": "circle-open", "size": 11})
+        for label, colour, key, marker in (found, wrong):
             rates = [p[key] for p in c["points"]]
             fig.add_scatter(
                 x=[p["size"] for p in c["points"]],
@@ -138,6 +140,7 @@ def found_by_size(answer: Mapping[str, Any]) -> Any:
                 mode="lines+markers",
                 name=label,
                 line_color=colour,
+                marker=marker,
                 hovertext=[f"{r['hits']} of {r['of']}" for r in rates],
                 showlegend=k == 0,
                 row=k // across + 1,
