@@ -48,65 +48,47 @@ def expected_deflection(config: JointConfig, load: float, output: Law, inner: La
     return total * stage.pretension_N / stage.EA_N / stage.output_radius_m
 
 
-@pytest.mark.parametrize("exponent", [-0.4, 1.0 / 3.0, 0.8])
-def test_friction_that_falls_with_pressure(exponent: float) -> None:
+def unloads_by(values: dict[str, float], factor: Callable[[float], float], rel: float) -> None:
+    """Asserts that an open drive with this law of pressure unloads as direct integration of mu0 times `factor` of
+    T/T0 has it."""
     config = joint("snow-open-rig")
     stage = config.drive.stage[0]
     columns = unloading(config)
-    found = run(config, columns, ("pressure_dependent_friction", {"exponent": exponent}))["deflection_rad"]
+    found = run(config, columns, ("pressure_dependent_friction", values))["deflection_rad"]
     for k in (20, 50, 79):
         expected = expected_deflection(
             config,
             columns["joint_torque_Nm"][k],
-            lambda tau, _: stage.mu_output * tau**-exponent,
-            lambda tau, _: stage.mu_input * tau**-exponent,
+            lambda tau, _: stage.mu_output * factor(tau),
+            lambda tau, _: stage.mu_input * factor(tau),
         )
-        assert found[k] == pytest.approx(expected, rel=1e-7)
+        assert found[k] == pytest.approx(expected, rel=rel)
+
+
+@pytest.mark.parametrize("exponent", [-0.4, 1.0 / 3.0, 0.8])
+def test_friction_that_falls_with_pressure(exponent: float) -> None:
+    unloads_by({"exponent": exponent}, lambda tau: tau**-exponent, rel=1e-7)
 
 
 @pytest.mark.parametrize(("lost", "exponent"), [(0.7, 0.0), (-0.5, 0.2)])
 def test_a_coat_that_is_pressed_through_loses_its_friction_there(lost: float, exponent: float) -> None:
     """Half of what is lost where T = 0.8 T0; a tenth and nine tenths of it a factor of 1.25 to either side."""
-    config = joint("snow-open-rig")
-    stage = config.drive.stage[0]
-    columns = unloading(config)
-    values = {"exponent": exponent, "lost": lost, "place": 0.8}
-    found = run(config, columns, ("pressure_dependent_friction", values))["deflection_rad"]
 
     def factor(tau: float) -> float:
         return float(tau**-exponent * (1.0 - lost * tau**10 / (tau**10 + 0.8**10)))
 
     assert factor(0.8) * 0.8**exponent == pytest.approx(1.0 - 0.5 * lost)
     assert factor(1.0) * 1.0 == pytest.approx(1.0 - 0.903 * lost, abs=1e-3)
-    for k in (20, 50, 79):
-        expected = expected_deflection(
-            config,
-            columns["joint_torque_Nm"][k],
-            lambda tau, _: stage.mu_output * factor(tau),
-            lambda tau, _: stage.mu_input * factor(tau),
-        )
-        assert found[k] == pytest.approx(expected, rel=1e-6)
+    unloads_by({"exponent": exponent, "lost": lost, "place": 0.8}, factor, rel=1e-6)
 
 
 @pytest.mark.parametrize(("adhesion", "power"), [(0.6, 1.0), (0.3, 2.5)])
 def test_friction_with_a_part_that_sticks_falls_to_a_floor(adhesion: float, power: float) -> None:
-    config = joint("snow-open-rig")
-    stage = config.drive.stage[0]
-    columns = unloading(config)
-    values = {"adhesion": adhesion, "adhesion_power": power}
-    found = run(config, columns, ("pressure_dependent_friction", values))["deflection_rad"]
-
-    def factor(tau: float) -> float:
-        return 1.0 - adhesion + adhesion * max(tau, 0.1) ** -power
-
-    for k in (20, 50, 79):
-        expected = expected_deflection(
-            config,
-            columns["joint_torque_Nm"][k],
-            lambda tau, _: stage.mu_output * factor(tau),
-            lambda tau, _: stage.mu_input * factor(tau),
-        )
-        assert found[k] == pytest.approx(expected, rel=1e-6)
+    unloads_by(
+        {"adhesion": adhesion, "adhesion_power": power},
+        lambda tau: 1.0 - adhesion + adhesion * max(tau, 0.1) ** -power,
+        rel=1e-6,
+    )
 
 
 def test_pressure_dependence_in_a_full_loop_against_a_grid() -> None:
