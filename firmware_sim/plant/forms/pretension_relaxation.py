@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import (
@@ -81,9 +82,8 @@ def _warm(build: Build, p: Mapping[str, float]) -> None:
         time = np.maximum(inputs[:, TIME], 0.0)
         quicker = np.exp2((inputs[:, TEMPERATURE] - _ROOM_DEGC) / p["doubling_K"])
         rate = quicker / (p["time_constant_s"] + time)
-        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
         before = np.log1p(time[0] / p["time_constant_s"])
-        return np.asarray(p["fraction"] * (before + np.concatenate([[0.0], np.cumsum(steps)])))
+        return np.asarray(p["fraction"] * (before + cumulative_trapezoid(rate, time, initial=0.0)))
 
     lowered(build, loss)
 
@@ -153,8 +153,7 @@ def _under_load(build: Build, p: Mapping[str, float]) -> None:
     def loss(inputs: Floats) -> Floats:
         time = np.maximum(inputs[:, TIME], 0.0)
         load = np.abs(inputs[:, JOINT_TORQUE]) / p["usual_Nm"]
-        steps = 0.5 * (load[1:] + load[:-1]) * np.diff(time)
-        borne = time[0] * float(np.mean(load)) + np.concatenate([[0.0], np.cumsum(steps)])
+        borne = time[0] * float(np.mean(load)) + cumulative_trapezoid(load, time, initial=0.0)
         return np.asarray(p["fraction"] * np.cbrt(borne / p["time_constant_s"]))
 
     lowered(build, loss)
