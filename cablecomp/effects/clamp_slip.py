@@ -167,6 +167,7 @@ EFFECT = Effect(
     ),
     acts_through=("time", "load"),
     bounded=True,
+    pliant=True,
     unbounded_by=("creep_m_per_Ns", "creep_l_m_per_Ns"),  # they go by the tension that is solved for
     change=_change,
     steps=True,

@@ -191,6 +191,7 @@ EFFECT = Effect(
     ),
     acts_through=("load", "load_rate"),
     bounded=True,
+    pliant=True,
     change=_change,
     tries=tuple({"stiffening_per_Nm": g, "power": p} for g, p in ((7.0, 0.3), (1.0, 2.0), (4.0, 2.0))),
     rank=5,

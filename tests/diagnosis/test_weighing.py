@@ -19,6 +19,7 @@ from cablecomp.diagnosis.explain.weighing import (
     _against,
     _at_bound,
     _follows,
+    _hardly_ahead,
     _slight,
     _too_little,
     _unfollowed,
@@ -205,3 +206,22 @@ def test_what_alone_explains_by_far_the_most_is_its_own_word(
     selection: Any = SimpleNamespace(rounds=[SimpleNamespace(tried=tried)])
     assert alone_by_far(selection.rounds, asked["termination_backlash"]) is by_far
     assert not alone_by_far(selection.rounds, asked["series_compliance:late_rad_per_Nm"])
+
+
+@pytest.mark.parametrize(
+    ("name", "lead", "hardly"),
+    [
+        ("series_compliance", 1.2, True),
+        ("series_compliance", 2.0, False),
+        ("clamp_slip", -0.3, True),
+        ("clamp_slip", 2.4, False),
+        ("bearing_friction", -0.3, False),
+    ],
+)
+def test_what_bends_to_the_form_of_others_has_to_be_clearly_ahead_of_them(
+    name: str, lead: float, hardly: bool
+) -> None:
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    said = _hardly_ahead(asked[name], lead)
+    assert bool(said) is hardly
+    assert not hardly or (f"by {lead:.1f} standard errors; 2 are asked" in said)

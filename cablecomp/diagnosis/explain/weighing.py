@@ -136,6 +136,8 @@ def _weighed(
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
+    elif hardly := _hardly_ahead(term, min(ahead.z, of_rival.z)):
+        confidence, why_not = min(confidence, LIMITS.little_told), hardly
     better = None
     beaten_by = _beaten(selection, term, against)
     if beaten_by and of_rival.z < LIMITS.z_unbeaten:
@@ -168,6 +170,17 @@ def _slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float
     if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
         return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
     return ""
+
+
+def _hardly_ahead(term: Hypothesis, lead: float) -> str:
+    """What is to be said of an effect that bends to what others' forms leave and is not clearly ahead, `lead` standard
+    errors, of none or of its nearest rival; "" of any other."""
+    if not term.effect.pliant or lead >= LIMITS.z_pliant:
+        return ""
+    return (
+        f"a curve or a step that other effects' forms leave as well, ahead of its nearest rival or of none by "
+        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
+    )
 
 
 def _beyond_noise(fit: Fit) -> float:
