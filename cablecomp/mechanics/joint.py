@@ -97,6 +97,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
     else:
         solved = Solved(x.joint, 0.0, STATUS_DIVERGED, 0.0, 0.0)
         low, high = -1e300, 1e300
+        slack = -1e300  # the largest trial moment that no open circuit can take
         followed = False
         excess = moved = 0.0
         again, settled = AFRESH, False
@@ -110,7 +111,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
             again = solved.status == STATUS_OK
             if solved.status == STATUS_SLACK and load > moment:
                 # a trial moment that no open circuit can take (a first guess of the acceleration): nearer to the load
-                low = max(low, moment)
+                slack = low = max(low, moment)
                 moment = 0.5 * (moment + load)
                 continue
             if solved.status != STATUS_OK:
@@ -150,7 +151,8 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
                 moment = 0.5 * (low + high)
         if solved.status == STATUS_OK and not settled:
             if abs(excess) > UNSETTLED * (abs(load) + abs(moment)) + 1e-9 or abs(moved) > UNSETTLED_RAD:
-                solved = Solved(solved.angle, solved.compliance, STATUS_DIVERGED, 0.0, 0.0)
+                status = STATUS_SLACK if low == slack > -1e300 else STATUS_DIVERGED
+                solved = Solved(solved.angle, solved.compliance, status, 0.0, 0.0)
     x.joint = solved.angle
     x.compliance = solved.compliance
     _show_tensions(d)

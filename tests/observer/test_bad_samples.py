@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from observer_joints import joint, pull_unit
 
+from cablecomp.config import EffectEntry
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
@@ -66,3 +67,17 @@ def test_a_filter_follows_a_ramp_without_lag_and_calms_noise() -> None:
     calm = Observer(config).run(noisy)["deflection_rad"] - b
     raw = Observer(plain).run(noisy)["deflection_rad"] - b
     assert np.std(calm[200:]) < 0.5 * np.std(raw[200:])
+
+
+@pytest.mark.parametrize("share", [0.88, 0.9, 0.93, 0.96, 0.99])
+def test_friction_that_slackens_an_open_circuit_says_so(share: float) -> None:
+    """Load and friction together are more than T0 holds; either alone is less."""
+    plain = joint("open")
+    unit, friction = pull_unit(plain), 0.13
+    shape = {"presliding_rad": 1.5e-4, "load_coefficient": 0.0}
+    bearing = {"id": "bearing_friction", "torque_Nm": friction * unit, **shape}
+    config = plain.model_copy(update={"effect": [EffectEntry.model_validate(bearing)]})
+    load, motor = np.full(200, -share * unit), 0.002 * np.arange(200.0)
+    assert Observer(plain).run(columns(load, motor))["deflection_rad"].shape == (200,)
+    with pytest.raises(InputError, match="slacken"):
+        Observer(config).run(columns(load, motor))

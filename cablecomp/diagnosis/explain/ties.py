@@ -110,7 +110,8 @@ def with_the_first(model: Model, rounds: Sequence[Round], groups: Groups) -> Mod
     if not isinstance(term, Hypothesis) or any(_of_one_effect(t, term) for t in model.terms):
         return model
     swapped = [_in_its_place(model, t, term, values, groups) for t in model.terms if t.name in others]
-    as_well = [m for m in swapped if m is not None and not outdoes(model, m, groups)]
+    plain = [m for m in swapped if m is not None and implausible(m) <= implausible(model)]
+    as_well = [m for m in plain if not outdoes(model, m, groups)]
     return simplest_first([*ranked(as_well, groups)[:1], model], groups)[0]
 
 
