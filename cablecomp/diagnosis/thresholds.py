@@ -162,9 +162,10 @@ class Thresholds:
     """Part of its largest plausible amount with which an effect that trades places is begun as well, where that is a
     share (a cable whose stiffness goes with its tension: from a twentieth of that no step led there, on two of three
     wrist pitches of a jaw)."""
-    less: tuple[float, ...] = (0.1, 0.01)
-    """Parts of the amount that shows at which an amount whose effect saturates is asked for, too (viscous slip delays
-    what slides by ever less as it grows: what a hundredth of it explains was not seen, `701/120`)."""
+    sizes: tuple[float, ...] = (0.01, 0.1, 10.0, 30.0)
+    """Times the amount that shows at which an amount whose effect saturates is asked for, too (viscous slip delays what
+    slides by ever less as it grows: what a hundredth of it explains was not seen, `701/120`, nor what thirty times as
+    much on one drum does, `718/0`)."""
     shaped: float = 0.9
     """Cost with a shape that an effect may do without (an event that takes its time, a mount that yields more one way)
     over that of the best without it, after a linear step (not of an event) and after a rough fit, above which it does

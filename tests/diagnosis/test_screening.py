@@ -117,6 +117,19 @@ def test_an_amount_known_by_orders_of_magnitude_is_begun_about_where_it_is(share
     assert fit.values[amount] == pytest.approx(true, rel=0.5)
 
 
+@pytest.mark.parametrize(("true", "on_input"), [(1e6, 1.0), (3e6, 0.0), (1e8, 1.0)])
+def test_an_amount_that_saturates_is_asked_for_far_beyond_what_shows(true: float, on_input: float) -> None:
+    """Slip so viscous that one drum hardly slides in a stroke: the other shape, and less of it, show as much."""
+    slip = [EffectSpec("viscous_slip:one_drum", {"coefficient_Ns_per_m_rad": true, "on_input": on_input})]
+    body, drive = calibrated(recorded(slip, 20.0))
+    (viscous,) = (h for h in hypotheses(TOLERANT, body.used) if h.effect.id == "viscous_slip")
+    answer = ask(anchor(drive.fit), viscous)
+    assert answer is not None
+    (fit, *_) = rough([answer], 8)
+    assert fit.cost < 0.05 * drive.fit.cost
+    assert fit.values["effect.viscous_slip.drum"] == pytest.approx(1.0 - 2.0 * on_input, abs=0.05)
+
+
 def test_an_effect_is_asked_for_at_no_size_that_its_fit_may_not_reach() -> None:
     """What shows next to nothing (an event just before the last rows) is not blown up until it does."""
     body, drive = calibrated(recorded([], 20.0))

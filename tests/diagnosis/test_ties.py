@@ -88,6 +88,14 @@ def test_what_explains_most_alone_stands_where_it_predicts_as_well(
     assert replaced == ["jaw"]
 
 
+def test_what_explains_most_alone_but_is_not_plausible_takes_no_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(ties, "_in_its_place", lambda *_: model(0.0, "absurd", "motor"))
+    found = model(0.02, "jaw", "motor")
+    assert ties.with_the_first(found, rounds(("absurd", 0.9), ("jaw", 0.1)), GROUPS) is found
+
+
 def test_a_model_that_has_what_explains_most_alone_stays() -> None:
     two = model(0.0, "path", "motor")
     assert ties.with_the_first(two, rounds(("jaw", 0.1), ("path", 0.9)), GROUPS) is two

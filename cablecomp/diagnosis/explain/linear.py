@@ -120,10 +120,12 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
     if best is None or not h.saturates:
         return best
     answers = [best]
-    for part in LIMITS.less:
-        less = difference(here, h, {**best.values, h.amount.name: part * best.size})
-        if less is not None:
-            answers.append(_linearly(here, h, Start(best.values), less, part * best.size))
+    low, high = reach_of(h.amount, here.fit.problem.config)
+    for part in LIMITS.sizes:
+        other = min(max(part * best.size, low), high)
+        d = difference(here, h, {**best.values, h.amount.name: other})
+        if d is not None:
+            answers.append(_linearly(here, h, Start(best.values), d, other))
     return _lowest(answers)
 
 

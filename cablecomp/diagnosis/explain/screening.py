@@ -105,9 +105,10 @@ def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> An
     other = min((f for f in shaped if f is not None), key=lambda f: f.cost, default=None)
     if other is None:
         return None
-    # what an event promises may be out of reach of its fit, which then decides between the shapes
+    # what an event promises may be out of reach of its fit, which then decides between the shapes; of what goes far
+    # beyond a straight line no promise decides
     enough = other.cost < best.cost if h.has_instant else worth_a_shape(other.by_channel, best.by_channel)
-    return _answer(here, h, other) if enough else None
+    return _answer(here, h, other) if enough or h.saturates else None
 
 
 def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
