@@ -123,9 +123,9 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
     low, high = reach_of(h.amount, here.fit.problem.config)
     for part in LIMITS.sizes:
         other = min(max(part * best.size, low), high)
-        d = difference(here, h, {**best.values, h.amount.name: other})
-        if d is not None:
-            answers.append(_linearly(here, h, Start(best.values), d, other))
+        shown = difference(here, h, {**best.values, h.amount.name: other})
+        if shown is not None:
+            answers.append(_linearly(here, h, Start(best.values), shown, other))
     return _lowest(answers)
 
 
