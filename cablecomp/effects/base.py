@@ -251,6 +251,8 @@ class Effect:
     """It is a friction of the joint itself: what the motor feels of it, the cable bears and yields to."""
     pliant: bool = False
     """It is a mere curve over the load, or a step: it bends to what other effects' forms leave, too."""
+    leaps: bool = False
+    """The joint falls at once, where the load changes sign."""
     posture: bool = False
     """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
     at_pretension: Callable[[Mapping[str, float], float], Restated] | None = None

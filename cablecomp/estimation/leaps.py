@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from cablecomp.effects import catalogue
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import BoolArray, FloatArray
@@ -28,8 +29,10 @@ KEPT: Final = 0.1
 
 def beside_leaps(problem: Problem, x: FloatArray) -> dict[str, FloatArray]:
     """What part of its weight every row of a recording keeps, by recording; recordings without such rows are left
-    out."""
-    found = {}
+    out. None of a joint without a clearance: where it moves quickest a late channel shows."""
+    found: dict[str, FloatArray] = {}
+    if not any(catalogue()[entry.id].leaps for entry in problem.config.effect):
+        return found
     for e, misfit in zip(problem.evidence, problem.misfits(x)[JOINT], strict=True):
         if JOINT not in e.counted:
             continue

@@ -17,6 +17,7 @@ from firmware_sim.trials.scene import is_slack
 from firmware_sim.trials.sizes import run_course
 from firmware_sim.trials.spoil import Recorded, record
 from firmware_sim.trials.suspects import Scene
+from firmware_sim.trials.tightened import tightened
 
 
 @dataclass(frozen=True)
@@ -51,27 +52,33 @@ def legs_of(
 ) -> tuple[Leg, ...] | None:
     """One leg for each course; None where a cable goes slack in one."""
     found = []
-    zeros, drive = {"joint_position": joint.offset_rad}, joint.true
+    zeros, factor = {"joint_position": joint.offset_rad}, 1.0
     for course, k in zip(courses, sessions, strict=True):
         if "sessions" in how:
-            zeros, drive = _session(joint, how, k)
-        leg = _leg(rng, replace(joint, true=drive), plain, specs, course, how, other, zeros)
+            zeros, factor = _session(joint, how, k)
+        leg = _leg(rng, joint, plain, specs, course, how, other, zeros, factor)
         if leg is None:
             return None
         found.append(replace(leg, session=k))
     return tuple(found)
 
 
-def _session(joint: DrawnJoint, how: Imperfections, k: int) -> tuple[dict[str, float], PlantConfig]:
-    """Zeros and drive of session k."""
+def _session(joint: DrawnJoint, how: Imperfections, k: int) -> tuple[dict[str, float], float]:
+    """Zeros of session k, and times how much its pretension is what it is meant to be."""
     numbers = how["sessions"]
     zeros = {
         "joint_position": joint.offset_rad + numbers["joint_zero_rad"][k],
         "joint_torque": numbers["torque_zero_of_load"][k] * joint.load_Nm,
     }
-    factor = numbers["pretension_factor"][k] if joint.true.circuit == "closed" else 1.0
-    stage = replace(joint.stage, pretension_N=joint.stage.pretension_N * factor)
-    return zeros, replace(joint.true, stages=(stage,))
+    return zeros, numbers["pretension_factor"][k] if joint.true.circuit == "closed" else 1.0
+
+
+def _standing(
+    joint: DrawnJoint, specs: Sequence[EffectSpec], factor: float
+) -> tuple[DrawnJoint, list[EffectSpec]]:
+    """The joint with these effects, its cables tightened so many times as much."""
+    stage, there = tightened(joint.stage, specs, factor)
+    return replace(joint, true=replace(joint.true, stages=(stage,))), there
 
 
 def _leg(
@@ -83,14 +90,14 @@ def _leg(
     how: Imperfections,
     other: str,
     zeros: dict[str, float],
+    factor: float,
 ) -> Leg | None:
-    scene = Scene(joint, course, plain)
-
     def played(effects: Sequence[EffectSpec]) -> PlantRun:
-        return run_course(scene, effects, NORMAL)
+        stood, there = _standing(joint, effects, factor)
+        return run_course(Scene(stood, course, plain), there, NORMAL)
 
-    run = played(specs)
-    if is_slack(run, joint):
+    run, drive = played(specs), _standing(joint, [], factor)[0]
+    if is_slack(run, drive):
         return None
     recorded = record(rng, run, joint.sensors, how, zeros, other)
     rows = recorded.rows
@@ -100,4 +107,4 @@ def _leg(
     torques = {"joint": run, "plain": bare, **{f"without_{name}": r for name, r in without.items()}}
     motor = {name: r.motor_torque_Nm[rows] for name, r in torques.items()}
     true, plain_rad = run.joint_position_rad[rows], bare.joint_position_rad[rows]
-    return Leg(course, joint.true, 0, zeros, recorded, true, plain_rad, angles, motor)
+    return Leg(course, drive.true, 0, zeros, recorded, true, plain_rad, angles, motor)

@@ -32,7 +32,7 @@ EXPONENTIAL = form(
     "pressure_dependent_friction",
     "exponential",
     "A coat that softens: mu = mu0 e^(−k (T/T0 − 1)).",
-    (Parameter("rate", "k", low=-0.5, high=1.5, neutral=0.0),),
+    (Parameter("rate", "k", low=-0.6, high=1.7, neutral=0.0),),
     ("load",),
     _law(2, "rate", None),
 )
