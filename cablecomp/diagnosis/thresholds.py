@@ -170,6 +170,9 @@ class Thresholds:
     """Cost with a shape that an effect may do without (an event that takes its time, a mount that yields more one way)
     over that of the best without it, after a linear step (not of an event) and after a rough fit, above which it does
     without it."""
+    another_shape: float = 1.2
+    """Cost with the next best shape over that with the best one, after a linear step, up to which both are fitted
+    roughly, and the fit decides (a link that drags in its clearance promised less than a key that wedges, 717/9)."""
     instants: int = 24
     """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
     course_instants: int = 160

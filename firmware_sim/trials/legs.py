@@ -13,7 +13,7 @@ from firmware_sim.trials.courses import Course
 from firmware_sim.trials.imperfections import Imperfections
 from firmware_sim.trials.joints import DrawnJoint
 from firmware_sim.trials.measures import PlainDrive
-from firmware_sim.trials.scene import is_slack
+from firmware_sim.trials.scene import is_no_trial
 from firmware_sim.trials.sizes import run_course
 from firmware_sim.trials.spoil import Recorded, record
 from firmware_sim.trials.suspects import Scene
@@ -97,7 +97,7 @@ def _leg(
         return run_course(Scene(stood, course, plain), there, NORMAL)
 
     run, drive = played(specs), _standing(joint, [], factor)[0]
-    if is_slack(run, drive):
+    if is_no_trial(run, drive):
         return None
     recorded = record(rng, run, joint.sensors, how, zeros, other)
     rows = recorded.rows

@@ -1,7 +1,9 @@
-"""The scene of a trial: what its courses may use, its plain drive's run and measures, and whether a cable goes
-slack."""
+"""The scene of a trial: what its courses may use, its plain drive's run and measures, and whether its joint is
+none that a trial is about."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from firmware_sim.plant import PlantRun
 from firmware_sim.trials.courses import Course, Range
@@ -12,6 +14,7 @@ from firmware_sim.trials.suspects import Scene
 
 PAUSE_S = 30.0  # between two recordings
 _TAUT = 0.02  # of T0, the least tension that a trial may come down to
+_LOST_RAD = 1.0  # off the motor, as no joint of a trial is
 
 
 def usable(joint: DrawnJoint, one_sided: bool = False) -> Range:
@@ -26,9 +29,11 @@ def plain_scene(joint: DrawnJoint, course: Course) -> tuple[Scene, PlantRun]:
     return Scene(joint, course, plain_measures(course.seen, run.joint_position_rad, joint.true.ratio)), run
 
 
-def is_slack(run: PlantRun, joint: DrawnJoint) -> bool:
-    """Whether a cable came so near to going slack that the trial would be about that."""
+def is_no_trial(run: PlantRun, joint: DrawnJoint) -> bool:
+    """Whether a cable came so near to going slack that the trial would be about that, or the plant found no tension
+    that holds: a coefficient that grows with pressure may have none, a few turns of a wrap on."""
     least = float(run.tension_h_N.min())
     if joint.true.circuit == "closed":
         least = min(least, float(run.tension_l_N.min()))
-    return least < _TAUT * joint.stage.pretension_N
+    off = run.joint_position_rad - joint.true.ratio * run.motor_true_rad
+    return least < _TAUT * joint.stage.pretension_N or float(np.abs(off).max()) > _LOST_RAD

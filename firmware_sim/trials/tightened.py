@@ -71,7 +71,7 @@ def _pressed_flat(p: Values, f: float) -> About:
     return About({"rate": p["rate"] * f}, mu=(1.0 + p["rate"]) / (1.0 + p["rate"] * f))
 
 
-LAWS: Mapping[str, Callable[[Values, float], About]] = {
+ABOUT_T0: Mapping[str, Callable[[Values, float], About]] = {
     "nonlinear_cable": _stiffening,
     "nonlinear_cable:saturating": _saturating,
     "nonlinear_cable:power_law": _power,
@@ -92,10 +92,10 @@ def tightened(
     there = replace(stage, pretension_N=stage.pretension_N * factor)
     found = []
     for spec in specs:
-        if spec.id not in LAWS:
+        if spec.id not in ABOUT_T0:
             found.append(spec)
             continue
-        about = LAWS[spec.id](spec.parameters, factor)
+        about = ABOUT_T0[spec.id](spec.parameters, factor)
         there = replace(
             there,
             EA_N=there.EA_N * about.EA,

@@ -23,6 +23,7 @@ from firmware_sim.trials.sensors import NEIGHBOUR_ANGLE, NEIGHBOUR_LOAD, draw_se
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
 from firmware_sim.trials.suspects import Scene, Shape, Suspect
 from firmware_sim.trials.tabletop import sessions_of, shape_of, table_courses
+from firmware_sim.trials.tightened import ABOUT_T0
 
 SAMPLES = (10_000, 12_000)
 """Of all recordings of a trial together."""
@@ -264,6 +265,7 @@ def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: se
         if scene.course.kind in s.courses
         and s.id.partition(":")[0] not in taken
         and not (s.warm or s.neighbour or s.two_sided or s.motor_torque or (s.closed and not closed))
+        and not (closed and s.id in ABOUT_T0)  # far larger from session to session than within one
     ]
     return fit[int(rng.integers(len(fit)))]
 

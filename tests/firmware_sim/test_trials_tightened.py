@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from plant_joints import Floats, joint
 
 from firmware_sim.plant import EffectSpec, StageConfig, simulate
-from firmware_sim.trials.tightened import LAWS, tightened
+from firmware_sim.trials.scene import is_no_trial
+from firmware_sim.trials.tightened import ABOUT_T0, tightened
 
 SPECS = (
     EffectSpec("nonlinear_cable", {"stiffening": 0.6}),
@@ -27,7 +30,7 @@ FACTOR = 1.08
 
 
 def test_every_law_about_the_pretension_is_tried() -> None:
-    assert {s.id for s in SPECS} == set(LAWS)
+    assert {s.id for s in SPECS} == set(ABOUT_T0)
 
 
 def loop(stage: StageConfig, spec: EffectSpec) -> Floats:
@@ -60,3 +63,20 @@ def test_what_is_not_stated_about_it_stays() -> None:
     there, specs = tightened(stage, [slip], FACTOR)
     assert specs == [slip]
     assert there == replace(stage, pretension_N=FACTOR * stage.pretension_N)
+
+
+@pytest.mark.parametrize(
+    ("off_rad", "tension_N", "none"), [(0.02, 30.0, False), (0.02, 0.5, True), (26060.0, 30.0, True)]
+)
+def test_a_slack_cable_and_a_joint_that_the_plant_lost_are_no_trial(
+    off_rad: float, tension_N: float, none: bool
+) -> None:
+    config = joint("open")
+    drawn: Any = SimpleNamespace(true=config, stage=config.stages[0])
+    motor = np.linspace(0.0, 3.0, 50)
+    run: Any = SimpleNamespace(
+        tension_h_N=np.full(50, tension_N),
+        motor_true_rad=motor,
+        joint_position_rad=config.ratio * motor + off_rad,
+    )
+    assert is_no_trial(run, drawn) is none

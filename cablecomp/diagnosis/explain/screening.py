@@ -38,7 +38,7 @@ from cablecomp.signal.smoothing import FloatArray
 class Answer:
     """What a hypothesis promises at its best start: cost after it (half the sum of squares; of each channel), its
     problem with the effect in it, points to begin from, the derivative there; `plain`: the same without a shape that
-    it may do without."""
+    it may do without; `next`: the same of the next best shape, where that promises about as much."""
 
     hypothesis: Hypothesis
     cost: float
@@ -47,6 +47,7 @@ class Answer:
     starts: tuple[FloatArray, ...]
     J: FloatArray
     plain: Answer | None = None
+    next: Answer | None = None
 
 
 def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
@@ -101,14 +102,26 @@ def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> An
         courses = [best_course(here, h, e) for e in lasting if e is not None]
         shaped = otherwise + courses
     else:
-        shaped = [best_start(here, replace(h, starts=tuple(Start({**best.values, **s}) for s in further)))]
-    other = min((f for f in shaped if f is not None), key=lambda f: f.cost, default=None)
-    if other is None:
+        shaped = [best_start(here, replace(h, starts=starts)) for starts in _by_shape(best, further)]
+    promised = sorted((f for f in shaped if f is not None), key=lambda f: f.cost)
+    if not promised:
         return None
+    other = promised[0]
     # what an event promises may be out of reach of its fit, which then decides between the shapes; of what goes far
     # beyond a straight line no promise decides
     enough = other.cost < best.cost if h.has_instant else worth_a_shape(other.by_channel, best.by_channel)
-    return _answer(here, h, other) if enough or h.saturates else None
+    if not (enough or h.saturates):
+        return None
+    near = [f for f in promised[1:2] if not h.has_instant and f.cost < LIMITS.another_shape * other.cost]
+    return replace(_answer(here, h, other), next=_answer(here, h, near[0]) if near else None)
+
+
+def _by_shape(best: Best, further: Sequence[Mapping[str, float]]) -> list[tuple[Start, ...]]:
+    """Starts beside the best one, those of one shape together."""
+    found: dict[frozenset[str], list[Start]] = {}
+    for values in further:
+        found.setdefault(frozenset(values), []).append(Start({**best.values, **values}))
+    return [tuple(starts) for starts in found.values()]
 
 
 def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
@@ -190,6 +203,9 @@ def _begun(a: Answer, evaluations: int) -> Fit | None:
         fit = approach(a.problem, x, known, 3 if a.problem.fine else evaluations, LIMITS.tolerance, residual)
     except InputError:
         fit = None
+    following = None if a.next is None else _begun(a.next, evaluations)
+    if fit is None or (following is not None and following.cost < fit.cost):
+        fit = following or fit
     plain = None if a.plain is None else _begun(a.plain, evaluations)
     if plain is None or fit is None:
         return fit or plain
