@@ -18,7 +18,13 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.outliers import outliers
 from cablecomp.mechanics.jit import njit
 from cablecomp.signal.noise import channel_noise
-from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
+from cablecomp.signal.smoothing import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    group_means,
+    keep_corners,
+)
 
 JOINT: Final = "joint_position_rad"
 INPUT: Final = "motor_position_rad"
@@ -39,6 +45,9 @@ SPARSE: Final = 0.6
 """Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
 DIED: Final = 10.0
 """Usual steps of such a channel beyond which it was not read for a while, or no more."""
+APART: Final = 3.0
+"""Times the usual span of the readings that make a fine row up to which they lie: what lies further apart lies on both
+sides of a gap."""
 OVERFLOWN: Final = 1e15
 """From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 
@@ -221,11 +230,15 @@ def _fine(
     fine_rows: int,
     load: str | None,
 ) -> tuple[dict[str, FloatArray], dict[str, BoolArray]]:
-    """Means of as many readings as leave `fine_rows`, inputs cleaned; and which of them count, by output channel."""
+    """Means of as many readings as leave `fine_rows`, inputs cleaned; and which of them count, by output channel. Of
+    readings on both sides of a gap nothing is made."""
     group = max(1, -(-len(raw["time_s"]) // fine_rows))
     whole = len(raw["time_s"]) // group * group
-    means = {k: group_means(v[:whole], group) for k, v in raw.items()}
-    counted = {k: group_means(v[:whole].astype(np.float64), group) > 0.99 for k, v in finite.items()}
+    time = raw["time_s"][:whole].reshape(-1, group)
+    span = time[:, -1] - time[:, 0]
+    near = span <= APART * np.median(span)
+    means = {k: group_means(v[:whole], group)[near] for k, v in raw.items()}
+    counted = {k: (group_means(v[:whole].astype(np.float64), group) > 0.99)[near] for k, v in finite.items()}
     for key in raw:
         is_input = key != "time_s" and (key not in OUTPUTS or key == load)
         if is_input and np.ptp(means[key]) > 0.0:

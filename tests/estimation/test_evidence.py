@@ -104,6 +104,17 @@ def test_no_value_is_made_up_where_an_input_has_no_reading() -> None:
     assert np.all(np.isin(e.columns["time_s"], measured))
 
 
+def test_no_row_is_made_of_readings_on_both_sides_of_a_gap() -> None:
+    time = np.arange(0.0, 40.0, 0.008)
+    time = time[(time < 10.004) | (time > 12.0)]
+    motor = np.sin(time)
+    columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": 0.5 * motor}
+    e = gather(JOINT, "one", columns, "all", fine_rows=len(time) // 4, judged_rows=200)
+    found = e.columns["time_s"]
+    assert len(found) >= len(time) // 5 - 2
+    assert not np.any((found > 10.01) & (found < 11.99))
+
+
 def test_a_run_of_absurd_readings_is_set_aside_and_a_quick_motion_after_a_long_rest_is_not() -> None:
     columns = recorded()
     clean = gathered(columns).outliers

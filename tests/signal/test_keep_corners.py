@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from cablecomp.signal.smoothing import FloatArray, keep_corners, local_fit
 
@@ -49,3 +50,20 @@ def test_steps_and_gaps_are_not_smeared() -> None:
 def test_without_noise_nothing_is_touched() -> None:
     values = np.random.default_rng(3).standard_normal(50)
     assert np.array_equal(keep_corners(np.arange(50.0), values, 0.0), values)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_turns_by_thousands_of_deviations_keeps_its_corners(seed: int) -> None:
+    """Ramps between rests, uneven steps, bursts lost: no sample far off, though its neighbours' windows are wide."""
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(0.016 * (1.0 + 0.2 * rng.uniform(-1.0, 1.0, 1200)))
+    kept = np.ones(len(time), dtype=np.bool_)
+    for k in rng.integers(0, len(time), 12 * (seed % 2)):
+        kept[k : k + rng.integers(1, 16)] = False
+    time = time[kept]
+    levels = np.cumsum(rng.normal(0.0, 0.5, 24) * (rng.uniform(size=24) < 0.5))
+    true = np.interp(time, np.sort(rng.uniform(0.0, time[-1], 24)), levels)
+    sigma = 5e-6
+    found = keep_corners(time, true + sigma * rng.standard_normal(len(time)), sigma)
+    assert np.max(np.abs(found - true)) < 8.0 * sigma
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.8 * sigma
