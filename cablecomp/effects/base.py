@@ -251,6 +251,8 @@ class Effect:
     """It is a friction of the joint itself: what the motor feels of it, the cable bears and yields to."""
     pliant: bool = False
     """It is a mere curve over the load, or a step: it bends to what other effects' forms leave, too."""
+    saturates: bool = False
+    """Twice the amount does far less than twice as much, over decades of it."""
     leaps: bool = False
     """The joint falls at once, where the load changes sign."""
     posture: bool = False

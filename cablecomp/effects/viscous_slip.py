@@ -55,6 +55,7 @@ EFFECT = Effect(
     ),
     acts_through=("dwell", "load_rate", "load_direction", "velocity"),
     rates=True,
+    saturates=True,
     bounded=False,
     change=_change,
 )

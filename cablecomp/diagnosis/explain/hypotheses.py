@@ -143,11 +143,6 @@ class Hypothesis:
         return plain and bool({"load", "reversal"} & through) and "time" not in through and not self.groove
 
     @property
-    def saturates(self) -> bool:
-        """Whether twice the amount does far less than twice as much: a rate's law over decades."""
-        return self.effect.rates and self.amount.log
-
-    @property
     def groove(self) -> bool:
         """Whether it depends on the place in the groove."""
         return "joint_angle" in self.effect.acts_through

@@ -117,7 +117,7 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
             d, size = found
             answers.append(_linearly(here, h, start, d, size))
     best = _lowest(answers)
-    if best is None or not h.saturates:
+    if best is None or not h.effect.saturates:
         return best
     answers = [best]
     low, high = reach_of(h.amount, here.fit.problem.config)

@@ -110,7 +110,7 @@ def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> An
     # what an event promises may be out of reach of its fit, which then decides between the shapes; of what goes far
     # beyond a straight line no promise decides
     enough = other.cost < best.cost if h.has_instant else worth_a_shape(other.by_channel, best.by_channel)
-    if not (enough or h.saturates):
+    if not (enough or h.effect.saturates):
         return None
     near = [f for f in promised[1:2] if not h.has_instant and f.cost < LIMITS.another_shape * other.cost]
     return replace(_answer(here, h, other), next=_answer(here, h, near[0]) if near else None)
