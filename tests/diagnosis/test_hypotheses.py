@@ -182,12 +182,11 @@ def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -
 
 
 def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
-    strands = _of("strand_friction", "strand_friction")
+    strands, bare = _of("strand_friction", "strand_friction"), SimpleNamespace(parameters=(), config=JOINT)
     least = strands.effect.parameter("yield_N").bounds(JOINT)[0]
     for held_N, word in ((2.0 * least, ""), (0.1 * least, "yield_N")):
-        problem = SimpleNamespace(parameters=(), config=JOINT)
         values = {strands.key("yield_N"): held_N, strands.key("fraction"): 1.0}
-        fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
+        fit = SimpleNamespace(problem=bare, x=np.empty(0), values=values)
         assert better_word(cast("Fit", fit), strands) == word
 
 
