@@ -172,7 +172,7 @@ class Thresholds:
     without it."""
     another_shape: float = 1.2
     """Cost with the next best shape over that with the best one, after a linear step, up to which both are fitted
-    roughly, and the fit decides (a link that drags in its clearance promised less than a key that wedges, 717/9)."""
+    roughly, and the fit decides: what a straight line promises is known no closer."""
     instants: int = 24
     """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
     course_instants: int = 160

@@ -253,8 +253,6 @@ class Effect:
     """It is a mere curve over the load, or a step: it bends to what other effects' forms leave, too."""
     saturates: bool = False
     """Twice the amount does far less than twice as much, over decades of it."""
-    leaps: bool = False
-    """The joint falls at once, where the load changes sign."""
     posture: bool = False
     """How much of it there is may change with how the cable's path lies (a wrist's turn, a sheath's bend)."""
     at_pretension: Callable[[Mapping[str, float], float], Restated] | None = None

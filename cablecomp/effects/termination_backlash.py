@@ -175,7 +175,6 @@ EFFECT = Effect(
     ),
     acts_through=("load", "load_direction"),
     bounded=True,
-    leaps=True,
     change=_change,
     tries=(
         *({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),

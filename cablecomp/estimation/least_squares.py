@@ -14,10 +14,8 @@ from scipy.optimize import least_squares
 
 from cablecomp.estimation.departures import FEWEST, departures, set_anew
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.leaps import beside_leaps
 from cablecomp.estimation.limits import HOPELESS, MOVED_SD, ZERO
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray
 
@@ -214,7 +212,7 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
             else:
                 anew, far = scatter.moved, zero_sd[c]
             moved[c] = dict.fromkeys(anew, MOVED_SD * far)
-    return Weighing(sigma, zero_sd, moved, floor.history, beside_leaps(problem, fit.x))
+    return Weighing(sigma, zero_sd, moved, floor.history)
 
 
 def refit(fit: Fit, weighing: Weighing, evaluations: int = 10) -> Fit:

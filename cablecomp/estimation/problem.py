@@ -23,7 +23,6 @@ from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, STEP
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing, stood, with_common
-from cablecomp.estimation.weighing import Weighing
 from cablecomp.estimation.zeros import Zeros
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
@@ -36,6 +35,18 @@ Known: TypeAlias = Mapping[int, Mapping[str, FloatArray]]
 def of_recording(misfits: Misfits, place: int) -> dict[str, FloatArray]:
     """Those of one recording."""
     return {c: parts[place] for c, parts in misfits.items()}
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """What a misfit counts for: by channel, 1-sigma of a row with its memory, and how far a recording's zero
+    departs from its session's; `moved`: recordings whose zero was set anew, and how far it may be; `history`: how far
+    one that nobody recorded moves zeros [the channel's unit]."""
+
+    sigma: Mapping[str, float]
+    zero_sd: Mapping[str, float]
+    moved: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    history: Mapping[str, float] = field(default_factory=dict)
 
 
 class Aside(NamedTuple):
@@ -289,8 +300,7 @@ class Problem:
         for r, m in zip(self.evidence, misfits, strict=True):
             if channel in r.counted:
                 kept = r.counted[channel]
-                weight = self.weighing.of_rows(r, channel)
-                parts.append((weight[kept] * m[kept].T).T / self.weighing.sigma[channel])
+                parts.append((r.weight[kept] * m[kept].T).T / self.weighing.sigma[channel])
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _length(self) -> int:
@@ -315,7 +325,7 @@ class Problem:
             if channel not in r.counted:
                 continue
             kept = r.counted[channel]
-            w = self.weighing.of_rows(r, channel)[kept] / sigma
+            w = r.weight[kept] / sigma
             block = np.zeros((len(w), free + sum(carried)))
             first = width * sessions.index(r.session)
             block[:, first] = w

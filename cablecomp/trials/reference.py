@@ -24,7 +24,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Weighing
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.sealed import Truth
 

@@ -19,8 +19,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive, reach_of
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 
 
 def test_an_event_is_asked_for_inside_of_recordings_and_between_those_of_a_session() -> None:

@@ -19,8 +19,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive, vague_drive
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
 
 ANGLE = "joint_position_rad"

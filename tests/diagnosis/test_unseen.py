@@ -19,8 +19,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT as ANGLE
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 

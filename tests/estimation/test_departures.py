@@ -13,8 +13,7 @@ from cablecomp.estimation.departures import departures, set_anew
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.limits import FAR
 from cablecomp.estimation.parameter import of_drive, of_effect
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
 ANGLE = "joint_position_rad"

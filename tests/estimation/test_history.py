@@ -12,8 +12,7 @@ from cablecomp.config import parse_joint
 from cablecomp.estimation.evidence import JOINT, gather
 from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.parameter import of_drive
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
 

@@ -14,8 +14,7 @@ from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.least_squares import covariance, inside, solve, weighed
 from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 

@@ -14,9 +14,8 @@ from cablecomp.effects import catalogue
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit, covariance, solve, weighed
 from cablecomp.estimation.parameter import of_drive, of_effect, own_of
-from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.estimation.profile import profile_interval
-from cablecomp.estimation.weighing import Weighing
 
 ANGLE, TORQUE = "joint_position_rad", "effect.bearing_friction.torque_Nm"
 SIGMA = 2e-5

@@ -19,8 +19,7 @@ from cablecomp.effects import catalogue
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve
 from cablecomp.estimation.parameter import Parameter, of_drive, of_effect, own_of
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.recording.reader import read_all
 from cablecomp.signal.smoothing import FloatArray
 

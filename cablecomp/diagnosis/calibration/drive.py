@@ -18,9 +18,8 @@ from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weig
 from cablecomp.estimation.limits import BY_TAPE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of
-from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.estimation.standing import in_its_place
-from cablecomp.estimation.weighing import Weighing
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
 TORQUE_ZERO = "joint_torque_offset_Nm"

@@ -24,8 +24,7 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, gather
 from cablecomp.estimation.least_squares import Fit, approach, refit, rms_left, solve, weighed
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.noise import reading_sigma
 from cablecomp.signal.smoothing import FloatArray, group_means

@@ -14,8 +14,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, covariance
 from cablecomp.estimation.parameter import Parameter, of_drive
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 
 RATE_HZ = 50.0
 """Samples of a motion that is only thought of."""

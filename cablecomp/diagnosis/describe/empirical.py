@@ -77,9 +77,7 @@ def _joint_rows(model: Model, groups: Groups) -> _Rows:
     problem = model.fit.problem
     first = problem.spans()[JOINT].start
     rows = slice(first, first + len(problem.owners(JOINT)))
-    weight = np.concatenate([
-        problem.weighing.of_rows(e, JOINT)[e.counted[JOINT]] for e in problem.evidence
-    ])  # fmt: skip
+    weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
     block = groups.block[rows]
     here = Groups(block, groups.fold[rows], groups.by, np.zeros_like(block))
     return _Rows(problem.evidence, model.left_out[rows].copy(), weight / problem.weighing.sigma[JOINT], here)

@@ -21,11 +21,9 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.departures import set_anew
 from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
 from cablecomp.estimation.history import with_own_carryover
-from cablecomp.estimation.leaps import beside_leaps
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
 from cablecomp.estimation.limits import MOVED_SD
-from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 
 Term = Hypothesis | Dependence
@@ -120,7 +118,7 @@ def loss(model: Model, size: FloatArray, groups: Groups) -> float:
 
 def searching(fit: Fit) -> Weighing:
     """Weights for a search beyond this fit: a part of what it leaves of each channel, never below the sensor's
-    noise; rows beside the model's own leaps count for little."""
+    noise."""
     problem = fit.problem
     sigma = {}
     for c in problem.channels:
@@ -136,7 +134,7 @@ def searching(fit: Fit) -> Weighing:
     anew = before.moved if told else _moved(fit)
     far = spread if told else {c: max(spread[c], sigma[c]) for c in sigma}
     moved = {c: dict.fromkeys(names, MOVED_SD * far[c]) for c, names in anew.items()}
-    return Weighing(sigma, spread, moved, before.history, beside_leaps(problem, fit.x))
+    return Weighing(sigma, spread, moved, before.history)
 
 
 def _moved(fit: Fit) -> dict[str, frozenset[str]]:

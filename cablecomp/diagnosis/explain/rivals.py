@@ -165,8 +165,7 @@ def _zero_step(model: Model, base: Model, term: Hypothesis, groups: Groups) -> P
     after = [how_far(course, e.at_rows("time_s")) for e in problem.evidence]
     struck = next((e.session for e, a in zip(problem.evidence, after, strict=True) if a.any()), None)
     rows = [
-        (problem.weighing.of_rows(e, JOINT) * a * (e.session == struck))[e.counted[JOINT]]
-        / problem.weighing.sigma[JOINT]
+        (e.weight * a * (e.session == struck))[e.counted[JOINT]] / problem.weighing.sigma[JOINT]
         for e, a in zip(problem.evidence, after, strict=True)
         if JOINT in e.counted
     ]

@@ -41,7 +41,7 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
-from cablecomp.estimation.weighing import Weighing
+from cablecomp.estimation.problem import Weighing
 
 
 def select(

@@ -39,9 +39,7 @@ def sensitivities(fit: Fit) -> FloatArray:
     """Derivative of the joint rows [rad] by the fit's parameters: what calibration can explain is not counted."""
     problem = fit.problem
     count = len(problem.owners(JOINT))
-    weight = np.concatenate([
-        problem.weighing.of_rows(e, JOINT)[e.counted[JOINT]] for e in problem.evidence
-    ])  # fmt: skip
+    weight = np.concatenate([e.weight[e.counted[JOINT]] for e in problem.evidence])
     rows = fit.J[:count] * (problem.weighing.sigma[JOINT] / weight)[:, None]
     own = np.stack([problem.owners(JOINT) == k for k in range(len(problem.evidence))], axis=1).astype(
         np.float64
