@@ -22,6 +22,7 @@ _GAP: Final = 10.0
 _REACHES: Final = np.array([1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64], dtype=np.int64)
 _EVEN: Final = 8  # samples either way over which a window's width is evened out
 _CORNER: Final = 0.5  # of the variance of a window to both sides, from which a line to one side is taken
+_FAR: Final = 4.0  # standard deviations off its reading, beyond which a window to both sides crosses a corner
 _AGREE: Final = 1.5  # half width of the confidence intervals that have to meet, in standard deviations
 
 
@@ -110,20 +111,17 @@ def keep_corners(time_s: FloatArray, values: FloatArray, sigma: float) -> FloatA
     How wide a window may be is asked sample by sample: as wide as the estimates of all narrower ones agree,
     their intervals of +-1.5 standard deviations sharing a point (intersection of confidence intervals:
     Goldenshluger and Nemirovski 1997, Katkovnik 1999). Where a window to both sides may be wide, the sample
-    takes a quadratic with tricube weights, its width changing slowly so that second differences stay quiet, no
-    further off than its own intervals and as much again allow (its neighbours' windows may be wide where its own
-    may not); at a corner, a line to the side that is straight. Windows end at gaps; readings must be finite.
+    takes a quadratic with tricube weights, its width changing slowly so that second differences stay quiet;
+    at a corner, and where that lies further off the reading than noise does, for its neighbours' windows may be wide
+    where its own may not, a line to the side that is straight. Windows end at gaps; readings must be finite.
     """
     if not sigma > 0.0 or len(values) < 3:
         return np.asarray(values, dtype=np.float64)
     bounds = segment_bounds(time_s)
-    wide, variance, line, line_variance, least, most = _widest(
-        time_s, values, bounds, sigma, _REACHES, _AGREE
-    )
+    wide, variance, line, line_variance = _widest(time_s, values, bounds, sigma, _REACHES, _AGREE)
     widths = np.exp(_local_mean(np.log(wide), bounds, _EVEN))
-    again = _AGREE * sigma * np.sqrt(variance)
-    smooth = np.clip(_tricube(time_s, values, bounds, widths), least - again, most + again)
-    corner = line_variance < _CORNER * variance
+    smooth = _tricube(time_s, values, bounds, widths)
+    corner = (line_variance < _CORNER * variance) | (np.abs(smooth - values) > _FAR * sigma)
     return np.asarray(np.where(corner, line, smooth), dtype=np.float64)
 
 
@@ -192,14 +190,12 @@ def _local_quadratic(
 @njit
 def _widest(
     time_s: FloatArray, values: FloatArray, bounds: IntArray, sigma: float, reaches: IntArray, agree: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Of every sample: reach (samples, at least 1) and variance (over a reading's) of the widest window to
-    both sides; value and variance of the better line to one side; what the intervals of all windows to both sides
-    share, from and to."""
+    both sides; value and variance of the better line to one side."""
     n = len(values)
     wide, variance = np.ones(n), np.ones(n)
     line, line_variance = values.copy(), np.ones(n)
-    least, most = values - agree * sigma, values + agree * sigma
     for b in range(len(bounds) - 1):
         first, last = bounds[b], bounds[b + 1]
         for i in range(first, last):
@@ -219,10 +215,9 @@ def _widest(
                         break
                     if side == 2:
                         wide[i], variance[i] = reach, share
-                        least[i], most[i] = low, high
                     elif share < line_variance[i]:
                         line[i], line_variance[i] = estimate, share
-    return wide, variance, line, line_variance, least, most
+    return wide, variance, line, line_variance
 
 
 @njit
