@@ -18,13 +18,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.outliers import outliers
 from cablecomp.mechanics.jit import njit
 from cablecomp.signal.noise import channel_noise
-from cablecomp.signal.smoothing import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    group_means,
-    keep_corners,
-)
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
 
 JOINT: Final = "joint_position_rad"
 INPUT: Final = "motor_position_rad"

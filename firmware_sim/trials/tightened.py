@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from firmware_sim.plant import EffectSpec, StageConfig
+from firmware_sim.plant.forms.nonlinear_cable import Stiffness, knee, power, saturating
 
 Values = Mapping[str, float]
 
@@ -29,24 +30,15 @@ def _stiffening(p: Values, f: float) -> About:
     return About({"stiffening": p["stiffening"] * f / gain}, EA=gain)
 
 
-def _saturating(p: Values, f: float) -> About:
-    def g(tau: float) -> float:
-        return 1.0 - p["softness"] * math.exp(-tau / p["reach"])
+def _tabled(of: Callable[[Values], Stiffness], *tensions: str) -> Callable[[Values, float], About]:
+    """Of a law that has a stiffness of its own, and these tensions among its parameters."""
 
-    return About({**p, "reach": p["reach"] / f}, EA=g(f) / g(1.0))
+    def about(p: Values, f: float) -> About:
+        stiffness = of(p)
+        there = {name: p[name] / f for name in tensions}
+        return About({**p, **there}, EA=stiffness(f) / stiffness(1.0))
 
-
-def _power(p: Values, f: float) -> About:
-    # its 0.02 T0, which keeps it from zero, stays that share of the pretension: 1e-3 of T0 at most
-    return About(dict(p), EA=((f + 0.02) / 1.02) ** p["exponent"])
-
-
-def _knee(p: Values, f: float) -> About:
-    def g(tau: float) -> float:
-        return 1.0 + p["rise"] * 0.5 * (1.0 + math.tanh((tau - p["place"]) / p["width"]))
-
-    there = {"place": p["place"] / f, "width": p["width"] / f}
-    return About({**p, **there}, EA=g(f) / g(1.0))
+    return about
 
 
 def _pressure(p: Values, f: float) -> About:
@@ -73,9 +65,10 @@ def _pressed_flat(p: Values, f: float) -> About:
 
 ABOUT_T0: Mapping[str, Callable[[Values, float], About]] = {
     "nonlinear_cable": _stiffening,
-    "nonlinear_cable:saturating": _saturating,
-    "nonlinear_cable:power_law": _power,
-    "nonlinear_cable:knee": _knee,
+    "nonlinear_cable:saturating": _tabled(saturating, "reach"),
+    # its 0.02 T0, which keeps it from zero, stays that share of the pretension: 1e-3 of T0 at most
+    "nonlinear_cable:power_law": _tabled(power),
+    "nonlinear_cable:knee": _tabled(knee, "place", "width"),
     "pressure_dependent_friction": _pressure,
     "pressure_dependent_friction:floor": _floor,
     "pressure_dependent_friction:exponential": _exponential,

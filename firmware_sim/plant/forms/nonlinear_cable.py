@@ -42,13 +42,21 @@ def tensile_table(stiffness: Callable[[float], float]) -> Floats:
     return table
 
 
-def _tabled(build: Build, stiffness: Callable[[float], float]) -> None:
-    build.cables["tabled"] = 1
-    build.tensile[:] = tensile_table(stiffness)
+Stiffness = Callable[[float], float]
+"""EA by T/T0, in proportion."""
 
 
-def _saturating(build: Build, p: Mapping[str, float]) -> None:
-    _tabled(build, lambda tau: 1.0 - p["softness"] * math.exp(-tau / p["reach"]))
+def _tabled(of: Callable[[Mapping[str, float]], Stiffness]) -> Callable[[Build, Mapping[str, float]], None]:
+    def apply(build: Build, p: Mapping[str, float]) -> None:
+        build.cables["tabled"] = 1
+        build.tensile[:] = tensile_table(of(p))
+
+    return apply
+
+
+def saturating(p: Mapping[str, float]) -> Stiffness:
+    """The stiffness of strands that bed in."""
+    return lambda tau: 1.0 - p["softness"] * math.exp(-tau / p["reach"])
 
 
 SATURATING = form(
@@ -60,12 +68,13 @@ SATURATING = form(
         Parameter("reach", "u", 0.7, 0.05, 10.0),
     ),
     ("load",),
-    _saturating,
+    _tabled(saturating),
 )
 
 
-def _power(build: Build, p: Mapping[str, float]) -> None:
-    _tabled(build, lambda tau: (tau + 0.02) ** p["exponent"])
+def power(p: Mapping[str, float]) -> Stiffness:
+    """The stiffness of wires that touch."""
+    return lambda tau: (tau + 0.02) ** p["exponent"]
 
 
 POWER_LAW = form(
@@ -74,12 +83,13 @@ POWER_LAW = form(
     "Wires that touch as Hertz has it: EA(T) in proportion to (T/T0 + 0.02)^n.",
     (Parameter("exponent", "n", low=-0.5, high=0.8, neutral=0.0),),
     ("load",),
-    _power,
+    _tabled(power),
 )
 
 
-def _knee(build: Build, p: Mapping[str, float]) -> None:
-    _tabled(build, lambda tau: 1.0 + p["rise"] * 0.5 * (1.0 + math.tanh((tau - p["place"]) / p["width"])))
+def knee(p: Mapping[str, float]) -> Stiffness:
+    """The stiffness of a core that carries from some tension on."""
+    return lambda tau: 1.0 + p["rise"] * 0.5 * (1.0 + math.tanh((tau - p["place"]) / p["width"]))
 
 
 KNEE = form(
@@ -92,7 +102,7 @@ KNEE = form(
         Parameter("width", "over T0", 0.1, 0.03, 2.0),
     ),
     ("load",),
-    _knee,
+    _tabled(knee),
 )
 
 KINDS: tuple[EffectKind, ...] = (SATURATING, POWER_LAW, KNEE)
