@@ -242,6 +242,12 @@ def _fine(
     return means, counted
 
 
+def gaps_of(time: FloatArray) -> IntArray:
+    """Rows after which nothing was recorded for more than `APART` usual steps."""
+    steps = np.diff(time)
+    return np.flatnonzero(steps > APART * np.median(steps)) if len(steps) else np.zeros(0, dtype=np.int64)
+
+
 def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]:
     """(fine, judged) rows of each recording, out of its samples and of what all together may have."""
     total = sum(samples)
@@ -250,8 +256,8 @@ def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]
 
 
 def thinned(columns: Mapping[str, FloatArray], load: str | None, count: int) -> IntArray:
-    """About `count` rows, even in travel (motor, joint and load over their ranges, and a share of time), and
-    every turning point of motor and load in between."""
+    """About `count` rows, even in travel (motor, joint and load over their ranges, and a share of time), every turning
+    point of motor and load in between, and both sides of every gap."""
     time = columns["time_s"]
     n = len(time)
     if n <= count:
@@ -267,7 +273,8 @@ def thinned(columns: Mapping[str, FloatArray], load: str | None, count: int) -> 
             travel = travel + step / max(float(step.sum()), 1e-12)
     total = np.cumsum(travel)
     even = np.searchsorted(total, np.linspace(total[0], total[-1], count))
-    kept = [even, np.array([0, n - 1])]
+    gaps = gaps_of(time)
+    kept = [even, np.array([0, n - 1]), gaps, gaps + 1]
     for key in drivers:
         kept.append(_turns(columns[key], 0.02 * float(np.ptp(columns[key]))))
     return np.unique(np.clip(np.concatenate(kept), 0, n - 1)).astype(np.int64)

@@ -1,27 +1,32 @@
-"""What the history before the first sample, which nobody recorded, may still do to a prediction: its carry-over.
+"""What the history before the first sample and in gaps, which nobody recorded, may still do to a prediction: its
+carry-over.
 
 The drive is run from several assumed histories (loaded to one side or the other, wound in from either end of the
 stroke, both); rows count from where these runs agree but for a constant, and how far the constants differ is how far a
-recording's zero may depart from its session's. What they still differ by from there on, the carry-over, is estimated
-with the zeros, each column with a prior.
+recording's zero may depart from its session's. What they still differ by from there on, and what detours in its gaps
+do, the carry-over, is estimated with the zeros, each column with a prior.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.gaps import along, detours
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.limits import HISTORY_CUTS, HISTORY_FAINT, HISTORY_LEG, HISTORY_PARTS
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.problem import Problem
-from cablecomp.estimation.simulate import load_of, simulator
+from cablecomp.estimation.simulate import Unrecorded, load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
+
+Runs: TypeAlias = list[list[dict[str, FloatArray]]]
+"""What each of the runs adds by channel: those of the assumed histories, then those of the detours of each gap."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,7 @@ def reaches(problem: Problem) -> tuple[Reach, ...]:
     return (seen,) if allowed == seen else (seen, allowed)
 
 
-def histories(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
+def histories(problem: Problem, recording: Evidence) -> Iterator[Unrecorded]:
     """Assumed histories (motor angle, load) of a recording, as far as it goes and a part of that: loaded and back,
     either way; loaded one way, then a part as far the other; in from towards either end of the stroke; loaded there and
     wound in under load; loaded, wound there and back."""
@@ -85,8 +90,8 @@ def histories(problem: Problem, recording: Evidence) -> Iterator[FloatArray]:
                     yield _path([(q, 0.0), (q, side), (end, side), (q, m)])
 
 
-def _path(corners: Sequence[tuple[float, float]]) -> FloatArray:
-    return np.concatenate([np.linspace(a, b, HISTORY_LEG) for a, b in pairwise(corners)])
+def _path(corners: list[tuple[float, float]]) -> Unrecorded:
+    return Unrecorded(along(corners, HISTORY_LEG))
 
 
 def full_swing(problem: Problem, recording: Evidence, most: float) -> int:
@@ -121,9 +126,9 @@ def forgotten(
     """Where the history is forgotten to within `share` of what is usually left over of each channel (`size`), from row
     `after` on; the best cut there is if it is nowhere."""
     runs = _apart(problem, x, recording, tuple(size))
-    if not runs:
+    if not runs or not runs[0]:
         return Forgotten(0, 0.0, 0.0)
-    apart = np.stack([run[JOINT] for run in runs])
+    apart = np.stack([run[JOINT] for run in runs[0]])
     first, left = _first_row(apart, share * size[JOINT], after)
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
     return Forgotten(first, left, constant, _carried_over(runs, first, size))
@@ -144,42 +149,42 @@ def _carried_over_anew(problem: Problem, x: FloatArray, recording: Evidence) -> 
     over otherwise. As it was, where there was none or the drive can have had none of the assumed histories."""
     known = recording.carryover
     runs = _apart(problem, x, recording, tuple(known)) if known else []
-    if not runs:
+    if not any(runs):
         return recording
     first = int(np.argmax(recording.counted[JOINT]))
     found = {c: _columns(_of(runs, c), first, 0.0, columns.shape[1]) for c, columns in known.items()}
     return replace(recording, carryover=found)
 
 
-def _carried_over(
-    runs: Sequence[Mapping[str, FloatArray]], first: int, size: Mapping[str, float]
-) -> dict[str, FloatArray]:
+def _carried_over(runs: Runs, first: int, size: Mapping[str, float]) -> dict[str, FloatArray]:
     """Columns by channel of what these runs add from row `first` on, where they are worth any."""
     found = {c: _columns(_of(runs, c), first, HISTORY_FAINT * s) for c, s in size.items()}
     return {c: columns for c, columns in found.items() if columns.shape[1]}
 
 
-def _of(runs: Sequence[Mapping[str, FloatArray]], channel: str) -> FloatArray:
-    return np.column_stack([run[channel] for run in runs])
+def _of(runs: Runs, channel: str) -> list[FloatArray]:
+    return [np.column_stack([run[channel] for run in each]) for each in runs if each]
 
 
-def _apart(
-    problem: Problem, x: FloatArray, recording: Evidence, channels: Sequence[str]
-) -> list[dict[str, FloatArray]]:
-    """What each assumed history that the drive could have had adds to the judged rows, by channel."""
+def _apart(problem: Problem, x: FloatArray, recording: Evidence, channels: Sequence[str]) -> Runs:
+    """What each assumed history, and each detour in each gap, that the drive could have had adds to the judged rows, by
+    channel: those of the history first."""
     made = simulator(problem.joint(x, recording))
     try:
         base = made.predict(recording)
     except InputError:
         return []
-    runs = []
-    for history in histories(problem, recording):
-        try:
-            run = made.predict(recording, history)
-        except InputError:
-            continue
-        runs.append({c: run[c] - base[c] for c in channels})
-    return runs
+    found = []
+    for each in (histories(problem, recording), *detours(problem.config, recording)):
+        runs = []
+        for unrecorded in each:
+            try:
+                run = made.predict(recording, unrecorded)
+            except InputError:
+                continue
+            runs.append({c: run[c] - base[c] for c in channels})
+        found.append(runs)
+    return found
 
 
 def _first_row(apart: FloatArray, enough: float, after: int) -> tuple[int, float]:
@@ -198,14 +203,16 @@ def _first_row(apart: FloatArray, enough: float, after: int) -> tuple[int, float
     return best
 
 
-def _columns(runs: FloatArray, first: int, faint: float, count: int | None = None) -> FloatArray:
-    """Principal columns of what the histories add from row `first` on, a constant apart, those that are not faint or
-    so many; rotated, so that one prior does for all, and over the root of their number, so that more of them say no
-    more: one of these has been."""
-    centred = (runs - runs[first:].mean(axis=0)) / np.sqrt(runs.shape[1])
+def _columns(runs: Sequence[FloatArray], first: int, faint: float, count: int | None = None) -> FloatArray:
+    """Principal columns of what the histories, and each gap's detours, add from row `first` on, a constant apart, those
+    that are not faint or so many; rotated, so that one prior does for all, and of each gap over the root of their
+    number, so that more of them say no more: one of these has been."""
+    number = np.concatenate([np.full(r.shape[1], float(r.shape[1])) for r in runs])
+    together = np.column_stack(runs)
+    centred = (together - together[first:].mean(axis=0)) / np.sqrt(number)
     _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)
     # in the history that has most of it: some directions few histories have
-    most = s * np.max(np.abs(Vt), axis=1) * np.sqrt(runs.shape[1])
+    most = s * np.max(np.abs(Vt) * np.sqrt(number), axis=1)
     kept = Vt[most > faint * np.sqrt(len(centred) - first)] if count is None else Vt[:count]
     columns: FloatArray = centred @ kept.T
     missing = 0 if count is None else count - columns.shape[1]

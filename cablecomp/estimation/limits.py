@@ -42,6 +42,14 @@ HISTORY_PARTS: Final = (1.0, 2.0 / 3.0, 1.0 / 3.0)
 """Of its reach, how far a drive went in an assumed history."""
 HISTORY_LEG: Final = 12
 """Rows of one leg of an assumed history."""
+DETOUR_PARTS: Final = (1.0, 0.5)
+"""Of what a gap leaves time for, how far load or motor went in an assumed detour."""
+DETOUR_LEAST: Final = 0.05
+"""Share of its range below which a channel's detour is not looked at."""
+DETOUR_LEG: Final = 6
+"""Rows of one leg of an assumed detour."""
+GAPS_MOST: Final = 12
+"""Gaps of a recording that are looked at, the longest."""
 HISTORY_FAINT: Final = 0.02
 """Share of what is usually left over below which a carry-over is not worth a column."""
 EXACT: Final = 0.003

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,18 @@ _ANSWERS: Final[Mapping[str, str]] = {
 }
 
 
+HISTORY_STEP_S: Final = 0.05
+"""Time from row to row of what went before a recording."""
+
+
+class Unrecorded(NamedTuple):
+    """Where motor [rad] and load [N m] went (`path`, k x 2) while nothing was recorded: after this fine row, as fast as
+    the recording's next row lets it; before the first row of all where `after` is -1."""
+
+    path: FloatArray
+    after: int = -1
+
+
 @dataclass(frozen=True)
 class Simulator:
     """A joint set up once, good for every recording in which it stands alike."""
@@ -39,25 +51,24 @@ class Simulator:
     others: tuple[str, ...]
     fine: bool
 
-    def predict(self, recording: Evidence, history: FloatArray | None = None) -> dict[str, FloatArray]:
-        """Every output channel [rad, N m, N] on the recording's judged rows, encoder zeros not added.
+    def predict(self, recording: Evidence, unrecorded: Unrecorded | None = None) -> dict[str, FloatArray]:
+        """Every output channel [rad, N m, N] on the recording's judged rows, encoder zeros not added; `unrecorded`:
+        where the drive went meanwhile.
 
-        `history` (k x 2): motor angle [rad] and load [N m] that went before the first row. Raises InputError
-        where the drive cannot follow (slack in an open circuit, a drum run out of cable).
+        Raises InputError where the drive cannot follow (slack in an open circuit, a drum run out of cable).
         """
         kept = recording.rated if self.fine else recording.rows
-        answer = self.run(recording, kept, history)
+        answer = self.run(recording, kept, unrecorded)
         judged = np.searchsorted(kept, recording.rows) if self.fine else slice(None)
         return {name: getattr(answer, field)[judged] for name, field in _ANSWERS.items()}
 
-    def run(self, recording: Evidence, kept: IntArray, history: FloatArray | None = None) -> Answer:
+    def run(self, recording: Evidence, kept: IntArray, unrecorded: Unrecorded | None = None) -> Answer:
         """The kernel's answers on the fine rows `kept`."""
-        before = 0 if history is None else len(history)
-        read = self._readings(recording, kept, before)
-        if history is not None:
-            read.rows[:before] = read.rows[before]
-            read.time[:before] -= np.arange(before, 0, -1) * 0.05
-            read.motor[:before], read.load[:before] = history[:, 0], history[:, 1]
+        read = self._readings(recording, kept)
+        place, more = 0, 0
+        if unrecorded is not None:
+            place, more = int(np.searchsorted(kept, unrecorded.after, side="right")), len(unrecorded.path)
+            read = _with_unrecorded(read, place, unrecorded.path)
         model = self.model
         memory, heights = model.memory.copy(), model.heights.copy()
         joint_start(model.fixed, model.layout, memory, heights, model.laws, read.time[0], read.motor[0], 0.0)
@@ -70,26 +81,43 @@ class Simulator:
             why = Refusal(status)
             refused = SlackError if why is Refusal.SLACK else InputError
             raise refused(f"{recording.name}: at {at:g} s {REASONS[why]}")
-        return Answer(*(column[before:] for column in answer))
+        own = np.r_[0:place, place + more : len(outs)]
+        return Answer(*(column[own] for column in answer)) if more else answer
 
-    def _readings(self, recording: Evidence, kept: IntArray, before: int) -> Readings:
-        """The recording's fine rows `kept`, behind room for a history of `before` rows."""
+    def _readings(self, recording: Evidence, kept: IntArray) -> Readings:
+        """The recording's fine rows `kept`."""
         columns = recording.columns
-        read = readings(before + len(kept), len(self.others))
+        read = readings(len(kept), len(self.others))
         load = load_of(self.joint, columns)
-        read.time[before:], read.motor[before:] = columns["time_s"][kept], columns["motor_position_rad"][kept]
-        read.load[before:] = load if isinstance(load, float) else load[kept]
-        read.joint[before:] = columns[JOINT][kept]
-        read.motor_rate[before:] = recording.motor_rate[kept]
+        read.time[:], read.motor[:] = columns["time_s"][kept], columns["motor_position_rad"][kept]
+        read.load[:] = load if isinstance(load, float) else load[kept]
+        read.joint[:] = columns[JOINT][kept]
+        read.motor_rate[:] = recording.motor_rate[kept]
         if "temperature_degC" in columns:
-            read.temperature[before:] = columns["temperature_degC"][kept]
+            read.temperature[:] = columns["temperature_degC"][kept]
         for k, name in enumerate(self.others):
             if name not in columns:
                 raise InputError(
                     f"{recording.name}: channel `{name}` is missing, which an effect reads; record it"
                 )
-            read.other[before:, k] = columns[name][kept]
+            read.other[:, k] = columns[name][kept]
         return read
+
+
+def _with_unrecorded(read: Readings, place: int, path: FloatArray) -> Readings:
+    """The readings with this path before the one at `place`, all else as it is read there."""
+    more = len(path)
+    both = readings(len(read.rows) + more, read.other.shape[1])
+    both.rows[:place], both.rows[place + more :] = read.rows[:place], read.rows[place:]
+    between = both.rows[place : place + more]
+    between[:] = read.rows[place]
+    time = both.time[place : place + more]
+    if place == 0:
+        time -= np.arange(more, 0, -1) * HISTORY_STEP_S
+    else:
+        time[:] = np.linspace(read.time[place - 1], read.time[place], more + 2)[1:-1]
+    both.motor[place : place + more], both.load[place : place + more] = path[:, 0], path[:, 1]
+    return both
 
 
 def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray | float:

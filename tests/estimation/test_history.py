@@ -1,8 +1,10 @@
-"""Histories that nobody recorded, against the plant's: what any of them adds lies within what is estimated of it."""
+"""Histories and detours that nobody recorded, against the plant's: what any of them adds lies within what is estimated
+of it."""
 
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +54,7 @@ def torque(circuit: str, share: FloatArray | float) -> FloatArray:
 def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
     raw = closed(LONG)
     raw["drive"]["circuit"] = circuit
-    joint, plant = parse_joint(raw, "nested"), PlantConfig.from_dict(raw)
+    plant = PlantConfig.from_dict(raw)
     motor, load = visible(circuit)
     angles = []
     for before in ([], *NESTED):
@@ -67,6 +69,50 @@ def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated
         "time_s": STEP_S * np.arange(len(motor)), "motor_position_rad": motor, "joint_torque_Nm": load,
         JOINT: angles[0],
     }  # fmt: skip
+    before, after = told_and_left(raw, columns, [angle - angles[0] for angle in angles[1:]])
+    assert max(before) > 4.0 * NOISE_RAD
+    assert max(after) < 0.1 * max(before) + 0.2 * NOISE_RAD
+
+
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+def test_what_a_detour_in_a_gap_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
+    raw = closed(LONG)
+    raw["drive"]["circuit"] = circuit
+    plant = PlantConfig.from_dict(raw)
+    motor, load = visible(circuit)
+    # a full swing both ways first, so that no history before it matters
+    corners = [(0.0, 0.0), *((0.0, float(torque(circuit, m))) for m in (1.0, -1.0, 0.0)), (motor[0], load[0])]
+    led = joined(corners)
+    gap = slice(200, 216)  # 0.8 s, through which motor and load go on as shown
+    angles = []
+    for peak in (None, (0.0, 0.7), (0.0, -0.6), (-0.2, 0.0), (0.1, 0.5)):
+        q, m = motor.copy(), load.copy()
+        if peak is not None:
+            turn, more = peak
+            bump = np.sin(np.linspace(0.0, np.pi, 18))[1:-1]
+            q[gap] += turn * bump
+            m[gap] += (float(torque(circuit, more)) - float(torque(circuit, 0.0))) * bump
+        drive, loads = (np.concatenate([led[:, k], v]) for k, v in enumerate((q, m)))
+        time = STEP_S * np.arange(len(drive))
+        angles.append(simulate(plant, time, drive, loads).channels()[JOINT][len(led) :])
+    seen = np.ones(len(motor), dtype=np.bool_)
+    seen[gap] = False
+    columns = {
+        "time_s": STEP_S * np.arange(len(motor)), "motor_position_rad": motor, "joint_torque_Nm": load,
+        JOINT: angles[0],
+    }  # fmt: skip
+    columns = {k: v[seen] for k, v in columns.items()}
+    before, after = told_and_left(raw, columns, [(angle - angles[0])[seen] for angle in angles[1:]])
+    assert max(before) > 4.0 * NOISE_RAD
+    assert max(after) < 0.1 * max(before) + 0.2 * NOISE_RAD
+
+
+def told_and_left(
+    raw: dict[str, Any], columns: dict[str, FloatArray], added: list[FloatArray]
+) -> tuple[list[float], list[float]]:
+    """RMS [rad], a constant apart, of what each of these adds to a recording, and of what is left of it beside the
+    carry-over that the recording is estimated with."""
+    joint = parse_joint(raw, "nested")
     e = gather(joint, "a", columns, "one", fine_rows=2000, judged_rows=300)
     p = Problem(joint, of_drive(joint), (e,), Weighing({JOINT: NOISE_RAD}, {}))
     found = forgotten(p, p.start, e, {JOINT: NOISE_RAD}, 0.25)
@@ -75,10 +121,9 @@ def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated
     prior[-1] = 0.0  # a zero
     A = np.vstack((told, prior))
     before, after = [], []
-    for angle in angles[1:]:
-        added = (angle - angles[0])[e.rows][found.first :]
-        step = np.linalg.lstsq(A, np.concatenate((added, np.zeros(len(prior)))), rcond=None)[0]
-        before.append(float(np.std(added)))
-        after.append(float(np.std(added - told @ step)))
-    assert max(before) > 4.0 * NOISE_RAD
-    assert max(after) < 0.1 * max(before) + 0.2 * NOISE_RAD
+    for each in added:
+        counted = each[e.rows][found.first :]
+        step = np.linalg.lstsq(A, np.concatenate((counted, np.zeros(len(prior)))), rcond=None)[0]
+        before.append(float(np.std(counted)))
+        after.append(float(np.std(counted - told @ step)))
+    return before, after

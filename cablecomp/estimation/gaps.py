@@ -1,0 +1,66 @@
+"""Where the drive may have gone while nothing was recorded: detours in the gaps of a recording.
+
+A model goes straight from the last reading before a gap to the first one after it. Motion and load may have gone
+further and come back, or one before the other, and friction remembers it. How far they can have gone is told by how
+fast they go elsewhere in the recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from cablecomp.config import JointConfig
+from cablecomp.estimation.evidence import INPUT, Evidence, gaps_of
+from cablecomp.estimation.limits import DETOUR_LEAST, DETOUR_LEG, DETOUR_PARTS, GAPS_MOST
+from cablecomp.estimation.simulate import Unrecorded, load_of
+from cablecomp.signal.smoothing import FloatArray, IntArray
+
+
+def detours(config: JointConfig, recording: Evidence) -> Iterator[tuple[Unrecorded, ...]]:
+    """For each gap that leaves room, the longest first: the load, or the motor, out to either side and back, as far
+    as there was time for and a part of that; and the one moved wholly before the other."""
+    time, motor = recording.columns["time_s"], recording.columns[INPUT]
+    load = np.broadcast_to(np.asarray(load_of(config, recording.columns), dtype=np.float64), time.shape)
+    gaps = gaps_of(time)
+    if not len(gaps):
+        return
+    steps = np.diff(time)
+    lost = steps[gaps] - np.median(steps)
+    for k in gaps[np.argsort(lost)[::-1][:GAPS_MOST]]:
+        corners = [(float(motor[j]), float(load[j])) for j in (k, k + 1)]
+        (q0, m0), (q1, m1) = corners
+        paths = [[(q0, m0), (q0, m), (q1, m1)] for m in _turns(load, steps, gaps, int(k))]
+        paths += [[(q0, m0), (q, m0), (q1, m1)] for q in _turns(motor, steps, gaps, int(k))]
+        if min(_moved(motor, int(k)), _moved(load, int(k))) > DETOUR_LEAST:
+            paths += [[(q0, m0), (q1, m0), (q1, m1)], [(q0, m0), (q0, m1), (q1, m1)]]
+        if paths:
+            yield tuple(Unrecorded(along(path, DETOUR_LEG), int(k)) for path in paths)
+
+
+def along(corners: list[tuple[float, float]], leg: int) -> FloatArray:
+    """Motor angle and load from corner to corner, `leg` rows each."""
+    return np.concatenate([np.linspace(a, b, leg) for a, b in pairwise(corners)])
+
+
+def _turns(values: FloatArray, steps: FloatArray, gaps: IntArray, k: int) -> Iterator[float]:
+    """Where a channel may have turned back within the gap after row k: as far as it had time for at the greatest speed
+    that it shows elsewhere, within its range, and a part of that."""
+    low, high = float(np.min(values)), float(np.max(values))
+    change = np.abs(np.diff(values))
+    elsewhere = np.ones(len(steps), dtype=np.bool_)
+    elsewhere[gaps] = False
+    fastest = float(np.max((change / steps)[elsewhere], initial=0.0))
+    beyond = 0.5 * (fastest * float(steps[k]) - float(change[k]))
+    a, b = sorted((float(values[k]), float(values[k + 1])))
+    for end, room in ((b, min(beyond, high - b)), (a, -min(beyond, a - low))):
+        if abs(room) > DETOUR_LEAST * (high - low):
+            for part in DETOUR_PARTS:
+                yield end + part * room
+
+
+def _moved(values: FloatArray, k: int) -> float:
+    """Share of its range by which a channel differs on both sides of the gap after row k."""
+    return float(abs(values[k + 1] - values[k])) / max(float(np.ptp(values)), 1e-300)
