@@ -15,7 +15,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
-from cablecomp.estimation.outliers import outliers
+from cablecomp.estimation.outliers import outliers, outliers_in_motion
 from cablecomp.mechanics.jit import njit
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
@@ -145,7 +145,7 @@ def gather(
             raise InputError(f"{name}: channel `{key}` is missing; a diagnosis needs {', '.join(NEEDED)}")
     raw = _in_order(name, {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()})
     load = load_channel(config, raw)
-    good, set_aside = _good(name, raw, load)
+    good, set_aside = _good(name, raw, load, config.drive.ratio)
     unread = tuple(k for k in raw if k != "time_s" and k not in good)
     raw = {k: v for k, v in raw.items() if k not in unread}
     noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
@@ -167,7 +167,9 @@ def gather(
     )  # fmt: skip
 
 
-def _good(name: str, raw: Mapping[str, FloatArray], load: str | None) -> tuple[dict[str, BoolArray], int]:
+def _good(
+    name: str, raw: Mapping[str, FloatArray], load: str | None, ratio: float
+) -> tuple[dict[str, BoolArray], int]:
     """Which readings of each channel are to be trusted, and how many were set aside as outliers; without the channels
     that may be missing and were hardly read."""
     good = {k: np.abs(v) < OVERFLOWN for k, v in raw.items() if k != "time_s"}
@@ -183,6 +185,11 @@ def _good(name: str, raw: Mapping[str, FloatArray], load: str | None) -> tuple[d
         spikes = outliers(raw[key], kept)
         set_aside += int(spikes.sum())
         kept &= ~spikes
+    both = good[JOINT] & good[INPUT]
+    in_motion = outliers_in_motion(raw["time_s"], raw[JOINT], ratio * raw[INPUT], both)
+    for key, spikes in zip((JOINT, INPUT), in_motion, strict=True):
+        set_aside += int(spikes.sum())
+        good[key] &= ~spikes
     return good, set_aside
 
 

@@ -30,6 +30,30 @@ def outliers(values: FloatArray, good: BoolArray) -> BoolArray:
     return found
 
 
+def outliers_in_motion(
+    time: FloatArray, joint: FloatArray, driven: FloatArray, good: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Readings of the joint's angle, and of the motor's times the ratio, that are outliers of their difference: what
+    quick motion, or stamps that come late, hide in either of them. Whose it is tells the line through its
+    neighbours."""
+    found = np.flatnonzero(outliers(joint - driven, good))
+    off_joint, off_driven = _off_line(time, joint, good), _off_line(time, driven, good)
+    of_joint, of_motor = np.zeros((2, len(joint)), dtype=np.bool_)
+    of_joint[found] = off_joint[found] >= off_driven[found]
+    of_motor[found] = ~of_joint[found]
+    return of_joint, of_motor
+
+
+def _off_line(time: FloatArray, values: FloatArray, good: BoolArray) -> FloatArray:
+    """How far each good reading lies off the line through its two neighbours."""
+    off = np.zeros(len(values))
+    place = np.flatnonzero(good)
+    t, v = time[place], values[place]
+    line = v[:-2] + (v[2:] - v[:-2]) * (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
+    off[place[1:-1]] = np.abs(v[1:-1] - line)
+    return off
+
+
 def _absurd(v: FloatArray) -> BoolArray:
     """Runs of readings far outside of where all others lie, into which and out of which the channel leaps in one
     sample: a quick motion after a long rest does not leap."""
