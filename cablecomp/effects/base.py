@@ -80,16 +80,16 @@ class Parameter:
     reading, a slack's shares of it, or half of what a channel that it needs covers, others' are in units of
     `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of a log-spaced shape
     may leave low..high. `is_another`: whether, by the effect's values and by whether it ended on `high`, another
-    effect is the better word; `least_is_another`: whether that is so below `low`, where other shapes are the plain
-    law. `of_cable_l`: whether it is cable l's, of which an open circuit has none: never, below zero, or always.
-    `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
-    `of_motor_load`: it is asked for only where the load is read at the motor. `points`: at how many places of a
-    log-spaced range a diagnosis asks. `goes_on`: what it does grows without end, so that a diagnosis keeps it only
-    where it is told from none. `by_itself`: an amount that is asked for without the effect's others. `per_reading`:
-    low..high are what the largest reading of the channel that the effect reads does (of a slack: shares of that
-    reading): what a unit of it means, no configuration tells. `needs`: a channel without which it says nothing.
-    `within_recording`: a time that a diagnosis asks up to the longest recording's; from there on what follows is a
-    drift, whatever it follows, and another effect the better word.
+    effect is the better word, one that has no name here if `another_is_unlisted`; `least_is_another`: whether that is
+    so below `low`, where other shapes are the plain law. `of_cable_l`: whether it is cable l's, of which an open
+    circuit has none: never, below zero, or always. `of_known_drive`: beside a drive known by order of magnitude it,
+    and what is `of` it, are not asked for. `of_motor_load`: it is asked for only where the load is read at the motor.
+    `points`: at how many places of a log-spaced range a diagnosis asks. `goes_on`: what it does grows without end, so
+    that a diagnosis keeps it only where it is told from none. `by_itself`: an amount that is asked for without the
+    effect's others. `per_reading`: low..high are what the largest reading of the channel that the effect reads does
+    (of a slack: shares of that reading): what a unit of it means, no configuration tells. `needs`: a channel without
+    which it says nothing. `within_recording`: a time that a diagnosis asks up to the longest recording's; from there
+    on what follows is a drift, whatever it follows, and another effect the better word.
     """
 
     name: str
@@ -110,6 +110,7 @@ class Parameter:
     tries: tuple[float, ...] = ()
     reach: float = 30.0
     is_another: Callable[[Mapping[str, float], bool], bool] = never
+    another_is_unlisted: bool = False
     least_is_another: bool = False
     of_cable_l: Literal["never", "below zero", "always"] = "never"
     of_known_drive: bool = False

@@ -11,8 +11,8 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 
 GAP = 5.0
 """Steps of the last one's length beyond which the motion in between is not known."""
-WHOLE: Final = 0.98
-"""Share that swings after the joint beyond which none of it is on the joint itself."""
+WHOLE: Final = 0.9
+"""Share that swings after the joint beyond which hardly any of it is on the joint itself."""
 SLOW_RAD_S: Final = 1.0
 """What follows more slowly follows no joint that is moved once in six seconds."""
 
@@ -164,6 +164,7 @@ EFFECT = Effect(
             minimum=0.0,
             maximum=1.0,
             is_another=_swings_away,
+            another_is_unlisted=True,
             of_known_drive=True,
         ),
         Parameter(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from turning import JOINT, recorded
 
@@ -17,6 +18,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.explain.weighing import (
     _against,
+    _another,
     _at_bound,
     _follows,
     _hardly_ahead,
@@ -225,3 +227,33 @@ def test_what_bends_to_the_form_of_others_has_to_be_clearly_ahead_of_them(
     said = _hardly_ahead(asked[name], lead)
     assert bool(said) is hardly
     assert not hardly or (f"by {lead:.1f} standard errors; 2 are asked" in said)
+
+
+@pytest.mark.parametrize(
+    ("effect", "shown", "said"),
+    [
+        # all of it swings, slowly: a drag of the joint, which no effect is
+        ("inertial_load", {"swings": 1.0, "swings_rad_s": 0.3, "damping_ratio": 0.7}, "no name here"),
+        ("inertial_load", {"swings": 0.6, "swings_rad_s": 9.0, "damping_ratio": 0.7}, ""),
+        # a coupling that reads late is alone by far here
+        ("series_compliance:late_rad_per_Nm", {"late_rad_per_Nm": 1e-3, "lag_s": 0.05}, ""),
+    ],
+)
+def test_a_shape_that_has_no_name_here_is_none_however_far_ahead(
+    effect: str, shown: dict[str, float], said: str
+) -> None:
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    term = asked[effect]
+    model: Any = SimpleNamespace(
+        terms=(term,),
+        fit=SimpleNamespace(
+            problem=SimpleNamespace(parameters=(), config=JOINT),
+            x=np.empty(0),
+            values={term.key(name): value for name, value in shown.items()},
+        ),
+    )
+    alone = SimpleNamespace(term=term, model=model, difference=ScoreDifference(0.95, 9.0, 9.0))
+    rounds: Any = [SimpleNamespace(tried=[alone])]
+    found = _another(model, term, rounds)
+    assert said in found
+    assert bool(found) is bool(said)

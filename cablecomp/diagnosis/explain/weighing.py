@@ -14,7 +14,7 @@ from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Selection, amount_resolved, without
+from cablecomp.diagnosis.explain.model import Model, Round, Selection, amount_resolved, without
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
@@ -122,9 +122,8 @@ def _weighed(
     removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes, min(ahead.z, of_rival.z)):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif (stretched := better_word(final.fit, term)) and not alone_by_far(selection.rounds, term):
-        confidence = min(confidence, LIMITS.beaten_told)
-        why_not = f"with this `{stretched}` another effect is the better word"
+    elif other := _another(final, term, selection.rounds):
+        confidence, why_not = min(confidence, LIMITS.beaten_told), other
     elif torque := borne_by_torque(final.fit, term):
         confidence, why_not = min(confidence, LIMITS.beaten_told), torque
     elif little := (
@@ -146,6 +145,19 @@ def _weighed(
             better = instead.models.get(beaten_by)
     said = {**evidence, "z": own.z, "gain": own.gain}
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
+
+
+def _another(final: Model, term: Hypothesis, rounds: Sequence[Round]) -> str:
+    """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
+    that is alone by far, but where it is known that the other is none of the catalogue's."""
+    stretched = better_word(final.fit, term)
+    if not stretched:
+        return ""
+    if term.effect.parameter(stretched).another_is_unlisted:
+        return f"with this `{stretched}` it stands for physics that has no name here"
+    if alone_by_far(rounds, term):
+        return ""
+    return f"with this `{stretched}` another effect is the better word"
 
 
 def _too_little(removes: float, left: float) -> str:
