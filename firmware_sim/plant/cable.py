@@ -18,7 +18,7 @@ from firmware_sim.plant.records import FREE, GUIDE, IN, OUT, Nodes
 @part
 def solve_cable(c: Any, nodes: Nodes, h: float) -> float:
     """Linear solve under the present sticking set; returns the largest unbalanced force over T0, or 0 where friction
-    is linear, so that one solve balances it.
+    and cable are linear, so that one solve balances it.
 
     Unknown is the change of every y: alpha (by itself) + beta dY (path length) + gamma dA (arc on the
     output drum). A sticking node keeps its place on what it touches: 0 on the output drum, dY on the input
@@ -80,7 +80,7 @@ def solve_cable(c: Any, nodes: Nodes, h: float) -> float:
     c.dT_in = slope[k] * (al[k + 1] - al[k])
     c.dT_in_dY = slope[k] * (be[k + 1] - be[k])
     c.dT_in_dA = slope[k] * (ga[k + 1] - ga[k])
-    return worst / c.T0 if special else 0.0
+    return worst / c.T0 if special or c.stiffening != 0.0 or c.tabled != 0 else 0.0
 
 
 @part

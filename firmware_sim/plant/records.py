@@ -227,6 +227,7 @@ class Nodes(NamedTuple):
     mode: Codes  # -1, +1: slides that way; 0: sticks
     where: Codes  # FREE, OUT, IN, GUIDE
     saved_mode: Codes
+    kept: Codes  # where, while contacts are kept
 
 
 class Drive(NamedTuple):
@@ -250,8 +251,10 @@ class Drive(NamedTuple):
 def allocate_nodes(total: int) -> Nodes:
     """Zeroed arrays for `total` nodes."""
     f = [np.zeros(total) for _ in range(12)]
-    c = [np.zeros(total, dtype=np.int8) for _ in range(3)]
-    return Nodes(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], c[0], c[1], c[2])
+    c = [np.zeros(total, dtype=np.int8) for _ in range(4)]
+    return Nodes(
+        f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], c[0], c[1], c[2], c[3]
+    )
 
 
 def make_drive(

@@ -31,9 +31,10 @@ from firmware_sim.plant.tension import (
 MAX_ITERATIONS = 400
 RUSH_ITERATIONS = 12  # so many with the rush of `update_modes`, so many without, and so on
 WHOLE_ITERATIONS = 50  # so many whole steps, then so many shortened ones, which end going to and fro
-CONTACT_ITERATIONS = 25  # then contacts are kept: where slack cable leaves a drum may have no answer
-TRIES = 4
+CONTACT_ITERATIONS = 25  # then contacts are kept until all else has settled, and found anew
+TRIES = 6
 LOOSE = 1e-3
+SAME_GRIP = 1e-5  # of the tension, by which kept contacts may grip otherwise than those found anew
 UNBALANCED = 1e-6  # of T0, what a law of friction that is not linear may leave at a node
 
 
@@ -168,12 +169,29 @@ def solve_step(drive: Drive, u: Floats, h: float, loose: float) -> bool:
             changed += modes
         if not (moved < 1e12 and all_finite(g, n)):
             return False
-        if changed == 0 and moved < 1e-8 and unbalanced < UNBALANCED:
+        settled = changed == 0 and moved < 1e-8 and unbalanced < UNBALANCED
+        if settled and (iteration < CONTACT_ITERATIONS or contacts_hold(drive, h)):
             return True
     if moved < loose:
         p.failures += 1
         return True
     return False
+
+
+@part
+def contacts_hold(drive: Drive, h: float) -> bool:
+    """Find all contacts anew; whether each cable touches its drums and guides, and grips, as the contacts that were
+    kept had it: where an iteration has swung far they had friction where nothing is."""
+    nodes = drive.nodes
+    copy(nodes.where, nodes.kept)
+    copy(nodes.grip, nodes.upper)
+    for k in range(len(drive.cables)):
+        c = drive.cables[k]
+        find_contacts(c, nodes, drive.grooves, h)
+        for i in range(c.first + 1, c.first + c.count - 1):
+            if nodes.where[i] != nodes.kept[i] or abs(nodes.grip[i] - nodes.upper[i]) > SAME_GRIP:
+                return False
+    return True
 
 
 @part
