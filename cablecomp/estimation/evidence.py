@@ -62,7 +62,8 @@ class Evidence:
     that a judged row stands for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it;
     `outliers`: readings set aside; `unread`: channels left out, hardly read; `shift_s`: what was added to the
     recording's own clock; `carryover`: by output channel, what histories that nobody recorded would add to the
-    judged rows, a column each; `apart`: by parameter, in this order, how the configuration states that the joint
+    judged rows, a column each; `hidden`: the gaps, by the fine row before each, in which the drive went where it was
+    not seen to; `apart`: by parameter, in this order, how the configuration states that the joint
     stood apart in this recording.
     """
 
@@ -79,6 +80,7 @@ class Evidence:
     step_s: float = 0.0
     shift_s: float = 0.0
     carryover: Mapping[str, FloatArray] = field(default_factory=dict)
+    hidden: tuple[int, ...] = ()
     apart: Mapping[str, Apart] = field(default_factory=dict)
     unread: tuple[str, ...] = ()
 

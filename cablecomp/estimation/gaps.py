@@ -19,14 +19,15 @@ from cablecomp.estimation.simulate import Unrecorded, load_of
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
-def detours(config: JointConfig, recording: Evidence) -> Iterator[tuple[Unrecorded, ...]]:
-    """For each gap that leaves room, the longest first: the load, or the motor, out to either side and back, as far
-    as there was time for and a part of that; and the one moved wholly before the other."""
+def detours(config: JointConfig, recording: Evidence) -> dict[int, tuple[Unrecorded, ...]]:
+    """By the fine row before each gap that leaves room, of the longest: the load, or the motor, out to either side and
+    back, as far as there was time for and a part of that; and the one moved wholly before the other."""
     time, motor = recording.columns["time_s"], recording.columns[INPUT]
     load = np.broadcast_to(np.asarray(load_of(config, recording.columns), dtype=np.float64), time.shape)
     gaps = gaps_of(time)
+    found: dict[int, tuple[Unrecorded, ...]] = {}
     if not len(gaps):
-        return
+        return found
     steps = np.diff(time)
     lost = steps[gaps] - np.median(steps)
     for k in gaps[np.argsort(lost)[::-1][:GAPS_MOST]]:
@@ -37,7 +38,8 @@ def detours(config: JointConfig, recording: Evidence) -> Iterator[tuple[Unrecord
         if min(_moved(motor, int(k)), _moved(load, int(k))) > DETOUR_LEAST:
             paths += [[(q0, m0), (q1, m0), (q1, m1)], [(q0, m0), (q0, m1), (q1, m1)]]
         if paths:
-            yield tuple(Unrecorded(along(path, DETOUR_LEG), int(k)) for path in paths)
+            found[int(k)] = tuple(Unrecorded(along(path, DETOUR_LEG), int(k)) for path in paths)
+    return found
 
 
 def along(corners: list[tuple[float, float]], leg: int) -> FloatArray:

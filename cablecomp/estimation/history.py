@@ -9,9 +9,9 @@ do, the carry-over, is estimated with the zeros, each column with a prior.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,26 +19,47 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.gaps import along, detours
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.limits import HISTORY_CUTS, HISTORY_FAINT, HISTORY_LEG, HISTORY_PARTS
+from cablecomp.estimation.limits import (
+    GAP_EACH,
+    GAP_LEAST,
+    GAP_STEP,
+    HISTORY_CUTS,
+    HISTORY_FAINT,
+    HISTORY_LEG,
+    HISTORY_PARTS,
+)
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import Unrecorded, load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
 
-Runs: TypeAlias = list[list[dict[str, FloatArray]]]
-"""What each of the runs adds by channel: those of the assumed histories, then those of the detours of each gap."""
+
+class Runs(NamedTuple):
+    """What a drive does on judged rows, what each assumed history adds, and each detour of each gap; by channel."""
+
+    plain: Mapping[str, FloatArray]
+    of_history: list[dict[str, FloatArray]]
+    of_gaps: Mapping[int, list[dict[str, FloatArray]]]
+
+    def chosen(self, hidden: Sequence[int]) -> list[list[dict[str, FloatArray]]]:
+        """Those of the history and of these gaps, where there are any."""
+        return [rows for rows in (self.of_history, *(self.of_gaps.get(k, []) for k in hidden)) if rows]
+
+
+NONE: Final = Runs({}, [], {})
 
 
 @dataclass(frozen=True)
 class Forgotten:
     """From which judged row on a recording's history no longer matters, how far it may still move the joint from
-    there (RMS, rad, a constant apart), how far the constants differ (rad), and what the assumed histories add by
-    channel (columns)."""
+    there (RMS, rad, a constant apart), how far the constants differ (rad), what the assumed histories and detours add
+    by channel (columns), and of which gaps these are."""
 
     first: int
     left_rad: float
     constant_rad: float
     carryover: Mapping[str, FloatArray] = field(default_factory=dict)
+    hidden: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,12 +147,46 @@ def forgotten(
     """Where the history is forgotten to within `share` of what is usually left over of each channel (`size`), from row
     `after` on; the best cut there is if it is nowhere."""
     runs = _apart(problem, x, recording, tuple(size))
-    if not runs or not runs[0]:
+    if not runs.of_history:
         return Forgotten(0, 0.0, 0.0)
-    apart = np.stack([run[JOINT] for run in runs[0]])
+    apart = np.stack([run[JOINT] for run in runs.of_history])
     first, left = _first_row(apart, share * size[JOINT], after)
     constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
-    return Forgotten(first, left, constant, _carried_over(runs, first, size))
+    hidden = _hidden(recording, runs, first)
+    return Forgotten(first, left, constant, _carried_over(runs, hidden, first, size), hidden)
+
+
+def _hidden(recording: Evidence, runs: Runs, first: int) -> tuple[int, ...]:
+    """The gaps in which the drive went where it was not seen to, as the misfit from judged row `first` on has it: that
+    whose detours lower the square of its steps from row to row most, and so on, as long as one lowers it by far more
+    than chance. A law that is missing comes and goes with what is seen, a detour with the gap."""
+    kept = recording.counted[JOINT] & (np.arange(len(recording.rows)) >= first)
+    steps = np.diff((recording.at_rows(JOINT) - runs.plain[JOINT])[kept])
+    usual = float(np.median(np.abs(steps))) / 0.6745 if len(steps) else 0.0
+    if not usual > 0.0 or not runs.of_gaps:
+        return ()
+    y = np.clip(steps / usual, -GAP_STEP, GAP_STEP)
+
+    def columns(rows: list[dict[str, FloatArray]]) -> FloatArray:
+        found = np.diff(_columns([_of(rows, JOINT)], first, 0.1 * usual)[kept], axis=0)
+        return np.asarray(found / usual, dtype=np.float64)
+
+    def square(A: FloatArray) -> float:
+        both, target = np.vstack((A, np.eye(A.shape[1]))), np.concatenate((y, np.zeros(A.shape[1])))
+        left = target - both @ np.linalg.lstsq(both, target, rcond=None)[0]
+        return float(left @ left)
+
+    asked = {k: columns(rows) for k, rows in runs.of_gaps.items() if rows}
+    A = columns(runs.of_history) if runs.of_history else np.empty((len(y), 0))
+    here, chosen = square(A), list[int]()
+    while asked:
+        with_it = {k: square(np.column_stack((A, c))) for k, c in asked.items()}
+        best = min(with_it, key=lambda k: with_it[k])
+        if here - with_it[best] < GAP_LEAST + GAP_EACH * asked[best].shape[1]:
+            break
+        here, A = with_it[best], np.column_stack((A, asked.pop(best)))
+        chosen.append(best)
+    return tuple(sorted(chosen))
 
 
 def with_own_carryover(fit: Fit) -> Fit:
@@ -148,43 +203,62 @@ def _carried_over_anew(problem: Problem, x: FloatArray, recording: Evidence) -> 
     """The recording with the carry-over of the drive as it is here, in as many columns as it had: another law carries
     over otherwise. As it was, where there was none or the drive can have had none of the assumed histories."""
     known = recording.carryover
-    runs = _apart(problem, x, recording, tuple(known)) if known else []
-    if not any(runs):
+    runs = _apart(problem, x, recording, tuple(known), recording.hidden) if known else NONE
+    if not runs.of_history and not any(runs.of_gaps.values()):
         return recording
     first = int(np.argmax(recording.counted[JOINT]))
-    found = {c: _columns(_of(runs, c), first, 0.0, columns.shape[1]) for c, columns in known.items()}
+    chosen = runs.chosen(recording.hidden)
+    found = {
+        c: _columns([_of(rows, c) for rows in chosen], first, 0.0, columns.shape[1])
+        for c, columns in known.items()
+    }
     return replace(recording, carryover=found)
 
 
-def _carried_over(runs: Runs, first: int, size: Mapping[str, float]) -> dict[str, FloatArray]:
-    """Columns by channel of what these runs add from row `first` on, where they are worth any."""
-    found = {c: _columns(_of(runs, c), first, HISTORY_FAINT * s) for c, s in size.items()}
+def _carried_over(
+    runs: Runs, hidden: Sequence[int], first: int, size: Mapping[str, float]
+) -> dict[str, FloatArray]:
+    """Columns by channel of what these runs, of gaps those chosen, add from row `first` on, where they are worth
+    any."""
+    chosen = runs.chosen(hidden)
+    found = {
+        c: _columns([_of(rows, c) for rows in chosen], first, HISTORY_FAINT * s) for c, s in size.items()
+    }
     return {c: columns for c, columns in found.items() if columns.shape[1]}
 
 
-def _of(runs: Runs, channel: str) -> list[FloatArray]:
-    return [np.column_stack([run[channel] for run in each]) for each in runs if each]
+def _of(rows: Sequence[Mapping[str, FloatArray]], channel: str) -> FloatArray:
+    return np.column_stack([run[channel] for run in rows])
 
 
-def _apart(problem: Problem, x: FloatArray, recording: Evidence, channels: Sequence[str]) -> Runs:
-    """What each assumed history, and each detour in each gap, that the drive could have had adds to the judged rows, by
-    channel: those of the history first."""
+def _apart(
+    problem: Problem,
+    x: FloatArray,
+    recording: Evidence,
+    channels: Sequence[str],
+    only: Sequence[int] | None = None,
+) -> Runs:
+    """What each assumed history, and each detour in each gap (or in these), that the drive could have had adds to the
+    judged rows, by channel."""
     made = simulator(problem.joint(x, recording))
     try:
-        base = made.predict(recording)
+        plain = made.predict(recording)
     except InputError:
-        return []
-    found = []
-    for each in (histories(problem, recording), *detours(problem.config, recording)):
-        runs = []
+        return NONE
+
+    def added(each: Iterable[Unrecorded]) -> list[dict[str, FloatArray]]:
+        found = []
         for unrecorded in each:
             try:
                 run = made.predict(recording, unrecorded)
             except InputError:
                 continue
-            runs.append({c: run[c] - base[c] for c in channels})
-        found.append(runs)
-    return found
+            found.append({c: run[c] - plain[c] for c in channels})
+        return found
+
+    asked = detours(problem.config, recording) if only is None or only else {}
+    gaps = {k: added(each) for k, each in asked.items() if only is None or k in only}
+    return Runs(plain, added(histories(problem, recording)), gaps)
 
 
 def _first_row(apart: FloatArray, enough: float, after: int) -> tuple[int, float]:

@@ -50,6 +50,12 @@ DETOUR_LEG: Final = 6
 """Rows of one leg of an assumed detour."""
 GAPS_MOST: Final = 12
 """Gaps of a recording that are looked at, the longest."""
+GAP_STEP: Final = 10.0
+"""Usual steps of the misfit from row to row that one counts for at most where gaps are told."""
+GAP_LEAST: Final = 12.0
+"""Squares of usual steps by which a gap's detours have to lower the misfit's to be looked at, ..."""
+GAP_EACH: Final = 3.0
+"""... and those for each column that they bring: some times what chance gives one."""
 HISTORY_FAINT: Final = 0.02
 """Share of what is usually left over below which a carry-over is not worth a column."""
 EXACT: Final = 0.003

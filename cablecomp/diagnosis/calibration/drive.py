@@ -140,7 +140,8 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
         found = forgotten(fit.problem, fit.x, e, size, LIMITS.history, swing)
         read = np.flatnonzero(e.counted[JOINT])
         most = int(read[len(read) // 2]) if len(read) else 0  # of an encoder that was read at first only
-        cut.append(replace(e.counting_from(min(found.first, most)), carryover=found.carryover))
+        counting = e.counting_from(min(found.first, most))
+        cut.append(replace(counting, carryover=found.carryover, hidden=found.hidden))
         constant.append(found.constant_rad)
     return cut, float(np.mean(constant))
 
