@@ -14,7 +14,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.estimation.evidence import INPUT, Evidence, gaps_of
-from cablecomp.estimation.limits import DETOUR_LEAST, DETOUR_LEG, DETOUR_PARTS, GAPS_MOST
+from cablecomp.estimation.limits import DETOUR_BEYOND, DETOUR_LEAST, DETOUR_LEG, DETOUR_PARTS, GAPS_MOST
 from cablecomp.estimation.simulate import Unrecorded, load_of
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
@@ -49,8 +49,10 @@ def along(corners: list[tuple[float, float]], leg: int) -> FloatArray:
 
 def _turns(values: FloatArray, steps: FloatArray, gaps: IntArray, k: int) -> Iterator[float]:
     """Where a channel may have turned back within the gap after row k: as far as it had time for at the greatest speed
-    that it shows elsewhere, within its range, and a part of that."""
+    that it shows elsewhere, little beyond its range, and a part of that."""
     low, high = float(np.min(values)), float(np.max(values))
+    width = high - low
+    low, high = low - DETOUR_BEYOND * width, high + DETOUR_BEYOND * width
     change = np.abs(np.diff(values))
     elsewhere = np.ones(len(steps), dtype=np.bool_)
     elsewhere[gaps] = False
@@ -58,7 +60,7 @@ def _turns(values: FloatArray, steps: FloatArray, gaps: IntArray, k: int) -> Ite
     beyond = 0.5 * (fastest * float(steps[k]) - float(change[k]))
     a, b = sorted((float(values[k]), float(values[k + 1])))
     for end, room in ((b, min(beyond, high - b)), (a, -min(beyond, a - low))):
-        if abs(room) > DETOUR_LEAST * (high - low):
+        if abs(room) > DETOUR_LEAST * width:
             for part in DETOUR_PARTS:
                 yield end + part * room
 

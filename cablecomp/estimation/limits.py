@@ -42,8 +42,10 @@ HISTORY_PARTS: Final = (1.0, 2.0 / 3.0, 1.0 / 3.0)
 """Of its reach, how far a drive went in an assumed history."""
 HISTORY_LEG: Final = 12
 """Rows of one leg of an assumed history."""
-DETOUR_PARTS: Final = (1.0, 0.5)
+DETOUR_PARTS: Final = (1.0, 0.8, 0.6, 0.4, 0.2)
 """Of what a gap leaves time for, how far load or motor went in an assumed detour."""
+DETOUR_BEYOND: Final = 0.15
+"""Share of its range by which a channel may have gone beyond it in a gap."""
 DETOUR_LEAST: Final = 0.05
 """Share of its range below which a channel's detour is not looked at."""
 DETOUR_LEG: Final = 6

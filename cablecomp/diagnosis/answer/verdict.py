@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, rms_left
 
 
@@ -80,7 +80,7 @@ def warnings_of(model: Model) -> tuple[str, ...]:
         )
     if any(isinstance(t, Hypothesis) and t.effect.id == "clock_skew" for t in model.terms):
         lines += filter(None, [drag_alike(model.fit)])
-    return (*lines, *_set_anew(model.fit))
+    return (*lines, *_set_anew(model.fit), *_hidden(model.fit.problem.evidence))
 
 
 def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
@@ -104,4 +104,18 @@ def _set_anew(fit: Fit) -> Iterator[str]:
                 f"{short(e.name)}: its zero lies {apart:+.3g} mrad from the others' of its session, and nothing within "
                 "the recordings moves it so: taken as set anew before it (several sessions: `--session each`, or "
                 "[[session]]); if nobody did, a clamp or a drum slipped there"
+            )
+
+
+def _hidden(evidence: Sequence[Evidence]) -> Iterator[str]:
+    """Recordings in whose gaps the drive went where it was not seen to, with when."""
+    for e in evidence:
+        time = e.columns["time_s"]
+        if e.hidden:
+            when = ", ".join(
+                f"{time[k] - e.shift_s:.4g} to {time[k + 1] - e.shift_s:.4g} s" for k in e.hidden
+            )
+            yield (
+                f"{short(e.name)}: the angle steps at a gap ({when}) as if motion or load had gone further in it and "
+                "come back; what friction remembers of that is estimated and taken off; record without gaps"
             )
