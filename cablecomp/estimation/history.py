@@ -21,6 +21,7 @@ from cablecomp.estimation.gaps import along, detours
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.limits import (
     GAP_EACH,
+    GAP_FAINT,
     GAP_LEAST,
     GAP_STEP,
     HISTORY_CUTS,
@@ -168,7 +169,7 @@ def _hidden(recording: Evidence, runs: Runs, first: int) -> tuple[int, ...]:
     y = np.clip(steps / usual, -GAP_STEP, GAP_STEP)
 
     def columns(rows: list[dict[str, FloatArray]]) -> FloatArray:
-        found = np.diff(_columns([_of(rows, JOINT)], first, 0.1 * usual)[kept], axis=0)
+        found = np.diff(_columns([_of(rows, JOINT)], first, GAP_FAINT * usual)[kept], axis=0)
         return np.asarray(found / usual, dtype=np.float64)
 
     def square(A: FloatArray) -> float:

@@ -54,6 +54,8 @@ GAPS_MOST: Final = 12
 """Gaps of a recording that are looked at, the longest."""
 GAP_STEP: Final = 10.0
 """Usual steps of the misfit from row to row that one counts for at most where gaps are told."""
+GAP_FAINT: Final = 0.1
+"""The same, below which a detour is not worth a column there."""
 GAP_LEAST: Final = 12.0
 """Squares of usual steps by which a gap's detours have to lower the misfit's to be looked at, ..."""
 GAP_EACH: Final = 3.0
