@@ -29,12 +29,11 @@ def detours(config: JointConfig, recording: Evidence) -> dict[int, tuple[Unrecor
     if not len(gaps):
         return found
     steps = np.diff(time)
-    lost = steps[gaps] - np.median(steps)
-    for k in gaps[np.argsort(lost)[::-1][:GAPS_MOST]]:
-        corners = [(float(motor[j]), float(load[j])) for j in (k, k + 1)]
-        (q0, m0), (q1, m1) = corners
-        paths = [[(q0, m0), (q0, m), (q1, m1)] for m in _turns(load, steps, gaps, int(k))]
-        paths += [[(q0, m0), (q, m0), (q1, m1)] for q in _turns(motor, steps, gaps, int(k))]
+    fastest_load, fastest_motor = (_fastest(values, steps, gaps) for values in (load, motor))
+    for k in gaps[np.argsort(steps[gaps])[::-1][:GAPS_MOST]]:
+        (q0, m0), (q1, m1) = ((float(motor[j]), float(load[j])) for j in (k, k + 1))
+        paths = [[(q0, m0), (q0, m), (q1, m1)] for m in _turns(load, int(k), fastest_load * steps[k])]
+        paths += [[(q0, m0), (q, m0), (q1, m1)] for q in _turns(motor, int(k), fastest_motor * steps[k])]
         if min(_moved(motor, int(k)), _moved(load, int(k))) > DETOUR_LEAST:
             paths += [[(q0, m0), (q1, m0), (q1, m1)], [(q0, m0), (q0, m1), (q1, m1)]]
         if paths:
@@ -47,18 +46,20 @@ def along(corners: list[tuple[float, float]], leg: int) -> FloatArray:
     return np.concatenate([np.linspace(a, b, leg) for a, b in pairwise(corners)])
 
 
-def _turns(values: FloatArray, steps: FloatArray, gaps: IntArray, k: int) -> Iterator[float]:
-    """Where a channel may have turned back within the gap after row k: as far as it had time for at the greatest speed
-    that it shows elsewhere, little beyond its range, and a part of that."""
+def _fastest(values: FloatArray, steps: FloatArray, gaps: IntArray) -> float:
+    """Greatest speed that a channel shows outside of the gaps, per second."""
+    speed = np.abs(np.diff(values)) / steps
+    return float(np.max(np.delete(speed, gaps), initial=0.0))
+
+
+def _turns(values: FloatArray, k: int, way: float) -> Iterator[float]:
+    """Where a channel that could have gone so far in the gap after row k may have turned back: as far as that, little
+    beyond its range, and a part of that."""
     low, high = float(np.min(values)), float(np.max(values))
     width = high - low
     low, high = low - DETOUR_BEYOND * width, high + DETOUR_BEYOND * width
-    change = np.abs(np.diff(values))
-    elsewhere = np.ones(len(steps), dtype=np.bool_)
-    elsewhere[gaps] = False
-    fastest = float(np.max((change / steps)[elsewhere], initial=0.0))
-    beyond = 0.5 * (fastest * float(steps[k]) - float(change[k]))
     a, b = sorted((float(values[k]), float(values[k + 1])))
+    beyond = 0.5 * (way - (b - a))
     for end, room in ((b, min(beyond, high - b)), (a, -min(beyond, a - low))):
         if abs(room) > DETOUR_LEAST * width:
             for part in DETOUR_PARTS:

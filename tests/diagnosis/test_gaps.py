@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from joints import closed
+from joints import LONG, closed
 
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.diagnose import diagnose
 from firmware_sim.plant import PlantConfig, simulate
 
 STEP_S, NOISE_RAD = 0.01, 2e-5
-SOFT = {
-    "output_radius_m": 0.0365, "input_radius_m": 0.062, "free_length_m": 0.14, "EA_N": 16000.0, "pretension_N": 25.0,
-    "mu_output": 0.13, "mu_input": 0.15, "wrap_output_rad": 14.0, "wrap_input_rad": 11.0,
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("peak_Nm", [0.0, 1.3, -0.7])
 def test_a_load_that_came_and_went_in_a_gap_is_told_and_named_nothing(peak_Nm: float) -> None:
-    raw = closed(SOFT)
+    raw = closed(LONG)
     joint = parse_joint(raw, "gap")
     time = np.arange(0.0, 60.0, STEP_S)
     motor = 0.5 * np.sin(0.35 * time)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints import closed
+from joints import LONG, closed
 
 from cablecomp.config import parse_joint
 from cablecomp.estimation.evidence import JOINT, Evidence, gather
@@ -20,11 +20,6 @@ from firmware_sim.plant import PlantConfig, simulate
 
 STEP_S, NOISE_RAD = 0.05, 2e-5
 LOAD_Nm, STROKE_rad = 1.4, 0.6
-LONG = {
-    "output_radius_m": 0.0365, "input_radius_m": 0.062, "free_length_m": 0.14, "EA_N": 16000.0, "pretension_N": 25.0,
-    "mu_output": 0.13, "mu_input": 0.15, "wrap_output_rad": 14.0, "wrap_input_rad": 11.0,
-}  # fmt: skip
-"""A drive of low pretension and much wrap: loads reach far into the drums, and what they left there lasts."""
 NESTED = (
     [(0.0, 0.45), (0.0, -0.3)],
     [(0.0, -0.8), (0.0, 0.4)],
@@ -50,12 +45,16 @@ def torque(circuit: str, share: FloatArray | float) -> FloatArray:
     return LOAD_Nm * np.asarray(0.35 + 0.65 * share if circuit == "open" else share)
 
 
-@pytest.mark.parametrize("circuit", ["open", "closed"])
-def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
+def nested(circuit: str) -> tuple[dict[str, Any], PlantConfig, FloatArray, FloatArray]:
+    """A long drive as configuration and as plant, and what its recording shows: motor angle [rad], load [N m]."""
     raw = closed(LONG)
     raw["drive"]["circuit"] = circuit
-    plant = PlantConfig.from_dict(raw)
-    motor, load = visible(circuit)
+    return raw, PlantConfig.from_dict(raw), *visible(circuit)
+
+
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
+    raw, plant, motor, load = nested(circuit)
     angles = []
     for before in ([], *NESTED):
         # every run begins at rest and ends up where the recording begins
@@ -70,8 +69,7 @@ def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated
         JOINT: angles[0],
     }  # fmt: skip
     e = gathered(raw, columns)
-    p = problem_of(raw, e)
-    found = forgotten(p, p.start, e, {JOINT: NOISE_RAD}, 0.25)
+    found = told(raw, e)
     added = [(angle - angles[0])[e.rows] for angle in angles[1:]]
     before = [float(np.std(a[found.first :])) for a in added]
     after = [float(np.std(without_told(found, a))) for a in added]
@@ -81,10 +79,7 @@ def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated
 
 @pytest.mark.parametrize("circuit", ["open", "closed"])
 def test_what_a_detour_in_a_gap_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
-    raw = closed(LONG)
-    raw["drive"]["circuit"] = circuit
-    plant = PlantConfig.from_dict(raw)
-    motor, load = visible(circuit)
+    raw, plant, motor, load = nested(circuit)
     # a full swing both ways first, so that no history before it matters
     corners = [(0.0, 0.0), *((0.0, float(torque(circuit, m))) for m in (1.0, -1.0, 0.0)), (motor[0], load[0])]
     led = joined(corners)
@@ -107,8 +102,7 @@ def test_what_a_detour_in_a_gap_leaves_in_the_plant_lies_within_what_is_estimate
         seen_there = {**columns, JOINT: angle + noise}
         e = gathered(raw, {k: v[seen] for k, v in seen_there.items()})
         added = (angle - angles[0])[seen][e.rows]
-        p = problem_of(raw, e)
-        found = forgotten(p, p.start, e, {JOINT: NOISE_RAD}, 0.25)
+        found = told(raw, e)
         moved, left = (float(np.std(v)) for v in (added[found.first :], without_told(found, added)))
         shown.append(moved)
         if moved == 0.0:  # a column that nothing asks for could take a law that is missing
@@ -124,19 +118,20 @@ def gathered(raw: dict[str, Any], columns: dict[str, FloatArray]) -> Evidence:
     return gather(parse_joint(raw, "nested"), "a", columns, "one", fine_rows=2000, judged_rows=300)
 
 
-def problem_of(raw: dict[str, Any], e: Evidence) -> Problem:
-    """The drive as it is, about that."""
+def told(raw: dict[str, Any], e: Evidence) -> Forgotten:
+    """What the drive as it is tells of the recording's history and gaps."""
     joint = parse_joint(raw, "nested")
-    return Problem(joint, of_drive(joint), (e,), Weighing({JOINT: NOISE_RAD}, {}))
+    p = Problem(joint, of_drive(joint), (e,), Weighing({JOINT: NOISE_RAD}, {}))
+    return forgotten(p, p.start, e, {JOINT: NOISE_RAD}, 0.25)
 
 
 def without_told(found: Forgotten, added: FloatArray) -> FloatArray:
     """What is left of something added to the judged rows [rad] beside the carry-over that a recording is estimated
     with, and a zero."""
-    columns = found.carryover.get(JOINT, np.empty((len(added), 0)))
-    told = np.column_stack((columns, np.ones(len(added))))[found.first :]
-    prior = np.eye(told.shape[1]) * NOISE_RAD
+    carried = found.carryover.get(JOINT, np.empty((len(added), 0)))
+    columns = np.column_stack((carried, np.ones(len(added))))[found.first :]
+    prior = np.eye(columns.shape[1]) * NOISE_RAD
     prior[-1] = 0.0  # a zero
     counted = added[found.first :]
     target = np.concatenate((counted, np.zeros(len(prior))))
-    return np.asarray(counted - told @ np.linalg.lstsq(np.vstack((told, prior)), target, rcond=None)[0])
+    return np.asarray(counted - columns @ np.linalg.lstsq(np.vstack((columns, prior)), target, rcond=None)[0])

@@ -37,3 +37,10 @@ WRIST_GAINS = {
 def closed(stage: dict[str, Any], name: str = "test joint") -> dict[str, Any]:
     """A configuration, ours and the plant's, of one closed stage."""
     return {"schema": 1, "name": name, "drive": {"circuit": "closed", "stage": [stage]}}
+
+
+LONG = {
+    "output_radius_m": 0.0365, "input_radius_m": 0.062, "free_length_m": 0.14, "EA_N": 16000.0, "pretension_N": 25.0,
+    "mu_output": 0.13, "mu_input": 0.15, "wrap_output_rad": 14.0, "wrap_input_rad": 11.0,
+}  # fmt: skip
+"""A drive of low pretension and much wrap: loads reach far into the drums, and what they left there lasts."""
