@@ -213,7 +213,7 @@ def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
             words = (
                 f"gap of {steps[k]:.3g} s after {time[k]:.6g} s, over which {name} "
                 f"moved by {100 * moved[k]:.0f} % of its "
-                f"range{more}: the way between is not known, the drive is taken as having gone straight"
+                f"range{more}: the way between is not known, and straight on is assumed at first"
             )
             yield Suspicion("gap", name, words, {"at_s": float(time[k]), "gap_s": float(steps[k])})
             return
