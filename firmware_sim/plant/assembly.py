@@ -175,7 +175,7 @@ def start_build(config: PlantConfig, dynamic: bool) -> Build:
             "guide_scale": 1.0,
             "slack_ratio": SLACK_RATIO,
         }
-        plays[k]["zero"] = plays[k]["value"] = stage.pretension_N
+        plays[k]["zero"] = plays[k]["value"] = plays[k]["tension"] = stage.pretension_N
         for key, value in values.items():
             record[key] = value
     shafts = np.zeros(count, dtype=SHAFT)

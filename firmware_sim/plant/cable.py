@@ -55,7 +55,7 @@ def solve_cable(c: Any, nodes: Nodes, h: float) -> float:
                 grip *= 1.0 + c.strengthening * math.asinh(abs(slip) / width)
             if c.pressure_exponent != 0.0:
                 steep += pressure_slope(c, max(mean / c.T0, 1e-3))
-        force = grip * mean if mean > 0.0 else 0.0
+        force = (grip * mean if mean > 0.0 else 0.0) + mode * nodes.hold[i]
         half = 0.5 * grip * steep if mean > 0.0 else 0.0
         residual = high - low - force - viscous
         worst = max(worst, abs(residual))
@@ -165,7 +165,7 @@ def _set_mode(nodes: Nodes, i: int, low: float, high: float, shift: float, toler
         pull = high - low
         bound = nodes.grip[i] * max(0.5 * (low + high), 0.0)
         burr = bound * nodes.burr[i]
-        bound += tolerance
+        bound += nodes.hold[i] + tolerance
         if pull > bound + burr:
             nodes.mode[i] = 1
             return 1

@@ -1,8 +1,8 @@
 """Compiled laws of friction: what each material point lies on, and at what force it slides there.
 
 A point on a drum or guide sticks to it while the net pull of its two elements stays within `2 tanh(mu dθ/2)` of
-their mean tension (over a point of contact angle dθ that is the capstan ratio e^(mu dθ), exactly), and slides at that
-force otherwise, plus `c v dθ` where viscous.
+their mean tension (over a point of contact angle dθ that is the capstan ratio e^(mu dθ), exactly), plus what a guide
+holds by itself, and slides at that force otherwise, plus `c v dθ` where viscous.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def _grip(x: float) -> float:
 @part
 def pressure_factor(c: Any, tau: float) -> float:
     """mu/mu0 at T/T0: τ^−n, or floor + (1 − floor) τ^−n, or e^(−n (τ − 1)), or a fall from 1 to the floor around
-    τ = 1 + n, or (1 + n)/(1 + n τ)."""
+    τ = 1 + n, or (1 + n)/(1 + n τ), or 1 + n (1/τ − 1) + floor (τ − 1)."""
     n, floor = c.pressure_exponent, c.pressure_floor
     if c.pressure_kind == 1:
         mixed: float = floor + (1.0 - floor) * tau**-n
@@ -49,6 +49,9 @@ def pressure_factor(c: Any, tau: float) -> float:
     if c.pressure_kind == 4:
         flat: float = (1.0 + n) / (1.0 + n * tau)
         return flat
+    if c.pressure_kind == 5:
+        ploughed: float = 1.0 + n * (1.0 / tau - 1.0) + floor * (tau - 1.0)
+        return ploughed
     plain: float = tau**-n
     return plain
 
@@ -71,6 +74,9 @@ def pressure_slope(c: Any, tau: float) -> float:
     if c.pressure_kind == 4:
         flat: float = -n * tau / (1.0 + n * tau)
         return flat
+    if c.pressure_kind == 5:
+        ploughed: float = (floor * tau - n / tau) / pressure_factor(c, tau)
+        return ploughed
     plain: float = -n
     return plain
 
@@ -105,7 +111,8 @@ def guide_contact(c: Any, left: float, right: float) -> float:
 
 @part
 def find_contacts(c: Any, nodes: Nodes, grooves: Floats, h: float) -> None:
-    """Lay each node's share of the cable on what it touches; sets `where`, `grip`, `burr` and `drag`."""
+    """Lay each node's share of the cable on what it touches; sets `where`, `grip`, `burr`, `hold` and
+    `drag`."""
     y, where, grip, drag, tension = nodes.y, nodes.where, nodes.grip, nodes.drag, nodes.tension
     first, last = c.first, c.first + c.count - 1
     A, B = c.A, c.A + c.free_m + c.guide_arc_m - c.ext  # departure points
@@ -119,7 +126,7 @@ def find_contacts(c: Any, nodes: Nodes, grooves: Floats, h: float) -> None:
         left = right
         right = 0.5 * (y[i] + y[i + 1])
         x = 0.0
-        drag[i] = 0.0
+        drag[i] = nodes.hold[i] = 0.0
         if left < A:
             where[i] = OUT
             c.i_out = i
@@ -154,6 +161,7 @@ def find_contacts(c: Any, nodes: Nodes, grooves: Floats, h: float) -> None:
                     x = c.guide_mu_per_m * c.guide_scale * arc
                     drag[i] = c.viscous_guide * arc / h
                     nodes.burr[i] = 0.0
+                    nodes.hold[i] = c.guide_hold_N * arc / c.guide_arc_m
         if pressed and x > 0.0:
             mean = max(0.5 * (tension[i - 1] + tension[i]) / c.T0, 1e-3)
             x *= pressure_factor(c, mean)
@@ -163,10 +171,12 @@ def find_contacts(c: Any, nodes: Nodes, grooves: Floats, h: float) -> None:
 @part
 def viscous_force(c: Any, drag: float, slip: float, h: float) -> tuple[float, float]:
     """Force of a viscous film on a sliding node and its derivative by the slip of this step: drag · slip, or with
-    the power p of the slip speed v: drag · slip (v/v0)^(p − 1)."""
+    the power p of the slip speed v: drag · slip (v/v0)^(p − 1); p = 0 stands for drag · h v0 arsinh(v/v0)."""
     if c.drag_exponent == 1.0:
         return drag * slip, drag
     p, x = c.drag_exponent, slip / (h * c.drag_speed)
+    if p == 0.0:
+        return drag * h * c.drag_speed * math.asinh(x), drag / math.sqrt(1.0 + x * x)
     size = x * x + 4e-4  # a film is no singularity at rest
     force: float = drag * slip * size ** (0.5 * (p - 1.0))
     return force, drag * size ** (0.5 * (p - 3.0)) * (p * x * x + 4e-4)

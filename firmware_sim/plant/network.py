@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from firmware_sim.plant.columns import (
+    BEARING_TORQUE,
     JOINT_TORQUE,
     LEAN,
     MOTOR_TORQUE,
@@ -104,6 +105,7 @@ def apply_surroundings(drive: Drive, u: Floats) -> float:
     drive.shafts[p.output_shaft].external_Nm = p.crosstalk * u[OTHER] + u[UNSEEN_TORQUE]
     drive.shafts[p.output_shaft].tilt = u[TILT]
     drive.shafts[p.output_shaft].lean = u[LEAN]
+    drive.shafts[p.output_shaft].coulomb_more_Nm = u[BEARING_TORQUE]
     if p.load_shaft == p.output_shaft:
         drive.shafts[p.load_shaft].external_Nm += u[JOINT_TORQUE]
     if drive.shafts[0].prescribed == 0:

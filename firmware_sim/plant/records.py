@@ -59,7 +59,8 @@ CABLE = np.dtype(
         ("viscous_out", "f8"),  # N s/m per metre of arc
         ("viscous_in", "f8"),
         ("viscous_guide", "f8"),
-        ("drag_exponent", "f8"),  # viscous force grows with this power of the slip speed,
+        ("guide_hold_N", "f8"),  # friction of all guides that the tension does not add to
+        ("drag_exponent", "f8"),  # viscous force grows with this power of the slip speed (0: as its arsinh),
         ("drag_speed", "f8"),  # m/s, and is the linear one at this speed
         ("strengthening", "f8"),  # Coulomb force grows by this times arsinh of slip speed over `drag_speed`
         ("pressure_exponent", "f8"),
@@ -115,6 +116,7 @@ SHAFT = np.dtype(
         ("inertia", "f8"),
         ("viscous", "f8"),
         ("coulomb_Nm", "f8"),
+        ("coulomb_more_Nm", "f8"),  # what that gains at present
         ("friction_kind", "i8"),  # 0: spring that yields, 1: Dahl, 2: LuGre
         ("coulomb_skew", "f8"),  # more friction turning forward than backward, over their mean
         ("stribeck_gain", "f8"),  # static over sliding friction, less one
@@ -198,9 +200,11 @@ PLAY = np.dtype(
         ("radius", "f8"),  # N
         ("share", "f8"),  # of the tension, adds to the radius
         ("time_s", "f8"),  # how long it takes to yield
+        ("rounded", "i8"),  # 1: it yields little by little, as Bouc and Wen have it
         ("seats", "f8"),  # N; 0: it goes on in proportion
         ("value", "f8"),  # N, state
         ("zero", "f8"),  # N
+        ("tension", "f8"),  # N, state of one that is rounded
     ]
 )
 PLAYS = 6  # slots per cable
@@ -224,6 +228,7 @@ class Nodes(NamedTuple):
     gamma: Floats  # per change of arc on the output drum
     upper: Floats  # elimination work space
     burr: Floats  # share by which the grip differs with the direction of sliding
+    hold: Floats  # N, friction that the tension does not add to
     mode: Codes  # -1, +1: slides that way; 0: sticks
     where: Codes  # FREE, OUT, IN, GUIDE
     saved_mode: Codes
@@ -250,11 +255,9 @@ class Drive(NamedTuple):
 
 def allocate_nodes(total: int) -> Nodes:
     """Zeroed arrays for `total` nodes."""
-    f = [np.zeros(total) for _ in range(12)]
+    f = [np.zeros(total) for _ in range(13)]
     c = [np.zeros(total, dtype=np.int8) for _ in range(4)]
-    return Nodes(
-        f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], c[0], c[1], c[2], c[3]
-    )
+    return Nodes._make((*f, *c))
 
 
 def make_drive(

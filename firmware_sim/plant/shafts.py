@@ -76,8 +76,9 @@ def shaft_slope(s: Any, rate: float) -> float:
 
 @part
 def bearing_limit(s: Any, way: float) -> float:
-    """τ_b = (coulomb + load_coefficient Σ R T) (1 + skew · way), way the sign of turning."""
-    limit: float = (s.coulomb_Nm + s.load_coefficient * max(s.radial_Nm, 0.0)) * (1.0 + s.coulomb_skew * way)
+    """τ_b = (coulomb + what it gains + load_coefficient Σ R T) (1 + skew · way), way the sign of turning."""
+    both: float = s.coulomb_Nm + s.coulomb_more_Nm + s.load_coefficient * max(s.radial_Nm, 0.0)
+    limit: float = both * (1.0 + s.coulomb_skew * way)
     return limit
 
 

@@ -90,9 +90,25 @@ def look_up_tension(c: Any, nodes: Nodes, tensile: Floats) -> None:
 
 
 @part
+def rounded_play(p: Any, T: float) -> float:
+    """Where a play that yields little by little stands, N: Z behind T, dZ/dT = 1 − |Z|/r away from zero and 1 towards
+    it."""
+    along = 1.0 if p.tension <= T else -1.0
+    held, way = along * (p.tension - p.value), along * (T - p.tension)
+    value: float = p.value
+    if held + way > 0.0:
+        if held < 0.0:  # back at zero, and on
+            held, way = 0.0, held + way
+        value = T - along * (p.radius + (held - p.radius) * math.exp(-way / p.radius))
+    return value
+
+
+@part
 def play_at(p: Any, T: float, h: float) -> float:
     """Where a play stands at the end of a step that ends at tension T, N: within its radius, r + share · T, of T,
     or on its way there in its time."""
+    if p.rounded != 0:
+        return rounded_play(p, T)
     low, high = T - p.radius - p.share * T, T + p.radius + p.share * T
     value: float = min(max(p.value, low), high)
     if p.time_s > 0.0:
@@ -121,7 +137,10 @@ def lumped_slope(c: Any, plays: Any, T: float, h: float) -> float:
     for k in range(c.plays):
         p = plays[c.index, k]
         part = 0.0
-        if p.value < T - p.radius - p.share * T:
+        if p.rounded != 0:
+            held = T - play_at(p, T, h)
+            part = max(held if p.tension <= T else -held, 0.0) / p.radius
+        elif p.value < T - p.radius - p.share * T:
             part = 1.0 - p.share
         elif p.value > T + p.radius + p.share * T:
             part = 1.0 + p.share
@@ -136,6 +155,6 @@ def settle_cable(c: Any, plays: Any, h: float) -> None:
     """End of a step: plays stay where they came to, and a clamp under too much tension has crept."""
     for k in range(c.plays):
         p = plays[c.index, k]
-        p.value = play_at(p, c.T_out, h)
+        p.value, p.tension = play_at(p, c.T_out, h), c.T_out
     if c.overload_rate > 0.0:
         c.crept_m += h * c.overload_rate * max(c.T_out - c.overload_N, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from firmware_sim.trials.joints import log_uniform
-from firmware_sim.trials.suspects import ANY, Scene, Shape, Suspect, sign
+from firmware_sim.trials.suspects import ANY, TURNING, Scene, Shape, Suspect, sign
 
 _WHOLE = 4.0  # recordings and pauses last so many first recordings, at the most
 
@@ -52,6 +52,14 @@ def _under_load(rng: np.random.Generator, scene: Scene) -> Shape:
     )
 
 
+def _stretched_creep(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {
+        "exponent": float(rng.uniform(0.3, 0.7)),
+        "time_constant_s": log_uniform(rng, 0.1, 1.5) * _span(scene),
+    }
+    return Shape(fixed, {"fraction": 1.0}, 0.12, 0.4)
+
+
 def _reach(scene: Scene, reference: float) -> float:
     return max(float(np.max(np.abs(scene.course.temperature_degC - reference))), 1e-3)
 
@@ -80,6 +88,13 @@ def _transient(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"coefficient_per_K": sign(rng) / _reach(scene, 20.0)}, 0.2, 0.4)
 
 
+def _sticking_frame(rng: np.random.Generator, scene: Scene) -> Shape:
+    reference = 20.0 + float(rng.uniform(-1.0, 1.0))
+    stick = float(rng.uniform(0.1, 0.3)) * float(np.ptp(scene.course.temperature_degC))
+    fixed = {"reference_degC": reference, "stick_K": stick}
+    return Shape(fixed, {"coefficient_per_K": sign(rng) / _reach(scene, reference)}, 0.15, 0.4)
+
+
 def _saturating(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"reach": float(rng.uniform(0.3, 1.0))}, {"softness": 1.0}, 1.0, 0.93)
 
@@ -93,6 +108,11 @@ def _knee(rng: np.random.Generator, scene: Scene) -> Shape:
     way = sign(rng, 0.2)
     fixed = {"place": float(rng.uniform(0.7, 1.4)), "width": float(rng.uniform(0.08, 0.3))}
     return Shape(fixed, {"rise": way}, 1.0, 3.0 if way > 0 else 0.6)
+
+
+def _s_shaped(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {"place": float(rng.uniform(0.7, 1.4)), "width": float(rng.uniform(0.15, 0.4))}
+    return Shape(fixed, {"dip": 1.0}, 0.5, 0.75)
 
 
 def _swing(scene: Scene) -> float:
@@ -121,6 +141,10 @@ def _mixed_strands(rng: np.random.Generator, scene: Scene) -> Shape:
 def _seating_strands(rng: np.random.Generator, scene: Scene) -> Shape:
     grip, seats = (float(u) * _swing(scene) for u in (rng.uniform(0.1, 0.4), rng.uniform(0.2, 0.6)))
     return Shape({"yield_N": grip, "seats_N": seats}, {"fraction": 1.0}, 0.3, 5.0)
+
+
+def _rounded_strands(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape({"yield_N": float(rng.uniform(0.1, 0.4)) * _swing(scene)}, {"fraction": 1.0}, 0.3, 5.0)
 
 
 def _slip(scene: Scene) -> tuple[float, float]:
@@ -200,12 +224,38 @@ def _overload(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"rate_m_per_Ns": unit}, first, 4.0 * most)
 
 
+def _walking(rng: np.random.Generator, scene: Scene) -> Shape:
+    """It walks at the higher ones of the loads that pull its cable in that while."""
+    when, course = _while(rng, scene), scene.course
+    inside = (course.time_s > when["time_s"]) & (course.time_s < when["time_s"] + when["duration_s"])
+    pulls = (-1.0 if when["cable_l"] else 1.0) * course.load_Nm[inside]
+    low, high = float(np.min(pulls)), float(np.max(pulls))
+    if high > 0.0:
+        low = max(low, 0.0)
+    holds = low + float(rng.uniform(0.1, 0.6)) * (high - low)
+    return Shape({**when, "holds_Nm": holds}, {"slip_m": 1.0}, *_slip(scene))
+
+
 def _breaking(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({**_while(rng, scene), "steps": float(rng.integers(2, 6))}, {"fraction": 1.0}, 0.5, 0.7)
 
 
 def _fraying(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(_while(rng, scene), {"fraction": 1.0}, 0.5, 0.7)
+
+
+def _bent_over(rng: np.random.Generator, scene: Scene) -> Shape:
+    when, course = _while(rng, scene), scene.course
+    after = course.time_s[1:] > when["time_s"]
+    way = float(np.abs(np.diff(course.motor_rad))[after].sum())
+    fixed = {
+        "time_s": when["time_s"],
+        "cable_l": when["cable_l"],
+        "travel_rad": float(rng.uniform(0.3, 0.7)) * max(way, 1e-2),
+        "power": float(rng.uniform(1.5, 3.5)),
+        "pace_rad_s": way / (float(course.time_s[-1]) - when["time_s"]),
+    }
+    return Shape(fixed, {"fraction": 1.0}, 0.5, 0.7)
 
 
 def _other_break(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -219,19 +269,23 @@ CABLE = (
     Suspect("pretension_relaxation:in_two", ANY, _creep_in_two, closed=True),
     Suspect("pretension_relaxation:by_travel", ANY, _run_in, closed=True),
     Suspect("pretension_relaxation:under_load", ANY, _under_load, closed=True),
+    Suspect("pretension_relaxation:stretched", ANY, _stretched_creep, closed=True),
     Suspect("thermal_pretension:lagged", ANY, _late_frame, warm=True, closed=True),
     Suspect("thermal_pretension:quadratic", ANY, _bent, warm=True, closed=True),
     Suspect("thermal_pretension:transient", ANY, _transient, warm=True, closed=True),
     Suspect("thermal_pretension:from_contact", ANY, _from_contact, warm=True, closed=True),
+    Suspect("thermal_pretension:sticking", ANY, _sticking_frame, warm=True, closed=True),
     Suspect("nonlinear_cable:saturating", ANY, _saturating),
     Suspect("nonlinear_cable:power_law", ANY, _hertz),
     Suspect("nonlinear_cable:knee", ANY, _knee),
+    Suspect("nonlinear_cable:s_shaped", ANY, _s_shaped),
     Suspect("strand_friction:masing", ANY, _masing),
     Suspect("strand_friction:graded", ANY, _masing),
     Suspect("strand_friction:rate_dependent", ANY, _slow_strands),
     Suspect("strand_friction:proportional", ANY, _pressed_strands),
     Suspect("strand_friction:mixed_lay", ANY, _mixed_strands),
     Suspect("strand_friction:seating", ANY, _seating_strands),
+    Suspect("strand_friction:bouc_wen", ANY, _rounded_strands),
     Suspect("clamp_slip:gradual", ANY, _sliding),
     Suspect("clamp_slip:in_steps", ANY, _letting_go),
     Suspect("clamp_slip:unequal_steps", ANY, _letting_go_unequally),
@@ -239,10 +293,12 @@ CABLE = (
     Suspect("clamp_slip:settling", ANY, _biting_again),
     Suspect("clamp_slip:other_cable", ANY, _other_slip, closed=True),
     Suspect("clamp_slip:overload", ANY, _overload),
+    Suspect("clamp_slip:ratcheting", ANY, _walking),
     Suspect("strand_break:in_steps", ANY, _breaking),
     Suspect("strand_break:unequal_steps", ANY, _breaking_unequally),
     Suspect("strand_break:fatigued", ANY, _fraying),
     Suspect("strand_break:fraying", ANY, _fraying),
+    Suspect("strand_break:bent_over_drums", TURNING, _bent_over),
     Suspect("strand_break:accelerating", ANY, _fraying),
     Suspect("strand_break:settling", ANY, _wearing_in),
     Suspect("strand_break:other_cable", ANY, _other_break, closed=True),

@@ -38,6 +38,12 @@ def _greased(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"mu_angle": 1.0, "viscous_Ns_per_m": viscous}, 0.2, 2.0, absent=False)
 
 
+def _wiped(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {"arc_length_m": _arc(rng, scene), "first": float(rng.uniform(0.15, 0.85))}
+    scaled = {"hold_N": scene.joint.stage.pretension_N, "mu_angle": float(rng.uniform(0.0, 0.3))}
+    return Shape(fixed, scaled, 0.3, 0.9, absent=False)
+
+
 def _slip_speed(scene: Scene) -> float:
     """How fast cable slips on a drum, about, m/s: once through the deflection in a second."""
     return scene.plain.deflection_range_rad * scene.joint.stage.output_radius_m
@@ -55,6 +61,12 @@ def _thinning(rng: np.random.Generator, scene: Scene) -> Shape:
 def _strengthening(rng: np.random.Generator, scene: Scene) -> Shape:
     fixed = {"speed_m_s": log_uniform(rng, 0.03, 0.5) * _slip_speed(scene)}
     return Shape(fixed, {"gain": 1.0}, 1.0, 2.0)
+
+
+def _eyring(rng: np.random.Generator, scene: Scene) -> Shape:
+    unit = scene.joint.stage.EA_N / scene.joint.stage.output_radius_m
+    speed = log_uniform(rng, 0.05, 0.5) * _slip_speed(scene)
+    return Shape({"speed_m_s": speed}, {"coefficient_Ns_per_m_rad": unit}, 0.5, 300.0)
 
 
 def _one_drum(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -79,6 +91,10 @@ def _pressed_flat(rng: np.random.Generator, scene: Scene) -> Shape:
 def _worn_through(rng: np.random.Generator, scene: Scene) -> Shape:
     fixed = {"place": float(rng.uniform(-0.25, 0.4))}
     return Shape(fixed, {"floor": -1.0}, 1.2, 0.85, base={"floor": 1.0})
+
+
+def _ploughed(rng: np.random.Generator, scene: Scene) -> Shape:
+    return Shape({"place": float(rng.uniform(0.85, 1.35))}, {"adhesion": 1.0}, 1.5, 2.0)
 
 
 def _patch(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -106,6 +122,11 @@ def _polished(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"height": 1.0}, 1.5, 5.0)
 
 
+def _fleet(rng: np.random.Generator, scene: Scene) -> Shape:
+    place = float(rng.uniform(-0.6, 0.6)) * scene.joint.travel_rad
+    return Shape({"place_rad": place}, {"growth_per_rad": 1.0}, 1.0, 5.0)
+
+
 def _burr(rng: np.random.Generator, scene: Scene) -> Shape:
     shape = _patch(rng, scene)
     grain = sign(rng) * float(rng.uniform(0.4, 0.9))
@@ -116,16 +137,20 @@ FRICTION = (
     Suspect("routing_friction:several_guides", ANY, _several),
     Suspect("routing_friction:unlike_paths", ANY, _unlike),
     Suspect("routing_friction:greased", TURNING, _greased),
+    Suspect("routing_friction:wiper", ANY, _wiped),
     Suspect("viscous_slip:power_law", ANY, _thinning),
     Suspect("viscous_slip:strengthening", ANY, _strengthening),
     Suspect("viscous_slip:one_drum", ANY, _one_drum),
+    Suspect("viscous_slip:eyring", ANY, _eyring),
     Suspect("pressure_dependent_friction:floor", ANY, _floor),
     Suspect("pressure_dependent_friction:exponential", ANY, _exponential),
     Suspect("pressure_dependent_friction:worn_through", ANY, _worn_through),
     Suspect("pressure_dependent_friction:pressed_flat", ANY, _pressed_flat),
+    Suspect("pressure_dependent_friction:ploughed", ANY, _ploughed),
     Suspect("position_dependent_friction:patch", TURNING, _patch),
     Suspect("position_dependent_friction:threaded", TURNING, _threaded),
     Suspect("position_dependent_friction:input_drum", TURNING, _input_drum),
     Suspect("position_dependent_friction:burr", TURNING, _burr),
     Suspect("position_dependent_friction:polished", TURNING, _polished),
+    Suspect("position_dependent_friction:fleet_angle", TURNING, _fleet),
 )

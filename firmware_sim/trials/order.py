@@ -16,6 +16,7 @@ from firmware_sim.trials import confounded
 from firmware_sim.trials.forms_cable import CABLE
 from firmware_sim.trials.forms_friction import FRICTION
 from firmware_sim.trials.forms_joint import JOINT
+from firmware_sim.trials.forms_loads import LOADS
 from firmware_sim.trials.forms_motor import MOTOR, MOTOR_FORMS
 from firmware_sim.trials.strangers import STRANGERS
 from firmware_sim.trials.suspects import CATALOGUE, Suspect
@@ -46,12 +47,38 @@ ALIKE = frozenset({
     "thermal_pretension:lagged", "thermal_pretension:quadratic", "viscous_slip:one_drum",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
-FORMS = (*FRICTION, *CABLE, *JOINT)
+FORMS = (*FRICTION, *CABLE, *JOINT, *LOADS)
 OTHER_FORMS = (*(s for s in FORMS if s.id not in ALIKE), *MOTOR_FORMS)
 """What can be concealed of laws that the catalogue does not hold."""
 CATALOGUE_FORMS = (*CATALOGUE, *(s for s in FORMS if s.id in ALIKE), *MOTOR)
 """What can be concealed of laws that it holds."""
-LAWS = {"catalogue": CATALOGUE_FORMS, "other": OTHER_FORMS, "mixed": (*CATALOGUE_FORMS, *OTHER_FORMS)}
+LATEST = frozenset({
+    "bearing_friction:by_moment",
+    "clamp_slip:ratcheting",
+    "clock_skew:resynchronised",
+    "crosstalk:rubbing",
+    "gravity_load:picked_up",
+    "inertial_load:turning_base",
+    "nonlinear_cable:s_shaped",
+    "position_dependent_friction:fleet_angle",
+    "pressure_dependent_friction:ploughed",
+    "pretension_relaxation:stretched",
+    "pulley_runout:idler",
+    "routing_friction:wiper",
+    "series_compliance:anisotropic",
+    "strand_break:bent_over_drums",
+    "strand_friction:bouc_wen",
+    "termination_backlash:loosening",
+    "thermal_pretension:sticking",
+    "viscous_slip:eyring",
+})  # fmt: skip
+"""Forms that joined last: nothing was tuned on them before they were judged."""
+LAWS = {
+    "catalogue": CATALOGUE_FORMS,
+    "other": OTHER_FORMS,
+    "mixed": (*CATALOGUE_FORMS, *OTHER_FORMS),
+    "latest": tuple(s for s in OTHER_FORMS if s.id in LATEST),
+}
 """What can be concealed, by whose laws are asked for."""
 
 
@@ -111,12 +138,25 @@ def order(wanted: Wanted, number: int, again: int = 0) -> Order:
     return Order(number, kind, _pair(wanted, place, again))
 
 
+def concealable(laws: str) -> tuple[Suspect, ...]:
+    """What can be concealed of these laws, and of an effect that has none of them its other forms."""
+    there = {_effect(s) for s in LAWS[laws]}
+    return (*LAWS[laws], *(s for s in OTHER_FORMS if _effect(s) not in there))
+
+
 def form_of(wanted: Wanted, effect: Suspect, place: int) -> Suspect:
-    """The law by which an effect goes the `place`-th time: the catalogue's, or one of its other forms in turn."""
+    """The law by which an effect goes the `place`-th time: the catalogue's, or one of its other forms in turn, of the
+    latest of them where it has any and they are asked for."""
     rng = np.random.default_rng([wanted.seed, 5, place])
-    known = wanted.laws == "catalogue" or (wanted.laws == "mixed" and rng.uniform() < 0.5)
-    forms = [s for s in LAWS["catalogue" if known else "other"] if s.id.partition(":")[0] == effect.id]
+    laws = wanted.laws
+    if laws == "mixed":
+        laws = "catalogue" if rng.uniform() < 0.5 else "other"
+    forms = [s for s in concealable(laws) if _effect(s) == effect.id]
     return forms[int(rng.integers(len(forms)))]
+
+
+def _effect(suspect: Suspect) -> str:
+    return suspect.id.partition(":")[0]
 
 
 def _in_turn(seed: int, place: int, pool: Sequence[T], stream: int) -> T:

@@ -77,6 +77,11 @@ def instant(rng: np.random.Generator, scene: Scene) -> float:
     return float(round(time[0] + rng.uniform(0.25, 0.75) * (time[-1] - time[0]), 2))
 
 
+def torque_for_a_loop(scene: Scene) -> float:
+    """Torque on the pulley that turns it by one loop width, N·m."""
+    return scene.plain.loop_rad / scene.plain.compliance
+
+
 def _routing(rng: np.random.Generator, scene: Scene) -> Shape:
     arc = float(rng.uniform(0.03, 0.15)) * scene.joint.stage.free_length_m
     return Shape({"arc_length_m": max(arc, 1e-3)}, {"mu_angle": 1.0}, 0.3, 3.0, absent=False)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from firmware_sim.plant import EffectSpec, StageConfig
-from firmware_sim.plant.forms.nonlinear_cable import Stiffness, knee, power, saturating
+from firmware_sim.plant.forms.nonlinear_cable import Stiffness, knee, power, s_shaped, saturating
 
 Values = Mapping[str, float]
 
@@ -63,17 +63,25 @@ def _pressed_flat(p: Values, f: float) -> About:
     return About({"rate": p["rate"] * f}, mu=(1.0 + p["rate"]) / (1.0 + p["rate"] * f))
 
 
+def _ploughed(p: Values, f: float) -> About:
+    a, u = p["adhesion"], p["place"]
+    mu = 1.0 + a * (1.0 / f - 1.0) + a / u**2 * (f - 1.0)
+    return About({"adhesion": a / (f * mu), "place": u / f}, mu=mu)
+
+
 ABOUT_T0: Mapping[str, Callable[[Values, float], About]] = {
     "nonlinear_cable": _stiffening,
     "nonlinear_cable:saturating": _tabled(saturating, "reach"),
     # its 0.02 T0, which keeps it from zero, stays that share of the pretension: 1e-3 of T0 at most
     "nonlinear_cable:power_law": _tabled(power),
     "nonlinear_cable:knee": _tabled(knee, "place", "width"),
+    "nonlinear_cable:s_shaped": _tabled(s_shaped, "place", "width"),
     "pressure_dependent_friction": _pressure,
     "pressure_dependent_friction:floor": _floor,
     "pressure_dependent_friction:exponential": _exponential,
     "pressure_dependent_friction:worn_through": _worn_through,
     "pressure_dependent_friction:pressed_flat": _pressed_flat,
+    "pressure_dependent_friction:ploughed": _ploughed,
 }
 """Laws that are stated about T0."""
 

@@ -17,7 +17,7 @@ from firmware_sim.trials.imperfections import Imperfections, draw_imperfections,
 from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
 from firmware_sim.trials.legs import Leg, legs_of
 from firmware_sim.trials.measures import PlainDrive
-from firmware_sim.trials.order import LAWS, Order, Wanted, order
+from firmware_sim.trials.order import Order, Wanted, concealable, order
 from firmware_sim.trials.scene import PAUSE_S, plain_scene, usable
 from firmware_sim.trials.sensors import NEIGHBOUR_ANGLE, NEIGHBOUR_LOAD, draw_sensors, noise_floor_rad
 from firmware_sim.trials.sizes import LARGEST, SMALLEST, Sized, give_size, run_course
@@ -261,7 +261,7 @@ def _companion(rng: np.random.Generator, wanted: Wanted, scene: Scene, taken: se
     closed = scene.joint.true.circuit == "closed"
     fit = [
         s
-        for s in LAWS[wanted.laws]
+        for s in concealable(wanted.laws)
         if scene.course.kind in s.courses
         and s.id.partition(":")[0] not in taken
         and not (s.warm or s.neighbour or s.two_sided or s.motor_torque or (s.closed and not closed))

@@ -1,9 +1,10 @@
-"""Other forms of what happens to the cable, its ends and its pretension, against laws worked out apart."""
+"""Other forms of what the cable is and of its pretension, against laws worked out apart."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,8 +12,7 @@ from plant_effect_course import WARM, T
 from plant_joints import clock, course, joint
 from scipy.integrate import quad, solve_ivp
 
-from firmware_sim.plant import EffectSpec, PlantRun, simulate
-from firmware_sim.plant.forms.courses import worked
+from firmware_sim.plant import EffectSpec, simulate
 
 STICKS = 50.0
 
@@ -52,6 +52,15 @@ def test_a_termination_beds_in_while_the_cable_creeps_on() -> None:
         np.testing.assert_allclose(_still(law, 0 * T + 20.0, start), expected, rtol=1e-6)
 
 
+def test_a_polymer_relaxes_by_a_stretched_exponential() -> None:
+    law = EffectSpec(
+        "pretension_relaxation:stretched", {"fraction": 0.07, "time_constant_s": 1.7, "exponent": 0.4}
+    )
+    for start in (0.0, 60.0):
+        expected = 0.93 + 0.07 / np.exp(((T + start) / 1.7) ** 0.4)
+        np.testing.assert_allclose(_still(law, 0 * T + 20.0, start), expected, rtol=1e-6)
+
+
 def _run(effect: EffectSpec, motor: np.ndarray, load: np.ndarray, start_s: float = 0.0) -> np.ndarray:
     """Mean tension over T0 of a joint that is run; what one cable gains the other loses."""
     config = joint()
@@ -82,6 +91,18 @@ def test_a_frame_that_closes_a_gap_pulls_from_then_on() -> None:
     expected = np.where(WARM > 21.0, 1 - 0.02 * (WARM - 21.0), 1.0)
     assert 0.1 < np.mean(WARM > 21.0) < 0.9
     np.testing.assert_allclose(_still(law, WARM), expected, rtol=1e-6)
+
+
+def test_a_frame_that_sticks_and_slides_follows_behind_a_play() -> None:
+    """It warms up to 4 K more and cools down again: held for 1.5 K at first, and for 3 K at the turn."""
+    law = EffectSpec(
+        "thermal_pretension:sticking", {"coefficient_per_K": 0.02, "reference_degC": 19.0, "stick_K": 1.5}
+    )
+    over = 4.0 * np.sin(0.8 * T)
+    cools = np.cos(0.8 * T) < 0.0
+    followed = np.where(cools, np.minimum(over + 1.5, 2.5), np.maximum(over - 1.5, 0.0))
+    assert followed[-1] < 1.5
+    np.testing.assert_allclose(_still(law, 20.0 + over), 1 + 0.02 * (1.0 + followed), atol=2e-6)
 
 
 def test_warmth_quickens_creep() -> None:
@@ -130,6 +151,11 @@ def test_thermal_pretension_lags_bends_or_passes() -> None:
             "knee",
             {"rise": 0.8, "place": 1.3, "width": 0.2},
             lambda t: 1 + 0.4 * (1 + math.tanh((t - 1.3) / 0.2)),
+        ),
+        (
+            "s_shaped",
+            {"dip": 0.6, "place": 1.2, "width": 0.3},
+            lambda t: 1 - 0.6 * math.exp(-((t - 1.2) ** 2) / 0.09),
         ),
     ],
 )
@@ -239,87 +265,15 @@ def test_wires_that_come_to_lie_yield_no_further() -> None:
     assert np.max(np.abs(added)) < 0.6 * 8.0
 
 
-def _alone(effect: EffectSpec, circuit: str = "open", load: float = 0.5) -> PlantRun:
-    """A steady load on a joint whose cables do not slip on their drums."""
-    config = joint(circuit, mu_output=STICKS, mu_input=STICKS)
-    s = config.stages[0]
-    moment = np.full(len(T), load * s.output_radius_m * s.pretension_N)
-    return simulate(config, T, 0 * T, moment, effects=(effect,))
-
-
-def test_a_clamp_slides_in_steps_or_for_a_while() -> None:
-    radius = joint().stages[0].output_radius_m
-    gradual = _alone(
-        EffectSpec("clamp_slip:gradual", {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 1.5, "cable_l": 0.0})
-    )
-    moved = (gradual.joint_position_rad - gradual.joint_position_rad[0]) * radius
-    np.testing.assert_allclose(moved, 2e-4 * np.clip((T - 1.0) / 1.5, 0, 1), atol=2e-8)
-    steps = _alone(
-        EffectSpec("clamp_slip:in_steps", {"slip_m": 3e-4, "time_s": 1.0, "duration_s": 1.0, "steps": 3.0})
-    )
-    moved = (steps.joint_position_rad - steps.joint_position_rad[0]) * radius
-    for at, share in ((0.98, 0.0), (1.2, 1 / 3), (1.7, 2 / 3), (2.2, 1.0)):
-        assert moved[round(at * 100)] == pytest.approx(3e-4 * share, abs=2e-8)
-    bites = _alone(EffectSpec("clamp_slip:settling", {"slip_m": 2e-4, "time_s": 1.0, "lag_s": 0.5}))
-    moved = (bites.joint_position_rad - bites.joint_position_rad[0]) * radius
-    np.testing.assert_allclose(moved, 2e-4 * (1.0 - np.exp(-np.maximum(T - 1.0, 0.0) / 0.5)), atol=2e-8)
-    values = {"slip_m": 7e-4, "time_s": 0.5, "duration_s": 1.5, "steps": 3.0, "growth": 2.0, "wait": 0.5}
-    unequal = _alone(EffectSpec("clamp_slip:unequal_steps", values))
-    moved = (unequal.joint_position_rad - unequal.joint_position_rad[0]) * radius
-    for at, gone in ((0.48, 0.0), (0.52, 1e-4), (1.48, 1e-4), (1.52, 3e-4), (1.98, 3e-4), (2.02, 7e-4)):
-        assert moved[round(at * 100)] == pytest.approx(gone, abs=2e-8)
-
-
-def test_what_the_load_works_at_goes_on_while_that_moves_alone() -> None:
-    """Half of it before the load rests, the other half after; by how far it goes, up or down."""
-    time = np.linspace(0.0, 8.0, 801)
-    load = np.interp(time, [0.0, 2.0, 3.0, 5.0, 5.5, 8.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
-    gone = worked(time, load, 1.0, 6.0)
-    for at, share in ((1.99, 0.0), (2.5, 0.25), (3.0, 0.5), (4.9, 0.5), (5.25, 0.75), (5.5, 1.0), (8.0, 1.0)):
-        assert gone[np.searchsorted(time, at)] == pytest.approx(share, abs=0.006)
-    np.testing.assert_array_equal(worked(time, 0.0 * load, 1.0, 6.0), time >= 1.0)
-    # what went on before and after is not its
-    assert worked(time, load, 2.5, 0.25)[np.searchsorted(time, 2.625)] == pytest.approx(0.5, abs=0.03)
-    config = joint("open")
-    moment = np.interp(T, [0.0, 1.5, 2.0], [0.2, 0.2, 0.4]) * config.stages[0].output_radius_m
-    moment *= config.stages[0].pretension_N
-    law = EffectSpec("clamp_slip:worked_loose", {"slip_m": 2e-4, "time_s": 0.5, "duration_s": 2.0})
-    plain, loose = (simulate(config, T, 0 * T, moment, effects=e) for e in ((), (law,)))
-    moved = (loose.joint_position_rad - plain.joint_position_rad) * config.stages[0].output_radius_m
-    np.testing.assert_allclose(moved, 2e-4 * np.clip((T - 1.5) / 0.5, 0.0, 1.0), atol=2e-7)
-
-
-@pytest.mark.parametrize("effect", ["clamp_slip", "strand_break"])
-def test_the_other_cable_is_the_mirror_image(effect: str) -> None:
-    size = {"slip_m": 4e-6} if effect == "clamp_slip" else {"fraction": 0.4}
-    here = _alone(EffectSpec(effect, {**size, "time_s": 1.0}), "closed", 0.4)
-    there = _alone(EffectSpec(f"{effect}:other_cable", {**size, "time_s": 1.0}), "closed", -0.4)
-    np.testing.assert_allclose(there.joint_position_rad, -here.joint_position_rad, atol=1e-9)
-    np.testing.assert_allclose(there.tension_l_N, here.tension_h_N, rtol=1e-6)
-
-
-def test_a_clamp_that_is_pulled_too_hard_creeps_by_the_excess() -> None:
-    config = joint("open")
-    tension = 1.5 * config.stages[0].pretension_N
-    for holds, excess in ((tension + 1.0, 0.0), (tension - 4.0, 4.0)):
-        run = _alone(EffectSpec("clamp_slip:overload", {"rate_m_per_Ns": 2e-6, "holds_N": holds}))
-        speed = np.gradient(run.joint_position_rad, T) * config.stages[0].output_radius_m
-        np.testing.assert_allclose(speed[5:-5], 2e-6 * excess, atol=1e-9)
-
-
-def test_wires_that_fray_or_break_in_steps_end_where_they_break_at_once() -> None:
-    once = _alone(EffectSpec("strand_break", {"fraction": 0.4, "time_s": 1.0}))
-    lasts = {"duration_s": 2.0}
-    for form, goes in (
-        ("fraying", lasts),
-        ("accelerating", lasts),
-        ("settling", {"lag_s": 0.2}),
-        ("in_steps", {**lasts, "steps": 4.0}),
-        ("unequal_steps", {**lasts, "growth": 0.5}),
-    ):
-        run = _alone(EffectSpec(f"strand_break:{form}", {"fraction": 0.4, "time_s": 1.0, **goes}))
-        assert run.joint_position_rad[-1] == pytest.approx(once.joint_position_rad[-1], rel=1e-4)
-        np.testing.assert_array_equal(run.joint_position_rad[T < 1.0], once.joint_position_rad[T < 1.0])
-        between = run.joint_position_rad[(T > 1.2) & (T < 2.8)]
-        assert np.all(between < once.joint_position_rad[-1])
-        assert np.all(np.diff(run.joint_position_rad) > -1e-12)
+def test_strands_that_yield_little_by_little_follow_bouc_and_wen() -> None:
+    """Z by the smallest of steps along the tension."""
+    law = {"fraction": 0.6, "yield_N": 8.0}
+    turns = course(0.0, 0.8, -0.4, 0.1, -0.2, 0.5, points=60)
+    pull, added = _stretch(EffectSpec("strand_friction:bouc_wen", law), turns)
+    held, expected = 0.0, [0.0]
+    for before, after in pairwise(pull):
+        for _ in range(50):
+            step = (after - before) / 50
+            held += step * (1.0 - abs(held) / 8.0 if held * step > 0.0 else 1.0)
+        expected.append(0.6 * (after - held))
+    assert np.max(np.abs(added - expected)) < 5e-3 * np.max(np.abs(expected))

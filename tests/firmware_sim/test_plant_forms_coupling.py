@@ -10,7 +10,7 @@ from firmware_sim.plant import EffectSpec, PlantRun, simulate
 
 
 def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:
-    path = plain.load_path_Nm
+    path, aside = plain.load_path_Nm, plain.pulley_position_rad - 0.2
     cases = {
         "stiffening": ({"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4}, 4e-4 * np.arcsinh(path / 0.4)),
         "softening": (
@@ -23,6 +23,10 @@ def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:
         ),
         "one_way": ({"compliance_rad_per_Nm": 1e-3, "skew": 1.0}, 2e-3 * np.maximum(path, 0.0)),
         "rubber": ({"compliance_rad_per_Nm": 1e-3, "share": 0.5, "lag_s": 0.0}, 1e-3 * path),
+        "anisotropic": (
+            {"compliance_rad_per_Nm": 1e-3, "swing": 0.6, "phase_rad": 0.4},
+            path * (1.6e-3 * np.cos(aside) ** 2 + 4e-4 * np.sin(aside) ** 2),
+        ),
     }
     for form, (parameters, expected) in cases.items():
         run = play(f"series_compliance:{form}", **parameters)

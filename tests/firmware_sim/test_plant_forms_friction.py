@@ -72,6 +72,24 @@ def test_a_greased_sheath_drags_in_proportion_to_the_cables_speed() -> None:
         assert run.tension_h_N[790] - run.tension_h_in_N[790] == pytest.approx(-2 * 50.0 * speed, rel=1e-3)
 
 
+@pytest.mark.parametrize("tension", [40.0, 80.0])
+def test_a_wiper_holds_back_the_same_at_any_tension_beside_its_bend(tension: float) -> None:
+    """Along the guide dT = −(mu T + w) ds: what T + W/(mu Θ) there is falls by the capstan ratio."""
+    law = {"hold_N": 6.0, "mu_angle": 0.2, "arc_length_m": 0.01}
+    run = _turned("open", EffectSpec("routing_friction:wiper", law), pretension_N=tension)
+    for at, way in ((390, -1.0), (790, 1.0)):
+        expected = (tension + 30.0) * math.exp(way * 0.2) - 30.0
+        assert run.tension_h_in_N[at] == pytest.approx(expected, rel=2e-3)
+    alone = EffectSpec("routing_friction:wiper", {"hold_N": 6.0})
+    config = joint("open", mu_output=STICKS, mu_input=STICKS, pretension_N=tension)
+    swing = course(0.0, 5.9, 9.0, -2.9, points=40)  # N: held, beyond by 3 N, held by 6 N the other way
+    run = simulate(
+        config, clock(swing), 0 * swing, swing * config.stages[0].output_radius_m, effects=(alone,)
+    )
+    for at, passed in ((40, 0.0), (80, 3.0), (120, 3.0)):
+        assert run.tension_h_in_N[at] == pytest.approx(tension + passed, abs=0.03)
+
+
 def test_a_sheath_that_bends_rubs_by_what_the_channel_says() -> None:
     motor = course(0.0, 2.0, -2.0, points=400)
     bend = np.linspace(0.0, 1.0, len(motor))
@@ -108,6 +126,25 @@ def test_a_thinning_film_is_the_linear_one_at_power_one_and_scales_with_speed_by
     assert np.max(np.abs(first - second)) < 0.01 * np.max(np.abs(first - plain))
 
 
+def test_a_lubricant_shears_as_eyring_has_it() -> None:
+    """Next to no Coulomb friction and a steady load: at s from its end the cable slips at s Ṫ/EA; what drags it there
+    shortens all that lies before."""
+    config = joint("open", mu_output=1e-7, mu_input=STICKS)
+    s = config.stages[0]
+    length, rate, speed = s.wrap_output_rad * s.output_radius_m, 20.0, 2e-5  # m, N/s, m/s
+    time = np.linspace(0.0, 1.0, 200)
+    moment = rate * s.output_radius_m * time
+    law = {"coefficient_Ns_per_m_rad": 2e3, "speed_m_s": speed}
+    plain, run = (
+        simulate(config, time, 0 * time, moment, effects=e)
+        for e in ((), (EffectSpec("viscous_slip:eyring", law),))
+    )
+    assert length * rate / s.EA_N > 2.0 * speed  # well into the logarithm
+    drag = quad(lambda x: x * 2e3 * speed * math.asinh(x * rate / s.EA_N / speed), 0.0, length)[0]
+    short = (plain.joint_position_rad - run.joint_position_rad)[-1] * s.output_radius_m
+    assert short == pytest.approx(drag / s.output_radius_m / s.EA_N, rel=0.01)
+
+
 def test_a_coefficient_that_grows_with_speed_is_the_plain_one_when_slow_and_depends_on_speed_over_its_own() -> (
     None
 ):
@@ -138,6 +175,7 @@ def test_grease_on_one_drum_acts_where_it_is() -> None:
         ("exponential", {"rate": 0.7}, lambda t: math.exp(-0.7 * (t - 1.0))),
         ("worn_through", {"place": 0.4, "floor": 0.5}, lambda t: 0.75 - 0.25 * math.tanh((t - 1.4) / 0.15)),
         ("pressed_flat", {"rate": 3.0}, lambda t: 4.0 / (1.0 + 3.0 * t)),
+        ("ploughed", {"adhesion": 0.9, "place": 1.5}, lambda t: 0.9 / t + 0.4 * t - 0.3),
     ],
 )
 def test_a_coefficient_by_pressure_sets_the_affected_wrap(
@@ -215,6 +253,18 @@ def test_a_polished_part_is_met_where_the_joint_stands(place: float) -> None:
 
     def mu(depth: np.ndarray) -> np.ndarray:
         return np.asarray(0.3 * (1.0 + 2.0 / (1.0 + np.exp(-2.0 * (place - depth - 0.2) / 0.15))))
+
+    assert left == pytest.approx(_left_over(s, mu, 0.25, 1.0), rel=0.02)
+
+
+@pytest.mark.parametrize("place", [-0.5, 0.4, 1.0])
+def test_a_cable_that_wanders_rubs_the_more_the_further_it_is_out_of_line(place: float) -> None:
+    law = {"growth_per_rad": 0.8, "place_rad": 0.25}
+    effect = EffectSpec("position_dependent_friction:fleet_angle", law)
+    left, s = _small_loop(effect, place / 0.5, mu_output=0.3, mu_input=STICKS)
+
+    def mu(depth: np.ndarray) -> np.ndarray:
+        return np.asarray(0.3 * (1.0 + 0.8 * np.abs(place - depth - 0.25)))
 
     assert left == pytest.approx(_left_over(s, mu, 0.25, 1.0), rel=0.02)
 

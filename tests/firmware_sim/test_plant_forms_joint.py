@@ -63,6 +63,16 @@ def test_a_lip_seal_holds_back_more_one_way() -> None:
     np.testing.assert_allclose(carried(run)[220:395], 0.05 * 0.6, rtol=1e-3)
 
 
+def test_a_tilted_bearing_holds_back_by_the_moment() -> None:
+    motor, load = course(0.0, 1.0, -1.0, points=200), course(-0.8, 0.8, -0.8, points=200)
+    law = {"torque_Nm": 0.03, "presliding_rad": 1e-4, "moment_coefficient": 0.2}
+    effect = EffectSpec("bearing_friction:by_moment", law)
+    run = simulate(joint(), clock(motor), motor, load, effects=(effect,))
+    held = load - carried(run)
+    np.testing.assert_allclose(held[20:195], 0.03 + 0.2 * np.abs(load[20:195]), atol=5e-4)
+    np.testing.assert_allclose(held[220:395], -0.03 - 0.2 * np.abs(load[220:395]), atol=5e-4)
+
+
 def _crossing(form: str, load: np.ndarray, motor: np.ndarray, **parameters: float) -> np.ndarray:
     """What a form of backlash adds to the joint's angle."""
     config = joint()
@@ -108,6 +118,15 @@ def test_a_worn_clearance_is_widest_where_it_has_worn() -> None:
         np.argmax(np.abs(run.pulley_position_rad - 0.2)),
     )
     assert abs(apart[amid]) > 3.0 * abs(apart[far])
+
+
+def test_a_set_screw_works_loose_while_the_load_moves() -> None:
+    swings = np.where(np.arange(100) // 10 % 2 == 0, 0.05, -0.05)  # at an even rate; a rest in between
+    load = -0.225 + np.cumsum(np.concatenate([[0.0], swings, np.zeros(100), swings, swings]))
+    law = {"gap_rad": 2e-3, "share": 0.2, "time_s": 0.5, "duration_s": 3.0}
+    added = _crossing("loosening", load, 0 * load, **law)
+    grown = np.interp(clock(load), [0.5, 1.0, 2.0, 3.5], [0.2, 0.4, 0.4, 1.0])
+    np.testing.assert_allclose(added, 1e-3 * grown * np.sign(load), atol=1e-12)
 
 
 def test_a_dragging_link_stands_still_while_it_is_not_loaded() -> None:
@@ -160,6 +179,23 @@ def test_runout_of_other_parts_bends_the_transmission(plain: PlantRun) -> None:
     np.testing.assert_allclose(disc.joint_position_rad - q, expected, atol=1e-12)
 
 
+@pytest.mark.parametrize(("circuit", "share"), [("open", 1.0), ("closed", 0.5)])
+def test_an_idler_out_of_true_lengthens_the_path_of_one_cable(circuit: str, share: float) -> None:
+    """By as much the joint stays behind, or by half of it where the other cable gives way as far."""
+    config, motor = joint(circuit), np.linspace(0.0, 2.0, 200)
+    law = {"eccentricity_m": 1e-4, "phase_rad": 0.7, "idler_radius_m": 0.016}
+    effect = EffectSpec("pulley_runout:idler", law)
+    run = simulate(config, clock(motor), motor, 0 * motor, effects=(effect,))
+    wave = np.sin(1.25 * motor + 0.7) - math.sin(0.7)
+    behind = 0.02 * motor - 0.04 * run.joint_position_rad
+    np.testing.assert_allclose(behind, share * 1e-4 * wave, atol=3e-7)
+    tighter = run.tension_h_N - simulate(config, clock(motor), motor, 0 * motor).tension_h_N
+    if circuit == "closed":
+        assert np.corrcoef(tighter, wave)[0, 1] > 0.9
+    else:
+        np.testing.assert_allclose(tighter, 0.0, atol=1e-6)
+
+
 def test_clocks_drift_wait_and_hold(plain: PlantRun) -> None:
     inner = slice(8, -8)
 
@@ -173,6 +209,8 @@ def test_clocks_drift_wait_and_hold(plain: PlantRun) -> None:
 
     drift = play("clock_skew:drift", delay_s=0.04, at_start=0.25, span_s=4.0)
     is_late(drift.joint_position_rad, plain.joint_position_rad, 0.04 * (0.25 + 0.75 * T / 4.0))
+    again = play("clock_skew:resynchronised", delay_s=0.02, period_s=1.3, start_s=0.303)
+    is_late(again.joint_position_rad, plain.joint_position_rad, 0.04 / 1.3 * np.mod(T - 0.303, 1.3))
     torque = play("clock_skew:torque_late", delay_s=0.03)
     is_late(torque.joint_torque_Nm, LOAD, 0.03)
     motor = play("clock_skew:motor_late", delay_s=-0.03)

@@ -80,6 +80,13 @@ def test_a_folding_arm_obeys_lagrange(plain: PlantRun) -> None:
     assert np.max(np.abs(change - expected)[20:-5]) < 0.03 * np.max(np.abs(expected))
 
 
+def test_an_inertia_on_a_turning_base_resists_what_it_turns_in_all() -> None:
+    run = play("inertial_load:turning_base", inertia_kgm2=0.03, coupling=0.8)
+    turns = np.gradient(np.gradient(run.pulley_position_rad, T), T) - 0.8 * 3.1**2 * OTHER
+    change = run.load_path_Nm - LOAD
+    assert np.max(np.abs(change + 0.03 * turns)[20:-10]) < 0.02 * np.max(np.abs(0.03 * turns))
+
+
 def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) -> None:
     q = plain.pulley_position_rad
     pose = 0.5 * MOTOR
@@ -91,6 +98,8 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
     drawn = [OTHER[0]]  # 0.3 behind the reading where that has come 0.3 or more from it
     for x in OTHER[1:]:
         drawn.append(max(x - 0.3, drawn[-1]) if x > drawn[-1] else min(x + 0.3, drawn[-1]))
+    lifts, edges = [0.5, 0.7, 1.3, 1.5, 2.1, 2.3, 2.9, 3.1, 3.7, 3.9], [0, 1, 1, 0, 0, 1, 1, 0, 0, 1]
+    lifted = np.interp(T, lifts, edges)
     cases = {
         "gravity_load:sprung": (
             {"moment_Nm": 0.3, "phase_rad": 0.2, "spring_share": 0.5},
@@ -108,6 +117,18 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
             {"moment_Nm": 0.3, "phase_rad": 0.2, "lean_rad_per_unit": 0.7, "upright_rad": 0.3},
             -0.3 * np.cos(0.3 + 0.7 * OTHER) * np.sin(q + 0.2),
         ),
+        "gravity_load:picked_up": (
+            {
+                "moment_Nm": 0.3,
+                "phase_rad": 0.2,
+                "share": 0.25,
+                "start_s": 0.5,
+                "period_s": 1.6,
+                "held": 0.5,
+                "lift_s": 0.2,
+            },
+            -(0.075 + 0.225 * lifted) * np.sin(q + 0.2),
+        ),
         "crosstalk:lagged": ({"load_coefficient": 0.3, "lag_s": smooth}, 0.3 * late),
         "crosstalk:quadratic": (
             {"load_coefficient": 0.3, "bend_per_unit": -0.5},
@@ -120,6 +141,10 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
         "crosstalk:dragged": (
             {"load_coefficient": 0.3, "friction_units": 0.3},
             0.3 * np.asarray(drawn),
+        ),
+        "crosstalk:rubbing": (
+            {"torque_Nm": 0.2, "reach_units": 0.3},
+            0.2 / 0.3 * (OTHER - np.asarray(drawn)),
         ),
         "crosstalk:stopped": ({"load_coefficient": 0.3, "stop_units": 0.4}, 0.12 * np.tanh(OTHER / 0.4)),
         "crosstalk:posed": ({"load_coefficient": 0.3, "phase_rad": 0.4}, 0.3 * OTHER * np.cos(pose + 0.4)),

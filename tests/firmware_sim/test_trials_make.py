@@ -15,7 +15,17 @@ import pytest
 from firmware_sim.plant import FORMS, PlantError
 from firmware_sim.trials.forms_motor import MOTOR
 from firmware_sim.trials.make import main, make
-from firmware_sim.trials.order import ALIKE, CATALOGUE_FORMS, KINDS, OTHER_FORMS, Wanted, order
+from firmware_sim.trials.order import (
+    ALIKE,
+    CATALOGUE_FORMS,
+    KINDS,
+    LATEST,
+    LAWS,
+    OTHER_FORMS,
+    Wanted,
+    concealable,
+    order,
+)
 from firmware_sim.trials.suspects import CATALOGUE
 from firmware_sim.trials.tabletop import CASES
 from firmware_sim.trials.world import _turns, draw_world
@@ -56,6 +66,20 @@ def test_effects_come_in_turn_and_forms_belong_to_them() -> None:
     assert [order(every, k).kind for k in range(len(KINDS))] == list(KINDS)
     first, second = order(Wanted(3, ("pair",), "mixed", "none"), 7).suspects
     assert first.id.partition(":")[0] != second.id.partition(":")[0]
+
+
+def test_the_latest_forms_are_drawn_where_an_effect_has_one_and_its_other_ones_else() -> None:
+    assert {s.id for s in LAWS["latest"]} == LATEST <= {s.id for s in OTHER_FORMS}
+    fresh = {name.partition(":")[0] for name in LATEST}
+    others = {s.id for s in OTHER_FORMS}
+    wanted = Wanted(3, (*KINDS, "single", "single"), "latest", "none")
+    for number in range(12 * len(CATALOGUE)):
+        asked = order(wanted, number)
+        for suspect in asked.suspects if asked.kind in ("single", "pair", "motor") else ():
+            assert suspect.id in (LATEST if suspect.id.partition(":")[0] in fresh else others)
+    assert {s.id.partition(":")[0] for s in concealable("latest")} == {s.id for s in (*CATALOGUE, *MOTOR)}
+    for laws in ("catalogue", "other", "mixed"):
+        assert concealable(laws) == LAWS[laws]
 
 
 def test_a_trial_depends_on_its_number_and_not_on_how_many_are_made(tmp_path: Path) -> None:

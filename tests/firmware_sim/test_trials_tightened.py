@@ -20,11 +20,13 @@ SPECS = (
     EffectSpec("nonlinear_cable:saturating", {"softness": 0.8, "reach": 0.6}),
     EffectSpec("nonlinear_cable:power_law", {"exponent": 0.7}),
     EffectSpec("nonlinear_cable:knee", {"rise": 2.0, "place": 1.1, "width": 0.2}),
+    EffectSpec("nonlinear_cable:s_shaped", {"dip": 0.6, "place": 0.9, "width": 0.4}),
     EffectSpec("pressure_dependent_friction", {"exponent": 0.6}),
     EffectSpec("pressure_dependent_friction:floor", {"exponent": 1.0, "floor": 0.4}),
     EffectSpec("pressure_dependent_friction:exponential", {"rate": 1.0}),
     EffectSpec("pressure_dependent_friction:worn_through", {"place": 0.1, "floor": 0.4}),
     EffectSpec("pressure_dependent_friction:pressed_flat", {"rate": 5.0}),
+    EffectSpec("pressure_dependent_friction:ploughed", {"adhesion": 0.9, "place": 1.2}),
 )
 FACTOR = 1.08
 

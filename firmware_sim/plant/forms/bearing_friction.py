@@ -1,11 +1,16 @@
-"""Bearing friction in other forms: Dahl, LuGre with Stribeck's fall and a viscous part, unlike by direction."""
+"""Bearing friction in other forms: Dahl, LuGre with Stribeck's fall and a viscous part, unlike by direction, growing
+with the moment."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from firmware_sim.plant.assembly import MIN_PRESLIDING_RAD, Build
+from firmware_sim.plant.columns import BEARING_TORQUE, JOINT_TORQUE
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.records import Floats
 
 _TORQUE = Parameter("torque_Nm", "τ_b", low=0.0, neutral=0.0)
 _PRESLIDING = Parameter("presliding_rad", "z0, turn within which friction builds up", 1e-5, 0.0, 0.1)
@@ -71,4 +76,24 @@ UNLIKE = form(
     _unlike,
 )
 
-KINDS: tuple[EffectKind, ...] = (DAHL, LUGRE, UNLIKE)
+
+def _by_moment(build: Build, p: Mapping[str, float]) -> None:
+    _coulomb(build, p, 0)
+
+    def fill(inputs: Floats) -> None:
+        inputs[:, BEARING_TORQUE] += p["moment_coefficient"] * np.abs(inputs[:, JOINT_TORQUE])
+
+    build.schedules.append(fill)
+
+
+BY_MOMENT = form(
+    "bearing_friction",
+    "by_moment",
+    "A crossed-roller or four-point bearing that the link's load tilts: it holds back with up to τ_b + k |M|, by a "
+    "presliding spring.",
+    (_TORQUE, _PRESLIDING, Parameter("moment_coefficient", "k", 0.0, 0.0, 1.0, neutral=0.0)),
+    (*_ACTS, "load"),
+    _by_moment,
+)
+
+KINDS: tuple[EffectKind, ...] = (DAHL, LUGRE, UNLIKE, BY_MOMENT)

@@ -1,13 +1,16 @@
-"""Clamps that slip in other forms: slowly, in steps, the other cable's, whenever they are pulled too hard."""
+"""Clamps that slip in other forms: slowly, in steps, the other cable's, whenever they are pulled too hard, a bit
+at every pull."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import RELEASED_H, RELEASED_L
+from firmware_sim.plant.columns import JOINT_TORQUE, RELEASED_H, RELEASED_L, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.events import Event
+from firmware_sim.plant.forms.courses import ratcheted
+from firmware_sim.plant.forms.events import Event, Values
+from firmware_sim.plant.records import Floats
 
 _SLIP = Event(
     "clamp_slip",
@@ -35,6 +38,12 @@ OVERLOAD = form(
     _overload,
 )
 
+
+def _ratchet(inputs: Floats, p: Values) -> Floats:
+    pulls = inputs[:, JOINT_TORQUE] * (-1.0 if p["cable_l"] >= 0.5 else 1.0)
+    return ratcheted(inputs[:, TIME], pulls, p["time_s"], p["duration_s"], p["holds_Nm"])
+
+
 KINDS: tuple[EffectKind, ...] = (
     _SLIP.for_a_while(
         "gradual",
@@ -53,4 +62,15 @@ KINDS: tuple[EffectKind, ...] = (
     ),
     _SLIP.of_cable_l("The clamp of cable l slips at once: the joint stands off the other way."),
     OVERLOAD,
+    _SLIP.driven(
+        "ratcheting",
+        "A clamp that walks, as joints held by friction do: every pull beyond what it holds takes a bit, by how far "
+        "it goes beyond, however quickly; letting go takes nothing back.",
+        (
+            Parameter("duration_s", "how long it walks", 15.0, 0.0),
+            Parameter("holds_Nm", "moment that pulls this cable, beyond which it walks", 0.0),
+        ),
+        _ratchet,
+        ("load",),
+    ),
 )

@@ -1,4 +1,5 @@
-"""Clocks that disagree in other forms: drifting apart, jittering, another channel late, stale values."""
+"""Clocks that disagree in other forms: drifting apart, jittering, another channel late, stale values, set right
+again and again."""
 
 from __future__ import annotations
 
@@ -104,4 +105,24 @@ STALE = form(
     _late(Q_OUT, _held),
 )
 
-KINDS: tuple[EffectKind, ...] = (DRIFT, JITTER, TORQUE_LATE, MOTOR_LATE, STALE)
+
+def _set_right(time: Floats, p: Mapping[str, float]) -> Floats:
+    since = (time - p["start_s"]) / p["period_s"]
+    return np.asarray(2.0 * p["delay_s"] * (since - np.floor(since)))
+
+
+RESYNCHRONISED = form(
+    "clock_skew",
+    "resynchronised",
+    "The joint encoder's clock drifts and is set right every p seconds, as network time is: its delay is 2 Δ times the "
+    "share of p that has passed since.",
+    (
+        _DELAY,
+        Parameter("period_s", "p", 5.0, 1e-3),
+        Parameter("start_s", "one instant at which it is set right", 0.0),
+    ),
+    ("velocity", "time"),
+    _late(Q_OUT, _set_right),
+)
+
+KINDS: tuple[EffectKind, ...] = (DRIFT, JITTER, TORQUE_LATE, MOTOR_LATE, STALE, RESYNCHRONISED)

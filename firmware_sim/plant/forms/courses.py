@@ -28,6 +28,14 @@ def low_passed(values: Floats, time_s: Floats, lag_s: float) -> Floats:
     return result
 
 
+def second_rate(values: Floats, time_s: Floats, reach_s: float = 0.05) -> Floats:
+    """Second derivative by time, of differences over `reach_s` either way; within that of an end as at that distance
+    from it."""
+    at = np.clip(time_s, time_s[0] + reach_s, time_s[-1] - reach_s)
+    before, here, after = (np.interp(at + k * reach_s, time_s, values) for k in (-1.0, 0.0, 1.0))
+    return np.asarray((after - 2.0 * here + before) / reach_s**2)
+
+
 def ramp(time_s: Floats, start_s: float, duration_s: float) -> Floats:
     """From 0 to 1 in `duration_s`; a step where that is 0."""
     if duration_s <= 0.0:
@@ -58,6 +66,32 @@ def worked(time_s: Floats, load_Nm: Floats, start_s: float, duration_s: float) -
     within = (time_s[1:] > start_s) & (time_s[:-1] < start_s + duration_s)
     moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(load_Nm)) * within)])
     return moved / moved[-1] if moved[-1] > 0.0 else (time_s >= start_s).astype(float)
+
+
+def ratcheted(time_s: Floats, load_Nm: Floats, start_s: float, duration_s: float, holds_Nm: float) -> Floats:
+    """From 0 to 1 as the load pulls: how far it has risen beyond what holds since `start_s`, over how far it does in
+    `duration_s`; a step where it never does."""
+    within = (time_s[1:] > start_s) & (time_s[:-1] < start_s + duration_s)
+    rises = np.maximum(np.diff(np.maximum(load_Nm - holds_Nm, 0.0)), 0.0)
+    moved = np.concatenate([[0.0], np.cumsum(rises * within)])
+    return moved / moved[-1] if moved[-1] > 0.0 else (time_s >= start_s).astype(float)
+
+
+def worn_by_travel(
+    time_s: Floats, motor_rad: Floats, start_s: float, pace_rad_s: float, travel_rad: float, power: float
+) -> Floats:
+    """From 0 towards 1 as Weibull has lives end, 1 − e^(−(s/travel)^power), s the motor's way since `start_s`: before
+    the first of these samples it went at its pace."""
+    went = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(motor_rad)) * (time_s[1:] > start_s))])
+    way = went + pace_rad_s * max(float(time_s[0]) - start_s, 0.0)
+    return np.asarray(-np.expm1(-((way / travel_rad) ** power)))
+
+
+def held(time_s: Floats, start_s: float, period_s: float, share: float, rise_s: float) -> Floats:
+    """1 for that share of every period, one of which begins at `start_s`, and 0 for the rest; from one to the other in
+    `rise_s`."""
+    since = np.mod(time_s - start_s, period_s)
+    return np.clip(since / rise_s, 0.0, 1.0) - np.clip((since - share * period_s) / rise_s, 0.0, 1.0)
 
 
 def schedule(build: Build, column: int, size: float, course: Callable[[Floats], Floats]) -> None:

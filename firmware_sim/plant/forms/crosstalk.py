@@ -1,5 +1,5 @@
-"""A neighbour's load in other forms: late, bent, beyond a slack, by the pose of this joint, through friction, and up to
-a stop."""
+"""A neighbour's load in other forms: late, bent, beyond a slack, by the pose of this joint, through friction, up to a
+stop, and as friction alone."""
 
 from __future__ import annotations
 
@@ -141,4 +141,26 @@ STOPPED = form(
     _stopped,
 )
 
-KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TOUCHING, POSED, DRAGGED, STOPPED)
+
+def _rubbing(build: Build, p: Mapping[str, float]) -> None:
+    def moment(inputs: Floats) -> Floats:
+        other, reach = inputs[:, OTHER], p["reach_units"]
+        return np.asarray(p["torque_Nm"] * (other - dragged_along(other, reach)) / reach)
+
+    _loading(build, moment)
+
+
+RUBBING = form(
+    "crosstalk",
+    "rubbing",
+    "The neighbour's cable crosses this joint's and rubs on it as it runs: M + τ_r (other_1 − y)/r, y stays while "
+    "|other_1 − y| < r, and is drawn along then.",
+    (
+        Parameter("torque_Nm", "τ_r, by the direction in which the neighbour goes", neutral=0.0),
+        Parameter("reach_units", "r, within which the friction builds up", 0.05, 1e-9),
+    ),
+    ("other:1",),
+    _rubbing,
+)
+
+KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TOUCHING, POSED, DRAGGED, STOPPED, RUBBING)

@@ -91,17 +91,33 @@ class Event:
     def worked(self, name: str, statement: str) -> EffectKind:
         """It as the load works at it: nothing while that rests, by how far it goes up and down for a while."""
         lasts = Parameter("duration_s", "how long", 15.0, 0.0)
+        return self.driven(
+            name,
+            statement,
+            (lasts,),
+            lambda u, p: worked(u[:, TIME], u[:, JOINT_TORQUE], p["time_s"], p["duration_s"]),
+        )
+
+    def driven(
+        self,
+        name: str,
+        statement: str,
+        parameters: tuple[Parameter, ...],
+        course: Callable[[Floats, Values], Floats],
+        acts: tuple[str, ...] = (),
+    ) -> EffectKind:
+        """It along a course that follows from all inputs; `acts`: what it shows in besides."""
 
         def happen(build: Build, p: Values) -> None:
             column = self.columns[1 if p[self.which.name] >= 0.5 else 0]
 
             def fill(inputs: Floats) -> None:
-                gone = worked(inputs[:, TIME], inputs[:, JOINT_TORQUE], p["time_s"], p["duration_s"])
-                inputs[:, column] += p[self.size.name] * gone
+                inputs[:, column] += p[self.size.name] * course(inputs, p)
 
             build.schedules.append(fill)
 
-        return form(self.effect, name, statement, (self.size, BEGINS, lasts, self.which), self.acts, happen)
+        given = (self.size, BEGINS, *parameters, self.which)
+        return form(self.effect, name, statement, given, (*self.acts, *acts), happen)
 
     def settling(self, statement: str) -> EffectKind:
         """It fast at first and ever more slowly."""

@@ -1,4 +1,5 @@
-"""Unseen weight in other forms: held by a spring, on a linkage, on a base that tilts or leans."""
+"""Unseen weight in other forms: held by a spring, on a linkage, on a base that tilts or leans, picked up and put
+down."""
 
 from __future__ import annotations
 
@@ -7,8 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import LEAN, OTHER, TILT
+from firmware_sim.plant.columns import LEAN, OTHER, TILT, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.forms.courses import held
 from firmware_sim.plant.records import Floats
 
 _MOMENT = Parameter("moment_Nm", "m g l", neutral=0.0)
@@ -104,4 +106,33 @@ LEANING = form(
     _leaning,
 )
 
-KINDS: tuple[EffectKind, ...] = (SPRUNG, LINKAGE, TILTING, LEANING)
+
+def _picked_up(build: Build, p: Mapping[str, float]) -> None:
+    _weight(build, p)
+
+    def fill(inputs: Floats) -> None:
+        there = held(inputs[:, TIME], p["start_s"], p["period_s"], p["held"], p["lift_s"])
+        inputs[:, LEAN] = (1.0 - p["share"]) * (1.0 - there)
+
+    build.schedules.append(fill)
+
+
+PICKED_UP = form(
+    "gravity_load",
+    "picked_up",
+    "A payload that is picked up and put down again and again: the cables carry "
+    "M − m g l (s + (1 − s) h(t)) sin(q + φ), h = 1 while it is held and 0 else.",
+    (
+        _MOMENT,
+        _PHASE,
+        Parameter("share", "s, of the weight that is always there", 0.2, 0.0, 1.0),
+        Parameter("start_s", "when it is picked up, once", 0.0),
+        Parameter("period_s", "from one time to the next", 10.0, 0.1),
+        Parameter("held", "share of the period", 0.5, 0.05, 0.9),
+        Parameter("lift_s", "within which the weight is taken up or set down", 0.3, 1e-3),
+    ),
+    (*_ACTS, "time"),
+    _picked_up,
+)
+
+KINDS: tuple[EffectKind, ...] = (SPRUNG, LINKAGE, TILTING, LEANING, PICKED_UP)

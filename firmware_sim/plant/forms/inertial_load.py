@@ -1,12 +1,15 @@
 """Unseen inertia in other forms: at the end of a flexible link, changing with the joint's angle, in part a liquid's, on
-two springs, behind a damper alone."""
+two springs, behind a damper alone, on a base that turns."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from firmware_sim.plant.assembly import Build, Tail
+from firmware_sim.plant.columns import OTHER, TIME, UNSEEN_TORQUE
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.forms.courses import second_rate
+from firmware_sim.plant.records import Floats
 
 _INERTIA = Parameter("inertia_kgm2", "J", low=0.0, neutral=0.0)
 
@@ -118,4 +121,25 @@ DRAGGED = form(
     _dragged_along,
 )
 
-KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING, LIQUID, TWO_MODES, DRAGGED)
+
+def _turning_base(build: Build, p: Mapping[str, float]) -> None:
+    build.shafts[build.output]["inertia"] += p["inertia_kgm2"]
+    coupled = p["inertia_kgm2"] * p["coupling"]
+
+    def fill(inputs: Floats) -> None:
+        inputs[:, UNSEEN_TORQUE] -= coupled * second_rate(inputs[:, OTHER], inputs[:, TIME])
+
+    build.schedules.append(fill)
+
+
+TURNING_BASE = form(
+    "inertial_load",
+    "turning_base",
+    "An inertia on a base that a neighbouring joint turns: the cables carry M − J (q̈ + c d²other_1/dt²), c the cosine "
+    "between the two axes.",
+    (_INERTIA, Parameter("coupling", "c", 1.0, -2.0, 2.0)),
+    ("acceleration", "other:1"),
+    _turning_base,
+)
+
+KINDS: tuple[EffectKind, ...] = (FLEXIBLE, FOLDING, LIQUID, TWO_MODES, DRAGGED, TURNING_BASE)

@@ -1,4 +1,4 @@
-"""A cable whose stiffness follows its tension, in other forms: saturating, a power law, a knee."""
+"""A cable whose stiffness follows its tension, in other forms: saturating, a power law, a knee, an S."""
 
 from __future__ import annotations
 
@@ -105,4 +105,24 @@ KNEE = form(
     _tabled(knee),
 )
 
-KINDS: tuple[EffectKind, ...] = (SATURATING, POWER_LAW, KNEE)
+
+def s_shaped(p: Mapping[str, float]) -> Stiffness:
+    """The stiffness of drawn fibres, which give way at some tension and draw tight beyond."""
+    return lambda tau: 1.0 - p["dip"] * math.exp(-(((tau - p["place"]) / p["width"]) ** 2))
+
+
+S_SHAPED = form(
+    "nonlinear_cable",
+    "s_shaped",
+    "A fibre line (polyester, nylon) whose force bends over its stretch as an S: EA(T) in proportion to "
+    "1 − b e^(−((T/T0 − u)/w)²).",
+    (
+        Parameter("dip", "b", low=0.0, high=0.9, neutral=0.0),
+        Parameter("place", "u", 1.1, 0.1, 5.0),
+        Parameter("width", "w", 0.3, 0.05, 3.0),
+    ),
+    ("load",),
+    _tabled(s_shaped),
+)
+
+KINDS: tuple[EffectKind, ...] = (SATURATING, POWER_LAW, KNEE, S_SHAPED)

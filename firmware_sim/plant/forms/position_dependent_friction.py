@@ -1,5 +1,5 @@
 """A groove that is rough in places, in other forms: a patch, ripples, the input drum's groove, a burr, a
-polished part."""
+polished part, a fleet angle."""
 
 from __future__ import annotations
 
@@ -111,4 +111,26 @@ POLISHED = form(
     _polished,
 )
 
-KINDS: tuple[EffectKind, ...] = (PATCH, THREADED, INPUT_DRUM, BURR, POLISHED)
+
+def _fleet(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["grooved"] = 1
+    away = np.abs(_ANGLES - p["place_rad"])
+    for k in range(len(build.cables)):
+        if build.cables[k]["shaft_out"] == build.output:
+            build.grooves[2 * k] = 1.0 + p["growth_per_rad"] * away
+
+
+FLEET_ANGLE = form(
+    "position_dependent_friction",
+    "fleet_angle",
+    "A cable that wanders along the drum and rubs at the groove's flank by its fleet angle: mu (1 + g |q − q_a|), in "
+    "line where the joint stands at q_a.",
+    (
+        Parameter("growth_per_rad", "g", low=0.0, high=10.0, neutral=0.0),
+        Parameter("place_rad", "q_a", 0.0),
+    ),
+    _ACTS,
+    _fleet,
+)
+
+KINDS: tuple[EffectKind, ...] = (PATCH, THREADED, INPUT_DRUM, BURR, POLISHED, FLEET_ANGLE)

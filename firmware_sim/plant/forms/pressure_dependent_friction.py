@@ -1,4 +1,5 @@
-"""A coefficient that falls with pressure, in other forms: with a floor, exponential, worn through, pressed flat."""
+"""A coefficient that falls with pressure, in other forms: with a floor, exponential, worn through, pressed flat, and
+one that rises again."""
 
 from __future__ import annotations
 
@@ -58,4 +59,23 @@ PRESSED_FLAT = form(
     _law(4, "rate", None),
 )
 
-KINDS: tuple[EffectKind, ...] = (FLOOR, EXPONENTIAL, WORN_THROUGH, PRESSED_FLAT)
+
+def _ploughed(build: Build, p: Mapping[str, float]) -> None:
+    build.cables["pressure_kind"], build.cables["pressure_exponent"] = 5, p["adhesion"]
+    build.cables["pressure_floor"] = p["adhesion"] / p["place"] ** 2
+
+
+PLOUGHED = form(
+    "pressure_dependent_friction",
+    "ploughed",
+    "Wires that adhere, and plough the drum the deeper they are pressed (Bowden and Tabor's two terms): "
+    "mu = mu0 (1 + a (T0/T − 1) + a/u² (T/T0 − 1)), least at T = u T0.",
+    (
+        Parameter("adhesion", "a", low=0.0, high=5.0, neutral=0.0),
+        Parameter("place", "u", 1.0, 0.7, 1.7),
+    ),
+    ("load",),
+    _ploughed,
+)
+
+KINDS: tuple[EffectKind, ...] = (FLOOR, EXPONENTIAL, WORN_THROUGH, PRESSED_FLAT, PLOUGHED)

@@ -173,4 +173,35 @@ UNDER_LOAD = form(
     _under_load,
 )
 
-KINDS: tuple[EffectKind, ...] = (POWER_LAW, EXPONENTIAL, WARM, IN_TWO, BY_TRAVEL, UNDER_LOAD)
+
+def _stretched(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        age = np.maximum(inputs[:, TIME], 0.0) / p["time_constant_s"]
+        return np.asarray(-p["fraction"] * np.expm1(-(age ** p["exponent"])))
+
+    lowered(build, loss)
+
+
+STRETCHED = form(
+    "pretension_relaxation",
+    "stretched",
+    "A polymer line relaxes by Kohlrausch's stretched exponential: T0 (1 − a (1 − e^(−(t/t_c)^b))), t the clock's "
+    "time.",
+    (
+        _FRACTION,
+        Parameter("time_constant_s", "t_c", 20.0, 1e-3),
+        Parameter("exponent", "b", 0.5, 0.1, 1.0),
+    ),
+    ("time",),
+    _stretched,
+)
+
+KINDS: tuple[EffectKind, ...] = (
+    POWER_LAW,
+    EXPONENTIAL,
+    WARM,
+    IN_TWO,
+    BY_TRAVEL,
+    UNDER_LOAD,
+    STRETCHED,
+)

@@ -1,4 +1,4 @@
-"""A pulley out of true in other forms: oval, the input pulley, an encoder off its centre."""
+"""A pulley out of true in other forms: oval, the input pulley, an encoder off its centre, an idler."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import Q_OUT
+from firmware_sim.plant.columns import MOTOR_ANGLE, Q_OUT, RELEASED_H
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 from firmware_sim.plant.records import Floats
 
@@ -70,4 +70,25 @@ ENCODER = form(
     _encoder,
 )
 
-KINDS: tuple[EffectKind, ...] = (OVAL, INPUT_PULLEY, ENCODER)
+
+def _idler(build: Build, p: Mapping[str, float]) -> None:
+    passes = build.config.ratio * build.stages[-1].output_radius_m  # m of cable per rad of the motor
+
+    def fill(inputs: Floats) -> None:
+        turned = passes / p["idler_radius_m"] * inputs[:, MOTOR_ANGLE] + p["phase_rad"]
+        inputs[:, RELEASED_H] -= p["eccentricity_m"] * (np.sin(turned) - np.sin(p["phase_rad"]))
+
+    build.schedules.append(fill)
+
+
+IDLER = form(
+    "pulley_runout",
+    "idler",
+    "An idler in the path of cable h runs out of true: that path is longer by e (sin(r q_in/r_i + φ) − sin φ), r_i the "
+    "idler's radius.",
+    (_ECCENTRIC, _PHASE, Parameter("idler_radius_m", "r_i", 0.02, 1e-4)),
+    ("motor_angle", "joint_angle"),
+    _idler,
+)
+
+KINDS: tuple[EffectKind, ...] = (OVAL, INPUT_PULLEY, ENCODER, IDLER)

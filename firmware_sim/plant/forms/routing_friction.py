@@ -1,4 +1,5 @@
-"""Routing friction in other forms: several guides, a path unlike for the two cables, a greased sheath."""
+"""Routing friction in other forms: several guides, a path unlike for the two cables, a greased sheath, one whose bend
+changes, a wiper."""
 
 from __future__ import annotations
 
@@ -84,4 +85,25 @@ BENDING = form(
     _bending,
 )
 
-KINDS: tuple[EffectKind, ...] = (SEVERAL_GUIDES, UNLIKE_PATHS, GREASED, BENDING)
+
+def _wiped(build: Build, p: Mapping[str, float]) -> None:
+    _guides(build, {**p, "mu_angle": max(p["mu_angle"], 1e-9)})
+    build.cables["guide_hold_N"] = p["hold_N"]
+
+
+WIPER = form(
+    "routing_friction",
+    "wiper",
+    "A wiper or seal that presses by itself, as a cable too stiff for its sheath does: it holds W at any tension, and "
+    "mu T per radian of the bend besides.",
+    (
+        Parameter("hold_N", "W", low=0.0, neutral=0.0),
+        Parameter("mu_angle", "mu Θ of the bend besides", 0.0, 0.0, 8.0, neutral=0.0),
+        _ARC,
+        _FIRST,
+    ),
+    _ACTS,
+    _wiped,
+)
+
+KINDS: tuple[EffectKind, ...] = (SEVERAL_GUIDES, UNLIKE_PATHS, GREASED, BENDING, WIPER)

@@ -1,5 +1,6 @@
 """Series compliance in other forms: a coupling that stiffens, one that softens, one of two stages,
-one that is softer one way, one of rubber, a bushing that creeps over decades of time."""
+one that is softer one way, one of rubber, a bushing that creeps over decades of time, a bracket that is softer one way
+up than the other."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import PATH, Q_OUT, TIME
+from firmware_sim.plant.columns import PATH, PULLEY, Q_OUT, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 from firmware_sim.plant.forms.courses import low_passed
 from firmware_sim.plant.records import Floats
@@ -139,4 +140,23 @@ BUSHING = form(
     _bushing,
 )
 
-KINDS: tuple[EffectKind, ...] = (STIFFENING, SOFTENING, STAGED, ONE_WAY, RUBBER, BUSHING)
+
+def _anisotropic(build: Build, p: Mapping[str, float]) -> None:
+    def yields(inputs: Floats, outputs: Floats) -> None:
+        soft = 1.0 + p["swing"] * np.cos(2.0 * outputs[:, PULLEY] - p["phase_rad"])
+        outputs[:, Q_OUT] += p["compliance_rad_per_Nm"] * soft * outputs[:, PATH]
+
+    build.mounts.append(yields)
+
+
+ANISOTROPIC = form(
+    "series_compliance",
+    "anisotropic",
+    "A bearing bracket or a split hub that is softer across than along, as the load turns in it: "
+    "+ c (1 + a cos(2q − φ)) M.",
+    (_SOFT, Parameter("swing", "a", 0.6, -1.0, 1.0), Parameter("phase_rad", "φ", 0.0)),
+    ("load", "joint_angle"),
+    _anisotropic,
+)
+
+KINDS: tuple[EffectKind, ...] = (STIFFENING, SOFTENING, STAGED, ONE_WAY, RUBBER, BUSHING, ANISOTROPIC)

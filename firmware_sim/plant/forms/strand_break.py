@@ -1,10 +1,13 @@
-"""Wires that break in other forms: one after another, fraying, ever faster or more slowly, the other cable's."""
+"""Wires that break in other forms: one after another, fraying, ever faster or more slowly, the other cable's, as they
+are bent over the drums."""
 
 from __future__ import annotations
 
-from firmware_sim.plant.columns import SOFTENED_H, SOFTENED_L
+from firmware_sim.plant.columns import MOTOR_ANGLE, SOFTENED_H, SOFTENED_L, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter
-from firmware_sim.plant.forms.events import Event
+from firmware_sim.plant.forms.courses import worn_by_travel
+from firmware_sim.plant.forms.events import Event, Values
+from firmware_sim.plant.records import Floats
 
 _BREAK = Event(
     "strand_break",
@@ -14,6 +17,12 @@ _BREAK = Event(
     ("time", "load"),
 )
 _LASTS = Parameter("duration_s", "how long", 15.0, 0.0)
+
+
+def _bent(inputs: Floats, p: Values) -> Floats:
+    time, motor = inputs[:, TIME], inputs[:, MOTOR_ANGLE]
+    return worn_by_travel(time, motor, p["time_s"], p["pace_rad_s"], p["travel_rad"], p["power"])
+
 
 KINDS: tuple[EffectKind, ...] = (
     _BREAK.in_steps("Wires break one after another: EA of one cable falls in equal steps."),
@@ -31,5 +40,17 @@ KINDS: tuple[EffectKind, ...] = (
         "Each wire that breaks loads the others: EA falls ever faster, by the square of the time, and then no more.",
         _LASTS,
         power=2.0,
+    ),
+    _BREAK.driven(
+        "bent_over_drums",
+        "Wires break as they are bent over the drums, their lives spread as Weibull has it: of the fraction "
+        "1 − e^(−(s/s_w)^k) is gone, s the way of the motor since then.",
+        (
+            Parameter("travel_rad", "s_w", 20.0, 1e-3),
+            Parameter("power", "k", 2.5, 0.5, 10.0),
+            Parameter("pace_rad_s", "how fast the motor went before the recording", 0.0, 0.0),
+        ),
+        _bent,
+        ("motor_angle",),
     ),
 )

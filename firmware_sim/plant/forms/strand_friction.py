@@ -1,5 +1,6 @@
 """Friction between strands in other forms: many small plays (Masing), most of them weak (graded), one that takes time,
-one that grows with T, half of either, and one behind which the wires come to lie."""
+one that grows with T, half of either, one behind which the wires come to lie, and one that yields little by
+little (Bouc–Wen)."""
 
 from __future__ import annotations
 
@@ -125,4 +126,28 @@ SEATING = form(
     _seating,
 )
 
-KINDS: tuple[EffectKind, ...] = (MASING, GRADED, RATE_DEPENDENT, PROPORTIONAL, MIXED_LAY, SEATING)
+
+def _bouc_wen(build: Build, p: Mapping[str, float]) -> None:
+    _in_plays(build, p["fraction"], 1)
+    build.plays["radius"][:, 0], build.plays["rounded"][:, 0] = p["yield_N"], 1
+
+
+BOUC_WEN = form(
+    "strand_friction",
+    "bouc_wen",
+    "Bouc and Wen's loop of wire ropes: the strands hold back Z of the tension, dZ/dT = 1 − |Z|/yield_N away from zero "
+    "and 1 towards it, so that they yield little by little; e = fraction · L/EA · (T − T0 − Z).",
+    (_FRACTION, Parameter("yield_N", "what Z tends to", low=1e-6)),
+    _ACTS,
+    _bouc_wen,
+)
+
+KINDS: tuple[EffectKind, ...] = (
+    MASING,
+    GRADED,
+    RATE_DEPENDENT,
+    PROPORTIONAL,
+    MIXED_LAY,
+    SEATING,
+    BOUC_WEN,
+)

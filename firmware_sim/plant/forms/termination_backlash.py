@@ -1,5 +1,5 @@
 """Backlash in other forms: a greased gap, a link that drags when unloaded, two clearances, three, a key on springs,
-one that wedges in its taper, one that has worn its way where the joint mostly stands."""
+one that wedges in its taper, one that has worn its way where the joint mostly stands, one that works loose."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from firmware_sim.plant.assembly import Build
-from firmware_sim.plant.columns import PATH, PULLEY, Q_OUT, TIME
+from firmware_sim.plant.columns import JOINT_TORQUE, PATH, PULLEY, Q_OUT, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
+from firmware_sim.plant.forms.courses import worked
 from firmware_sim.plant.records import Floats
 
 _GAP = Parameter("gap_rad", "b, total clearance", low=0.0, high=0.5, neutral=0.0)
@@ -180,4 +181,24 @@ WORN = form(
     _behind_pulley(_worn),
 )
 
-KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, BOTH_WAYS, SPRUNG, WEDGED, WORN)
+
+def _loosening(inputs: Floats, outputs: Floats, p: _Values) -> Floats:
+    gone = worked(inputs[:, TIME], inputs[:, JOINT_TORQUE], p["time_s"], p["duration_s"])
+    return 0.5 * p["gap_rad"] * (p["share"] + (1.0 - p["share"]) * gone) * np.sign(outputs[:, PATH])
+
+
+LOOSENING = form(
+    "termination_backlash",
+    "loosening",
+    "A set screw that the load works loose: the clearance grows from s b to b as the load comes and goes for a while.",
+    (
+        _GAP,
+        Parameter("share", "s, of the gap that is there before", 0.1, 0.0, 1.0),
+        Parameter("time_s", "when it begins"),
+        Parameter("duration_s", "how long", 15.0, 0.0),
+    ),
+    ("load", "time"),
+    _behind_pulley(_loosening),
+)
+
+KINDS: tuple[EffectKind, ...] = (GREASED, DRAGGING, TWO, BOTH_WAYS, SPRUNG, WEDGED, WORN, LOOSENING)

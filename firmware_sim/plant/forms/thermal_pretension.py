@@ -1,4 +1,4 @@
-"""Thermal pretension in other forms: late, bent, one way, and gone once all is warm."""
+"""Thermal pretension in other forms: late, bent, one way, behind a play, and gone once all is warm."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import TEMPERATURE, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
 from firmware_sim.plant.forms.courses import low_passed
+from firmware_sim.plant.forms.crosstalk import dragged_along
 from firmware_sim.plant.forms.pretension_relaxation import lowered
 from firmware_sim.plant.records import Floats
 
@@ -89,4 +90,23 @@ FROM_CONTACT = form(
     _from_contact,
 )
 
-KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TRANSIENT, FROM_CONTACT)
+
+def _sticking(build: Build, p: Mapping[str, float]) -> None:
+    def loss(inputs: Floats) -> Floats:
+        followed = dragged_along(inputs[:, TEMPERATURE], p["stick_K"])
+        return np.asarray(-p["coefficient_per_K"] * (followed - p["reference_degC"]))
+
+    lowered(build, loss)
+
+
+STICKING = form(
+    "thermal_pretension",
+    "sticking",
+    "Bolted joints of the frame stick and then slide: T0 (1 + k (ϑ_p − ϑ_ref)), ϑ_p follows ϑ through a play of ± ΔK, "
+    "from its middle on.",
+    (_RATE, _REFERENCE, Parameter("stick_K", "ΔK", 1.0, 0.0, 100.0)),
+    ("temperature",),
+    _sticking,
+)
+
+KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TRANSIENT, FROM_CONTACT, STICKING)

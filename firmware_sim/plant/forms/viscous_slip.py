@@ -1,4 +1,4 @@
-"""Slip drag in other forms: a power of the speed, a coefficient that grows with it, one drum alone."""
+"""Slip drag in other forms: a power of the speed, its arsinh, a coefficient that grows with it, one drum alone."""
 
 from __future__ import annotations
 
@@ -56,4 +56,19 @@ ONE_DRUM = form(
     _one_drum,
 )
 
-KINDS: tuple[EffectKind, ...] = (POWER_LAW, STRENGTHENING, ONE_DRUM)
+
+def _eyring(build: Build, p: Mapping[str, float]) -> None:
+    _power(build, {**p, "exponent": 0.0})
+
+
+EYRING = form(
+    "viscous_slip",
+    "eyring",
+    "A lubricant that shears as Eyring has it, in proportion at first and then by the logarithm: a sliding point feels "
+    "mu T + c v0 arsinh(v/v0) per radian.",
+    (_DRAG, _SPEED),
+    _ACTS,
+    _eyring,
+)
+
+KINDS: tuple[EffectKind, ...] = (POWER_LAW, STRENGTHENING, ONE_DRUM, EYRING)
