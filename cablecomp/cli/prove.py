@@ -51,7 +51,7 @@ def prove_blindly(
     seed: Annotated[int, typer.Option(min=0, help="of everything that is drawn")] = 1,
     out: Annotated[Path, out_option("folder for trials, verdicts, answer and page")] = Path("prove"),
     kinds: Annotated[str, typer.Option(help="what the joints conceal, in turn; one given twice comes twice")] = KINDS,
-    laws: Annotated[str, typer.Option(help="catalogue, other, or mixed")] = "mixed",
+    laws: Annotated[str, typer.Option(help="catalogue, other, mixed, or latest")] = "mixed",
     imperfections: Annotated[str, typer.Option(help="of the world: none, some, or all")] = "some",
     workers: Annotated[int, typer.Option(min=1, help="processes on this machine")] = 2,
     scheduler: Annotated[

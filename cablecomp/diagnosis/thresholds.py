@@ -95,6 +95,11 @@ class Thresholds:
     promising: int = 6
     """Hypotheses of a round that are fitted to the end, best first (trials seed 101: the true one was among the first
     four of the rough answers wherever it was found at all)."""
+    asked_again: int = 2
+    """Of the points and shapes that an effect may be asked from, those that are run again beside another model, by what
+    they did beside an earlier one."""
+    asked_later: int = 14
+    """Hypotheses that are asked again, by the same: twice what a later round tries."""
     tried_later: int = 7
     """Hypotheses of a later round that are tried, by what they promise."""
     tried_trading: int = 3

@@ -3,14 +3,16 @@ that no step of the model's own parameters can do."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
+from cablecomp.diagnosis.explain.seen import Added, Seen, Starts
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit
@@ -43,6 +45,8 @@ class Anchor:
     J: FloatArray
     over: dict[tuple[int, tuple[object, ...]], Mapping[str, FloatArray]] = field(default_factory=dict)
     """Misfits of recordings that begin after an event, by the recording's place and what happened."""
+    seen: Seen = field(default_factory=Seen)
+    """What was asked beside earlier models does there."""
 
     @cached_property
     def rated(self) -> FloatArray | None:
@@ -92,17 +96,18 @@ class Anchor:
         return np.concatenate([v, np.zeros((self.J.shape[1], *v.shape[1:]))])
 
 
-def anchor(fit: Fit, reach: float = LIMITS.reach) -> Anchor:
+def anchor(fit: Fit, reach: float = LIMITS.reach, seen: Seen | None = None) -> Anchor:
     """An anchor at a fit (or any evaluated point); `reach`: share of the cost that a step by one in a parameter
-    costs."""
+    costs; `seen`: what was asked elsewhere."""
+    seen = Seen() if seen is None else seen
     count = fit.J.shape[1]
     cost = np.sqrt(reach * 2.0 * fit.cost) * np.eye(count)
     J = np.concatenate([fit.J, cost])
     if not count:
-        return Anchor(fit, np.empty((len(J), 0)), J)
+        return Anchor(fit, np.empty((len(J), 0)), J, seen=seen)
     scale = np.sqrt(np.maximum(np.sum(J**2, axis=0), 1e-300))
     u, s, _ = np.linalg.svd(J / scale, full_matrices=False)
-    return Anchor(fit, u[:, s > 1e-6], J)
+    return Anchor(fit, u[:, s > 1e-6], J, seen=seen)
 
 
 def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best | None:
@@ -111,8 +116,13 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
     size = about  # what was worth seeing at one start is about that at the next
     # an event's instants are looked at coarsely where every run is dear
     dear = h.has_instant and here.fit.problem.fine
-    for start in h.starts[1::3] if len(h.starts) > 9 and dear else h.starts:
+    starts = h.starts[1::3] if len(h.starts) > 9 and dear else h.starts
+    for (start,) in worth_asking(here, h, [(s,) for s in starts]):
         found = contribution(here, h, start, size)
+        if (
+            about is None and not h.has_instant
+        ):  # of an event the instant decides, which is looked for ever more closely
+            here.seen.keep(h, (start,), here.fit, [] if found is None else [found])
         if found is not None:
             d, size = found
             answers.append(_linearly(here, h, start, d, size))
@@ -127,6 +137,59 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
         if shown is not None:
             answers.append(_linearly(here, h, Start(best.values), shown, other))
     return _lowest(answers)
+
+
+def best_pair(here: Anchor, h: Hypothesis, shapes: Sequence[Mapping[str, float]]) -> Best | None:
+    """The best linear answer of amount and phase as a pair (a cos, a sin), over these shapes and the hypothesis's
+    starts: the first half of those are cosines, the others their sines."""
+    half = len(h.starts) // 2
+    both = zip(h.starts[:half], h.starts[half:], strict=True)
+    pairs = [tuple(Start({**s.values, **f}) for s in pair) for pair in both for f in shapes]
+    answers: list[Best | None] = []
+    for cosine, sine in worth_asking(here, h, pairs):
+        first = contribution(here, h, cosine)
+        second = contribution(here, h, sine, first and first[1])
+        found = [] if first is None or second is None else [first, second]
+        here.seen.keep(h, (cosine, sine), here.fit, found)
+        if found:
+            answers.append(_paired(here, h, cosine, found))
+    return _lowest(answers)
+
+
+def worth_asking(here: Anchor, h: Hypothesis, starts: Sequence[Starts]) -> Sequence[Starts]:
+    """Of the points to ask from those that what was seen beside earlier models puts first; all of them where something
+    has not been asked."""
+    costs = [promised(here, h, s) for s in starts]
+    known = [c for c in costs if c is not None]
+    if len(known) < len(starts) or len(starts) <= LIMITS.asked_again:
+        return starts
+    first = sorted(range(len(starts)), key=known.__getitem__)[: LIMITS.asked_again]
+    return [starts[k] for k in sorted(first)]
+
+
+def promised(here: Anchor, h: Hypothesis, starts: Starts) -> float | None:
+    """Cost after a linear step by what was seen from there beside an earlier model; None where nothing was."""
+    found = here.seen.recall(h, starts, here.fit)
+    if found is None:
+        return None
+    if not found:
+        return inf
+    best = _paired(here, h, starts[0], found) if len(starts) > 1 else _linearly(here, h, starts[0], *found[0])
+    return inf if best is None else best.cost
+
+
+def likeliest(
+    here: Anchor, pool: Sequence[Hypothesis], most: int, besides: Callable[[Hypothesis], bool]
+) -> list[Hypothesis]:
+    """Of the hypotheses so many that promise most by what was seen of them, those of which nothing was, and `besides`
+    whatever they promise."""
+    costs: dict[str, float] = {}
+    for h in pool:
+        known = (promised(here, h, s) for s in here.seen.starts_of(h))
+        costs[h.name] = min((c for c in known if c is not None), default=-inf)
+    told = sorted(c for c in costs.values() if c > -inf)
+    worst = told[most - 1] if len(told) > most else inf
+    return [h for h in pool if costs[h.name] <= worst or besides(h)]
 
 
 def _lowest(answers: Sequence[Best | None]) -> Best | None:
@@ -148,6 +211,23 @@ def _linearly(here: Anchor, h: Hypothesis, start: Start, d: FloatArray, size: fl
     cost = 0.5 * (energy - 2.0 * factor * float(left @ own) + factor**2 * square)
     values = {**start.values, h.amount.name: size * (factor if factor != 0.0 else 0.1)}
     return Best(cost, values, d, size, by_channel(here.fit.problem, left - factor * own))
+
+
+def _paired(here: Anchor, h: Hypothesis, cosine: Start, found: Sequence[Added]) -> Best | None:
+    """The linear answer by what a cosine and a sine add; None where that is nothing."""
+    (d0, s0), (d1, s1) = found
+    left = here.beyond(here.fit.residual)
+    own = np.column_stack((here.beyond(d0) / s0, here.beyond(d1) / s1))
+    scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+    pair = np.linalg.lstsq(own / scale, left, rcond=1e-6)[0] / scale
+    pair = pair * min(1.0, h.amount.maximum / max(float(np.hypot(*pair)), 1e-300))
+    rest = left - own @ pair
+    size, phase = float(np.hypot(*pair)), float(np.arctan2(pair[1], pair[0]))
+    if not size > 0.0:
+        return None
+    values = {**cosine.values, h.amount.name: size, h.phase: phase}
+    d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
+    return Best(0.5 * float(np.sum(rest**2)), values, d, size, by_channel(here.fit.problem, rest))
 
 
 def by_channel(problem: Problem, residual: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.plausible import amount_of
 from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, left_out, scales
+from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
@@ -83,12 +84,13 @@ class Round:
 
 @dataclass(frozen=True)
 class Selection:
-    """The calibrated drive, the rounds, the final model."""
+    """The calibrated drive, the rounds, the final model; what was asked beside its models does."""
 
     baseline: Model
     rounds: tuple[Round, ...]
     final: Model
     groups: Groups
+    seen: Seen
 
 
 def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:

@@ -14,7 +14,7 @@ from cablecomp.diagnosis.explain.dependence import ask_dependences
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.linear import anchor
+from cablecomp.diagnosis.explain.linear import anchor, likeliest
 from cablecomp.diagnosis.explain.model import Model, placed
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.scores import (
@@ -28,6 +28,7 @@ from cablecomp.diagnosis.explain.scores import (
     selected_in,
 )
 from cablecomp.diagnosis.explain.screening import ask_all, rough
+from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
@@ -70,15 +71,17 @@ def rivals(
     base: Model,
     pool: Sequence[Hypothesis],
     groups: Groups,
+    seen: Seen,
     rng: np.random.Generator,
 ) -> Rivals:
     """Every effect that promises something, and for an event what is none, fitted in a term's place: beside `base`,
-    the model without it."""
-    here = anchor(base.fit)
+    the model without it; `seen`: what the search saw of them."""
+    here = anchor(base.fit, seen=seen)
     beside = [t for t in base.terms if isinstance(t, Hypothesis)]
     ids = {t.effect.id for t in beside}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
     others = [h for h in pool if h.effect.id not in ids and not h.same_as(term)]
+    others = likeliest(here, others, LIMITS.asked_later, lambda h: False)
     asked = side_by_side(lambda h: ask_all([here], h), others)
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]

@@ -13,7 +13,7 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.linear import anchor
+from cablecomp.diagnosis.explain.linear import anchor, likeliest
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
@@ -38,6 +38,7 @@ from cablecomp.diagnosis.explain.scores import (
     selected_in,
 )
 from cablecomp.diagnosis.explain.screening import Answer, ask_all, rough
+from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -55,8 +56,8 @@ class Beginning:
     """What a round begins from.
 
     `nominal`: a further point to ask from. `number`: 0 for the first round. `cold`: values to begin from where the
-    drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well. Once the time
-    is up nothing further is begun but the most promising fit.
+    drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well; `seen`: what
+    was asked beside these does. Once the time is up nothing further is begun but the most promising fit.
     """
 
     model: Model
@@ -67,6 +68,7 @@ class Beginning:
     number: int
     cold: Mapping[str, float] | None
     known: Sequence[Model]
+    seen: Seen
 
     @property
     def cost(self) -> float:
@@ -151,10 +153,14 @@ def _pairs(begun: Sequence[Begun], at: Beginning) -> list[Begun]:
 
 
 def _asked(at: Beginning) -> list[list[Answer]]:
-    """What each hypothesis that the model has not promises, by a linear step from each anchor."""
-    anchors = [anchor(f) for f in (at.model.fit, at.nominal) if f is not None]
+    """What each hypothesis that the model has not promises, by a linear step from each anchor. In a later round those
+    that promise most by what was seen of them before are asked."""
+    here = anchor(at.model.fit, seen=at.seen)
+    anchors = [here, *([] if at.nominal is None else [anchor(at.nominal)])]
     ids = {t.effect.id for t in at.model.terms if isinstance(t, Hypothesis)}
     left = [h for h in at.pool if h.effect.id not in ids]  # a second of the same would share its parameters
+    if at.number > 0:
+        left = likeliest(here, left, LIMITS.asked_later, at.trades)
 
     def answer(h: Hypothesis) -> list[Answer]:
         at.tell(f"asking {h.name}")

@@ -19,10 +19,10 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.linear import (
     Anchor,
     Best,
+    best_pair,
     best_start,
     better_shaped,
-    by_channel,
-    contribution,
+    promised,
     worth_a_shape,
 )
 from cablecomp.diagnosis.explain.plausible import runs_away
@@ -67,7 +67,7 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     if found is None:
         return None
     plain, best = found
-    other = _shaped(here, h, plain, best) if h.further or h.has_instant else None
+    other = _shaped(here, h, best) if h.further or h.has_instant else None
     return plain if other is None else replace(other, plain=plain)
 
 
@@ -77,24 +77,24 @@ def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
     return sorted((a for a in asked if a is not None), key=lambda a: a.cost)
 
 
-def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best | None] | None:
-    """The best over the hypothesis's starts, and (of what has no phase) as it was found."""
+def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best] | None:
+    """The best over the hypothesis's starts, and as it was found."""
     if h.has_phase:
-        pair = _ask_pair(here, h, {})
-        return None if pair is None else (pair, None)
-    best = best_event(here, h) if h.has_instant else best_start(here, h)
+        best = best_pair(here, h, [{}])
+    else:
+        best = best_event(here, h) if h.has_instant else best_start(here, h)
     return None if best is None else (_answer(here, h, best), best)
 
 
-def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> Answer | None:
+def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event is asked at
     every instant with each of them, then for its course."""
     # where every run is dear no shape is asked for but by laws that need it so; of an event, its course alone
     further = () if here.fit.problem.fine and not h.effect.rates else h.further
-    if best is None:
-        found = [_ask_pair(here, h, f) for f in further]
-        pair = min((a for a in found if a is not None), key=lambda a: a.cost, default=None)
-        return pair if pair is not None and worth_a_shape(pair.by_channel, plain.by_channel) else None
+    if h.has_phase:
+        pair = best_pair(here, h, further)
+        worth = pair is not None and worth_a_shape(pair.by_channel, best.by_channel)
+        return _answer(here, h, pair) if pair is not None and worth else None
     if h.has_instant:
         everywhere = (replace(h, starts=tuple(Start({**s.values, **f}) for s in h.starts)) for f in further)
         otherwise = [best_event(here, e) for e in everywhere]
@@ -102,7 +102,9 @@ def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> An
         courses = [best_course(here, h, e) for e in lasting if e is not None]
         shaped = otherwise + courses
     else:
-        shaped = [best_start(here, replace(h, starts=starts)) for starts in _by_shape(best, further)]
+        shaped = [
+            best_start(here, replace(h, starts=starts)) for starts in _likely_shapes(here, h, best, further)
+        ]
     promised = sorted((f for f in shaped if f is not None), key=lambda f: f.cost)
     if not promised:
         return None
@@ -116,12 +118,21 @@ def _shaped(here: Anchor, h: Hypothesis, plain: Answer, best: Best | None) -> An
     return replace(_answer(here, h, other), next=_answer(here, h, near[0]) if near else None)
 
 
-def _by_shape(best: Best, further: Sequence[Mapping[str, float]]) -> list[tuple[Start, ...]]:
-    """Starts beside the best one, those of one shape together."""
+def _likely_shapes(
+    here: Anchor, h: Hypothesis, best: Best, further: Sequence[Mapping[str, float]]
+) -> list[tuple[Start, ...]]:
+    """Starts beside the best one, those of one shape together; of shapes that were seen beside earlier models the first
+    by that."""
     found: dict[frozenset[str], list[Start]] = {}
     for values in further:
         found.setdefault(frozenset(values), []).append(Start({**best.values, **values}))
-    return [tuple(starts) for starts in found.values()]
+    shapes = [tuple(starts) for starts in found.values()]
+    costs = [[promised(here, h, (s,)) for s in starts] for starts in shapes]
+    least = [min(c for c in cs if c is not None) for cs in costs if None not in cs]
+    if len(least) < len(shapes) or len(shapes) <= LIMITS.asked_again:
+        return shapes
+    first = sorted(range(len(shapes)), key=least.__getitem__)[: LIMITS.asked_again]
+    return [shapes[k] for k in sorted(first)]
 
 
 def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
@@ -161,36 +172,6 @@ def _answer(here: Anchor, h: Hypothesis, best: Best) -> Answer:
     starts = (x, x + along, part + PART * along, part)
     begin = tuple(inside(problem, s) for s in starts)
     return Answer(h, best.cost, best.by_channel, problem, begin, J)
-
-
-def _ask_pair(here: Anchor, h: Hypothesis, shape: Mapping[str, float]) -> Answer | None:
-    """Amount and phase as a pair (a cos, a sin), of this shape, with the best of those that its starts have."""
-    half = len(h.starts) // 2
-    starts = [Start({**s.values, **shape}) for s in h.starts]
-    found = (_pair(here, h, *both) for both in zip(starts[:half], starts[half:], strict=True))
-    return min((a for a in found if a is not None), key=lambda a: a.cost, default=None)
-
-
-def _pair(here: Anchor, h: Hypothesis, cosine: Start, sine: Start) -> Answer | None:
-    """Both contributions in one linear step."""
-    first = contribution(here, h, cosine)
-    found = [first, contribution(here, h, sine, first and first[1])]
-    if any(f is None for f in found):
-        return None
-    (d0, s0), (d1, s1) = (f for f in found if f is not None)
-    left = here.beyond(here.fit.residual)
-    own = np.column_stack((here.beyond(d0) / s0, here.beyond(d1) / s1))
-    scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-    pair = np.linalg.lstsq(own / scale, left, rcond=1e-6)[0] / scale
-    pair = pair * min(1.0, h.amount.maximum / max(float(np.hypot(*pair)), 1e-300))
-    rest = left - own @ pair
-    size, phase = float(np.hypot(*pair)), float(np.arctan2(pair[1], pair[0]))
-    if not size > 0.0:
-        return None
-    values = {**cosine.values, h.amount.name: size, h.phase: phase}
-    d = (d0 / s0 * np.cos(phase) + d1 / s1 * np.sin(phase)) * size
-    cost = 0.5 * float(np.sum(rest**2))
-    return _answer(here, h, Best(cost, values, d, size, by_channel(here.fit.problem, rest)))
 
 
 def _begun(a: Answer, evaluations: int) -> Fit | None:

@@ -25,6 +25,7 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.rounds import Beginning, cold_starts, one_round
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
+from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.explain.ties import (
     alone_by_far,
     implausible,
@@ -68,7 +69,7 @@ def select(
     latest: list[Round] = []
     cold = cold_starts(pool, baseline)
     below = first if cold is not None and len(baseline.problem.repeated) > 1 else None
-    best = first
+    best, seen = first, Seen()
     for number in range(0 if quiet(baseline) else LIMITS.rounds + LIMITS.later_rounds):
         if number >= LIMITS.rounds:
             pool, beam = _still_demanded(pool, latest, best), beam[:1]
@@ -77,7 +78,9 @@ def select(
         latest = []
         for model, start in beam:
             known = [t.model for r in (*rounds, *latest) for t in r.tried]
-            latest.append(one_round(Beginning(model, start, pool, groups, pace, number, cold, known), rng))
+            latest.append(
+                one_round(Beginning(model, start, pool, groups, pace, number, cold, known, seen), rng)
+            )
         rounds += latest
         tried = [t for r in latest for t in r.tried]
         found = _carried(tried, groups, None if number == 0 else best)
@@ -95,7 +98,8 @@ def select(
             carried = _beside_doubtful(carried, below)
         beam = [(m, None) for m in carried]
     final = _pruned(best, rounds, groups)
-    return Selection(first, tuple(rounds), with_the_first(final, rounds, groups) if rounds else final, groups)
+    final = with_the_first(final, rounds, groups) if rounds else final
+    return Selection(first, tuple(rounds), final, groups, seen)
 
 
 def _beside_doubtful(carried: list[Model], below: Model | None) -> list[Model]:

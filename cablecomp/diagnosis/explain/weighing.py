@@ -91,7 +91,7 @@ def _weighed(
         others = [t for t in bare.terms if isinstance(t, Hypothesis)]
         having, lacking = (left_out_with_discrepancy(m, others, groups) for m in (final, bare))
         own = score_difference(having, lacking, groups)
-        instead = rivals(final, term, bare, pool, groups, rng)
+        instead = rivals(final, term, bare, pool, groups, selection.seen, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
     nearest = min(against.values(), key=lambda v: v.z, default=NO_RIVAL)
     # an event of any course predicts nothing of a part left out: it is weighed as it goes
