@@ -122,6 +122,12 @@ def _weighed(
         found = fewer
 
 
+def _moved(w: Weighed) -> tuple[float, float]:
+    """What stands first among names: what moves the joint's angle most (all of it where the drive cannot follow without
+    it); of what shows in the motor's torque alone, what is missed most there."""
+    return w.evidence.get("moves_rad", inf), w.evidence["gain"]
+
+
 def _judged(
     case: Case,
     before: Remainder,
@@ -137,9 +143,7 @@ def _judged(
     augmented = errors_of(final.fit, case.body.final, by) if final.terms else baseline
     if not predicts(drive.fit, final, baseline, augmented, drive.floor_rad):
         weighed = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed]
-    named = sorted(
-        (w for w in weighed if w.confidence >= LIMITS.name), key=lambda w: -w.evidence["gain"]
-    )  # what is missed most stands first
+    named = sorted((w for w in weighed if w.confidence >= LIMITS.name), key=_moved, reverse=True)
     kept, remainder = final, after
     if not named:
         kept = without_effects(final, drive, found.groups)

@@ -168,6 +168,11 @@ def pretension_moment(config: JointConfig) -> float:
     return config.drive.stage[-1].pretension_moment_Nm
 
 
+def per_moment(config: JointConfig) -> float:
+    """1/(R T0) of the output stage [1/(N m)]."""
+    return 1.0 / pretension_moment(config)
+
+
 def input_moment(config: JointConfig) -> float:
     """r T0 of the input stage [N m]: the natural unit of torque at the motor."""
     return config.drive.stage[0].input_radius_m * config.drive.stage[0].pretension_N

@@ -1,4 +1,5 @@
-"""Bearing friction: the output bearing holds the joint back, the more the harder it is loaded."""
+"""Bearing friction: the output bearing holds the joint back, the more the harder it is loaded, by the cables or by the
+joint's own load."""
 
 from __future__ import annotations
 
@@ -7,12 +8,23 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment, term
+from cablecomp.effects.base import (
+    Change,
+    Effect,
+    Parameter,
+    drum_radius,
+    per_moment,
+    pretension_moment,
+    term,
+)
 
 
-@term(parameters=("torque", "load_coefficient", "presliding", "radius", "radial_at_rest"), state=("z",))
+@term(
+    parameters=("torque", "growth", "load_coefficient", "presliding", "radius", "radial_at_rest"),
+    state=("z",),
+)
 def _hold_back(c: Any, p: Any, s: Any) -> None:
-    """p: torque [N m], load coefficient, presliding [rad], R [m], R (T_h + T_l) at rest [N m].
+    """p: torque [N m], growth [1/(N m)], load coefficient, presliding [rad], R [m], R (T_h + T_l) at rest [N m].
 
     The first sample counts from the angle at uniform pretension, as the profiles do: z = 0 there.
     """
@@ -21,7 +33,7 @@ def _hold_back(c: Any, p: Any, s: Any) -> None:
         radial = p.radius * c.tension_h
         if not math.isnan(c.tension_l):
             radial += p.radius * c.tension_l
-    limit = p.torque + p.load_coefficient * radial
+    limit = p.torque * (1.0 + p.growth * abs(c.load)) + p.load_coefficient * radial
     before = 0.0 if c.first else s.z
     z = before + (c.joint - c.joint_old) / p.presliding
     if z > 1.0:
@@ -39,6 +51,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     cables = 2.0 if config.drive.circuit == "closed" else 1.0
     terms = _hold_back(
         torque=values["torque_Nm"],
+        growth=values["growth_per_Nm"],
         load_coefficient=values["load_coefficient"],
         presliding=values["presliding_rad"],
         radius=drum_radius(config),
@@ -50,11 +63,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="bearing_friction",
     statement="The output bearing holds the joint back with a nearly constant torque against its motion, "
-    "more under radial load; at a reversal it gives way elastically first.",
-    equation="M_cable = M - τ_b z, dz = dq_out/δ within -1 <= z <= 1, τ_b = τ_0 + κ R (T_h + T_l)",
+    "more under radial load, or where the joint's load tilts it; at a reversal it gives way elastically first.",
+    equation="M_cable = M - τ_b z, dz = dq_out/δ within -1 <= z <= 1, τ_b = τ_0 (1 + g |M|) + κ R (T_h + T_l)",
     source="one elasto-plastic (Jenkins) element, the static limit of P. Dahl, A Solid Friction Model, "
     "1968; torque in proportion to the radial load: rolling bearing manufacturers' estimate M = mu "
-    "F d/2",
+    "F d/2, of crossed rollers with the tilting moment in F",
     parameters=(
         Parameter(
             "torque_Nm",
@@ -66,6 +79,22 @@ EFFECT = Effect(
             log=True,
             scale=pretension_moment,
             minimum=0.0,
+        ),
+        Parameter(
+            "growth_per_Nm",
+            "1/(N m)",
+            0.0,
+            0.3,
+            30.0,
+            "g, by which share of itself it grows per moment of the joint's load; 0: it does not",
+            log=True,
+            role="shape",
+            scale=per_moment,
+            omitted=0.0,
+            minimum=0.0,
+            of_load=True,
+            of_known_drive=True,
+            tries=(2.0, 20.0),
         ),
         Parameter(
             "load_coefficient",

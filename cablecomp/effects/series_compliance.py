@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_compliance
+from cablecomp.effects.base import Change, Effect, Parameter, per_moment, term, wrap_compliance
 from cablecomp.effects.lag import lagged
 
 HERTZ = 2.0 / 3.0
@@ -74,11 +74,6 @@ def _reads_late(values: Mapping[str, float], _on_high: bool) -> bool:
     return alone and values["lag_s"] < LATE_READING_S and values["decades"] == 0.0
 
 
-def _per_moment(config: JointConfig) -> float:
-    """1/(R T0) [1/(N m)]."""
-    return 1.0 / pretension_moment(config)
-
-
 EFFECT = Effect(
     id="series_compliance",
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
@@ -125,7 +120,7 @@ EFFECT = Effect(
             "g, one over the moment from which it yields by a power of the load; 0: it yields in proportion",
             log=True,
             role="shape",
-            scale=_per_moment,
+            scale=per_moment,
             omitted=0.0,
             minimum=0.0,
             tries=(2.0, 7.0),

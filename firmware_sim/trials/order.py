@@ -28,6 +28,7 @@ KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor"
 """What a trial holds; `motor`: an effect that shows in the motor's torque alone."""
 IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
+    "bearing_friction:by_moment",
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
     "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:lagged", "crosstalk:posed",
     "crosstalk:quadratic", "crosstalk:touching",
@@ -53,7 +54,6 @@ OTHER_FORMS = (*(s for s in FORMS if s.id not in ALIKE), *MOTOR_FORMS)
 CATALOGUE_FORMS = (*CATALOGUE, *(s for s in FORMS if s.id in ALIKE), *MOTOR)
 """What can be concealed of laws that it holds."""
 LATEST = frozenset({
-    "bearing_friction:by_moment",
     "clamp_slip:ratcheting",
     "clock_skew:resynchronised",
     "crosstalk:rubbing",

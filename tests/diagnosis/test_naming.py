@@ -182,6 +182,11 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             Case({"mu_angle": 0.4, "arc_length_m": 0.02, "count": 3.0, "first": 0.1}, form=":several_guides"),
             ("spread", 0.6, 1.0),
         ),
+        (
+            "bearing_friction",
+            Case({"torque_Nm": 0.01, "moment_coefficient": 0.08, "presliding_rad": 2e-4}, form=":by_moment"),
+            ("growth_per_Nm", 6.0, 10.0),
+        ),
     ],
     ids=[
         "stiffens",
@@ -199,6 +204,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "turns the joint",
         "grease on one drum",
         "guides in a row",
+        "tilts its bearing",
     ],
 )
 def test_what_goes_by_another_law_is_named_for_what_it_is(

@@ -187,15 +187,19 @@ def presliding(q: Floats, start: float, width: float) -> Floats:
     return np.array(states)
 
 
-@pytest.mark.parametrize("width", [1e-6, 1e-3])
+@pytest.mark.parametrize(("width", "growth"), [(1e-6, 0.0), (1e-3, 0.0), (1e-3, 3.0)])
 @pytest.mark.parametrize("name", ["snow-closed-rig", "tendon-finger", "two-stage-series"])
-def test_bearing_friction_holds_back(name: str, width: float) -> None:
+def test_bearing_friction_holds_back_more_where_the_load_tilts_the_bearing(
+    name: str, width: float, growth: float
+) -> None:
     config = joint(name)
     columns = excitation(config)
-    torque = 0.05 * unit(config)
+    torque, load = 0.05 * unit(config), columns["joint_torque_Nm"]
     values = {"torque_Nm": torque, "load_coefficient": 0.0, "presliding_rad": width}
+    values["growth_per_Nm"] = growth / unit(config)
     found = run(config, columns, ("bearing_friction", values))["joint_position_rad"]
-    load = columns["joint_torque_Nm"] - torque * presliding(found, 0.0, width)
+    limit = torque * (1.0 + growth * np.abs(load) / unit(config))
+    load = load - limit * presliding(found, 0.0, width)
     expected = fed_with(config, columns, load)
     assert found == pytest.approx(expected, abs=1e-9)
 

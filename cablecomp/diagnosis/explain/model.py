@@ -20,7 +20,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.departures import set_anew
-from cablecomp.estimation.evidence import Evidence, load_channel, noise_rms
+from cablecomp.estimation.evidence import JOINT, Evidence, load_channel, noise_rms
 from cablecomp.estimation.history import with_own_carryover
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
 from cablecomp.estimation.limits import MOVED_SD
@@ -232,6 +232,24 @@ def stripped(problem: Problem, term: Term) -> Problem:
     entries = tuple(e for e in problem.config.effect if not _is(e.id, e.parameters, term))
     free = tuple(p for p in problem.parameters if not p.name.startswith(f"effect.{term.effect.id}."))
     return replace(problem, config=problem.config.model_copy(update={"effect": entries}), parameters=free)
+
+
+def moves_rad(model: Model, term: Hypothesis) -> float | None:
+    """By how much an effect moves the joint's angle as it is fitted, RMS about each recording's mean [rad]; None where
+    the drive cannot follow the recordings without it."""
+    fit = model.fit
+    problem = stripped(fit.problem, term)
+    try:
+        less = problem.misfits(placed(fit, problem))[JOINT]
+    except InputError:
+        return None
+    parts = []
+    for e, a, b in zip(problem.evidence, less, fit.problem.misfits(fit.x)[JOINT], strict=True):
+        here = e.counted.get(JOINT)
+        if here is not None and here.any():
+            weight, moved = e.weight[here], (a - b)[here]
+            parts.append(weight * (moved - np.average(moved, weights=weight**2)))
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
 def left_off(problem: Problem, keys: Collection[str]) -> Problem:

@@ -14,7 +14,14 @@ from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.model import Model, Round, Selection, amount_resolved, without
+from cablecomp.diagnosis.explain.model import (
+    Model,
+    Round,
+    Selection,
+    amount_resolved,
+    moves_rad,
+    without,
+)
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
@@ -144,6 +151,8 @@ def _weighed(
         if depends is None:
             better = instead.models.get(beaten_by)
     said = {**evidence, "z": own.z, "gain": own.gain}
+    if (moves := moves_rad(final, term)) is not None:
+        said["moves_rad"] = moves
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
 
 
