@@ -3,11 +3,13 @@ loaded more, or in their own time."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, per_moment, term, wrap_compliance
+from cablecomp.effects.by_angle import varied, varying
 from cablecomp.effects.lag import lagged
 
 HERTZ = 2.0 / 3.0
@@ -19,11 +21,14 @@ LATE_READING_S = 0.1
 channels were filtered and late by some milliseconds)."""
 
 
-@term(parameters=("compliance", "skew", "bends", "exponent"))
+@term(parameters=("compliance", "skew", "bends", "exponent", "swing", "order", "softest"))
 def _give_way(c: Any, p: Any, s: Any) -> None:
-    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], exponent (1 - power)/2."""
+    """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], exponent (1 - power)/2, how
+    much softer it is than on average where it is softest, how often a turn, and there [rad, times the order]."""
     path = c.load - c.moment
     gives = p.compliance * (path + p.skew * abs(path))
+    if p.swing != 0.0:
+        gives *= 1.0 + p.swing * math.cos(p.order * c.joint - p.softest)
     c.reading += gives / (1.0 + (p.bends * path) ** 2) ** p.exponent
 
 
@@ -53,6 +58,9 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         skew=values["skew"],
         bends=values["stiffening_per_Nm"],
         exponent=CONTACT - 0.5 * (values["power"] - HERTZ),
+        swing=values["swing"],
+        order=values["order"],
+        softest=values["softest_rad"],
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)
@@ -77,9 +85,11 @@ def _reads_late(values: Mapping[str, float], _on_high: bool) -> bool:
 EFFECT = Effect(
     id="series_compliance",
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
-    "stiffen or soften as it is loaded, or, where it is of rubber or plastic, yield in its own time.",
-    equation="q_out = q_drive + c_s (M + s |M|) (1 + (g M)^2)^((p - 1)/2) + c_l y, t_l dy/dt = M - y, M the moment "
-    "in the load path, -1 <= s <= 1; over d decades y is the mean of three, of t_l 10^(-d/2), t_l, t_l 10^(d/2)",
+    "stiffen or soften as it is loaded, or as the joint turns its load across it, or, where it is of rubber or "
+    "plastic, yield in its own time.",
+    equation="q_out = q_drive + c_s (1 + a cos(k q_drive - φ)) (M + s |M|) (1 + (g M)^2)^((p - 1)/2) + c_l y, "
+    "t_l dy/dt = M - y, M the moment in the load path, -1 <= s <= 1; over d decades y is the mean of three, of "
+    "t_l 10^(-d/2), t_l, t_l 10^(d/2)",
     source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
     "yield by the 2/3 power of their load (H. Hertz, 1882), strain wave gears by makers' K1 < K2 < K3; bolted "
     "and clamped seats soften as they open (VDI 2230); delayed elasticity: C. Zener, Elasticity and "
@@ -142,6 +152,7 @@ EFFECT = Effect(
             of="compliance_rad_per_Nm",
             of_known_drive=True,
         ),
+        *varying("it is softest", of="compliance_rad_per_Nm", at="softest_rad"),
         Parameter(
             "late_rad_per_Nm",
             "rad/(N m)",
@@ -188,6 +199,9 @@ EFFECT = Effect(
     bounded=True,
     pliant=True,
     change=_change,
-    tries=tuple({"stiffening_per_Nm": g, "power": p} for g, p in ((7.0, 0.3), (1.0, 2.0), (4.0, 2.0))),
+    tries=(
+        *({"stiffening_per_Nm": g, "power": p} for g, p in ((7.0, 0.3), (1.0, 2.0), (4.0, 2.0))),
+        *varied("softest_rad"),
+    ),
     rank=5,
 )

@@ -17,19 +17,23 @@ from cablecomp.effects.base import (
     term,
     wrap_deflection,
 )
+from cablecomp.effects.by_angle import varied, varying
 from cablecomp.errors import InputError
 
 # Moment, as a share of R T0, within which the clearance is crossed: a step that is smooth can be fitted.
 TRANSITION = 0.0005
 
 
-@term(parameters=("gap", "width", "middle", "preloaded"))
+@term(parameters=("gap", "width", "middle", "preloaded", "swing", "order", "widest"))
 def _cross(c: Any, p: Any, s: Any) -> None:
-    """p: gap [rad], width of the transition [N m], moment amid what of it is preloaded [N m], share that is."""
+    """p: gap [rad], width of the transition [N m], moment amid what of it is preloaded [N m], share that is; how much
+    wider than on average it is where it is widest, how often a turn, and there [rad, times the order]."""
     path = c.load - c.moment
     place = p.preloaded * math.tanh((path - p.middle) / p.width)
     if p.preloaded < 1.0:
         place += (1.0 - p.preloaded) * math.tanh(path / p.width)
+    if p.swing != 0.0:
+        place *= 1.0 + p.swing * math.cos(p.order * c.joint - p.widest)
     c.reading += 0.5 * p.gap * place
 
 
@@ -55,27 +59,28 @@ def _cross_slowly(c: Any, p: Any, s: Any) -> None:
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     gap, impulse, drag, wedges = (values[n] for n in ("gap_rad", "impulse_Nms", "drag_Nm", "wedges_Nm"))
-    closes, preload, share = values["closes_Nm"], values["preload_Nm"], values["preloaded"]
+    closes, preload, share, swing = (values[n] for n in ("closes_Nm", "preload_Nm", "preloaded", "swing"))
     if impulse > 0.0 or drag > 0.0 or wedges > 0.0:
-        if closes or preload or share != 1.0:
+        if closes or preload or share != 1.0 or swing:
             raise InputError(
                 f"{config.name}: effect `termination_backlash` has `impulse_Nms`, `drag_Nm` or `wedges_Nm`, and "
-                "`closes_Nm`, `preload_Nm` or `preloaded`; one law is accepted: leave out either"
+                "`closes_Nm`, `preload_Nm`, `preloaded` or `swing`; one law is accepted: leave out either"
             )
         return Change(terms=_cross_slowly(gap=gap, impulse=impulse, drag=drag, wedges=wedges))
     width = closes or TRANSITION * pretension_moment(config)
-    return Change(terms=_cross(gap=gap, width=width, middle=preload, preloaded=share))
+    varies = {"swing": swing, "order": values["order"], "widest": values["widest_rad"]}
+    return Change(terms=_cross(gap=gap, width=width, middle=preload, preloaded=share, **varies))
 
 
 EFFECT = Effect(
     id="termination_backlash",
     statement="A hub key, pin or crimp has clearance: the joint falls from one flank to the other where the load "
     "changes sign; bit by bit where springs hold it amid the gap, or several gaps open one by one; of two in a row one "
-    "may be preloaded.",
-    equation="q_out = q_drive + (b/2) (s tanh((M - M_0)/M_c) + (1 - s) tanh(M/M_c)), M the moment in the load path, "
-    "M_c = 0.0005 R T0 where it is not given: sgn M with a narrow transition; greased, the gap is crossed at the speed "
-    "b M/J; a link that drags stands still in space while |M| is less than its friction M_f, and the pulley turns "
-    "under it; a key that wedges leaves its flank only where M is M_w and more the other way",
+    "may be preloaded; teeth and pins wear wider where they mostly stand.",
+    equation="q_out = q_drive + (b/2) (1 + a cos(k q_drive - φ)) (s tanh((M - M_0)/M_c) + (1 - s) tanh(M/M_c)), M the "
+    "moment in the load path, M_c = 0.0005 R T0 where it is not given: sgn M with a narrow transition; greased, the "
+    "gap is crossed at the speed b M/J; a link that drags stands still in space while |M| is less than its friction "
+    "M_f, and the pulley turns under it; a key that wedges leaves its flank only where M is M_w and more the other way",
     source="dead zone in the load path, seen from the load: M. Nordin and P.-O. Gutman, Controlling "
     "mechanical systems with backlash: a survey, Automatica 38 (2002)",
     parameters=(
@@ -172,6 +177,7 @@ EFFECT = Effect(
             maximum=1.0,
             of_known_drive=True,
         ),
+        *varying("the clearance is widest", at="widest_rad"),
     ),
     acts_through=("load", "load_direction"),
     bounded=True,
@@ -181,6 +187,7 @@ EFFECT = Effect(
         # where a gap opens at once, or a key lets go, is found by looking there
         *({"wedges_Nm": m} for m in (0.02, 0.04, 0.07, 0.11, 0.17, 0.25)),
         *({"preload_Nm": 0.05 * k, "preloaded": 0.5} for k in (*range(-9, 0), *range(1, 10))),
+        *varied("widest_rad"),
     ),
     rank=5,
 )

@@ -187,6 +187,16 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             Case({"torque_Nm": 0.01, "moment_coefficient": 0.08, "presliding_rad": 2e-4}, form=":by_moment"),
             ("growth_per_Nm", 6.0, 10.0),
         ),
+        (
+            "series_compliance",
+            Case({"compliance_rad_per_Nm": 3e-3, "swing": 0.7, "phase_rad": 0.5}, form=":anisotropic"),
+            ("swing", 0.6, 0.8),
+        ),
+        (
+            "termination_backlash",
+            Case({"gap_rad": 3e-3, "share": 0.8, "place_rad": 0.2, "width_rad": 0.3}, form=":worn"),
+            ("swing", 0.4, 1.0),
+        ),
     ],
     ids=[
         "stiffens",
@@ -205,6 +215,8 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "grease on one drum",
         "guides in a row",
         "tilts its bearing",
+        "softer across",
+        "worn",
     ],
 )
 def test_what_goes_by_another_law_is_named_for_what_it_is(

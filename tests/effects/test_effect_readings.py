@@ -131,6 +131,24 @@ def test_backlash_jumps_by_its_gap_at_zero_load() -> None:
     assert np.all(np.diff(step[np.argsort(load)]) >= -1e-15)
 
 
+def test_a_mount_is_softer_and_a_gap_wider_at_some_angles_than_at_others() -> None:
+    """Of order 2, the more the further the joint stands from 0.3 rad; 1.5 and 0.5 of it at most and at least."""
+    config = joint()
+    columns = excitation(config)
+    plain, load = run(config, columns), columns["joint_torque_Nm"]
+    aside = plain["joint_position_rad"] - 0.3
+    factor = 1.5 * np.sin(aside) ** 2 + 0.5 * np.cos(aside) ** 2
+    wave = {"swing": 0.5, "order": 2.0}
+    soft = ("series_compliance", {"compliance_rad_per_Nm": 1e-3, **wave, "softest_rad": 0.6 - np.pi})
+    bent = run(config, columns, soft)["deflection_rad"] - plain["deflection_rad"]
+    assert bent == pytest.approx(1e-3 * load * factor, abs=1e-12)
+    worn = ("termination_backlash", {"gap_rad": 2e-3, **wave, "widest_rad": 0.6 - np.pi})
+    loose = run(config, columns, worn)["deflection_rad"] - plain["deflection_rad"]
+    far = np.abs(load) > 0.05
+    assert loose[far] == pytest.approx((1e-3 * np.sign(load) * factor)[far], abs=1e-9)
+    assert np.ptp(factor) > 0.4
+
+
 def test_springs_close_a_gap_bit_by_bit_about_their_preload() -> None:
     config = joint()
     time = np.linspace(0.0, 1.0, 801)

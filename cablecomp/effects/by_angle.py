@@ -1,0 +1,64 @@
+"""Shape of a law whose amount varies as the joint turns: by 1 + a cos(k q - φ), as a wave that is widest where the
+joint mostly stands, or a bracket that is softer across than along."""
+
+from __future__ import annotations
+
+import math
+
+from cablecomp.effects.base import Parameter
+
+SWING, ORDERS, PHASES = 0.6, (1.0, 2.0, 4.0), 4
+"""Where a diagnosis asks: how much, how often a turn, at how many phases of each."""
+
+
+def varying(what: str, *, at: str, of: str = "") -> tuple[Parameter, ...]:
+    """The wave's amplitude, order and phase; `what`: the amount, and that it is most there, `at`: the phase's name."""
+    return (
+        Parameter(
+            "swing",
+            "-",
+            0.0,
+            0.0,
+            1.0,
+            "a, by which share of itself it varies with the joint's angle; 0: it does not",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+            of=of,
+            of_known_drive=True,
+        ),
+        Parameter(
+            "order",
+            "-",
+            1.0,
+            0.5,
+            8.0,
+            "k, how often in a turn of the joint",
+            log=True,
+            role="shape",
+            omitted=1.0,
+            minimum=0.1,
+            maximum=30.0,
+            of=of,
+            of_known_drive=True,
+        ),
+        Parameter(
+            at,
+            "rad",
+            0.0,
+            -math.pi,
+            math.pi,
+            f"φ, k times the angle at which {what}",
+            role="shape",
+            omitted=0.0,
+            of=of,
+            of_known_drive=True,
+        ),
+    )
+
+
+def varied(at: str) -> tuple[dict[str, float], ...]:
+    """Waves to ask for."""
+    phases = [2.0 * math.pi * k / PHASES - math.pi for k in range(PHASES)]
+    return tuple({"swing": SWING, "order": k, at: p} for k in ORDERS for p in phases)
