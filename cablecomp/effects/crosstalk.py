@@ -12,14 +12,15 @@ from cablecomp.effects.lag import lagged
 
 
 @term(
-    parameters=("load_coefficient", "growth", "turn", "bend", "slack", "lag", "channel"),
-    state=("known", "late", "other", "time"),
+    parameters=("load_coefficient", "growth", "turn", "bend", "slack", "lag", "play", "rubs", "channel"),
+    state=("known", "late", "other", "time", "drawn"),
 )
 def _arrive(c: Any, p: Any, s: Any) -> None:
     """p: load coefficient [N m per unit of the channel], its growth with the joint's angle [1/rad], turn of the joint
     [rad per unit], growth of what arrives with itself [1/unit], what is taken up before anything arrives [unit], lag
-    [s], place of the channel among the others; s: whether a reading came before, what had arrived of it late, that
-    reading and its time. The channel goes straight from sample to sample; without a reading nothing arrives."""
+    [s], how far it goes before something is drawn along [unit], how much of what arrives is that distance, place of the
+    channel among the others; s: whether a reading came before, what had arrived of it late, that reading and its time,
+    what was drawn along. The channel goes straight from sample to sample; without a reading nothing arrives."""
     other = c.other[int(p.channel)]
     if math.isnan(other):
         if c.first and c.commit:
@@ -28,8 +29,13 @@ def _arrive(c: Any, p: Any, s: Any) -> None:
         late = other
         if p.lag > 0.0 and s.known != 0.0 and not c.first:
             late = lagged(s.late, s.other, other, c.time - s.time, p.lag) if c.time > s.time else s.late
+        drawn = late
+        if p.play > 0.0 and s.known != 0.0 and not c.first:
+            drawn = min(max(s.drawn, late - p.play), late + p.play)
         if c.commit:
-            s.known, s.late, s.other, s.time = 1.0, late, other, c.time
+            s.known, s.late, s.other, s.time, s.drawn = 1.0, late, other, c.time, drawn
+        if p.play > 0.0:
+            late = (1.0 - p.rubs) * drawn + p.rubs * (late - drawn)
         arrives = late - min(max(late, -p.slack), p.slack)
         arrives *= 1.0 + p.bend * arrives
         c.moment -= p.load_coefficient * (1.0 + p.growth * c.joint) * arrives
@@ -46,6 +52,8 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
             bend=values["bend_per_unit"],
             slack=values["slack_units"],
             lag=values["lag_s"],
+            play=values["play_units"],
+            rubs=values["rubs"],
             channel=values["channel"],
         )
     )
@@ -55,13 +63,14 @@ EFFECT = Effect(
     id="crosstalk",
     statement="A neighbouring joint loads this joint's cables, or turns the joint (its cables pass the other's axis, "
     "or the frame between them gives way): what the other does appears here, at once or through something soft and "
-    "damped, all of it or what goes beyond a slack.",
-    equation="M_cable = M + k (1 + p q_out) (1 + b z) z; q_out + d (1 + b z) z; z = y - clip(y, -s, s), "
-    "t_l dy/dt = other - y",
+    "damped, all of it or what goes beyond a slack, or through friction: what it draws along, or what that takes.",
+    equation="M_cable = M + k (1 + p q_out) (1 + b z) z; q_out + d (1 + b z) z; z = x - clip(x, -s, s), "
+    "x = (1 - f) w + f (y - w), w drawn along by y, |y - w| <= r (where r is 0, x = y); t_l dy/dt = other - y",
     source="cables routed past or over a neighbouring axis carry part of its load, or lengthen on one side by its "
     "turn, and a frame bends under its load; linear as first order, in the joint's angle too, with which the lever "
     "arm changes; quadratic where it counts more one way than the other; a first lag for rubber, grease or a sheath "
-    "between them; a dead zone where parts touch only beyond a clearance",
+    "between them; a dead zone where parts touch only beyond a clearance; a play operator (M. A. Krasnosel'skii and "
+    "A. V. Pokrovskii, Systems with Hysteresis, 1989) where cables or sheaths that cross rub",
     parameters=(
         Parameter(
             "load_coefficient",
@@ -138,10 +147,35 @@ EFFECT = Effect(
             tries=(0.35,),
             per_reading=True,
         ),
+        Parameter(
+            "play_units",
+            "unit",
+            0.0,
+            0.0,
+            0.9,
+            "r, how far the other goes before it draws along what rubs on it; 0: nothing rubs",
+            role="slack",
+            omitted=0.0,
+            minimum=0.0,
+            per_reading=True,
+        ),
+        Parameter(
+            "rubs",
+            "-",
+            0.0,
+            0.0,
+            1.0,
+            "f, share that goes by the force that this takes rather than by what is drawn along",
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+        ),
     ),
     acts_through=("other",),
     bounded=True,
     unbounded_by=("growth_per_rad",),  # the moment then goes by the angle that is solved for
     change=_change,
     texts=("channel",),
+    tries=tuple({"play_units": r, "rubs": f} for r in (0.06, 0.35) for f in (0.0, 1.0)),
 )

@@ -169,6 +169,16 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         ),
         (
             "crosstalk",
+            Case({"torque_Nm": 0.1, "reach_units": 0.3}, ("other_1",), form=":rubbing"),
+            ("rubs", 0.8, 1.0),
+        ),
+        (
+            "crosstalk",
+            Case({"load_coefficient": 0.1, "friction_units": 0.3}, ("other_1",), form=":dragged"),
+            ("play_units", 0.2, 0.4),
+        ),
+        (
+            "crosstalk",
             Case({"compliance_rad_per_unit": -2e-4}, ("other_1",), plant="frame_flex"),
             ("turn_rad_per_unit", -2.1e-4, -1.9e-4),
         ),
@@ -211,6 +221,8 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "unequal steps",
         "saturates",
         "more one way",
+        "rubs",
+        "drags along",
         "turns the joint",
         "grease on one drum",
         "guides in a row",

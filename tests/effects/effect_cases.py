@@ -27,6 +27,7 @@ IN_TWO_SECONDS = {"time_s": 0.7, "began_s": -1.0, "lag_s": 0.3} | {
 """Times at which something happens while the excitation lasts."""
 OTHER_LAW = {
     "closes_Nm": 0.0, "preload_Nm": 0.0, "preloaded": 1.0, "swing": 0.0, "duration_s": 0.0, "curve": 1.0,
+    "play_units": 0.0,
 }  # fmt: skip
 """Values of a law that an effect may have in the place of another of its own."""
 

@@ -70,6 +70,23 @@ def test_a_neighbours_load_may_count_more_one_way_than_the_other() -> None:
     )
 
 
+@pytest.mark.parametrize(("rubs", "play"), [(0.0, 0.3), (1.0, 0.1)])
+def test_a_neighbour_draws_this_joint_along_or_rubs_on_it(rubs: float, play: float) -> None:
+    """What is drawn along is as far behind as the play once the neighbour has turned back by twice that."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    other = columns["other_neighbour_Nm"]
+    drawn = [other[0]]
+    for x in other[1:]:
+        drawn.append(max(x - play, drawn[-1]) if x > drawn[-1] else min(x + play, drawn[-1]))
+    arrives = other - np.array(drawn) if rubs else np.array(drawn)
+    assert np.ptp(other) > 4.0 * play
+    law = {"load_coefficient": 0.4, "play_units": play, "rubs": rubs}
+    found = run(config, columns, ("crosstalk", {"channel": "other_neighbour_Nm", **law}))
+    expected = fed_with(config, columns, columns["joint_torque_Nm"] + 0.4 * arrives)
+    assert found["joint_position_rad"] == pytest.approx(expected, abs=1e-11)
+
+
 @pytest.mark.parametrize("amount", ["load_coefficient", "turn_rad_per_unit"])
 def test_what_a_neighbour_does_may_arrive_late_and_beyond_a_slack_alone(amount: str) -> None:
     """Of a first lag, started at rest, what goes beyond the slack."""
