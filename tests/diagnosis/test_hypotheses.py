@@ -96,7 +96,11 @@ def test_shapes_that_belong_together_are_asked_for_together() -> None:
     assert any(v["preload_Nm"] < 0.0 for v in together)
     coupling = _of("series_compliance", "series_compliance")
     assert set(coupling.starts[0].values) == {"compliance_rad_per_Nm"}
-    assert {k for v in coupling.further for k in v} == {"skew", "stiffening_per_Nm", "power"}
+    asked = {frozenset(v) for v in coupling.further}
+    by_angle = {"swing", "order", "softest_rad"}
+    assert asked == {
+        frozenset(n) for n in ({"skew"}, {"stiffening_per_Nm"}, {"stiffening_per_Nm", "power"}, by_angle)
+    }
     rubber = _of("series_compliance", "series_compliance:late_rad_per_Nm")
     assert set(rubber.starts[0].values) == {"late_rad_per_Nm", "lag_s", "compliance_rad_per_Nm"}
     assert rubber.further == ({"decades": 2.0},)
@@ -303,6 +307,7 @@ def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
     [
         (1.0, 0.4, 0.5, "swings"),  # a drag of 2 z w J and a spring
         (1.0, 30.0, 0.2, ""),  # at the end of a flexible link
+        (1.0, 0.44, 1.7, "swings"),  # a drag alone
         (1.0, 0.4, 6.0, ""),  # dragged along
         (0.7, 0.4, 0.5, ""),  # the rest is on the joint
     ],
