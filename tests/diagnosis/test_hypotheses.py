@@ -7,16 +7,16 @@ from typing import cast
 
 import numpy as np
 import pytest
-from turning import JOINT, recorded
+from turning import JOINT, gathered, hypothesis, recorded
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.instants import instants
-from cablecomp.diagnosis.explain.plausible import better_word, in_no_recording, over_plausible
+from cablecomp.diagnosis.explain.plausible import in_no_recording, over_plausible
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive, reach_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -81,27 +81,22 @@ def test_every_hypothesis_is_free_in_its_amount() -> None:
         assert f"effect.{h.effect.id}.{h.amount.name}" in free, h.name
 
 
-def _of(effect: str, name: str) -> Hypothesis:
-    body = gather_body(JOINT, {"a/1": recorded()})
-    return next(h for h in hypotheses(JOINT, body.used) if h.effect.id == effect and h.name == name)
-
-
 def test_shapes_that_belong_together_are_asked_for_together() -> None:
     """Springs that close a gap, and the moment amid it; what yields late goes with what yields at once."""
-    gap = _of("termination_backlash", "termination_backlash")
+    gap = hypothesis("termination_backlash", "termination_backlash")
     assert set(gap.starts[0].values) == {"gap_rad"}
     together = [v for v in gap.further if "closes_Nm" in v]
     assert len(together) >= 4
     assert all(set(v) == {"closes_Nm", "preload_Nm"} for v in together)
     assert any(v["preload_Nm"] < 0.0 for v in together)
-    coupling = _of("series_compliance", "series_compliance")
+    coupling = hypothesis("series_compliance", "series_compliance")
     assert set(coupling.starts[0].values) == {"compliance_rad_per_Nm"}
     asked = {frozenset(v) for v in coupling.further}
     by_angle = {"swing", "order", "softest_rad"}
     assert asked == {
         frozenset(n) for n in ({"skew"}, {"stiffening_per_Nm"}, {"stiffening_per_Nm", "power"}, by_angle)
     }
-    rubber = _of("series_compliance", "series_compliance:late_rad_per_Nm")
+    rubber = hypothesis("series_compliance", "series_compliance:late_rad_per_Nm")
     assert set(rubber.starts[0].values) == {"late_rad_per_Nm", "lag_s", "compliance_rad_per_Nm"}
     assert rubber.further == ({"decades": 2.0},)
 
@@ -124,13 +119,13 @@ def test_beside_a_drive_known_by_order_of_magnitude_laws_are_asked_for_plainly()
 
 def test_a_slip_of_any_kind_trades_no_places_with_friction_and_stiffness() -> None:
     """What is tried beyond what promises most are laws of the load's path: slips had crowded out a stiffening cable."""
-    assert _of("nonlinear_cable", "nonlinear_cable").trades
+    assert hypothesis("nonlinear_cable", "nonlinear_cable").trades
     for slip in ("clamp_slip", "clamp_slip:creep_m_per_Ns", "clamp_slip:creep_l_m_per_Ns"):
-        assert not _of("clamp_slip", slip).trades
+        assert not hypothesis("clamp_slip", slip).trades
 
 
 def test_a_clamp_that_creeps_has_no_instant() -> None:
-    slip, creep = (_of("clamp_slip", f"clamp_slip{more}") for more in ("", ":creep_m_per_Ns"))
+    slip, creep = (hypothesis("clamp_slip", f"clamp_slip{more}") for more in ("", ":creep_m_per_Ns"))
     assert slip.has_instant
     assert set(slip.starts[0].values) == {"slip_m", "time_s"}
     assert not creep.has_instant
@@ -162,72 +157,6 @@ def test_a_weight_is_asked_for_on_a_base_that_each_further_channel_turns() -> No
         assert leak.effect.parameter("slack_units").high == pytest.approx(0.9 * most)
     assert "other:roll_rad" in tilted.acts_through
     assert not any(name.startswith("other") for name in plain.acts_through)
-
-
-def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -> None:
-    gap = _of("termination_backlash", "termination_backlash")
-    free = {
-        p.base.rpartition(".")[2]: p for p in gap.free(dict.fromkeys(("gap_rad", "closes_Nm"), 0.1), JOINT)
-    }
-    most = free["closes_Nm"].high
-
-    def word(gap_rad: float, closes_Nm: float) -> str:
-        ends = [free["gap_rad"], free["closes_Nm"]]
-        low, high = (np.array([p.x(getattr(p, end)) for p in ends]) for end in ("low", "high"))
-        problem = SimpleNamespace(parameters=ends, bounds=lambda: (low, high))
-        x = np.array([p.x(v) for p, v in zip(ends, (gap_rad, closes_Nm), strict=True)])
-        return better_word(cast("Fit", SimpleNamespace(problem=problem, x=x, values={})), gap)
-
-    assert most == gap.effect.parameter("closes_Nm").bounds(JOINT)[1]
-    assert word(0.1, most) == "closes_Nm"
-    assert word(0.1, free["closes_Nm"].low) == ""  # a gap that closes at once is one
-    assert word(free["gap_rad"].high, 0.5 * most) == ""
-
-
-def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
-    strands, bare = _of("strand_friction", "strand_friction"), SimpleNamespace(parameters=(), config=JOINT)
-    least = strands.effect.parameter("yield_N").bounds(JOINT)[0]
-    for held_N, word in ((2.0 * least, ""), (0.1 * least, "yield_N")):
-        values = {strands.key("yield_N"): held_N, strands.key("fraction"): 1.0}
-        fit = SimpleNamespace(problem=bare, x=np.empty(0), values=values)
-        assert better_word(cast("Fit", fit), strands) == word
-
-
-def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:
-    coupling = _of("series_compliance", "series_compliance")
-    shapes = ("stiffening_per_Nm", "power")
-    free = {p.base.rpartition(".")[2]: p for p in coupling.free(dict.fromkeys(shapes, 0.5), JOINT)}
-    ends = [free[name] for name in shapes]
-    at = np.array([p.x(p.high) for p in ends])
-
-    def word(power: float) -> str:
-        problem = SimpleNamespace(parameters=ends)
-        values = {coupling.key("power"): power}
-        fit = SimpleNamespace(problem=problem, x=at, values=values)
-        return better_word(cast("Fit", fit), coupling)
-
-    assert word(0.4) == "stiffening_per_Nm"
-    assert word(1.8) == ""
-
-
-@pytest.mark.parametrize(
-    ("compliance", "lag_s", "decades", "word"),
-    [(0.0, 0.05, 0.0, "lag_s"), (0.0, 0.5, 0.0, ""), (0.0, 0.05, 2.0, ""), (1e-3, 0.05, 0.0, "")],
-)
-def test_a_coupling_that_follows_at_once_and_yields_no_other_way_is_better_called_a_late_reading(
-    compliance: float, lag_s: float, decades: float, word: str
-) -> None:
-    coupling = _of("series_compliance", "series_compliance:late_rad_per_Nm")
-    shown = {
-        "compliance_rad_per_Nm": compliance,
-        "late_rad_per_Nm": 1e-3,
-        "lag_s": lag_s,
-        "decades": decades,
-    }
-    values = {coupling.key(name): value for name, value in shown.items()}
-    problem = SimpleNamespace(parameters=())
-    fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
-    assert better_word(cast("Fit", fit), coupling) == word
 
 
 def test_where_the_load_is_read_at_the_motor_its_friction_is_asked_for_and_what_it_feels_is_not() -> None:
@@ -302,53 +231,9 @@ def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
         assert all((reach_of(h.amount, config)[0] < 0.0) is sides for h in events)
 
 
-@pytest.mark.parametrize(
-    ("swings", "rad_s", "damping_ratio", "word"),
-    [
-        (1.0, 0.4, 0.5, "swings"),  # a drag of 2 z w J and a spring
-        (1.0, 30.0, 0.2, ""),  # at the end of a flexible link
-        (1.0, 0.44, 1.7, "swings"),  # a drag alone
-        (1.0, 0.4, 6.0, ""),  # dragged along
-        (0.7, 0.4, 0.5, ""),  # the rest is on the joint
-    ],
-)
-def test_an_inertia_that_swings_away_as_a_whole_is_none(
-    swings: float, rad_s: float, damping_ratio: float, word: str
-) -> None:
-    load = _of("inertial_load", "inertial_load")
-    given = {"swings": swings, "swings_rad_s": rad_s, "damping_ratio": damping_ratio}
-    fit = SimpleNamespace(
-        problem=SimpleNamespace(parameters=(), config=JOINT),
-        x=np.empty(0),
-        values={load.key(name): value for name, value in given.items()},
-    )
-    assert better_word(cast("Fit", fit), load) == word
-
-
-def _recorded(*, warm: bool) -> tuple[Evidence, ...]:
-    columns = recorded()
-    if warm:
-        columns["temperature_degC"] = 20.0 + np.sin(columns["time_s"])
-    return gather_body(JOINT, {"a/1": columns}).used
-
-
 @pytest.mark.parametrize("warm", [True, False])
 def test_that_warmth_quickens_creep_is_asked_where_a_temperature_moves(warm: bool) -> None:
-    (creep,) = [h for h in hypotheses(JOINT, _recorded(warm=warm)) if h.effect.id == "pretension_relaxation"]
+    (creep,) = [h for h in hypotheses(JOINT, gathered(warm=warm)) if h.effect.id == "pretension_relaxation"]
     asked = {name for further in creep.further for name in further}
     assert {"power", "steady"} <= asked
     assert ("quickening_per_K" in asked) is warm
-
-
-def test_a_pretension_that_follows_later_than_a_recording_lasts_is_better_called_a_drift() -> None:
-    used = _recorded(warm=True)
-    longest = max(float(np.ptp(e.columns["time_s"])) for e in used)
-    (thermal,) = [h for h in hypotheses(JOINT, used) if h.effect.id == "thermal_pretension"]
-    tried = [further["lag_s"] for further in thermal.further if "lag_s" in further]
-    assert max(thermal.entry({"coefficient_per_K": 0.01, "lag_s": t}).lag_s for t in tried) <= longest
-    (lag,) = [p for p in thermal.free({"lag_s": 5.0}, JOINT) if p.base.endswith("lag_s")]
-    assert lag.high == longest
-    for lag_s, word in ((0.5 * longest, ""), (longest, "lag_s")):
-        problem = SimpleNamespace(parameters=[lag], config=JOINT)
-        fit = SimpleNamespace(problem=problem, x=np.array([lag.x(lag_s)]), values={lag.name: lag_s})
-        assert better_word(cast("Fit", fit), thermal) == word

@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from cablecomp.config import JointConfig, Limits, load_joint
+from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.effects import with_effects
+from cablecomp.estimation.evidence import Evidence
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
@@ -60,3 +63,16 @@ def after_a_history(seed: int, softness: float = 0.0) -> dict[str, FloatArray]:
     angle = Observer(joint).run(whole)["joint_position_rad"]
     noise = NOISE_RAD * np.random.default_rng(seed).standard_normal(len(angle))
     return {c: v[-len(time) :] for c, v in {**whole, "joint_position_rad": angle + noise}.items()}
+
+
+def gathered(*, warm: bool = False) -> tuple[Evidence, ...]:
+    """The recording gathered; `warm`: beside a temperature that moves."""
+    columns = recorded()
+    if warm:
+        columns["temperature_degC"] = 20.0 + np.sin(columns["time_s"])
+    return gather_body(JOINT, {"a/1": columns}).used
+
+
+def hypothesis(effect: str, name: str) -> Hypothesis:
+    """What is asked of it about an effect."""
+    return next(h for h in hypotheses(JOINT, gathered()) if h.effect.id == effect and h.name == name)

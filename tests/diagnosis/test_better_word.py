@@ -1,0 +1,135 @@
+"""Shapes at which another effect is the better word, or one that has no name here."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from turning import JOINT, gathered, hypothesis
+
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.plausible import better_word
+from cablecomp.estimation.least_squares import Fit
+
+
+def test_a_gap_that_closes_over_much_of_the_load_is_better_called_a_coupling() -> None:
+    gap = hypothesis("termination_backlash", "termination_backlash")
+    free = {
+        p.base.rpartition(".")[2]: p for p in gap.free(dict.fromkeys(("gap_rad", "closes_Nm"), 0.1), JOINT)
+    }
+    most = free["closes_Nm"].high
+
+    def word(gap_rad: float, closes_Nm: float) -> str:
+        ends = [free["gap_rad"], free["closes_Nm"]]
+        low, high = (np.array([p.x(getattr(p, end)) for p in ends]) for end in ("low", "high"))
+        problem = SimpleNamespace(parameters=ends, bounds=lambda: (low, high))
+        x = np.array([p.x(v) for p, v in zip(ends, (gap_rad, closes_Nm), strict=True)])
+        return better_word(cast("Fit", SimpleNamespace(problem=problem, x=x, values={})), gap)
+
+    assert most == gap.effect.parameter("closes_Nm").bounds(JOINT)[1]
+    assert word(0.1, most) == "closes_Nm"
+    assert word(0.1, free["closes_Nm"].low) == ""  # a gap that closes at once is one
+    assert word(free["gap_rad"].high, 0.5 * most) == ""
+
+
+def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
+    strands, bare = (
+        hypothesis("strand_friction", "strand_friction"),
+        SimpleNamespace(parameters=(), config=JOINT),
+    )
+    least = strands.effect.parameter("yield_N").bounds(JOINT)[0]
+    for held_N, word in ((2.0 * least, ""), (0.1 * least, "yield_N")):
+        values = {strands.key("yield_N"): held_N, strands.key("fraction"): 1.0}
+        fit = SimpleNamespace(problem=bare, x=np.empty(0), values=values)
+        assert better_word(cast("Fit", fit), strands) == word
+
+
+def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:
+    coupling = hypothesis("series_compliance", "series_compliance")
+    shapes = ("stiffening_per_Nm", "power")
+    free = {p.base.rpartition(".")[2]: p for p in coupling.free(dict.fromkeys(shapes, 0.5), JOINT)}
+    ends = [free[name] for name in shapes]
+    at = np.array([p.x(p.high) for p in ends])
+
+    def word(power: float) -> str:
+        problem = SimpleNamespace(parameters=ends)
+        values = {coupling.key("power"): power}
+        fit = SimpleNamespace(problem=problem, x=at, values=values)
+        return better_word(cast("Fit", fit), coupling)
+
+    assert word(0.4) == "stiffening_per_Nm"
+    assert word(1.8) == ""
+
+
+@pytest.mark.parametrize(
+    ("compliance", "lag_s", "decades", "word"),
+    [(0.0, 0.05, 0.0, "lag_s"), (0.0, 0.5, 0.0, ""), (0.0, 0.05, 2.0, ""), (1e-3, 0.05, 0.0, "")],
+)
+def test_a_coupling_that_follows_at_once_and_yields_no_other_way_is_better_called_a_late_reading(
+    compliance: float, lag_s: float, decades: float, word: str
+) -> None:
+    coupling = hypothesis("series_compliance", "series_compliance:late_rad_per_Nm")
+    shown = {
+        "compliance_rad_per_Nm": compliance,
+        "late_rad_per_Nm": 1e-3,
+        "lag_s": lag_s,
+        "decades": decades,
+    }
+    values = {coupling.key(name): value for name, value in shown.items()}
+    problem = SimpleNamespace(parameters=())
+    fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
+    assert better_word(cast("Fit", fit), coupling) == word
+
+
+@pytest.mark.parametrize(
+    ("swings", "rad_s", "damping_ratio", "word"),
+    [
+        (1.0, 0.4, 0.5, "swings"),  # a drag of 2 z w J and a spring
+        (1.0, 30.0, 0.2, ""),  # at the end of a flexible link
+        (1.0, 0.44, 1.7, "swings"),  # a drag alone
+        (1.0, 0.4, 6.0, ""),  # dragged along
+        (0.7, 0.4, 0.5, ""),  # the rest is on the joint
+    ],
+)
+def test_an_inertia_that_swings_away_as_a_whole_is_none(
+    swings: float, rad_s: float, damping_ratio: float, word: str
+) -> None:
+    load = hypothesis("inertial_load", "inertial_load")
+    given = {"swings": swings, "swings_rad_s": rad_s, "damping_ratio": damping_ratio}
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(parameters=(), config=JOINT),
+        x=np.empty(0),
+        values={load.key(name): value for name, value in given.items()},
+    )
+    assert better_word(cast("Fit", fit), load) == word
+
+
+@pytest.mark.parametrize(
+    ("exponent", "lost", "word"), [(-0.3, -0.5, "lost"), (0.0, -0.5, ""), (-0.3, 0.5, ""), (0.5, -0.5, "")]
+)
+def test_a_coefficient_that_grows_with_the_pressure_both_ways_is_another_friction(
+    exponent: float, lost: float, word: str
+) -> None:
+    """A film of grease that is pressed through gains beyond a pressure, and not by a power as well."""
+    law = hypothesis("pressure_dependent_friction", "pressure_dependent_friction")
+    values = {law.key("exponent"): exponent, law.key("lost"): lost}
+    problem = SimpleNamespace(parameters=(), config=JOINT)
+    assert (
+        better_word(cast("Fit", SimpleNamespace(problem=problem, x=np.empty(0), values=values)), law) == word
+    )
+
+
+def test_a_pretension_that_follows_later_than_a_recording_lasts_is_better_called_a_drift() -> None:
+    used = gathered(warm=True)
+    longest = max(float(np.ptp(e.columns["time_s"])) for e in used)
+    (thermal,) = [h for h in hypotheses(JOINT, used) if h.effect.id == "thermal_pretension"]
+    tried = [further["lag_s"] for further in thermal.further if "lag_s" in further]
+    assert max(thermal.entry({"coefficient_per_K": 0.01, "lag_s": t}).lag_s for t in tried) <= longest
+    (lag,) = [p for p in thermal.free({"lag_s": 5.0}, JOINT) if p.base.endswith("lag_s")]
+    assert lag.high == longest
+    for lag_s, word in ((0.5 * longest, ""), (longest, "lag_s")):
+        problem = SimpleNamespace(parameters=[lag], config=JOINT)
+        fit = SimpleNamespace(problem=problem, x=np.array([lag.x(lag_s)]), values={lag.name: lag_s})
+        assert better_word(cast("Fit", fit), thermal) == word
