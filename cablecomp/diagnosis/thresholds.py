@@ -99,7 +99,8 @@ class Thresholds:
     """Of the points and shapes that an effect may be asked from, those that are run again beside another model, by what
     they did beside an earlier one."""
     asked_later: int = 14
-    """Hypotheses that are asked again, by the same: twice what a later round tries."""
+    """Hypotheses that are asked again, by the same: twice what a later round tries; half of them where every run is
+    dear."""
     tried_later: int = 7
     """Hypotheses of a later round that are tried, by what they promise."""
     tried_trading: int = 3

@@ -50,7 +50,7 @@ def could_be_unseen(
         if h.name in named or (h.effect.id in held and not h.channel):
             continue
         shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
-        made = [contribution(here, h, h.starts[k]) for k in shapes]
+        made = _made(here, h, shapes)
         sizes = _bounds(here, h, made)
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
@@ -69,6 +69,16 @@ def could_be_unseen(
             behind = [_hidden(here, h, k, *m) for k, m in zip(shapes, made, strict=True) if m is not None]
             hidden += sorted((b for b in behind if b is not None), key=lambda b: -b.visible)[:1]
     return found, sorted(hidden, key=lambda b: -b.visible)[: LIMITS.hidden_most]
+
+
+def _made(here: Anchor, h: Hypothesis, shapes: Sequence[int]) -> list[tuple[FloatArray, float] | None]:
+    """What an effect does in each of these shapes, and of which size: what shows in one is about that in the next."""
+    made: list[tuple[FloatArray, float] | None] = []
+    about = None
+    for k in shapes:
+        made.append(contribution(here, h, h.starts[k], about))
+        about = made[-1][1] if made[-1] is not None else about
+    return made
 
 
 def _bounds(
