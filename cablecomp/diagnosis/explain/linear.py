@@ -119,9 +119,8 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
     starts = h.starts[1::3] if len(h.starts) > 9 and dear else h.starts
     for (start,) in worth_asking(here, h, [(s,) for s in starts]):
         found = contribution(here, h, start, size)
-        if (
-            about is None and not h.has_instant
-        ):  # of an event the instant decides, which is looked for ever more closely
+        # of an event the instant decides, which is looked for ever more closely
+        if about is None and not h.has_instant:
             here.seen.keep(h, (start,), here.fit, [] if found is None else [found])
         if found is not None:
             d, size = found
@@ -156,15 +155,27 @@ def best_pair(here: Anchor, h: Hypothesis, shapes: Sequence[Mapping[str, float]]
     return _lowest(answers)
 
 
-def worth_asking(here: Anchor, h: Hypothesis, starts: Sequence[Starts]) -> Sequence[Starts]:
+def worth_asking(here: Anchor, h: Hypothesis, starts: Sequence[Starts]) -> list[Starts]:
     """Of the points to ask from those that what was seen beside earlier models puts first; all of them where something
     has not been asked."""
-    costs = [promised(here, h, s) for s in starts]
+    return [starts[k] for k in _first([promised(here, h, s) for s in starts])]
+
+
+def shapes_worth_asking(
+    here: Anchor, h: Hypothesis, shapes: Sequence[tuple[Start, ...]]
+) -> list[tuple[Start, ...]]:
+    """The same of shapes, each by the best of its starts."""
+    costs = [[promised(here, h, (s,)) for s in starts] for starts in shapes]
+    least = [None if None in cs else min(c for c in cs if c is not None) for cs in costs]
+    return [shapes[k] for k in _first(least)]
+
+
+def _first(costs: Sequence[float | None]) -> list[int]:
+    """Places of the least of these costs, so many as are asked again; all places where one is not known."""
     known = [c for c in costs if c is not None]
-    if len(known) < len(starts) or len(starts) <= LIMITS.asked_again:
-        return starts
-    first = sorted(range(len(starts)), key=known.__getitem__)[: LIMITS.asked_again]
-    return [starts[k] for k in sorted(first)]
+    if len(known) < len(costs):
+        return list(range(len(costs)))
+    return sorted(sorted(range(len(costs)), key=known.__getitem__)[: LIMITS.asked_again])
 
 
 def promised(here: Anchor, h: Hypothesis, starts: Starts) -> float | None:

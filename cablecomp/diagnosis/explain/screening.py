@@ -22,7 +22,7 @@ from cablecomp.diagnosis.explain.linear import (
     best_pair,
     best_start,
     better_shaped,
-    promised,
+    shapes_worth_asking,
     worth_a_shape,
 )
 from cablecomp.diagnosis.explain.plausible import runs_away
@@ -102,9 +102,8 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
         courses = [best_course(here, h, e) for e in lasting if e is not None]
         shaped = otherwise + courses
     else:
-        shaped = [
-            best_start(here, replace(h, starts=starts)) for starts in _likely_shapes(here, h, best, further)
-        ]
+        shapes = shapes_worth_asking(here, h, _by_shape(best, further))
+        shaped = [best_start(here, replace(h, starts=starts)) for starts in shapes]
     promised = sorted((f for f in shaped if f is not None), key=lambda f: f.cost)
     if not promised:
         return None
@@ -118,21 +117,12 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
     return replace(_answer(here, h, other), next=_answer(here, h, near[0]) if near else None)
 
 
-def _likely_shapes(
-    here: Anchor, h: Hypothesis, best: Best, further: Sequence[Mapping[str, float]]
-) -> list[tuple[Start, ...]]:
-    """Starts beside the best one, those of one shape together; of shapes that were seen beside earlier models the first
-    by that."""
+def _by_shape(best: Best, further: Sequence[Mapping[str, float]]) -> list[tuple[Start, ...]]:
+    """Starts beside the best one, those of one shape together."""
     found: dict[frozenset[str], list[Start]] = {}
     for values in further:
         found.setdefault(frozenset(values), []).append(Start({**best.values, **values}))
-    shapes = [tuple(starts) for starts in found.values()]
-    costs = [[promised(here, h, (s,)) for s in starts] for starts in shapes]
-    least = [min(c for c in cs if c is not None) for cs in costs if None not in cs]
-    if len(least) < len(shapes) or len(shapes) <= LIMITS.asked_again:
-        return shapes
-    first = sorted(range(len(shapes)), key=least.__getitem__)[: LIMITS.asked_again]
-    return [shapes[k] for k in sorted(first)]
+    return [tuple(starts) for starts in found.values()]
 
 
 def in_another_course(here: Anchor, h: Hypothesis, now: Best) -> Answer | None:
