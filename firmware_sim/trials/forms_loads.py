@@ -113,6 +113,11 @@ def _late_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape({"lag_s": log_uniform(rng, 0.05, 0.6)}, {"load_coefficient": sign(rng)}, _cross(scene), 0.5)
 
 
+def _passing_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
+    fixed = {"lag_s": log_uniform(rng, 0.2, 2.0), "share": float(rng.uniform(0.6, 1.0))}
+    return Shape(fixed, {"load_coefficient": sign(rng)}, 1.5 * _cross(scene), 0.6)
+
+
 def _bent_neighbour(rng: np.random.Generator, scene: Scene) -> Shape:
     bend = sign(rng) * float(rng.uniform(0.4, 0.9)) / _most(scene)
     return Shape({"bend_per_unit": bend}, {"load_coefficient": sign(rng)}, _cross(scene), 0.3)
@@ -157,6 +162,7 @@ LOADS = (
     Suspect("gravity_load:leaning_base", TURNING, _leaning, neighbour=True, turned=True),
     Suspect("gravity_load:picked_up", TURNING, _payload),
     Suspect("crosstalk:lagged", ANY, _late_neighbour, neighbour=True),
+    Suspect("crosstalk:let_go", ANY, _passing_neighbour, neighbour=True),
     Suspect("crosstalk:quadratic", ANY, _bent_neighbour, neighbour=True),
     Suspect("crosstalk:touching", ANY, _touching_neighbour, neighbour=True),
     Suspect("crosstalk:posed", TURNING, _posed_neighbour, neighbour=True),

@@ -30,8 +30,8 @@ IMPERFECTIONS = ("none", "some", "all")
 ALIKE = frozenset({
     "bearing_friction:by_moment",
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
-    "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:lagged", "crosstalk:posed",
-    "crosstalk:dragged", "crosstalk:quadratic", "crosstalk:rubbing", "crosstalk:touching",
+    "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:dragged", "crosstalk:lagged",
+    "crosstalk:posed", "crosstalk:quadratic", "crosstalk:rubbing", "crosstalk:touching",
     "gravity_load:leaning_base", "gravity_load:tilting_base",
     "inertial_load:flexible_link", "inertial_load:folding_arm", "inertial_load:half_filled",
     "position_dependent_friction:input_drum", "position_dependent_friction:patch",
@@ -56,6 +56,7 @@ CATALOGUE_FORMS = (*CATALOGUE, *(s for s in FORMS if s.id in ALIKE), *MOTOR)
 LATEST = frozenset({
     "clamp_slip:ratcheting",
     "clock_skew:resynchronised",
+    "crosstalk:let_go",
     "gravity_load:picked_up",
     "inertial_load:turning_base",
     "nonlinear_cable:s_shaped",

@@ -114,6 +114,7 @@ SIZES = {
     "strand_break:other_cable": {"fraction": 0.3, "time_s": 1.0},
     "strand_break:bent_over_drums": {"fraction": 0.3, "time_s": 1.0, "travel_rad": 2.0},
     "crosstalk:lagged": {"load_coefficient": 0.3},
+    "crosstalk:let_go": {"load_coefficient": 0.3},
     "crosstalk:quadratic": {"load_coefficient": 0.3, "bend_per_unit": 0.5},
     "crosstalk:touching": {"load_coefficient": 0.3, "slack_units": 0.2},
     "crosstalk:posed": {"load_coefficient": 0.3},

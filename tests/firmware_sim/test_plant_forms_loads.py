@@ -130,6 +130,10 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
             -(0.075 + 0.225 * lifted) * np.sin(q + 0.2),
         ),
         "crosstalk:lagged": ({"load_coefficient": 0.3, "lag_s": smooth}, 0.3 * late),
+        "crosstalk:let_go": (
+            {"load_coefficient": 0.3, "lag_s": smooth, "share": 0.7},
+            0.3 * (OTHER - 0.7 * late),
+        ),
         "crosstalk:quadratic": (
             {"load_coefficient": 0.3, "bend_per_unit": -0.5},
             0.3 * OTHER * (1 - 0.5 * OTHER),

@@ -105,7 +105,7 @@ def test_a_run_is_the_same_whatever_was_there_and_hides_its_truth(tmp_path: Path
     assert names <= {"joint.toml", "recording-1.csv.gz", "recording-2.csv.gz", "recording-3.csv.gz"}
     assert not any(name in (folder / "joint.toml").read_text() for name in EFFECTS)
     truth = open_truth(tmp_path / "a" / "sealed" / "00000.zip")
-    assert [e["effect"] for e in truth["effects"]] == [order(wanted, 0).suspects[0].id]
+    assert [e["id"] for e in truth["effects"]] == [order(wanted, 0).suspects[0].id]
     assert open_truth(tmp_path / "a" / "sealed" / "00001.zip")["effects"] == []
 
 

@@ -1,5 +1,5 @@
-"""A neighbour's load in other forms: late, bent, beyond a slack, by the pose of this joint, through friction, up to a
-stop, and as friction alone."""
+"""A neighbour's load in other forms: late, let go of again, bent, beyond a slack, by the pose of this joint, through
+friction, up to a stop, and as friction alone."""
 
 from __future__ import annotations
 
@@ -37,6 +37,26 @@ LAGGED = form(
     (_GAIN, Parameter("lag_s", "t_l", 0.2, 0.0)),
     ("other:1",),
     _lagged,
+)
+
+
+def _let_go(build: Build, p: Mapping[str, float]) -> None:
+    def moment(inputs: Floats) -> Floats:
+        other = inputs[:, OTHER]
+        gone = p["share"] * low_passed(other, inputs[:, TIME], p["lag_s"])
+        return np.asarray(p["load_coefficient"] * (other - gone))
+
+    _loading(build, moment)
+
+
+LET_GO = form(
+    "crosstalk",
+    "let_go",
+    "The neighbour's load arrives through grease, which lets go of a share of it: M + k (other_1 − s y), "
+    "t_l ẏ = other_1 − y.",
+    (_GAIN, Parameter("lag_s", "t_l", 0.5, 0.0), Parameter("share", "s", 0.8, 0.0, 1.0)),
+    ("other:1",),
+    _let_go,
 )
 
 
@@ -163,4 +183,4 @@ RUBBING = form(
     _rubbing,
 )
 
-KINDS: tuple[EffectKind, ...] = (LAGGED, QUADRATIC, TOUCHING, POSED, DRAGGED, STOPPED, RUBBING)
+KINDS: tuple[EffectKind, ...] = (LAGGED, LET_GO, QUADRATIC, TOUCHING, POSED, DRAGGED, STOPPED, RUBBING)
