@@ -37,7 +37,7 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     """The answer: names or new values on the left, measured, before and after on the right, numbers below."""
     words = f'<p class="verdict {_TONES[d.verdict]}">{escape(sentence(d.verdict))}</p>'
     words += page.paragraph(in_a_sentence(result))
-    words += "".join(_missing(m, bool(result["channels"])) for m in result["missing_physics"])
+    words += "".join(_missing(m, bool(result["channels"]), unit) for m in result["missing_physics"])
     words += "".join(_law(law) for law in dependences(result) if not _of_a_name(law, result))
     if not result["missing_physics"]:
         words += _without_a_name(result)
@@ -57,15 +57,17 @@ def shown_first(d: Diagnosis) -> Traces | None:
     return max(d.traces, key=lambda t: float(np.mean(figures.residual(t, "before_rad") ** 2)), default=None)
 
 
-def _missing(m: Mapping[str, Any], several: bool) -> str:
+def _missing(m: Mapping[str, Any], several: bool, unit: Scale) -> str:
     sure, gain = 100.0 * known(m["confidence"]), 100.0 * known(m["heldout_gain"])
     lines = "; ".join(values_of(m))
     law = page.paragraph(f"{depends(m['depends_on'])}.") if m["depends_on"] else ""
+    moves = m["evidence"].get("moves_rad")
+    by = f", and moves the joint by {angle(moves, unit)} RMS" if moves else ""
     return (
         f'<div class="missing"><h3>{escape(sentence(plain(m["effect"])))}</h3>'
         f'<div class="sure"><i style="width:{sure:.0f}%"></i></div>'
         f"<p><b>{sure:.0f} %</b> sure of the name; takes <b>{gain:.0f} %</b> off the held-out square"
-        f"{' of the channel in which it shows most' if several else ''}.</p>"
+        f"{' of the channel in which it shows most' if several else ''}{by}.</p>"
         f'<p class="values">{escape(lines)}</p>{law}</div>'
     )
 

@@ -106,7 +106,7 @@ def entries(share: float) -> tuple[Named, Named]:
         {"coefficient_Ns_per_m_rad": Value("coefficient_Ns_per_m_rad", 118.4, 3.1)},
         {"parameter": "viscous_slip.coefficient_Ns_per_m_rad", "on": "session",
          "values": {"rig-1": 118.4, "rig-2": 131.0}},
-        share, 0.97, {"z": 9.3, "selected_in": 1.0}, effect.acts_through,
+        share, 0.97, {"z": 9.3, "selected_in": 1.0, "moves_rad": 3.21e-4}, effect.acts_through,
     )  # fmt: skip
     candidate = Named(
         skew.id, skew.statement, skew.equation, {}, None, 0.38, 0.21, {"z": 3.4}, (), "viscous_slip takes off more",

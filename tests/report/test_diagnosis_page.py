@@ -48,6 +48,7 @@ def test_all_parts_of_the_result_are_on_the_page(found: Diagnosis) -> None:
         "Partly explained",
         "Viscous slip",
         "97 % sure of the name",
+        "and moves the joint by 321 µrad RMS",
         "118.4 ± 3.1",
         "differs between sessions: rig-1 118.4, rig-2 131",
         "33.10 ± 0.22",
