@@ -192,8 +192,9 @@ def promised(here: Anchor, h: Hypothesis, starts: Starts) -> float | None:
 def likeliest(
     here: Anchor, pool: Sequence[Hypothesis], most: int, besides: Callable[[Hypothesis], bool]
 ) -> list[Hypothesis]:
-    """Of the hypotheses so many that promise most by what was seen of them, those of which nothing was, and `besides`
-    whatever they promise."""
+    """Of the hypotheses so many that promise most by what was seen of them (half where every run is dear), those of
+    which nothing was, and `besides` whatever they promise."""
+    most //= 2 if here.fit.problem.fine else 1
     costs: dict[str, float] = {}
     for h in pool:
         known = (promised(here, h, s) for s in here.seen.starts_of(h))

@@ -81,9 +81,7 @@ def rivals(
     ids = {t.effect.id for t in beside}
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
     others = [h for h in pool if h.effect.id not in ids and not h.same_as(term)]
-    others = likeliest(
-        here, others, LIMITS.asked_later // (2 if base.fit.problem.fine else 1), lambda h: False
-    )
+    others = likeliest(here, others, LIMITS.asked_later, lambda h: False)
     asked = side_by_side(lambda h: ask_all([here], h), others)
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]

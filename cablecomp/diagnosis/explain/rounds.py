@@ -160,7 +160,7 @@ def _asked(at: Beginning) -> list[list[Answer]]:
     ids = {t.effect.id for t in at.model.terms if isinstance(t, Hypothesis)}
     left = [h for h in at.pool if h.effect.id not in ids]  # a second of the same would share its parameters
     if at.number > 0:
-        left = likeliest(here, left, LIMITS.asked_later // (2 if at.model.fit.problem.fine else 1), at.trades)
+        left = likeliest(here, left, LIMITS.asked_later, at.trades)
 
     def answer(h: Hypothesis) -> list[Answer]:
         at.tell(f"asking {h.name}")
