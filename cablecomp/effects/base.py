@@ -142,23 +142,6 @@ class Parameter:
         return self.low * unit, self.high * unit
 
 
-def begun(name: str, *, of: str = "", tries: tuple[float, ...] = ()) -> Parameter:
-    """When a slow course began [s]: with each recording's first sample, or at one instant of them all."""
-    return Parameter(
-        name,
-        "s",
-        0.0,
-        0.0,
-        3600.0,
-        "t0, on the recordings' common clock; left out: the recording's first sample",
-        role="begin",
-        held=True,
-        omitted=math.nan,
-        of=of,
-        tries=tries,
-    )
-
-
 LEAST_PRETENSION = 0.05
 """Share of T0 below which no law of the pretension is followed further."""
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, begun, term
+from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.shared_shapes import begun
 
 SLOTS = 256
 # The past is kept at steps of at least a 200th of the delay, so that the slots always reach back far enough.

@@ -9,8 +9,8 @@ from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, per_moment, term, wrap_compliance
-from cablecomp.effects.by_angle import varied, varying
 from cablecomp.effects.lag import lagged
+from cablecomp.effects.shared_shapes import varied, varying
 
 HERTZ = 2.0 / 3.0
 """Power of the load by which a contact yields."""

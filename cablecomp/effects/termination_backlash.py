@@ -17,7 +17,7 @@ from cablecomp.effects.base import (
     term,
     wrap_deflection,
 )
-from cablecomp.effects.by_angle import varied, varying
+from cablecomp.effects.shared_shapes import varied, varying
 from cablecomp.errors import InputError
 
 # Moment, as a share of R T0, within which the clearance is crossed: a step that is smooth can be fitted.

@@ -1,5 +1,6 @@
-"""Shape of a law whose amount varies as the joint turns: by 1 + a cos(k q - φ), as a wave that is widest where the
-joint mostly stands, or a bracket that is softer across than along."""
+"""Parameters that several laws have for the same: when a slow course began; an amount that varies as the joint turns,
+by 1 + a cos(k q - φ), as a clearance that is widest where the joint mostly stands, a bracket softer across than along.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +10,23 @@ from cablecomp.effects.base import Parameter
 
 SWING, ORDERS, PHASES = 0.6, (1.0, 2.0, 4.0), 4
 """Where a diagnosis asks: how much, how often a turn, at how many phases of each."""
+
+
+def begun(name: str, *, of: str = "", tries: tuple[float, ...] = ()) -> Parameter:
+    """When a slow course began [s]: with each recording's first sample, or at one instant of them all."""
+    return Parameter(
+        name,
+        "s",
+        0.0,
+        0.0,
+        3600.0,
+        "t0, on the recordings' common clock; left out: the recording's first sample",
+        role="begin",
+        held=True,
+        omitted=math.nan,
+        of=of,
+        tries=tries,
+    )
 
 
 def varying(what: str, *, at: str, of: str = "") -> tuple[Parameter, ...]:
