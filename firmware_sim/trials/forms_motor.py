@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from firmware_sim.trials.joints import log_uniform
-from firmware_sim.trials.suspects import TURNING, Scene, Shape, Suspect, angle
+from firmware_sim.trials.suspects import TURNING, Scene, Shape, Suspect, angle, torque_for_a_loop
 
 
 def _torque(scene: Scene) -> float:
     """Motor torque for one loop width, N·m."""
-    return scene.plain.loop_rad / scene.plain.compliance * scene.joint.true.ratio
+    return torque_for_a_loop(scene) * scene.joint.true.ratio
 
 
 def _presliding(rng: np.random.Generator, scene: Scene) -> float:

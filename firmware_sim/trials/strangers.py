@@ -11,7 +11,17 @@ import math
 
 import numpy as np
 
-from firmware_sim.trials.suspects import ANY, TURNING, Scene, Shape, Suspect, angle, instant, sign
+from firmware_sim.trials.suspects import (
+    ANY,
+    TURNING,
+    Scene,
+    Shape,
+    Suspect,
+    angle,
+    instant,
+    sign,
+    torque_for_a_loop,
+)
 
 
 def _ageing(rng: np.random.Generator, scene: Scene) -> Shape:
@@ -69,19 +79,19 @@ def _bent_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
 
 def _lazy_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
     width = float(rng.uniform(0.1, 0.3)) * scene.joint.load_Nm
-    first = scene.plain.loop_rad / scene.plain.compliance / width
+    first = torque_for_a_loop(scene) / width
     return Shape({"width_Nm": width}, {"fraction": 1.0}, first, 0.9)
 
 
 def _drifting_sensor(rng: np.random.Generator, scene: Scene) -> Shape:
     swing = max(float(np.std(scene.course.temperature_degC)), 1e-3)
-    first = scene.plain.loop_rad / scene.plain.compliance / swing
+    first = torque_for_a_loop(scene) / swing
     return Shape({"reference_degC": 20.0}, {"coefficient_Nm_per_K": sign(rng)}, first, 100.0 * first)
 
 
 def _harmonic_of_motor_torque(rng: np.random.Generator, scene: Scene) -> Shape:
     order = float(rng.integers(6, 22))
-    first = scene.plain.loop_rad / scene.plain.compliance * scene.joint.true.ratio
+    first = torque_for_a_loop(scene) * scene.joint.true.ratio
     return Shape({"order": order, "phase_rad": angle(rng)}, {"amplitude_Nm": 1.0}, first, 100.0 * first)
 
 
