@@ -236,10 +236,10 @@ class Effect:
     felt_by_motor: bool = False
     """It turns the joint or holds it, so that the motor feels it: a load that is read at the motor holds it already,
     and the cables' tensions do not change by it."""
-    drags_joint: bool = False
-    """It is a friction of the joint itself: what the motor feels of it, the cable bears and yields to."""
     pliant: bool = False
     """It is a mere curve over the load, or a step: it bends to what other effects' forms leave, too."""
+    in_series: bool = False
+    """It gives way to the load between drum and joint, where one curve holds whatever does."""
     saturates: bool = False
     """Twice the amount does far less than twice as much, over decades of it."""
     posture: bool = False

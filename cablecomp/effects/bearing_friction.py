@@ -121,7 +121,6 @@ EFFECT = Effect(
     ),
     acts_through=("reversal", "velocity", "load_direction"),
     felt_by_motor=True,
-    drags_joint=True,
     bounded=False,
     change=_change,
     rank=10,

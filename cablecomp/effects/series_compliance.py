@@ -8,7 +8,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, per_moment, term, wrap_compliance
+from cablecomp.effects.base import (
+    Change,
+    Effect,
+    Parameter,
+    per_moment,
+    pretension_moment,
+    term,
+    wrap_compliance,
+)
 from cablecomp.effects.lag import lagged
 from cablecomp.effects.shared_shapes import varied, varying
 
@@ -21,12 +29,28 @@ LATE_READING_S = 0.1
 channels were filtered and late by some milliseconds)."""
 
 
-@term(parameters=("compliance", "skew", "bends", "exponent", "swing", "order", "softest"))
+@term(
+    parameters=(
+        "compliance",
+        "skew",
+        "bends",
+        "exponent",
+        "swing",
+        "order",
+        "softest",
+        "stage",
+        "beyond",
+    )
+)
 def _give_way(c: Any, p: Any, s: Any) -> None:
     """p: compliance [rad/(N m)], skew, one over the moment from which it bends [1/(N m)], exponent (1 - power)/2, how
-    much softer it is than on average where it is softest, how often a turn, and there [rad, times the order]."""
+    much softer it is than on average where it is softest, how often a turn, and there [rad, times the order]; moment
+    at which its first stage ends [N m], how many times as much it yields beyond."""
     path = c.load - c.moment
-    gives = p.compliance * (path + p.skew * abs(path))
+    gives = path + p.skew * abs(path)
+    if p.beyond != 1.0:
+        gives += (p.beyond - 1.0) * (path - min(max(path, -p.stage), p.stage))
+    gives *= p.compliance
     if p.swing != 0.0:
         gives *= 1.0 + p.swing * math.cos(p.order * c.joint - p.softest)
     c.reading += gives / (1.0 + (p.bends * path) ** 2) ** p.exponent
@@ -61,6 +85,8 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         swing=values["swing"],
         order=values["order"],
         softest=values["softest_rad"],
+        stage=values["stage_Nm"],
+        beyond=values["beyond"],
     )
     if values["late_rad_per_Nm"] == 0.0:
         return Change(terms=elastic)
@@ -85,9 +111,10 @@ def _reads_late(values: Mapping[str, float], _on_high: bool) -> bool:
 EFFECT = Effect(
     id="series_compliance",
     statement="Something in series with the joint (torque sensor, coupling, mount) yields with the load; it may "
-    "stiffen or soften as it is loaded, or as the joint turns its load across it, or, where it is of rubber or "
-    "plastic, yield in its own time.",
-    equation="q_out = q_drive + c_s (1 + a cos(k q_drive - φ)) (M + s |M|) (1 + (g M)^2)^((p - 1)/2) + c_l y, "
+    "stiffen or soften as it is loaded, in two stages, or as the joint turns its load across it, or, where it is of "
+    "rubber or plastic, yield in its own time.",
+    equation="q_out = q_drive + c_s (1 + a cos(k q_drive - φ)) (M + s |M| + (b - 1) max(|M| - M_1, 0) sgn M) "
+    "(1 + (g M)^2)^((p - 1)/2) + c_l y, "
     "t_l dy/dt = M - y, M the moment in the load path, -1 <= s <= 1; over d decades y is the mean of three, of "
     "t_l 10^(-d/2), t_l, t_l 10^(d/2)",
     source="Snow 1993, App. A.3; a mount that rests on a stop yields one way alone (s = 1 or -1); contacts "
@@ -154,6 +181,37 @@ EFFECT = Effect(
         ),
         *varying("it is softest", of="compliance_rad_per_Nm", at="softest_rad"),
         Parameter(
+            "stage_Nm",
+            "N m",
+            0.0,
+            0.05,
+            0.6,
+            "M_1, moment at which its first stage ends",
+            log=True,
+            role="shape",
+            scale=pretension_moment,
+            omitted=0.0,
+            minimum=0.0,
+            of="compliance_rad_per_Nm",
+            of_known_drive=True,
+        ),
+        Parameter(
+            "beyond",
+            "-",
+            1.0,
+            0.1,
+            10.0,
+            "b, how many times as much it yields beyond: below 1 lobes that close, above 1 a seat that gapes",
+            log=True,
+            role="shape",
+            omitted=1.0,
+            minimum=0.0,
+            reach=3.0,
+            least_is_another=True,  # what hardly yields beyond is a clearance on springs
+            of="compliance_rad_per_Nm",
+            of_known_drive=True,
+        ),
+        Parameter(
             "late_rad_per_Nm",
             "rad/(N m)",
             0.0,
@@ -198,10 +256,12 @@ EFFECT = Effect(
     acts_through=("load", "load_rate"),
     bounded=True,
     pliant=True,
+    in_series=True,
     change=_change,
     tries=(
         *({"stiffening_per_Nm": g, "power": p} for g, p in ((7.0, 0.3), (1.0, 2.0), (4.0, 2.0))),
         *varied("softest_rad"),
+        *({"stage_Nm": m, "beyond": b} for b in (0.25, 4.0) for m in (0.1, 0.2, 0.35)),
     ),
     rank=5,
 )

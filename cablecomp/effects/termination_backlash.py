@@ -181,6 +181,7 @@ EFFECT = Effect(
     ),
     acts_through=("load", "load_direction"),
     bounded=True,
+    in_series=True,
     change=_change,
     tries=(
         *({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),

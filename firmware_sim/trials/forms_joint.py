@@ -64,6 +64,12 @@ def _staged(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"compliance_rad_per_Nm": 1.0}, first, 100.0 * first)
 
 
+def _diaphragm(rng: np.random.Generator, scene: Scene) -> Shape:
+    first = 1.5 * scene.plain.loop_rad / scene.plain.load_rms
+    fixed = {"knee_Nm": float(rng.uniform(0.05, 0.4)) * scene.joint.load_Nm}
+    return Shape(fixed, {"compliance_rad_per_Nm": 1.0}, first, 100.0 * first)
+
+
 def _one_way(rng: np.random.Generator, scene: Scene) -> Shape:
     first = scene.plain.loop_rad / scene.plain.load_rms
     skew = sign(rng) * float(rng.uniform(0.4, 1.0))
@@ -215,6 +221,7 @@ JOINT = (
     Suspect("series_compliance:stiffening", ANY, _stiffening),
     Suspect("series_compliance:softening", ANY, _softening),
     Suspect("series_compliance:staged", ANY, _staged),
+    Suspect("series_compliance:diaphragm", ANY, _diaphragm),
     Suspect("series_compliance:one_way", ANY, _one_way, two_sided=True),
     Suspect("series_compliance:rubber", ANY, _rubber),
     Suspect("series_compliance:bushing", ANY, _bushing),

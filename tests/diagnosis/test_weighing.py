@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from turning import JOINT, recorded
+from turning import JOINT, hypothesis, recorded
 
 from cablecomp.diagnosis.answer import entries
 from cablecomp.diagnosis.body import gather_body
@@ -17,6 +17,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.explain.weighing import (
+    Weighed,
     _against,
     _another,
     _at_bound,
@@ -25,6 +26,7 @@ from cablecomp.diagnosis.explain.weighing import (
     _slight,
     _too_little,
     _unfollowed,
+    one_in_series,
 )
 
 
@@ -71,6 +73,35 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
     reason = _against(instead, ScoreDifference(0.5, z, z), {**STRONG, **weak})
     assert said in reason
     assert ";" not in reason
+
+
+@pytest.mark.parametrize(
+    ("sizes", "named"),
+    [
+        # share of the mismatch that it takes off, its confidence
+        ({"termination_backlash": (0.7, 0.98), "series_compliance": (0.2, 0.96)}, {"termination_backlash"}),
+        ({"termination_backlash": (0.2, 0.98), "series_compliance": (0.3, 0.6)}, {"series_compliance"}),
+        ({"termination_backlash": (0.7, 0.4), "series_compliance": (0.2, 0.96)}, {"series_compliance"}),
+        (
+            {"series_compliance": (0.2, 0.9), "gravity_load": (0.7, 0.9)},
+            {"series_compliance", "gravity_load"},
+        ),
+    ],
+)
+def test_of_a_coupling_and_a_clearance_one_has_the_name(
+    sizes: dict[str, tuple[float, float]], named: set[str]
+) -> None:
+    def weighed(effect: str, removes: float, confidence: float) -> Weighed:
+        even = ScoreDifference(0.5, 9.0, 9.0)
+        return Weighed(hypothesis(effect, effect), None, {}, confidence, (), even, "", removes)
+
+    found = one_in_series([weighed(name, *size) for name, size in sizes.items()])
+    assert {w.term.effect.id for w in found} == set(sizes)
+    assert {w.term.effect.id for w in found if w.confidence >= 0.5} == named
+    for w in found:
+        was = sizes[w.term.effect.id][1]
+        assert (w.confidence == was) is (w.term.effect.id in named or was < 0.5)
+        assert ("one curve of the load" in w.why_not) is (w.confidence != was)
 
 
 @pytest.mark.parametrize(

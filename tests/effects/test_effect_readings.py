@@ -131,6 +131,20 @@ def test_backlash_jumps_by_its_gap_at_zero_load() -> None:
     assert np.all(np.diff(step[np.argsort(load)]) >= -1e-15)
 
 
+def test_a_coupling_of_two_stages_has_a_slope_in_each() -> None:
+    config = joint()
+    columns = excitation(config)
+    load, plain = columns["joint_torque_Nm"], run(config, columns)["deflection_rad"]
+    first = 0.4 * float(np.max(np.abs(load)))
+    for beyond, second in ((0.2, 6e-4), (5.0, 1.5e-2)):
+        law = {"compliance_rad_per_Nm": 3e-3, "stage_Nm": first, "beyond": beyond}
+        gave = run(config, columns, ("series_compliance", law))["deflection_rad"] - plain
+        at = np.array([-5.0 * first, -first, first, 5.0 * first])
+        curve = np.array([-1.0, 0.0, 0.0, 1.0]) * 4.0 * first * second + 3e-3 * np.clip(at, -first, first)
+        assert gave == pytest.approx(np.interp(load, at, curve), abs=1e-12)
+    assert np.max(np.abs(load)) > 2.0 * first
+
+
 def test_a_mount_is_softer_and_a_gap_wider_at_some_angles_than_at_others() -> None:
     """Of order 2, the more the further the joint stands from 0.3 rad; 1.5 and 0.5 of it at most and at least."""
     config = joint()

@@ -38,6 +38,7 @@ SIZES = {
     "series_compliance:stiffening": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.5},
     "series_compliance:softening": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.4},
     "series_compliance:staged": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.2},
+    "series_compliance:diaphragm": {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.2},
     "series_compliance:one_way": {"compliance_rad_per_Nm": 1e-3},
     "series_compliance:rubber": {"compliance_rad_per_Nm": 1e-3},
     "series_compliance:bushing": {"compliance_rad_per_Nm": 1e-3},

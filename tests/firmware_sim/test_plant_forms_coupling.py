@@ -33,6 +33,14 @@ def test_a_coupling_stiffens_and_a_stop_is_one_sided(plain: PlantRun) -> None:
         np.testing.assert_allclose(run.joint_position_rad - plain.joint_position_rad, expected, atol=1e-12)
 
 
+def test_a_diaphragm_bends_at_first_and_is_stretched_the_more_it_turns(plain: PlantRun) -> None:
+    law = {"compliance_rad_per_Nm": 1e-3, "knee_Nm": 0.1}
+    turned = play("series_compliance:diaphragm", **law).joint_position_rad - plain.joint_position_rad
+    borne = turned / 1e-3 + turned**3 / (1e-3 * 1e-4**2)
+    np.testing.assert_allclose(borne, plain.load_path_Nm, rtol=1e-7, atol=1e-10)
+    assert np.max(np.abs(turned)) > 2e-4  # most of it by what stretches
+
+
 def test_rubber_gives_way_exponentially_to_a_step_of_load() -> None:
     load, still = np.full(300, 0.5), np.zeros(300)
     load[:100] = 0.0

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from cablecomp.diagnosis.explain.by_channel import borne_by_torque
 from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
@@ -77,7 +76,24 @@ def weigh(
     pool = [h for h in found.pool if h.name in able]
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
     weighed = [_weighed(found, t, pool, left, locate, share_left, rng) for t in terms]
-    return sorted(weighed, key=lambda w: -w.confidence)
+    return sorted(one_in_series(weighed), key=lambda w: -w.confidence)
+
+
+def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """The same, where of those named that give way in series with the joint the one that takes off most keeps its name:
+    what one law's form lacks there the other has, and data show the one curve that they make together."""
+    among = [w for w in weighed if w.term.effect.in_series and w.confidence >= LIMITS.name]
+    most = max(among, key=lambda w: w.removes, default=None)
+
+    def held(w: Weighed) -> Weighed:
+        if most is None or w is most or not any(w is other for other in among):
+            return w
+        why_not = (
+            f"what gives way in series is one curve of the load, and `{most.term.name}` takes off more of it"
+        )
+        return replace(w, confidence=LIMITS.little_told, why_not=why_not)
+
+    return [held(w) for w in weighed]
 
 
 def _weighed(
@@ -131,8 +147,6 @@ def _weighed(
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
     elif other := _another(final, term, selection.rounds):
         confidence, why_not = min(confidence, LIMITS.beaten_told), other
-    elif torque := borne_by_torque(final.fit, term):
-        confidence, why_not = min(confidence, LIMITS.beaten_told), torque
     elif little := (
         _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):

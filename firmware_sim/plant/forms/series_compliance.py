@@ -1,4 +1,4 @@
-"""Series compliance in other forms: a coupling that stiffens, one that softens, one of two stages,
+"""Series compliance in other forms: a coupling that stiffens, one that softens, one of two stages, a diaphragm,
 one that is softer one way, one of rubber, a bushing that creeps over decades of time, a bracket that is softer one way
 up than the other."""
 
@@ -70,6 +70,26 @@ STAGED = form(
     (_SOFT, Parameter("knee_Nm", "M_k", low=1e-9), Parameter("beyond", "b", 3.0, 0.0)),
     ("load",),
     _staged,
+)
+
+
+def _diaphragm(build: Build, p: Mapping[str, float]) -> None:
+    def yields(inputs: Floats, outputs: Floats) -> None:
+        way, slope = p["compliance_rad_per_Nm"] * p["knee_Nm"], 1.5 * np.sqrt(3.0)
+        third = np.sinh(np.arcsinh(slope * outputs[:, PATH] / p["knee_Nm"]) / 3.0)
+        outputs[:, Q_OUT] += 3.0 / slope * way * third
+
+    build.mounts.append(yields)
+
+
+DIAPHRAGM = form(
+    "series_compliance",
+    "diaphragm",
+    "A diaphragm or disc coupling (Duffing's spring): + u with M = (u/c) (1 + (u/(c M_k))²), bent at first and "
+    "stretched the more it turns.",
+    (_SOFT, Parameter("knee_Nm", "M_k", low=1e-9)),
+    ("load",),
+    _diaphragm,
 )
 
 
@@ -159,4 +179,13 @@ ANISOTROPIC = form(
     _anisotropic,
 )
 
-KINDS: tuple[EffectKind, ...] = (STIFFENING, SOFTENING, STAGED, ONE_WAY, RUBBER, BUSHING, ANISOTROPIC)
+KINDS: tuple[EffectKind, ...] = (
+    STIFFENING,
+    SOFTENING,
+    STAGED,
+    DIAPHRAGM,
+    ONE_WAY,
+    RUBBER,
+    BUSHING,
+    ANISOTROPIC,
+)
