@@ -12,6 +12,7 @@ from cablecomp.effects.base import (
     Change,
     Effect,
     Parameter,
+    at_most,
     drum_radius,
     per_moment,
     pretension_moment,
@@ -85,7 +86,7 @@ EFFECT = Effect(
             "1/(N m)",
             0.0,
             0.3,
-            30.0,
+            40.0,
             "g, by which share of itself it grows per moment of the joint's load; 0: it does not",
             log=True,
             role="shape",
@@ -95,6 +96,8 @@ EFFECT = Effect(
             of_load=True,
             of_known_drive=True,
             tries=(2.0, 20.0),
+            reach=1.0,
+            is_another=at_most,  # a bearing drags without load, too: what does not is another friction
         ),
         Parameter(
             "load_coefficient",

@@ -95,6 +95,15 @@ class Evidence:
             rate = np.gradient(self.columns[INPUT], self.columns["time_s"])
         return np.asarray(np.where(np.isfinite(rate), rate, np.nan), dtype=np.float64)
 
+    @cached_property
+    def deflection_rad(self) -> float:
+        """How far the joint's angle goes beside a straight line over the motor's, from its 1 to its 99 % quantile."""
+        joint, motor = self.columns[JOINT], self.columns[INPUT]
+        seen = np.isfinite(joint) & np.isfinite(motor)
+        line = np.stack([motor[seen], np.ones(int(np.sum(seen)))], axis=1)
+        beside = joint[seen] - line @ np.linalg.lstsq(line, joint[seen], rcond=None)[0]
+        return float(np.ptp(np.quantile(beside, (0.01, 0.99))))
+
     @property
     def group(self) -> float:
         """Readings of which a fine row is the mean."""

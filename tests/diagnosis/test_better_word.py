@@ -54,7 +54,7 @@ def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone()
     at = np.array([p.x(p.high) for p in ends])
 
     def word(power: float) -> str:
-        problem = SimpleNamespace(parameters=ends)
+        problem = SimpleNamespace(parameters=ends, config=JOINT)
         values = {coupling.key("power"): power}
         fit = SimpleNamespace(problem=problem, x=at, values=values)
         return better_word(cast("Fit", fit), coupling)
@@ -78,7 +78,7 @@ def test_a_coupling_that_follows_at_once_and_yields_no_other_way_is_better_calle
         "decades": decades,
     }
     values = {coupling.key(name): value for name, value in shown.items()}
-    problem = SimpleNamespace(parameters=())
+    problem = SimpleNamespace(parameters=(), config=JOINT)
     fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
     assert better_word(cast("Fit", fit), coupling) == word
 
@@ -119,6 +119,32 @@ def test_a_coefficient_that_grows_with_the_pressure_both_ways_is_another_frictio
     assert (
         better_word(cast("Fit", SimpleNamespace(problem=problem, x=np.empty(0), values=values)), law) == word
     )
+
+
+@pytest.mark.parametrize(
+    ("share", "known", "word"), [(0.05, True, ""), (0.2, True, "presliding_rad"), (0.2, False, "")]
+)
+def test_friction_that_builds_up_over_much_of_the_deflection_is_no_bearings(
+    share: float, known: bool, word: str
+) -> None:
+    """A hysteresis of the drive, where the drive is known."""
+    law, used = hypothesis("bearing_friction", "bearing_friction"), gathered()
+    joint, motor = (used[0].columns[name] for name in ("joint_position_rad", "motor_position_rad"))
+    slope, middle = np.polyfit(motor, joint, 1)
+    seen = float(np.ptp(np.quantile(joint - slope * motor - middle, (0.01, 0.99))))
+    drive = SimpleNamespace(base="EA_N", vague=not known, of_effect=False, high=2.0, value=lambda x: 1.0)
+    problem = SimpleNamespace(parameters=[drive], config=JOINT, evidence=used[:1])
+    fit = SimpleNamespace(problem=problem, x=np.zeros(1), values={law.key("presliding_rad"): share * seen})
+    assert better_word(cast("Fit", fit), law) == word
+
+
+def test_friction_that_only_the_load_makes_is_no_bearings() -> None:
+    law = hypothesis("bearing_friction", "bearing_friction")
+    (growth,) = [p for p in law.free({"growth_per_Nm": 1.0}, JOINT) if p.base.endswith("growth_per_Nm")]
+    for value, word in ((0.5 * growth.high, ""), (growth.high, "growth_per_Nm")):
+        problem = SimpleNamespace(parameters=[growth], config=JOINT, evidence=())
+        fit = SimpleNamespace(problem=problem, x=np.array([growth.x(value)]), values={})
+        assert better_word(cast("Fit", fit), law) == word
 
 
 def test_a_pretension_that_follows_later_than_a_recording_lasts_is_better_called_a_drift() -> None:

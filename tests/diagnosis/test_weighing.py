@@ -13,18 +13,15 @@ from cablecomp.diagnosis.answer import entries
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.confidence import learnt
+from cablecomp.diagnosis.explain.held_down import another, hardly_ahead, slight, too_little
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.explain.weighing import (
     Weighed,
     _against,
-    _another,
     _at_bound,
     _follows,
-    _hardly_ahead,
-    _slight,
-    _too_little,
     _unfollowed,
     one_in_series,
 )
@@ -109,13 +106,13 @@ def test_of_a_coupling_and_a_clearance_one_has_the_name(
     [(0.1, 0.85, True), (0.1, 0.4, False), (0.03, 0.0, False), (0.3, 0.7, False)],
 )
 def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float, little: bool) -> None:
-    said = _too_little(removes, left)
+    said = too_little(removes, left)
     assert bool(said) is little
     assert not little or (f"{removes:.0%}" in said and f"{left:.0%}" in said)
 
 
 @pytest.mark.parametrize(
-    ("name", "beside", "gain", "z", "share", "slight"),
+    ("name", "beside", "gain", "z", "share", "expected"),
     [
         ("bearing_friction", True, 0.2, 4.0, 0.01, "1.0% of the mismatch, which the form"),
         ("bearing_friction", False, 0.2, 4.0, 0.01, ""),
@@ -131,15 +128,15 @@ def test_an_effect_has_to_stand_out_of_what_is_left(removes: float, left: float,
     ],
 )
 def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form(
-    name: str, beside: bool, gain: float, z: float, share: float, slight: str
+    name: str, beside: bool, gain: float, z: float, share: float, expected: str
 ) -> None:
     """Not alone, nor where it takes off most of what was left, nor a delay; more may be chance's, a delay too."""
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
     term = asked[name]
     model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
-    said = _slight(model, term, ScoreDifference(gain, z, z), share)
-    assert bool(said) is bool(slight)
-    assert slight in said
+    said = slight(model, term, ScoreDifference(gain, z, z), share)
+    assert bool(said) is bool(expected)
+    assert expected in said
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:
@@ -255,7 +252,7 @@ def test_what_bends_to_the_form_of_others_has_to_be_clearly_ahead_of_them(
     name: str, lead: float, hardly: bool
 ) -> None:
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
-    said = _hardly_ahead(asked[name], lead)
+    said = hardly_ahead(asked[name], lead)
     assert bool(said) is hardly
     assert not hardly or (f"by {lead:.1f} standard errors; 2 are asked" in said)
 
@@ -285,6 +282,6 @@ def test_a_shape_that_has_no_name_here_is_none_however_far_ahead(
     )
     alone = SimpleNamespace(term=term, model=model, difference=ScoreDifference(0.95, 9.0, 9.0))
     rounds: Any = [SimpleNamespace(tried=[alone])]
-    found = _another(model, term, rounds)
+    found = another(model, term, rounds)
     assert said in found
     assert bool(found) is bool(said)

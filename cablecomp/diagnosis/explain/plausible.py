@@ -10,7 +10,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.instants import inside_of
 from cablecomp.diagnosis.explain.starts import width
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import MOTOR
+from cablecomp.estimation.evidence import JOINT, MOTOR
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import Parameter, vague_drive
 from cablecomp.estimation.simulate import load_of
@@ -59,7 +59,18 @@ def better_word(fit: Fit, h: Hypothesis) -> str:
         below = p.least_is_another and own[p.name] < p.bounds(fit.problem.config)[0]
         if below or p.is_another(own, h.key(p.name) in on_high):
             return p.name
+        if p.role == "presliding" and own[p.name] > _widest_presliding(fit, h):
+            return p.name
     return ""
+
+
+def _widest_presliding(fit: Fit, h: Hypothesis) -> float:
+    """The turn within which a joint's own friction builds up, at most [rad]: beyond it what gives way is a hysteresis
+    of the drive. No bound beside a drive known by order of magnitude, whose deflection nothing tells from it."""
+    if MOTOR in h.effect.needs or vague_drive(fit.problem.parameters):
+        return np.inf
+    seen = [e.deflection_rad for e in fit.problem.evidence if JOINT in e.columns]
+    return LIMITS.presliding * max(seen, default=np.inf)
 
 
 def in_no_recording(fit: Fit, h: Hypothesis) -> bool:

@@ -12,20 +12,18 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
+from cablecomp.diagnosis.explain.held_down import another, hardly_ahead, slight, too_little
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
     Model,
-    Round,
     Selection,
     amount_resolved,
     moves_rad,
     without,
 )
-from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
-from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.explain.usual import lost_in_usual
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
@@ -145,18 +143,18 @@ def _weighed(
     removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes, min(ahead.z, of_rival.z)):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif other := _another(final, term, selection.rounds):
+    elif other := another(final, term, selection.rounds):
         confidence, why_not = min(confidence, LIMITS.beaten_told), other
     elif little := (
-        _too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
+        too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
-    elif slight := _slight(final, term, own, removes):
-        confidence, why_not = min(confidence, LIMITS.little_told), slight
+    elif small := slight(final, term, own, removes):
+        confidence, why_not = min(confidence, LIMITS.little_told), small
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
-    elif hardly := _hardly_ahead(term, min(ahead.z, of_rival.z)):
+    elif hardly := hardly_ahead(term, min(ahead.z, of_rival.z)):
         confidence, why_not = min(confidence, LIMITS.little_told), hardly
     better = None
     beaten_by = _beaten(selection, term, against)
@@ -168,54 +166,6 @@ def _weighed(
     if (moves := moves_rad(final, term)) is not None:
         said["moves_rad"] = moves
     return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
-
-
-def _another(final: Model, term: Hypothesis, rounds: Sequence[Round]) -> str:
-    """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
-    that is alone by far, but where it is known that the other is none of the catalogue's."""
-    stretched = better_word(final.fit, term)
-    if not stretched:
-        return ""
-    if term.effect.parameter(stretched).another_is_unlisted:
-        return f"with this `{stretched}` it stands for physics that has no name here"
-    if alone_by_far(rounds, term):
-        return ""
-    return f"with this `{stretched}` another effect is the better word"
-
-
-def _too_little(removes: float, left: float) -> str:
-    """What is to be said of an effect that takes off little beside what is `left` beyond noise, both as shares of the
-    calibrated drive's mean square; "" of one that takes off enough."""
-    if removes >= LIMITS.little * left:
-        return ""
-    return f"it takes off {removes:.0%} of the mismatch, and {left:.0%} of it, beyond noise, is left"
-
-
-def _slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float) -> str:
-    """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
-    the mismatch and `own` of what is left without it; "" of one that does more. What takes off no more than a tie is
-    not missed, whatever it does alone. What is late differs in time, which no form does, but chance may.
-    """
-    if sum(isinstance(t, Hypothesis) for t in final.terms) < 2:
-        return ""
-    if own.gain < LIMITS.tie:
-        return "without it the others predict data left out as well"
-    if removes < LIMITS.slight and own.gain < LIMITS.slight_gain and term.amount.unit != "s":
-        return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
-    if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
-        return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
-    return ""
-
-
-def _hardly_ahead(term: Hypothesis, lead: float) -> str:
-    """What is to be said of an effect that bends to what others' forms leave and is not clearly ahead, `lead` standard
-    errors, of none or of its nearest rival; "" of any other."""
-    if not term.effect.pliant or lead >= LIMITS.z_pliant:
-        return ""
-    return (
-        f"a curve or a step that other effects' forms leave as well, ahead of its nearest rival or of none by "
-        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
-    )
 
 
 def _beyond_noise(fit: Fit) -> float:

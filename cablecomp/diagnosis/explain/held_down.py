@@ -1,0 +1,61 @@
+"""What holds an effect down whatever its evidence is: a shape that is another's, little of what there is, chance, a
+curve that bends to anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.model import Model, Round
+from cablecomp.diagnosis.explain.plausible import better_word
+from cablecomp.diagnosis.explain.scores import ScoreDifference
+from cablecomp.diagnosis.explain.ties import alone_by_far
+from cablecomp.diagnosis.thresholds import LIMITS
+
+
+def another(final: Model, term: Hypothesis, rounds: Sequence[Round]) -> str:
+    """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
+    that is alone by far, but where it is known that the other is none of the catalogue's."""
+    stretched = better_word(final.fit, term)
+    if not stretched:
+        return ""
+    if term.effect.parameter(stretched).another_is_unlisted:
+        return f"with this `{stretched}` it stands for physics that has no name here"
+    if alone_by_far(rounds, term):
+        return ""
+    return f"with this `{stretched}` another effect is the better word"
+
+
+def too_little(removes: float, left: float) -> str:
+    """What is to be said of an effect that takes off little beside what is `left` beyond noise, both as shares of the
+    calibrated drive's mean square; "" of one that takes off enough."""
+    if removes >= LIMITS.little * left:
+        return ""
+    return f"it takes off {removes:.0%} of the mismatch, and {left:.0%} of it, beyond noise, is left"
+
+
+def slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float) -> str:
+    """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
+    the mismatch and `own` of what is left without it; "" of one that does more. What takes off no more than a tie is
+    not missed, whatever it does alone. What is late differs in time, which no form does, but chance may.
+    """
+    if sum(isinstance(t, Hypothesis) for t in final.terms) < 2:
+        return ""
+    if own.gain < LIMITS.tie:
+        return "without it the others predict data left out as well"
+    if removes < LIMITS.slight and own.gain < LIMITS.slight_gain and term.amount.unit != "s":
+        return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
+    if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
+        return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
+    return ""
+
+
+def hardly_ahead(term: Hypothesis, lead: float) -> str:
+    """What is to be said of an effect that bends to what others' forms leave and is not clearly ahead, `lead` standard
+    errors, of none or of its nearest rival; "" of any other."""
+    if not term.effect.pliant or lead >= LIMITS.z_pliant:
+        return ""
+    return (
+        f"a curve or a step that other effects' forms leave as well, ahead of its nearest rival or of none by "
+        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
+    )
