@@ -71,25 +71,25 @@ class Parameter:
     """One parameter: name with unit, the value that switches the effect off, and where it plausibly lies.
 
     `low`..`high` is the prior range for fitting (log-spaced where `log`), in units of `scale(config)` where a scale is
-    given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`: a diagnosis
-    leaves it where it starts, because another parameter takes its part. `minimum`..`maximum`, in the parameter's
-    unit, is what the law can take; beyond it a configuration is refused. `omitted`: its value where a configuration
-    leaves it out (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`: the amount
-    whose shape it is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it
-    leaves out at first (a begin's count from the first of all samples, a bend's are over the channel's largest
-    reading, a slack's shares of it, or half of what a channel that it needs covers, others' are in units of
-    `scale(config)`); of an event's course it asks by itself. `reach`: times by which a fit of a log-spaced shape
-    may leave low..high. `is_another`: whether, by the effect's values and by whether it ended on `high`, another
-    effect is the better word, one that has no name here if `another_is_unlisted`; `least_is_another`: whether that is
-    so below `low`, where other shapes are the plain law. `of_cable_l`: whether it is cable l's, of which an open
-    circuit has none: never, below zero, or always. `of_known_drive`: beside a drive known by order of magnitude it,
-    and what is `of` it, are not asked for. `of_motor_load`: it is asked for only where the load is read at the motor.
-    `points`: at how many places of a log-spaced range a diagnosis asks. `goes_on`: what it does grows without end, so
-    that a diagnosis keeps it only where it is told from none. `by_itself`: an amount that is asked for without the
-    effect's others. `per_reading`: low..high are what the largest reading of the channel that the effect reads does
+    given. `role`: whether it says how much (an amount) or how, and then what of (`Role`). `held`: a diagnosis leaves it
+    where it starts, because another parameter takes its part. `minimum`..`maximum`, in the parameter's unit, is what
+    the law can take; beyond it a configuration is refused. `omitted`: its value where a configuration leaves it out
+    (None: it has to be given). `of_load`: it says nothing where no load is recorded. `of`: the amount whose shape it
+    is, where an effect has several. `tries`: values at which a diagnosis asks for a shape that it leaves out at first
+    (a begin's count from the first of all samples, a bend's are over the channel's largest reading, a slack's shares of
+    it, or half of what a channel that it needs covers, others' are in units of `scale(config)`); of an event's course
+    it asks by itself. `reach`: times by which a fit of a log-spaced shape may leave low..high. `is_another`: whether,
+    by the effect's values and by whether it ended on `high`, another effect is the better word, one that has no name
+    here if `another_is_unlisted`; `least_is_another`: whether that is so below `low`, where other shapes are the plain
+    law. `of_cable_l`: whether it is cable l's, of which an open circuit has none: never, below zero, or always.
+    `of_known_drive`: beside a drive known by order of magnitude it, and what is `of` it, are not asked for.
+    `of_motor_load`: it is asked for only where the load is read at the motor, `of_both_ways`: only where it takes both
+    signs. `points`: at how many places of a log-spaced range a diagnosis asks. `goes_on`: what it does grows without
+    end, so that a diagnosis keeps it only where it is told from none. `by_itself`: an amount that is asked for without
+    the effect's others. `per_reading`: low..high are what the largest reading of the channel that the effect reads does
     (of a slack: shares of that reading): what a unit of it means, no configuration tells. `needs`: a channel without
-    which it says nothing. `within_recording`: a time that a diagnosis asks up to the longest recording's; from there
-    on what follows is a drift, whatever it follows, and another effect the better word.
+    which it says nothing. `within_recording`: a time that a diagnosis asks up to the longest recording's; from there on
+    what follows is a drift, whatever it follows, and another effect the better word.
     """
 
     name: str
@@ -115,6 +115,7 @@ class Parameter:
     of_cable_l: Literal["never", "below zero", "always"] = "never"
     of_known_drive: bool = False
     of_motor_load: bool = False
+    of_both_ways: bool = False
     points: int = 3
     goes_on: bool = False
     by_itself: bool = False

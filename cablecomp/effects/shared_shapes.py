@@ -5,6 +5,7 @@ by 1 + a cos(k q - φ), as a clearance that is widest where the joint mostly sta
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from cablecomp.effects.base import Parameter
 
@@ -29,9 +30,9 @@ def begun(name: str, *, of: str = "", tries: tuple[float, ...] = ()) -> Paramete
     )
 
 
-def varying(what: str, *, at: str, of: str = "") -> tuple[Parameter, ...]:
+def varying(what: str, *, at: str, of: str = "", of_both_ways: bool = False) -> tuple[Parameter, ...]:
     """The wave's amplitude, order and phase; `what`: the amount, and that it is most there, `at`: the phase's name."""
-    return (
+    wave = (
         Parameter(
             "swing",
             "-",
@@ -74,6 +75,7 @@ def varying(what: str, *, at: str, of: str = "") -> tuple[Parameter, ...]:
             of_known_drive=True,
         ),
     )
+    return tuple(replace(p, of_both_ways=of_both_ways) for p in wave)
 
 
 def varied(at: str) -> tuple[dict[str, float], ...]:

@@ -177,7 +177,8 @@ EFFECT = Effect(
             maximum=1.0,
             of_known_drive=True,
         ),
-        *varying("the clearance is widest", at="widest_rad"),
+        # of a load that keeps its sign a clearance shows nothing but how it varies, as a pulley out of true does
+        *varying("the clearance is widest", at="widest_rad", of_both_ways=True),
     ),
     acts_through=("load", "load_direction"),
     bounded=True,

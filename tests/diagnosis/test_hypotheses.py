@@ -92,10 +92,9 @@ def test_shapes_that_belong_together_are_asked_for_together() -> None:
     coupling = hypothesis("series_compliance", "series_compliance")
     assert set(coupling.starts[0].values) == {"compliance_rad_per_Nm"}
     asked = {frozenset(v) for v in coupling.further}
-    by_angle = {"swing", "order", "softest_rad"}
-    assert asked == {
-        frozenset(n) for n in ({"skew"}, {"stiffening_per_Nm"}, {"stiffening_per_Nm", "power"}, by_angle)
-    }
+    by_angle, in_stages = {"swing", "order", "softest_rad"}, {"stage_Nm", "beyond"}
+    by_load = ({"skew"}, {"stiffening_per_Nm"}, {"stiffening_per_Nm", "power"}, in_stages)
+    assert asked == {frozenset(n) for n in (*by_load, by_angle)}
     rubber = hypothesis("series_compliance", "series_compliance:late_rad_per_Nm")
     assert set(rubber.starts[0].values) == {"late_rad_per_Nm", "lag_s", "compliance_rad_per_Nm"}
     assert rubber.further == ({"decades": 2.0},)
@@ -115,6 +114,21 @@ def test_beside_a_drive_known_by_order_of_magnitude_laws_are_asked_for_plainly()
     }
     assert {k for values in vague["routing_friction"].further for k in values} == {"skew"}
     assert {k for values in known["routing_friction"].further for k in values} == {"skew", "place", "spread"}
+
+
+@pytest.mark.parametrize(("lift_Nm", "varies"), [(0.0, True), (5.0, False)])
+def test_a_clearance_that_varies_is_asked_for_where_the_load_changes_sign(
+    lift_Nm: float, varies: bool
+) -> None:
+    """Under a load that keeps its sign all that shows of it is a run-out; a coupling yields under any load."""
+    columns = recorded()
+    columns = {**columns, "joint_torque_Nm": columns["joint_torque_Nm"] + lift_Nm}
+    assert (float(np.min(columns["joint_torque_Nm"])) < 0.0) is varies
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used)}
+    gap, coupling = asked["termination_backlash"], asked["series_compliance"]
+    assert any("swing" in values for values in gap.further) is varies
+    assert any("preload_Nm" in values for values in gap.further)
+    assert any("swing" in values for values in coupling.further)
 
 
 def test_a_slip_of_any_kind_trades_no_places_with_friction_and_stiffness() -> None:

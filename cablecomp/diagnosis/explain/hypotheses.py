@@ -18,6 +18,7 @@ from cablecomp.effects.base import Role, at_most
 from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
+from cablecomp.estimation.simulate import load_of
 
 OF_COURSE: Final = ("duration", "curve", "step", "step size")
 """Roles of what tells an event's course beside its instant."""
@@ -175,7 +176,7 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
     held = {entry.id for entry in config.effect}
     told, vague = loaded(config, evidence), vague_drive(of_drive(config))
     load = load_channel(config, evidence[0].columns)
-    at_motor = load == MOTOR
+    at_motor, both_ways = load == MOTOR, _changes_sign(config, evidence)
     found = []
     for effect in catalogue().values():
         if effect.id in held or (effect.felt_by_motor and at_motor):
@@ -186,6 +187,7 @@ def hypotheses(config: JointConfig, evidence: Sequence[Evidence]) -> list[Hypoth
             if (p.of_load and not told)
             or (p.of_known_drive and vague)
             or (p.of_motor_load and not at_motor)
+            or (p.of_both_ways and not both_ways)
             or (p.needs and not _tells(evidence, p.needs, load))
         }
         # a shape goes with its amount
@@ -306,6 +308,13 @@ def loaded(config: JointConfig, evidence: Sequence[Evidence]) -> bool:
     """Whether the recordings tell a load."""
     channel = load_channel(config, evidence[0].columns)
     return channel is not None and _varies(evidence, channel)
+
+
+def _changes_sign(config: JointConfig, evidence: Sequence[Evidence]) -> bool:
+    """Whether the load goes as far as a twentieth of its largest both ways."""
+    loads = [load_of(config, e.columns) for e in evidence]
+    low, high = min(float(np.nanmin(m)) for m in loads), max(float(np.nanmax(m)) for m in loads)
+    return min(-low, high) > 0.05 * max(-low, high)
 
 
 def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
