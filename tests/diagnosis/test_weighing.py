@@ -49,6 +49,7 @@ def test_that_all_of_a_cable_lies_on_its_guides_is_held_against_no_name(
     assert _at_bound(model, term) is held
 
 
+LATE = {"late_rad_per_Nm": 1e-3, "lag_s": 0.05}
 STRONG = {"follows": 0.0, "selected_in": 1.0, "share_left": 0.0, "unfollowed": 0.001}
 
 
@@ -258,17 +259,33 @@ def test_what_bends_to_the_form_of_others_has_to_be_clearly_ahead_of_them(
 
 
 @pytest.mark.parametrize(
-    ("effect", "shown", "said"),
+    ("effect", "shown", "by_far", "lead", "said"),
     [
         # all of it swings, slowly: a drag of the joint, which no effect is
-        ("inertial_load", {"swings": 1.0, "swings_rad_s": 0.3, "damping_ratio": 0.7}, "no name here"),
-        ("inertial_load", {"swings": 0.6, "swings_rad_s": 9.0, "damping_ratio": 0.7}, ""),
-        # a coupling that reads late is alone by far here
-        ("series_compliance:late_rad_per_Nm", {"late_rad_per_Nm": 1e-3, "lag_s": 0.05}, ""),
+        (
+            "inertial_load",
+            {"swings": 1.0, "swings_rad_s": 0.3, "damping_ratio": 0.7},
+            True,
+            9.0,
+            "no name here",
+        ),
+        ("inertial_load", {"swings": 0.6, "swings_rad_s": 9.0, "damping_ratio": 0.7}, True, 9.0, ""),
+        # a coupling that reads late, alone by far, or ahead of its rivals, or neither
+        ("series_compliance:late_rad_per_Nm", LATE, True, 0.0, ""),
+        ("series_compliance:late_rad_per_Nm", LATE, False, 2.5, ""),
+        ("series_compliance:late_rad_per_Nm", LATE, False, 1.5, "another effect is the better word"),
+        # which is no coupling's or clearance's
+        (
+            "strand_friction",
+            {"fraction": 0.2, "yield_N": 1e-6},
+            False,
+            9.0,
+            "another effect is the better word",
+        ),
     ],
 )
-def test_a_shape_that_has_no_name_here_is_none_however_far_ahead(
-    effect: str, shown: dict[str, float], said: str
+def test_a_shape_at_which_another_effect_is_the_better_word_has_no_name_but_alone_or_far_ahead_of_it(
+    effect: str, shown: dict[str, float], by_far: bool, lead: float, said: str
 ) -> None:
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
     term = asked[effect]
@@ -281,7 +298,7 @@ def test_a_shape_that_has_no_name_here_is_none_however_far_ahead(
         ),
     )
     alone = SimpleNamespace(term=term, model=model, difference=ScoreDifference(0.95, 9.0, 9.0))
-    rounds: Any = [SimpleNamespace(tried=[alone])]
-    found = another(model, term, rounds)
+    rounds: Any = [SimpleNamespace(tried=[alone])] if by_far else []
+    found = another(model, term, rounds, lead)
     assert said in found
     assert bool(found) is bool(said)

@@ -13,15 +13,17 @@ from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.thresholds import LIMITS
 
 
-def another(final: Model, term: Hypothesis, rounds: Sequence[Round]) -> str:
+def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float) -> str:
     """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
-    that is alone by far, but where it is known that the other is none of the catalogue's."""
+    that is alone by far, but where it is known that the other is none of the catalogue's. What gives way in series
+    would be the other of a coupling and a clearance: it is none if it is ahead of its rivals, `lead` standard errors.
+    """
     stretched = better_word(final.fit, term)
     if not stretched:
         return ""
     if term.effect.parameter(stretched).another_is_unlisted:
         return f"with this `{stretched}` it stands for physics that has no name here"
-    if alone_by_far(rounds, term):
+    if alone_by_far(rounds, term) or (term.effect.in_series and lead >= LIMITS.z_unbeaten):
         return ""
     return f"with this `{stretched}` another effect is the better word"
 

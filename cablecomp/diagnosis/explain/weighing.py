@@ -139,11 +139,12 @@ def _weighed(
     if amount_resolved(final.fit, term):
         confidence = learnt().probability(evidence)
         why_not = _against((*instead.effects, *instead.plain), own, evidence)
+    lead = min(ahead.z, of_rival.z)
     most = max(ways, key=lambda gone: _share(selection, gone))
     removes = _share(selection, most)
-    if lacks := untold(final.fit, term, removes, min(ahead.z, of_rival.z)):
+    if lacks := untold(final.fit, term, removes, lead):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif other := another(final, term, selection.rounds):
+    elif other := another(final, term, selection.rounds, lead):
         confidence, why_not = min(confidence, LIMITS.beaten_told), other
     elif little := (
         too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
@@ -154,7 +155,7 @@ def _weighed(
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
-    elif hardly := hardly_ahead(term, min(ahead.z, of_rival.z)):
+    elif hardly := hardly_ahead(term, lead):
         confidence, why_not = min(confidence, LIMITS.little_told), hardly
     better = None
     beaten_by = _beaten(selection, term, against)
