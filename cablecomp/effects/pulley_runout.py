@@ -1,4 +1,4 @@
-"""Pulley run-out: the output pulley turns about a point beside its centre."""
+"""Pulley run-out: the output pulley turns about a point beside its centre, or is out of round."""
 
 from __future__ import annotations
 
@@ -7,24 +7,26 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment, term
+from cablecomp.effects.base import Change, Effect, Parameter, at_most, drum_radius, pretension_moment, term
 
 
-@term(parameters=("eccentricity", "phase", "radius", "hanging"))
+@term(parameters=("eccentricity", "phase", "order", "radius", "hanging"))
 def _wind(c: Any, p: Any, s: Any) -> None:
-    """p: eccentricity [m], phase [rad], R [m], moment that holds the pretension [N m] (open circuit: R T0).
+    """p: eccentricity [m], phase [rad], how often a turn, R [m], moment that holds the pretension [N m] (open circuit:
+    R T0).
 
-    Lever arm and wound length belong together (virtual work): the cables feel M R/(R + e cos(x + φ)).
+    Lever arm and wound length belong together (virtual work): the cables feel M R/(R + e k cos(k x + φ)).
     """
-    angle = c.joint + p.phase
+    angle = p.order * c.joint + p.phase
     wound = p.eccentricity * (math.sin(angle) - math.sin(p.phase))
     c.length_h += wound
     c.length_l -= wound
-    arm = p.eccentricity * math.cos(angle)
+    arm = p.eccentricity * p.order * math.cos(angle)
     whole = c.load - c.moment + p.hanging
     c.moment += whole * arm / (p.radius + arm)
     c.moment_slope *= p.radius / (p.radius + arm)
-    c.moment_slope -= whole * p.eccentricity * math.sin(angle) * p.radius / (p.radius + arm) ** 2
+    bend = p.eccentricity * p.order**2 * math.sin(angle)
+    c.moment_slope -= whole * bend * p.radius / (p.radius + arm) ** 2
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -32,6 +34,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     terms = _wind(
         eccentricity=values["eccentricity_m"],
         phase=values["phase_rad"],
+        order=values["order"],
         radius=drum_radius(config),
         hanging=hanging,
     )
@@ -41,10 +44,10 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="pulley_runout",
     statement="The output pulley (or its encoder) is mounted off centre: the transmission swings once per "
-    "turn.",
-    equation="wound length = R q + e (sin(q + φ) - sin φ), lever arm R + e cos(q + φ)",
+    "turn; more often where a pulley is out of round or an idler runs out of true.",
+    equation="wound length = R q + e (sin(k q + φ) - sin φ), lever arm R + e k cos(k q + φ)",
     source="kinematics of an eccentric drum: distance of the cable's line from the axis, integrated over "
-    "the turn",
+    "the turn; one harmonic of any other",
     parameters=(
         Parameter(
             "eccentricity_m",
@@ -60,6 +63,23 @@ EFFECT = Effect(
         ),
         Parameter(
             "phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, its direction at joint angle zero", role="phase"
+        ),
+        Parameter(
+            "order",
+            "-",
+            1.0,
+            1.0,
+            10.0,
+            "k, how often a turn of the joint repeats it: 2 for a pulley that is oval",
+            log=True,
+            role="shape",
+            omitted=1.0,
+            minimum=0.2,
+            maximum=50.0,
+            tries=(2.0, 3.5, 5.0, 6.5, 8.0),
+            reach=1.0,
+            is_another=at_most,
+            of_known_drive=True,
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

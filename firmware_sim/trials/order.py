@@ -38,7 +38,7 @@ ALIKE = frozenset({
     "position_dependent_friction:threaded",
     "pressure_dependent_friction:floor", "pressure_dependent_friction:worn_through",
     "pretension_relaxation:exponential", "pretension_relaxation:in_two",
-    "pretension_relaxation:power_law", "pretension_relaxation:warm_creep",
+    "pretension_relaxation:power_law", "pretension_relaxation:warm_creep", "pulley_runout:oval",
     "routing_friction:unlike_paths", "series_compliance:anisotropic", "series_compliance:bushing",
     "series_compliance:one_way", "series_compliance:rubber", "series_compliance:softening", "series_compliance:staged",
     "strand_break:accelerating", "strand_break:fraying", "strand_break:in_steps", "strand_break:other_cable",

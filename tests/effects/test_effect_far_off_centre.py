@@ -17,18 +17,21 @@ from cablecomp.signals import Sample
 PHASE = 0.6
 
 
-@pytest.mark.parametrize("share", [0.01, 0.25, 0.6, 0.9, -0.9])
-def test_the_angle_winds_up_what_the_motor_lets_out(share: float) -> None:
-    """R q + e (sin(q + φ) - sin φ) is what the drive on its centre winds up; steps of 0.1 rad through two turns."""
+@pytest.mark.parametrize(
+    ("share", "order"),
+    [(0.01, 1.0), (0.25, 1.0), (0.6, 1.0), (0.9, 1.0), (-0.9, 1.0), (0.1, 5.0), (-0.3, 2.0)],
+)
+def test_the_angle_winds_up_what_the_motor_lets_out(share: float, order: float) -> None:
+    """R q + e (sin(k q + φ) - sin φ) is what the drive on its centre winds up; steps of 0.1 rad through two turns."""
     config = joint("tendon-finger", wrap_output_rad=40.0, wrap_input_rad=60.0)
     radius = config.drive.stage[0].output_radius_m
     time = np.linspace(0.0, 1.0, 130)
     columns = still(time, np.zeros_like(time), motor=4.0 * np.pi * time / config.drive.ratio)
-    effect = ("pulley_runout", {"eccentricity_m": share * radius, "phase_rad": PHASE})
+    effect = ("pulley_runout", {"eccentricity_m": share * radius, "phase_rad": PHASE, "order": order})
     found = run(config, columns, effect)["joint_position_rad"]
 
     def beyond(q: float, wound: float) -> float:
-        return q + share * (math.sin(q + PHASE) - math.sin(PHASE)) - wound
+        return q + share * (math.sin(order * q + PHASE) - math.sin(PHASE)) - wound
 
     wound = run(config, columns)["joint_position_rad"]
     expected = [brentq(beyond, w - 3.0, w + 3.0, args=(w,), xtol=1e-14, rtol=1e-14) for w in wound]
