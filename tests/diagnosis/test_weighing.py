@@ -84,21 +84,26 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
             {"series_compliance": (0.2, 0.9), "gravity_load": (0.7, 0.9)},
             {"series_compliance", "gravity_load"},
         ),
+        # what yields at once and what yields late is one coupling
+        (
+            {"series_compliance": (0.2, 0.9), "series_compliance:late_rad_per_Nm": (0.7, 0.9)},
+            {"series_compliance", "series_compliance:late_rad_per_Nm"},
+        ),
     ],
 )
 def test_of_a_coupling_and_a_clearance_one_has_the_name(
     sizes: dict[str, tuple[float, float]], named: set[str]
 ) -> None:
-    def weighed(effect: str, removes: float, confidence: float) -> Weighed:
+    def weighed(name: str, removes: float, confidence: float) -> Weighed:
         even = ScoreDifference(0.5, 9.0, 9.0)
-        return Weighed(hypothesis(effect, effect), None, {}, confidence, (), even, "", removes)
+        return Weighed(hypothesis(name.partition(":")[0], name), None, {}, confidence, (), even, "", removes)
 
     found = one_in_series([weighed(name, *size) for name, size in sizes.items()])
-    assert {w.term.effect.id for w in found} == set(sizes)
-    assert {w.term.effect.id for w in found if w.confidence >= 0.5} == named
+    assert [w.term.name for w in found] == list(sizes)
+    assert {w.term.name for w in found if w.confidence >= 0.5} == named
     for w in found:
-        was = sizes[w.term.effect.id][1]
-        assert (w.confidence == was) is (w.term.effect.id in named or was < 0.5)
+        was = sizes[w.term.name][1]
+        assert (w.confidence == was) is (w.term.name in named or was < 0.5)
         assert ("one curve of the load" in w.why_not) is (w.confidence != was)
 
 

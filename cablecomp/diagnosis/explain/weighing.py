@@ -81,17 +81,16 @@ def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
     """The same, where of those named that give way in series with the joint the one that takes off most keeps its name:
     what one law's form lacks there the other has, and data show the one curve that they make together."""
     among = [w for w in weighed if w.term.effect.in_series and w.confidence >= LIMITS.name]
-    most = max(among, key=lambda w: w.removes, default=None)
-
-    def held(w: Weighed) -> Weighed:
-        if most is None or w is most or not any(w is other for other in among):
-            return w
-        why_not = (
-            f"what gives way in series is one curve of the load, and `{most.term.name}` takes off more of it"
-        )
-        return replace(w, confidence=LIMITS.little_told, why_not=why_not)
-
-    return [held(w) for w in weighed]
+    if not among:
+        return list(weighed)
+    most = max(among, key=lambda w: w.removes).term.effect.id
+    why_not = f"what gives way in series is one curve of the load, and `{most}` takes off more of it"
+    return [
+        replace(w, confidence=LIMITS.little_told, why_not=why_not)
+        if any(w is other for other in among) and w.term.effect.id != most
+        else w
+        for w in weighed
+    ]
 
 
 def _weighed(
