@@ -11,11 +11,11 @@ from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment,
 from cablecomp.errors import InputError
 
 
-@term(parameters=("moment", "phase", "second", "second_phase", "tilt", "lean", "upright", "channel"))
+@term(parameters=("moment", "phase", "growth", "tilt", "lean", "upright", "channel"))
 def _weigh(c: Any, p: Any, s: Any) -> None:
-    """p: greatest moment [N m], phase [rad], share of it that comes twice a turn, and by how much its phase is
-    ahead of the other's [rad], turn of the base about the joint's axis and of that axis out of the level [rad per unit
-    of the channel], its slope where the channel is 0 [rad], the channel's place among the others (-1: none)."""
+    """p: greatest moment [N m], phase [rad], by what share it grows with the joint's angle [1/rad], turn of the base
+    about the joint's axis and of that axis out of the level [rad per unit of the channel], its slope where the channel
+    is 0 [rad], the channel's place among the others (-1: none)."""
     angle, slope = c.joint + p.phase, p.upright
     if p.channel >= 0.0:
         other = c.other[int(p.channel)]
@@ -23,12 +23,9 @@ def _weigh(c: Any, p: Any, s: Any) -> None:
             angle += p.tilt * other
             slope += p.lean * other
     moment = p.moment * math.cos(slope)
-    c.moment += moment * math.sin(angle)
-    c.moment_slope += moment * math.cos(angle)
-    if p.second != 0.0:
-        twice, share = 2.0 * c.joint + p.phase + p.second_phase, moment * p.second
-        c.moment += share * math.sin(twice)
-        c.moment_slope += 2.0 * share * math.cos(twice)
+    lever = moment * (1.0 + p.growth * c.joint)
+    c.moment += lever * math.sin(angle)
+    c.moment_slope += lever * math.cos(angle) + moment * p.growth * math.sin(angle)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -41,8 +38,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     weight = _weigh(
         moment=values["moment_Nm"],
         phase=values["phase_rad"],
-        second=values["second"],
-        second_phase=values["second_phase_rad"],
+        growth=values["growth_per_rad"],
         tilt=values["tilt_rad_per_unit"],
         lean=values["lean_rad_per_unit"],
         upright=values["upright_rad"],
@@ -56,9 +52,9 @@ EFFECT = Effect(
     statement="The link's weight turns the joint, more or less by its position, and by how another "
     "joint has turned its base about this joint's axis or out of its plane; on a linkage its lever grows or shrinks on "
     "the way. The torque channel does not show it.",
-    equation="M_cable = M - m g l cos(l0 + l other(t)) (sin(q_out + φ + t other(t)) + s sin(2 q_out + φ + ψ))",
-    source="statics of a pendulum, of which the share across a leaning axis turns it; a linkage's potential to the "
-    "second harmonic of the joint's angle",
+    equation="M_cable = M - m g l (1 + p q_out) cos(l0 + l other(t)) sin(q_out + φ + t other(t))",
+    source="statics of a pendulum, of which the share across a leaning axis turns it; a linkage's lever to first order "
+    "in the joint's angle",
     parameters=(
         Parameter(
             "moment_Nm",
@@ -72,28 +68,16 @@ EFFECT = Effect(
         ),
         Parameter("phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, angle from the hanging rest", role="phase"),
         Parameter(
-            "second",
-            "-",
+            "growth_per_rad",
+            "1/rad",
             0.0,
-            0.0,
-            1.0,
-            "s, what comes twice a turn over what comes once, as on a linkage",
-            role="shape",
-            omitted=0.0,
-            minimum=0.0,
-            maximum=1.0,
-            of_known_drive=True,
-        ),
-        Parameter(
-            "second_phase_rad",
-            "rad",
-            0.0,
-            -math.pi,
-            math.pi,
-            "ψ, its phase at joint angle zero, beyond φ",
+            -20.0,
+            20.0,
+            "p, share by which its lever grows per radian of the joint, as on a linkage",
             role="shape",
             omitted=0.0,
             of_known_drive=True,
+            tries=(-1.0, 1.0),
         ),
         Parameter(
             "tilt_rad_per_unit",
@@ -135,8 +119,5 @@ EFFECT = Effect(
     felt_by_motor=True,
     bounded=False,
     change=_change,
-    tries=(
-        *({"lean_rad_per_unit": turn, "upright_rad": 0.7} for turn in (-0.8, 0.8)),
-        *({"second": 0.5, "second_phase_rad": 0.25 * math.pi * k} for k in (-3, -1, 1, 3)),
-    ),
+    tries=tuple({"lean_rad_per_unit": turn, "upright_rad": 0.7} for turn in (-0.8, 0.8)),
 )

@@ -32,7 +32,7 @@ ALIKE = frozenset({
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",
     "clamp_slip:unequal_steps", "clock_skew:drift", "crosstalk:dragged", "crosstalk:lagged",
     "crosstalk:posed", "crosstalk:quadratic", "crosstalk:rubbing", "crosstalk:touching",
-    "gravity_load:leaning_base", "gravity_load:linkage", "gravity_load:tilting_base",
+    "gravity_load:leaning_base", "gravity_load:tilting_base",
     "inertial_load:flexible_link", "inertial_load:folding_arm", "inertial_load:half_filled",
     "position_dependent_friction:input_drum", "position_dependent_friction:patch",
     "position_dependent_friction:threaded",

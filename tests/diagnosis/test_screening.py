@@ -68,8 +68,8 @@ def test_an_event_leaves_recordings_that_ended_before_it_as_they_were_and_later_
                 np.testing.assert_array_equal(mine, theirs)
 
 
-def test_a_weight_on_a_linkage_is_promised_with_what_comes_twice_a_turn() -> None:
-    """A plain weight promises none."""
+def test_a_weight_on_a_linkage_is_promised_with_a_lever_that_grows() -> None:
+    """The plant's linkage has a second harmonic, which no law of the catalogue has; a plain weight promises none."""
     law = {"moment_Nm": 0.15, "phase_rad": 0.4}
     second = {"second": 0.8, "second_phase_rad": 1.5}
     for spec, shaped in (
@@ -80,7 +80,7 @@ def test_a_weight_on_a_linkage_is_promised_with_what_comes_twice_a_turn() -> Non
         weight = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "gravity_load")
         answer = ask(anchor(drive.fit), weight)
         assert answer is not None
-        assert ("second" in answer.problem.config.effect[-1].parameters) == shaped
+        assert ("growth_per_rad" in answer.problem.config.effect[-1].parameters) == shaped
         if shaped:
             assert answer.plain is not None
             assert answer.cost < 0.5 * answer.plain.cost

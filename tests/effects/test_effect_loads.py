@@ -22,16 +22,15 @@ def test_gravity_turns_with_the_joint(name: str) -> None:
     assert found == pytest.approx(expected, abs=1e-10)
 
 
-def test_a_weight_on_a_linkage_comes_twice_a_turn_too() -> None:
-    """m g l (sin(q + phase) + s sin(2 q + phase + psi))."""
+def test_a_weights_lever_may_grow_with_the_joint() -> None:
+    """As on a linkage: m g l (1 + p q) sin(q + phase)."""
     config = joint(JOINTS[0])
     columns = excitation(config)
     weight = 0.4 * unit(config)
-    for second, phase in ((0.8, -0.4), (0.3, 2.0)):
-        values = {"moment_Nm": weight, "phase_rad": 0.7, "second": second, "second_phase_rad": phase}
+    for growth in (0.8, -0.6):
+        values = {"moment_Nm": weight, "phase_rad": 0.7, "growth_per_rad": growth}
         found = run(config, columns, ("gravity_load", values))["joint_position_rad"]
-        taken = weight * (np.sin(found + 0.7) + second * np.sin(2.0 * found + 0.7 + phase))
-        load = columns["joint_torque_Nm"] - taken
+        load = columns["joint_torque_Nm"] - weight * (1.0 + growth * found) * np.sin(found + 0.7)
         assert found == pytest.approx(fed_with(config, columns, load), abs=1e-10)
 
 
