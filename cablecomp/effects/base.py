@@ -240,7 +240,7 @@ class Effect:
     pliant: bool = False
     """It is a mere curve over the load, or a step: it bends to what other effects' forms leave, too."""
     in_series: bool = False
-    """It gives way to the load between drum and joint, where one curve holds whatever does."""
+    """It gives way to the load in series with the joint: of several that do, recordings show one curve."""
     saturates: bool = False
     """Twice the amount does far less than twice as much, over decades of it."""
     posture: bool = False

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Floats, Parameter, at_most
+from cablecomp.effects.base import Change, Effect, Floats, Parameter
+from cablecomp.effects.shared_shapes import repeated
 from cablecomp.mechanics.change import Factor
 
 
@@ -74,24 +75,7 @@ EFFECT = Effect(
             omitted=0.0,
             of="amplitude",
         ),
-        Parameter(
-            "order",
-            "-",
-            1.0,
-            1.0,
-            10.0,
-            "k, how often a turn of the drum repeats it",
-            log=True,
-            role="shape",
-            omitted=1.0,
-            minimum=0.2,
-            maximum=50.0,
-            of="amplitude",
-            tries=(2.5, 4.0, 5.5, 7.0),
-            reach=1.0,
-            is_another=at_most,
-            of_known_drive=True,
-        ),
+        repeated("k, how often a turn of the drum repeats it", tries=(2.5, 4.0, 5.5, 7.0), of="amplitude"),
         Parameter(
             "input_amplitude",
             "-",

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, at_most, drum_radius, pretension_moment, term
+from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment, term
+from cablecomp.effects.shared_shapes import repeated
 
 
 @term(parameters=("eccentricity", "phase", "order", "radius", "hanging"))
@@ -64,22 +65,9 @@ EFFECT = Effect(
         Parameter(
             "phase_rad", "rad", 0.0, -math.pi, math.pi, "φ, its direction at joint angle zero", role="phase"
         ),
-        Parameter(
-            "order",
-            "-",
-            1.0,
-            1.0,
-            10.0,
+        repeated(
             "k, how often a turn of the joint repeats it: 2 for a pulley that is oval",
-            log=True,
-            role="shape",
-            omitted=1.0,
-            minimum=0.2,
-            maximum=50.0,
             tries=(2.0, 3.5, 5.0, 6.5, 8.0),
-            reach=1.0,
-            is_another=at_most,
-            of_known_drive=True,
         ),
     ),
     acts_through=("joint_angle", "motor_angle"),

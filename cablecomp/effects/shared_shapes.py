@@ -1,5 +1,6 @@
 """Parameters that several laws have for the same: when a slow course began; an amount that varies as the joint turns,
-by 1 + a cos(k q - φ), as a clearance that is widest where the joint mostly stands, a bracket softer across than along.
+by 1 + a cos(k q - φ), as a clearance that is widest where the joint mostly stands, a bracket softer across than along;
+how often in a turn a drum's wave comes.
 """
 
 from __future__ import annotations
@@ -7,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from cablecomp.effects.base import Parameter
+from cablecomp.effects.base import Parameter, at_most
 
 SWING, ORDERS, PHASES = 0.6, (1.0, 2.0, 4.0), 4
 """Where a diagnosis asks: how much, how often a turn, at how many phases of each."""
@@ -27,6 +28,28 @@ def begun(name: str, *, of: str = "", tries: tuple[float, ...] = ()) -> Paramete
         omitted=math.nan,
         of=of,
         tries=tries,
+    )
+
+
+def repeated(text: str, *, tries: tuple[float, ...], of: str = "") -> Parameter:
+    """How often in a turn of a drum a wave of its own comes; ever more often it is teeth, poles or a graduation."""
+    return Parameter(
+        "order",
+        "-",
+        1.0,
+        1.0,
+        10.0,
+        text,
+        log=True,
+        role="shape",
+        omitted=1.0,
+        minimum=0.2,
+        maximum=50.0,
+        of=of,
+        tries=tries,
+        reach=1.0,
+        is_another=at_most,
+        of_known_drive=True,
     )
 
 
