@@ -72,5 +72,9 @@ answered by a coupling that yields or by friction (blind trials draw 1.5 %)."""
 ZERO_OF_TORQUE: Final = 0.005
 """1-sigma of a torque sensor's zero that `[session] own` names without a tolerance, over the largest torque it reads:
 what mounting and warming up leave (blind trials draw 0.4 %)."""
+GAIN_OF_TORQUE: Final = 0.02
+"""Relative 1-sigma of a joint's torque sensor against what else reads force (the motor's torque, tensions), where no
+tolerance is stated: what calibrating two sensors apart leaves (blind trials draw 1 %). Without it, a percent of the
+load that the motor's torque does not show is answered by friction of the motor, or by a weight."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""

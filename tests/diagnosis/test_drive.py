@@ -45,6 +45,28 @@ def test_a_free_length_is_known_by_the_tape(tolerance: dict[str, float], length_
     assert found.get("free_length_m") == (None if length_sd is None else pytest.approx(length_sd))
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "motor", "gain_sd"),
+    [
+        ({"EA_N": 0.05}, True, 0.02),
+        ({"EA_N": 0.05}, False, None),  # nothing else reads force
+        ({"EA_N": 1.0}, True, None),  # the drive itself bends to that
+        ({"joint_torque_gain": 0.005}, True, 0.005),
+        ({"joint_torque_gain": 0.0}, True, None),  # whoever says exact means it
+    ],
+)
+def test_two_sensors_of_force_agree_to_some_percent(
+    tolerance: dict[str, float], motor: bool, gain_sd: float | None
+) -> None:
+    columns = recorded([], 20.0)
+    if motor:
+        felt = simulate(PlantConfig.from_dict(closed(SMALL)), *course(20.0)).channels()["motor_torque_Nm"]
+        columns["motor_torque_Nm"] = felt + 1e-3 * np.random.default_rng(5).standard_normal(len(felt))
+    fit = fitted(tolerance, {"a/1": columns})
+    found = {p.name: p.sd for p in fit.problem.parameters}
+    assert found.get("joint_torque_gain") == (None if gain_sd is None else pytest.approx(gain_sd))
+
+
 def test_what_is_calibrated_as_stated_is_exact_without_a_tolerance() -> None:
     fit = fitted({"EA_N": 0.05}, {"a/1": recorded([], 20.0)}, as_stated=True)
     assert [p.name for p in fit.problem.parameters] == ["EA_N", "input_radius_m"]

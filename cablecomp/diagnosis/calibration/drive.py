@@ -15,14 +15,14 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
 from cablecomp.estimation.history import forgotten, full_swing, with_own_carryover
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
-from cablecomp.estimation.limits import BY_TAPE, ZERO_OF_TORQUE
+from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
-from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of
+from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of, vague_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.estimation.standing import in_its_place
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
-TORQUE_ZERO = "joint_torque_offset_Nm"
+TORQUE_ZERO, TORQUE_GAIN = "joint_torque_offset_Nm", "joint_torque_gain"
 REPLICAS = 2
 """Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
 BESIDE = 1e3
@@ -51,7 +51,7 @@ def calibrate_drive(
 ) -> Calibrated:
     """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one.
 
-    `as_stated`: free lengths are exact where no tolerance is stated of them."""
+    `as_stated`: free lengths and the torque sensor's gain are exact where no tolerance is stated of them."""
     parameters = _parameters(config, evidence, as_stated)
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
@@ -151,7 +151,8 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bo
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
     own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
     by_tape = {} if as_stated else _by_tape(config)
-    further = {**by_tape, **_torque_zero(config, evidence)}
+    gain = {} if as_stated else _torque_gain(config, evidence)
+    further = {**by_tape, **_torque_zero(config, evidence), **gain}
     free = list(of_drive(config, further))
     if len(sessions) > 1:
         first = [next(e for e in evidence if e.session == s) for s in sessions]
@@ -191,6 +192,16 @@ def _torque_zero(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str,
     read = [e.columns[c] for e in evidence if (c := load_channel(config, e.columns)) not in (None, MOTOR)]
     largest = max((float(np.max(np.abs(r))) for r in read), default=0.0)
     return {TORQUE_ZERO: ZERO_OF_TORQUE * largest} if largest else {}
+
+
+def _torque_gain(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str, float]:
+    """How well a joint's torque sensor without a tolerance agrees with what else reads force; none where nothing does,
+    or where how much the drive yields is known by order of magnitude only."""
+    read = {load_channel(config, e.columns) for e in evidence}
+    beside = any(c in e.counted for e in evidence for c in OUTPUTS if c != JOINT)
+    if TORQUE_GAIN in config.tolerance or read != {"joint_torque_Nm"} or not beside:
+        return {}
+    return {} if vague_drive(of_drive(config)) else {TORQUE_GAIN: GAIN_OF_TORQUE}
 
 
 def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing:
