@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -31,26 +31,23 @@ def joint() -> JointConfig:
     return parse_joint({**closed(SMALL, "small"), "tolerance": SMALL_TOLERANCE}, "small")
 
 
-def recording(effects: list[EffectSpec], seed: int = 3, tighter: float = 1.0) -> dict[str, FloatArray]:
+def recording(
+    effects: list[EffectSpec], seed: int = 3, tighter: float = 1.0, noise: Mapping[str, float] = SMALL_NOISE
+) -> dict[str, FloatArray]:
     """24 s at 50 Hz of the plant: both pulleys turning, load of two frequencies, noise on all channels; cables
     `tighter` times as tight as they are meant to be."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 24.0, 0.02)
-    stage = {**SMALL, "pretension_N": tighter * float(SMALL["pretension_N"])}
-    config = PlantConfig.from_dict(closed(stage))
-    found = simulate(config, *_moved(time), effects=effects).channels()
-    columns = {"time_s": time}
-    for name, sigma in SMALL_NOISE.items():
-        columns[name] = found[name] + sigma * rng.standard_normal(len(time))
-    return columns
-
-
-def _moved(time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time, motor angle and load."""
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
     load = soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
-    return time, motor, load
+    stage = {**SMALL, "pretension_N": tighter * float(SMALL["pretension_N"])}
+    config = PlantConfig.from_dict(closed(stage))
+    found = simulate(config, time, motor, load, effects=effects).channels()
+    columns = {"time_s": time}
+    for name, sigma in noise.items():
+        columns[name] = found[name] + sigma * rng.standard_normal(len(time))
+    return columns
 
 
 def diagnosed(effects: list[EffectSpec]) -> Diagnosis:
@@ -163,10 +160,7 @@ def test_a_free_length_stated_a_little_wrong_is_no_physics(off: float) -> None:
 def test_a_torque_sensor_that_reads_too_much_is_no_physics() -> None:
     """The motor's torque shows 3 % less of the load than the joint's sensor reads: a late clock was named for it
     (0.82), and with two recordings friction of the motor."""
-    columns = recording([])
-    rng = np.random.default_rng(5)
-    found = simulate(PlantConfig.from_dict(closed(SMALL)), *_moved(columns["time_s"])).channels()
-    columns["motor_torque_Nm"] = found["motor_torque_Nm"] + 1e-3 * rng.standard_normal(len(columns["time_s"]))
+    columns = recording([], noise={**SMALL_NOISE, "motor_torque_Nm": 1e-3})
     columns["joint_torque_Nm"] = 1.03 * columns["joint_torque_Nm"]
     d = diagnose(joint(), {"small/1": columns})
     assert not d.named

@@ -150,9 +150,8 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bo
     """What `[tolerance]` frees, and what is exact on paper alone; what `[session] own` names is each session's."""
     sessions = tuple(dict.fromkeys(e.session for e in evidence))
     own = [n for n in config.session_own if n not in ZEROS]  # these are found inside of the fit, by session
-    by_tape = {} if as_stated else _by_tape(config)
-    gain = {} if as_stated else _torque_gain(config, evidence)
-    further = {**by_tape, **_torque_zero(config, evidence), **gain}
+    usual = {} if as_stated else {**_by_tape(config), **_torque_gain(config, evidence)}
+    further = {**usual, **_torque_zero(config, evidence)}
     free = list(of_drive(config, further))
     if len(sessions) > 1:
         first = [next(e for e in evidence if e.session == s) for s in sessions]
