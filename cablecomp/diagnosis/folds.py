@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.problem import Problem
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
@@ -100,7 +101,7 @@ def make_groups(fit: Fit) -> Groups:
     problem = fit.problem
     owners = [problem.owners(c) for c in problem.channels]
     counts = np.bincount(owners[0], minlength=len(problem.evidence))
-    by = "recording" if len(problem.evidence) >= LIMITS.recordings else "block"
+    by = kind_of_parts(len(problem.evidence))
     each = _blocks_of_each(fit, owners[0], counts)
     alone = _alone(problem.evidence, by)
     blocks, folds, channels = [], [], []
@@ -131,6 +132,16 @@ def _blocks_of_each(fit: Fit, owners: IntArray, counts: IntArray) -> list[int]:
     least, most = LIMITS.blocks
     total = int(np.clip(counts.sum() / (LIMITS.memory * memory), least, most))
     return [max(1, round(total * n / max(counts.sum(), 1))) for n in counts]
+
+
+def shown_apart(problem: Problem, by: str) -> Collection[str]:
+    """Sessions of which what is left shows a value of their own while another part is left out."""
+    return problem.sessions if by == "block" else problem.repeated
+
+
+def kind_of_parts(recordings: int) -> str:
+    """What is left out of so many recordings: whole ones ("recording") where there are enough, else blocks of rows."""
+    return "recording" if recordings >= LIMITS.recordings else "block"
 
 
 def _alone(evidence: Sequence[Evidence], by: str) -> BoolArray:

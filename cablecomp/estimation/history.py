@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.linalg import svd
 
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
@@ -285,10 +286,20 @@ def _columns(runs: Sequence[FloatArray], first: int, faint: float, count: int | 
     number = np.concatenate([np.full(r.shape[1], float(r.shape[1])) for r in runs])
     together = np.column_stack(runs)
     centred = (together - together[first:].mean(axis=0)) / np.sqrt(number)
-    _, s, Vt = np.linalg.svd(centred[first:], full_matrices=False)
+    _, s, Vt = _svd(centred[first:])
     # in the history that has most of it: some directions few histories have
     most = s * np.max(np.abs(Vt) * np.sqrt(number), axis=1)
     kept = Vt[most > faint * np.sqrt(len(centred) - first)] if count is None else Vt[:count]
     columns: FloatArray = centred @ kept.T
     missing = 0 if count is None else count - columns.shape[1]
     return np.pad(columns, ((0, 0), (0, missing))) if missing > 0 else columns
+
+
+def _svd(a: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Singular value decomposition, by the slower iteration where the quick one ends without an answer: it may on what
+    is rounding alone."""
+    try:
+        return np.linalg.svd(a, full_matrices=False)
+    except np.linalg.LinAlgError:
+        U, s, Vt = svd(a, full_matrices=False, lapack_driver="gesvd")
+        return U, s, Vt

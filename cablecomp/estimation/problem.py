@@ -20,7 +20,7 @@ from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, STEP
-from cablecomp.estimation.parameter import Parameter
+from cablecomp.estimation.parameter import Parameter, own_of
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing, stood, with_common
 from cablecomp.estimation.zeros import Zeros
@@ -105,6 +105,11 @@ class Problem:
     def finely(self) -> Problem:
         """The same, run on every fine row, as laws with rates need it."""
         return replace(self, fine=True)
+
+    def with_own(self, place: int) -> Problem:
+        """The same with a value of each session's own of the parameter at this place."""
+        own = own_of(self.parameters[place], self.sessions)
+        return replace(self, parameters=(*self.parameters[:place], *own, *self.parameters[place + 1 :]))
 
     def with_weighing(self, weighing: Weighing) -> Problem:
         """The same with other weights."""

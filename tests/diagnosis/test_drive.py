@@ -184,12 +184,39 @@ def test_a_sessions_own_value_begins_where_the_session_states_it() -> None:
     assert rms_left(drive.nominal) > 10.0 * drive.floor_rad  # it is what is stated that tells
 
 
-def mounted(pretension_N: float) -> dict[str, FloatArray]:
+@pytest.mark.parametrize(
+    ("factor", "tolerance", "circuit", "sessions"),
+    [
+        (1.04, {"EA_N": 0.03, "pretension_N": 0.08}, "closed", "ab"),
+        (1.0, {"EA_N": 0.03, "pretension_N": 0.08}, "closed", ""),  # nothing differs
+        (1.04, {"EA_N": 0.03}, "closed", ""),  # pretension is exact
+        (1.04, {"EA_N": 1.0, "pretension_N": 1.0}, "closed", ""),  # the search asks for that beside effects
+        (1.04, {"EA_N": 0.03, "pretension_N": 0.08}, "open", ""),  # a weight is the same
+    ],
+)
+def test_cables_that_were_taken_off_are_tightened_anew(
+    factor: float, tolerance: dict[str, float], circuit: str, sessions: str
+) -> None:
+    """The plant's two sessions, one of them tighter by so much, and `[session] own` names nothing."""
+    plain = closed(SMALL, "small")
+    tension_N = plain["drive"]["stage"][0]["pretension_N"]
+    recordings = {"a/1": mounted(tension_N), "b/1": mounted(factor * tension_N, 6)}
+    raw = {**plain, "drive": {**plain["drive"], "circuit": circuit}, "tolerance": tolerance}
+    joint = parse_joint(raw, "small")
+    fit = calibrate_drive(joint, gather_body(joint, recordings).used, np.random.default_rng(0)).fit
+    own = {p.session: p for p in fit.problem.parameters if p.base == "pretension_N" and p.session}
+    assert sorted(own) == list(sessions)
+    if own:
+        ratio = fit.values["pretension_N@b"] / fit.values["pretension_N@a"]
+        assert ratio == pytest.approx(factor, abs=0.005)
+
+
+def mounted(pretension_N: float, seed: int = 5) -> dict[str, FloatArray]:
     """What the plant shows of the small joint with this pretension."""
     plain = closed(SMALL)
     (stage,) = plain["drive"]["stage"]
     built = {**plain, "drive": {**plain["drive"], "stage": [{**stage, "pretension_N": pretension_N}]}}
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
     time, motor, load = course(40.0)
     found = simulate(PlantConfig.from_dict(built), time, motor, load).channels()
     return {

@@ -77,6 +77,25 @@ def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated
     assert max(after) < 0.1 * max(before) + 0.2 * NOISE_RAD
 
 
+def test_a_decomposition_that_ends_without_an_answer_is_made_the_slower_way(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    raw, _, motor, load = nested("closed")
+    columns = {
+        "time_s": STEP_S * np.arange(len(motor)), "motor_position_rad": motor, "joint_torque_Nm": load, JOINT: motor,
+    }  # fmt: skip
+    e = gathered(raw, columns)
+    usual = told(raw, e).carryover[JOINT]
+
+    def without_an_answer(*_: Any, **__: Any) -> None:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(np.linalg, "svd", without_an_answer)
+    slower = told(raw, e).carryover[JOINT]
+    assert usual.shape[1] > 1
+    assert np.abs(slower) == pytest.approx(np.abs(usual), rel=1e-6, abs=1e-6 * np.abs(usual).max())
+
+
 @pytest.mark.parametrize("circuit", ["open", "closed"])
 def test_what_a_detour_in_a_gap_leaves_in_the_plant_lies_within_what_is_estimated_of_it(circuit: str) -> None:
     raw, plant, motor, load = nested(circuit)

@@ -10,6 +10,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.config.sessions import ZEROS
+from cablecomp.diagnosis.folds import kind_of_parts, shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
@@ -19,7 +20,7 @@ from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of, vague_drive
 from cablecomp.estimation.problem import Problem, Weighing
-from cablecomp.estimation.standing import in_its_place
+from cablecomp.estimation.standing import PRETENSION, in_its_place
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
 TORQUE_ZERO, TORQUE_GAIN = "joint_torque_offset_Nm", "joint_torque_gain"
@@ -56,6 +57,7 @@ def calibrate_drive(
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
     fit = _begun(problem, floor)
+    fit = fit if as_stated else _tightened_anew(fit)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
     sensors = floor
     for k in range(PASSES):
@@ -67,6 +69,7 @@ def calibrate_drive(
         fit = refit(fit, weighed(fit, floor), 6)
         if k > 0 and rms_left(fit) > NO_LESS * left:
             break
+    fit = fit if as_stated else _tightened_anew(fit)
     floor_rad = noise_floor(fit, rng)
     seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
@@ -91,6 +94,26 @@ def _begun(problem: Problem, floor: Weighing) -> Fit:
     sigma = {c: s if c == JOINT else BESIDE * s for c, s in problem.weighing.sigma.items()}
     fit = solve(problem.with_weighing(replace(problem.weighing, sigma=sigma)), evaluations=15)
     return refit(fit, weighed(fit, floor), 10)
+
+
+def _tightened_anew(fit: Fit) -> Fit:
+    """The fit, or that with a pretension of each session's own, where that leaves less by more than chance: cables that
+    were taken off are never tightened quite alike, and what one pretension leaves of them looks like physics.
+
+    Not of an open circuit, whose weight or spring is the same; a drive that is known by order of magnitude is asked for
+    it beside its effects."""
+    problem = fit.problem
+    place = next((k for k, p in enumerate(problem.parameters) if p.name == PRETENSION), None)
+    shown = shown_apart(problem, kind_of_parts(len(problem.evidence)))
+    closed = problem.config.drive.circuit == "closed"
+    if place is None or len(shown) < 2 or not closed or problem.states(PRETENSION):
+        return fit
+    if vague_drive(problem.parameters):
+        return fit
+    sessions = len(problem.sessions)
+    x = np.concatenate((fit.x[:place], np.full(sessions, fit.x[place]), fit.x[place + 1 :]))
+    own = solve(problem.with_own(place), x, 10)
+    return own if 2.0 * (fit.cost - own.cost) > LIMITS.tightened_anew * (sessions - 1) else fit
 
 
 def _followed(problem: Problem) -> Problem:

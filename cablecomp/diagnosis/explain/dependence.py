@@ -13,10 +13,11 @@ from typing import Any, Final
 import numpy as np
 
 from cablecomp.diagnosis.explain.linear import anchor
+from cablecomp.diagnosis.folds import shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.parameter import Parameter, by_condition, own_of
+from cablecomp.estimation.parameter import Parameter, by_condition
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
@@ -119,9 +120,8 @@ def _ways(
     problem: Problem, p: Parameter, column: FloatArray, owners: FloatArray, by: str
 ) -> list[tuple[Dependence, list[FloatArray], Problem]]:
     ways: list[tuple[Dependence, list[FloatArray], Problem]] = []
-    sessions = problem.sessions
+    sessions, shown = problem.sessions, shown_apart(problem, by)
     place = problem.parameters.index(p)
-    shown = sessions if by == "block" else problem.repeated
     # one recording alone shows how tight its cables are, but nothing is left of it that would judge a law of its own
     judged = len(shown) > 1 and not (p.of_effect and len(shown) < len(sessions))
     if judged and _along_path(p.base) and not problem.states(p.base):
@@ -130,9 +130,7 @@ def _ways(
             mine = np.array([e.session == s for e in problem.evidence])
             inside = (owners >= 0) & mine[np.maximum(owners, 0).astype(np.int64)]
             cut.append(np.where(inside, column, 0.0))
-        own = own_of(p, sessions)
-        free = (*problem.parameters[:place], *own, *problem.parameters[place + 1 :])
-        ways.append((Dependence(p.name, "session"), cut, replace(problem, parameters=free)))
+        ways.append((Dependence(p.name, "session"), cut, problem.with_own(place)))
     for condition in problem.evidence[0].condition:
         values = [e.condition[condition] for e in problem.evidence]
         if not tell_a_gain(values) or not may_depend(p.base, condition):

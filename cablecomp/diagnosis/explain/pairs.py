@@ -4,18 +4,17 @@ less tight, neither is worth anything without the other."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.folds import shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.multi_start import lowest_by_session
-from cablecomp.estimation.parameter import own_of
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.standing import PRETENSION
 from cablecomp.signal.smoothing import FloatArray
@@ -36,13 +35,9 @@ def with_own_pretensions(
     Each session begins at the factor that suits its own recordings best, all other things being equal.
     """
     common = next((p for p in problem.parameters if p.name == PRETENSION), None)
-    sessions = problem.sessions
-    shown = sessions if by == "block" else problem.repeated
-    if common is None or len(sessions) < 2 or len(shown) < 2 or problem.states(PRETENSION):
+    if common is None or len(shown_apart(problem, by)) < 2 or problem.states(PRETENSION):
         return None
-    place = problem.parameters.index(common)
-    free = (*problem.parameters[:place], *own_of(common, sessions), *problem.parameters[place + 1 :])
-    own = replace(problem, parameters=free)
+    own = problem.with_own(problem.parameters.index(common))
     begin = {**cold, **values}
     amount = h.key(h.amount.name)
     best: tuple[float, FloatArray] | None = None
