@@ -47,6 +47,11 @@ class Thresholds:
     """Blocks that a recording is cut into for these, where whole ones are too few: four to a part."""
     telling: float = 0.3
     """Share of a recording that the fit has not seen that tells its carry-over; the rest is predicted."""
+    carried_over: float = 0.5
+    """Standard deviation, over what is usually left over, that a recording's carry-over may have at a row left out by
+    what the rows seen tell of it: with more, the row says what went before the recording, or in a gap (in trials
+    814/26 and 102 blocks left out in turn are off by 2.6 and 5.9 times what is left in sample, without such rows by
+    1.1 and 1.2)."""
     final_share: float = 0.15
     """Share of a recording, its end, that nothing is chosen or fitted on where whole recordings are too few."""
     final_from: int = 8
@@ -61,8 +66,11 @@ class Thresholds:
     has spoiled it, and the angle goes first (a motor torque of the wrong sign where the encoder had died)."""
     tightened_anew: float = 4.0
     """Twice the cost, for each session after the first, that a pretension of each session's own has to take off the
-    calibrated drive: two standard errors (of 17 joints of trials seed 814 that nothing is missing of and that one
-    pretension left most over the noise, ten are left by it 1.2 to 1.7 of that noise for 1.7 to 4.2)."""
+    calibrated drive: two standard errors, ..."""
+    all_but_noise: float = 2.0
+    """... and what it may leave then, over what noise does (of 17 joints of trials seed 814 that nothing is missing of
+    and that one pretension left most of, 1.6 to 4.2 of the noise, ten are left 1.2 to 1.7 by it; of two whose cables
+    creep, trials 733/20 and 36, it leaves 2.1 and 3.0)."""
     history: float = 0.15
     """Part of what is usually left over that an unknown history may still move the joint by where rows count."""
     history_most: float = 0.4

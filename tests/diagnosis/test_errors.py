@@ -10,6 +10,9 @@ from turning import LIMITED, NOISE_RAD, after_a_history
 from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
 
 
 def test_an_unrecorded_history_is_no_error_and_a_missing_law_is() -> None:
@@ -34,3 +37,22 @@ def test_the_carryover_of_a_recording_that_the_fit_has_not_seen_is_told_by_its_o
     errors = [errors_of(drive.fit, final, "block").final_rmse_rad for final in (known, blind)]
     assert errors[0] < 1.5 * NOISE_RAD
     assert errors[1] > 2.0 * errors[0]
+
+
+def gapped(seed: int, begin_s: float) -> dict[str, FloatArray]:
+    """A recording that misses a swing of the load and back, of 0.8 s."""
+    time = np.arange(0.0, 16.0, 0.02)
+    into = np.clip((time - begin_s) / 0.8, 0.0, 1.0)
+    load = 0.8 * np.sin(2.0 * time + seed) * (1.0 - np.exp(-time)) + 0.45 * np.sin(np.pi * into)
+    whole = {"time_s": time, "motor_position_rad": np.zeros_like(time), "joint_torque_Nm": load}
+    noise = NOISE_RAD * np.random.default_rng(seed).standard_normal(len(time))
+    whole[JOINT] = Observer(LIMITED).run(whole)[JOINT] + noise
+    return {c: v[(into <= 0.0) | (into >= 1.0)] for c, v in whole.items()}
+
+
+def test_what_a_gap_leaves_is_no_error_of_rows_that_alone_tell_it() -> None:
+    """It is forgotten by the next swing: while that is left out, nothing says where the load went in the gap."""
+    body = gather_body(LIMITED, {f"{k}/1": gapped(k, 5.2 + 0.3 * k) for k in range(2)})
+    drive = calibrate_drive(LIMITED, body.used, np.random.default_rng(0))
+    assert any(e.hidden for e in drive.fit.problem.evidence)
+    assert errors_of(drive.fit, body.final, body.final_by).heldout_rmse_rad < 1.3 * NOISE_RAD

@@ -14,10 +14,10 @@ from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.least_squares import Fit, fitted_to_part
+from cablecomp.estimation.least_squares import Fit, fitted_to_part, rms_left
 from cablecomp.estimation.limits import CARRYOVER_SD
 from cablecomp.estimation.parallel import side_by_side
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray
 
 
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
@@ -47,7 +47,7 @@ def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
     """Weighted misfit of the joint angle [rad] on counted rows; laws, the zero and the recording's carry-over taken off
     (where the fit has not seen the recording: the session's; nor the session: as these rows, or the first of them,
-    tell)."""
+    tell), without rows at which a carry-over comes back that the rows seen have not told."""
     problem = fit.problem
     zeros, carryover = problem.aside(fit.x)
     try:
@@ -63,10 +63,26 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
         own = e.name if e.name in zeros else e.session
         left -= zeros[own][0] if own in zeros else float(np.mean(left))
         if e.name in carryover:
-            parts.append(e.weight[kept] * (left - carryover[e.name][kept]))
+            parts.append((e.weight[kept] * (left - carryover[e.name][kept]))[_forgotten(fit, e)])
         else:
             parts.append(_without_carryover(e, left, problem.weighing.sigma[JOINT]))
     return parts
+
+
+def _forgotten(fit: Fit, e: Evidence) -> BoolArray:
+    """Which counted rows of a recording are not moved, by more than a part of what is usually left over, by that of its
+    carry-over which the rows that the fit has seen have not told: where the load goes further than before, bumps from
+    before the recording come back. All of them where that would leave none."""
+    seen = next(s for s in fit.problem.evidence if s.name == e.name)
+    kept = e.counted[JOINT]
+    columns = seen.carryover.get(JOINT)
+    if columns is None:
+        return np.ones(int(kept.sum()), dtype=np.bool_)
+    told = (seen.weight[:, None] * columns)[seen.counted[JOINT]] / fit.problem.weighing.sigma[JOINT]
+    covariance = np.linalg.inv(told.T @ told + np.eye(columns.shape[1]) / CARRYOVER_SD**2)
+    sd = np.sqrt(np.einsum("ij,jk,ik->i", columns[kept], covariance, columns[kept]))
+    known = sd <= LIMITS.carried_over * rms_left(fit)
+    return known if known.any() else np.ones_like(known)
 
 
 def _without_carryover(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:

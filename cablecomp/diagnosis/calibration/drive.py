@@ -57,7 +57,6 @@ def calibrate_drive(
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
     fit = _begun(problem, floor)
-    fit = fit if as_stated else _tightened_anew(fit)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
     sensors = floor
     for k in range(PASSES):
@@ -69,10 +68,10 @@ def calibrate_drive(
         fit = refit(fit, weighed(fit, floor), 6)
         if k > 0 and rms_left(fit) > NO_LESS * left:
             break
-    fit = fit if as_stated else _tightened_anew(fit)
     floor_rad = noise_floor(fit, rng)
     seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
+    fit = fit if as_stated else _tightened_anew(fit, floor, floor_rad)
     for _ in range(2):
         fit = refit(with_own_carryover(fit), weighed(fit, floor), 8)
     fit = _drums_exchanged(fit)
@@ -96,12 +95,14 @@ def _begun(problem: Problem, floor: Weighing) -> Fit:
     return refit(fit, weighed(fit, floor), 10)
 
 
-def _tightened_anew(fit: Fit) -> Fit:
-    """The fit, or that with a pretension of each session's own, where that leaves less by more than chance: cables that
-    were taken off are never tightened quite alike, and what one pretension leaves of them looks like physics.
+def _tightened_anew(fit: Fit, floor: Weighing, floor_rad: float) -> Fit:
+    """The fit, or that with a pretension of each session's own, where that leaves less by more than chance, and little
+    beyond noise: cables that were taken off are never tightened quite alike, and what one pretension leaves of them
+    looks like physics.
 
-    Not of an open circuit, whose weight or spring is the same; a drive that is known by order of magnitude is asked for
-    it beside its effects."""
+    Where more is left, something else is missing (cables that creep loosen from session to session, too), and the
+    search asks for it beside its effects, as it does for a drive that is known by order of magnitude. Not of an open
+    circuit, whose weight or spring is the same."""
     problem = fit.problem
     place = next((k for k, p in enumerate(problem.parameters) if p.name == PRETENSION), None)
     shown = shown_apart(problem, kind_of_parts(len(problem.evidence)))
@@ -113,7 +114,10 @@ def _tightened_anew(fit: Fit) -> Fit:
     sessions = len(problem.sessions)
     x = np.concatenate((fit.x[:place], np.full(sessions, fit.x[place]), fit.x[place + 1 :]))
     own = solve(problem.with_own(place), x, 10)
-    return own if 2.0 * (fit.cost - own.cost) > LIMITS.tightened_anew * (sessions - 1) else fit
+    if 2.0 * (fit.cost - own.cost) <= LIMITS.tightened_anew * (sessions - 1):
+        return fit
+    own = refit(own, weighed(own, floor), 8)
+    return own if rms_left(own) < LIMITS.all_but_noise * floor_rad else fit
 
 
 def _followed(problem: Problem) -> Problem:
