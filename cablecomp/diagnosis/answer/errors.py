@@ -70,9 +70,9 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
 
 
 def _forgotten(fit: Fit, e: Evidence) -> BoolArray:
-    """Which counted rows of a recording are not moved, by more than a part of what is usually left over, by that of its
-    carry-over which the rows that the fit has seen have not told: where the load goes further than before, bumps from
-    before the recording come back. All of them where that would leave none."""
+    """Which counted rows of a recording the fit has seen, or are not moved, by more than a part of what is usually left
+    over, by that of its carry-over which the rows seen have not told: where the load goes further than before, bumps
+    from before the recording come back. All of them where that would leave none."""
     seen = next(s for s in fit.problem.evidence if s.name == e.name)
     kept = e.counted[JOINT]
     columns = seen.carryover.get(JOINT)
@@ -81,7 +81,7 @@ def _forgotten(fit: Fit, e: Evidence) -> BoolArray:
     told = (seen.weight[:, None] * columns)[seen.counted[JOINT]] / fit.problem.weighing.sigma[JOINT]
     covariance = np.linalg.inv(told.T @ told + np.eye(columns.shape[1]) / CARRYOVER_SD**2)
     sd = np.sqrt(np.einsum("ij,jk,ik->i", columns[kept], covariance, columns[kept]))
-    known = sd <= LIMITS.carried_over * rms_left(fit)
+    known = seen.counted[JOINT][kept] | (sd <= LIMITS.carried_over * rms_left(fit))
     return known if known.any() else np.ones_like(known)
 
 

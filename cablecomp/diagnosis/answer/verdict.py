@@ -90,7 +90,8 @@ def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
     if ratio > LIMITS.not_carried:
         yield (
             f"what was kept for the end is predicted {ratio:.1f} times worse than what was left out in turn: something "
-            "changed there, or the model does not carry that far; look at the recordings' last stretches"
+            "changed there, the load goes further there than before, or the model does not carry that far; look at the "
+            "recordings' last stretches"
         )
 
 
