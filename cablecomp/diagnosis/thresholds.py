@@ -242,6 +242,9 @@ class Thresholds:
     gain: float = 0.06
     """Share of the held-out square of what is left that an effect must take off to be looked at as a name:
     below it, laws of another form and calibration trade places."""
+    channels: int = 2
+    """Channels of which that share is at most, those in which two models differ most: trials have two, and a third and
+    a fourth (tensions) halved what an eccentric pulley takes off, 0.14 of two and 0.07 of four."""
     z_sure: float = 5.0
     """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
     gain_sure: float = 0.03

@@ -170,3 +170,20 @@ def test_a_channels_unit_decides_nothing() -> None:
     plain, scaled = score_difference(better, worse, g), score_difference(unit * better, unit * worse, g)
     assert scaled.gain == pytest.approx(plain.gain, rel=1e-9)
     assert scaled.z == pytest.approx(plain.z, rel=1e-9)
+
+
+def test_a_further_channel_that_both_follow_makes_nothing_harder_to_see() -> None:
+    rng = np.random.default_rng(8)
+    gains = []
+    for channels in (1, 2, 4):
+        block = np.tile(np.repeat(np.arange(BLOCKS), ROWS // 2), channels)
+        channel = np.repeat(np.arange(channels), BLOCKS * ROWS // 2)
+        better = rng.standard_normal(block.size)
+        worse = better + np.where(channel == 0, 1.2, 0.0) * rng.standard_normal(block.size)
+        g = Groups(block, block, "block", channel)
+        gains.append(score_difference(better, worse, g).gain)
+        assert score_difference(worse, better, g).gain < 0.0
+    one, two, four = gains
+    added = one / (1.0 - one)  # loss of the worse over that of the better
+    assert two == pytest.approx(added / (2.0 + added), rel=0.2)
+    assert four == pytest.approx(two, rel=0.15)

@@ -140,8 +140,9 @@ def block_losses(r: FloatArray, scale: FloatArray, groups: Groups) -> FloatArray
 class ScoreDifference:
     """How much better one model predicts than another.
 
-    `gain`: share of the worse one's loss that it takes off. `z`: the difference over what the better one's own
-    remainder makes of it by chance. `z_blocks`: over its scatter between blocks.
+    `gain`: share of the worse one's loss that it takes off, of more than two channels in the two in which they differ
+    most: a further channel, which both follow alike, makes nothing harder to see. `z`: the difference over what the
+    better one's own remainder makes of it by chance. `z_blocks`: over its scatter between blocks.
     """
 
     gain: float
@@ -157,8 +158,7 @@ def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> S
     """
     here = groups.block >= 0
     size = scales(better, groups)
-    lb = block_losses(worse, size, groups)
-    difference = lb - block_losses(better, size, groups)
+    difference = block_losses(worse, size, groups) - block_losses(better, size, groups)
     by_row, block = size[groups.channel[here]], groups.block[here]
     a, b = better[here] / by_row, worse[here] / by_row
     total = float(np.sum(difference))
@@ -168,10 +168,18 @@ def score_difference(better: FloatArray, worse: FloatArray, groups: Groups) -> S
     chance = np.bincount(block, r * d, minlength=groups.blocks)
     noise = 2.0 * sqrt(float(np.sum(chance**2)) * len(chance) / max(len(chance) - 1, 1))
     return ScoreDifference(
-        total / max(float(np.sum(lb)), 1e-300),
+        _share(huber(a), huber(b), groups.channel[here]),
         total / max(noise, 1e-300),
         total / max(error, 1e-300),
     )
+
+
+def _share(better: FloatArray, worse: FloatArray, channel: IntArray) -> float:
+    """Share of the worse loss (by row) that the better one takes off, in the channels in which they differ most."""
+    lost = np.bincount(channel, worse)
+    off = lost - np.bincount(channel, better)
+    most = np.argsort(-np.abs(off))[: LIMITS.channels]
+    return float(off[most].sum()) / max(float(lost[most].sum()), 1e-300)
 
 
 def halves(problem: Problem, groups: Groups) -> list[IntArray]:
