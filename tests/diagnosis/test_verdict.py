@@ -112,13 +112,15 @@ def structured(
     repeated_rad: float | None = None,
     usual_rad: float = 0.0,
     named: bool = False,
+    share: float = 1.0,
 ) -> bool:
     rng = np.random.default_rng(1)
     residual = rng.standard_normal(4_000)
     series: Any = SimpleNamespace(
         residual=times_noise * NOISE * residual / np.sqrt(np.mean(residual**2)), sigma=np.full(4_000, NOISE)
     )
-    location: Any = SimpleNamespace(significant=lambda level: ("time",) if follows else ())
+    mismatch = SimpleNamespace(covariate="time", share=share)
+    location: Any = SimpleNamespace(significant=lambda level: (mismatch,) if follows else ())
     return is_structured(location, series, repeated_rad, usual_rad, named)
 
 
@@ -130,6 +132,25 @@ def test_what_follows_something_is_structured_sooner_than_what_follows_nothing()
     for limit, follows, named in zip(beyond, (True, False, False), (True, True, False), strict=True):
         assert structured(1.01 * limit**0.5, follows, named=named)
         assert not structured(0.99 * limit**0.5, follows, named=named)
+
+
+@pytest.mark.parametrize(
+    ("times_noise", "share", "is_one"),
+    [
+        (1.4, 0.2, False),  # two fifths of noise's square
+        (1.4, 0.3, True),
+        (1.9, 0.1, False),
+        (1.9, 0.2, True),
+        (2.1, 0.01, True),  # this much is no noise, whatever part of it follows something
+        (1.2, 1.0, False),
+    ],
+)
+def test_near_the_noise_what_follows_something_has_to_be_a_good_part_of_it(
+    times_noise: float, share: float, is_one: bool
+) -> None:
+    assert structured(times_noise, follows=True, share=share) == is_one
+    of_repeats = structured(3.0 * times_noise, follows=True, repeated_rad=3.0 * NOISE, share=share)
+    assert of_repeats == is_one
 
 
 def test_what_the_machine_itself_does_not_repeat_is_no_structure() -> None:

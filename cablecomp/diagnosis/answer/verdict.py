@@ -54,12 +54,17 @@ def is_structured(
     found: Location, series: Series, repeated_rad: float | None, usual_rad: float, named: bool
 ) -> bool:
     """Whether what is left is more than noise, than what repeats, and than what the joint is known to leave, and
-    follows something; beside a name, far more than that is enough, and where nothing is named, far more than noise and
-    clearly more than what repeats (an event makes repeats differ, too)."""
+    follows something (near these, that part of it alone has to be as much more); beside a name, far more than that is
+    enough, and where nothing is named, far more than noise and clearly more than what repeats (an event makes repeats
+    differ, too)."""
     left = float(np.mean(series.residual**2))
     noise, yardstick = float(np.mean(series.sigma)), max(repeated_rad or 0.0, usual_rad)
-    if found.significant(LIMITS.p_structured):
-        return left > LIMITS.structured * max(noise, yardstick) ** 2
+    shown = found.significant(LIMITS.p_structured)
+    if shown:
+        usual = max(noise, yardstick) ** 2
+        near = left < LIMITS.near_noise**2 * usual
+        part = max(m.share for m in shown) if near else 1.0
+        return left > LIMITS.structured * usual and part * left > (LIMITS.structured - 1.0) * usual
     of_noise = LIMITS.beyond_noise if named else LIMITS.far_beyond_noise
     return left > max(of_noise * noise**2, LIMITS.beyond_noise * yardstick**2)
 
