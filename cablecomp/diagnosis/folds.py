@@ -101,7 +101,7 @@ def make_groups(fit: Fit) -> Groups:
     problem = fit.problem
     owners = [problem.owners(c) for c in problem.channels]
     counts = np.bincount(owners[0], minlength=len(problem.evidence))
-    by = kind_of_parts(len(problem.evidence))
+    by = kind_of_parts(problem)
     each = _blocks_of_each(fit, owners[0], counts)
     alone = _alone(problem.evidence, by)
     blocks, folds, channels = [], [], []
@@ -139,9 +139,12 @@ def shown_apart(problem: Problem, by: str) -> Collection[str]:
     return problem.sessions if by == "block" else problem.repeated
 
 
-def kind_of_parts(recordings: int) -> str:
-    """What is left out of so many recordings: whole ones ("recording") where there are enough, else blocks of rows."""
-    return "recording" if recordings >= LIMITS.recordings else "block"
+def kind_of_parts(problem: Problem) -> str:
+    """What is left out in turn: whole recordings ("recording") where there are enough, else blocks of rows; blocks,
+    too, where sessions have values of their own, zeros apart, that nothing but their one recording tells."""
+    own = any(p.session and "_offset_" not in p.base for p in problem.parameters)
+    enough = len(problem.evidence) >= LIMITS.recordings
+    return "recording" if enough and (not own or len(problem.repeated) > 1) else "block"
 
 
 def _alone(evidence: Sequence[Evidence], by: str) -> BoolArray:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cablecomp.diagnosis.folds import left_out_in_turn
+from cablecomp.diagnosis.folds import kind_of_parts, left_out_in_turn
 from cablecomp.estimation.evidence import JOINT, Evidence
 
 
@@ -43,3 +45,21 @@ def test_blocks_are_left_out_once() -> None:
         assert np.array_equal(counted, np.ones(60))
         for part in parts:
             assert not np.any(part.out[k].counted[JOINT] & part.rest[k].counted[JOINT])
+
+
+@pytest.mark.parametrize(
+    ("sessions", "own", "what"),
+    [
+        ("abc", "", "block"),  # too few
+        ("abcd", "", "recording"),
+        ("abcd", "pretension_N", "block"),  # only its one recording tells how tight a session's cables are
+        ("aabb", "pretension_N", "recording"),
+        ("abcd", "joint_torque_offset_Nm", "recording"),
+    ],
+)
+def test_what_a_session_alone_tells_is_not_left_out_as_a_whole(sessions: str, own: str, what: str) -> None:
+    named = [SimpleNamespace(base=own, session=s) for s in dict.fromkeys(sessions) if own]
+    common = SimpleNamespace(base="EA_N", session=None)
+    repeated = frozenset(s for s, n in Counter(sessions).items() if n > 1)
+    problem: Any = SimpleNamespace(evidence=list(sessions), repeated=repeated, parameters=[common, *named])
+    assert kind_of_parts(problem) == what

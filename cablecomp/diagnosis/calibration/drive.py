@@ -101,23 +101,24 @@ def _tightened_anew(fit: Fit, floor: Weighing, floor_rad: float) -> Fit:
     looks like physics.
 
     Where more is left, something else is missing (cables that creep loosen from session to session, too), and the
-    search asks for it beside its effects, as it does for a drive that is known by order of magnitude. Not of an open
-    circuit, whose weight or spring is the same."""
+    search asks for it beside its effects, if it can (of four and more sessions of one recording each nothing would be
+    left to judge it by), as it does for a drive that is known by order of magnitude. Not of an open circuit, whose
+    weight or spring is the same."""
     problem = fit.problem
     place = next((k for k, p in enumerate(problem.parameters) if p.name == PRETENSION), None)
-    shown = shown_apart(problem, kind_of_parts(len(problem.evidence)))
     closed = problem.config.drive.circuit == "closed"
-    if place is None or len(shown) < 2 or not closed or problem.states(PRETENSION):
+    sessions = len(problem.sessions)
+    if place is None or sessions < 2 or not closed or problem.states(PRETENSION):
         return fit
     if vague_drive(problem.parameters):
         return fit
-    sessions = len(problem.sessions)
     x = np.concatenate((fit.x[:place], np.full(sessions, fit.x[place]), fit.x[place + 1 :]))
     own = solve(problem.with_own(place), x, 10)
     if 2.0 * (fit.cost - own.cost) <= LIMITS.tightened_anew * (sessions - 1):
         return fit
     own = refit(own, weighed(own, floor), 8)
-    return own if rms_left(own) < LIMITS.all_but_noise * floor_rad else fit
+    asked = len(shown_apart(problem, kind_of_parts(problem))) > 1
+    return fit if asked and rms_left(own) >= LIMITS.all_but_noise * floor_rad else own
 
 
 def _followed(problem: Problem) -> Problem:
