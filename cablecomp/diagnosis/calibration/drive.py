@@ -52,7 +52,8 @@ def calibrate_drive(
 ) -> Calibrated:
     """Calibrate the drive on these recordings; raises InputError where the nominal drive cannot follow one.
 
-    `as_stated`: free lengths and the torque sensor's gain are exact where no tolerance is stated of them."""
+    `as_stated`: free lengths and the torque sensor's gain are exact where no tolerance is stated of them, and what
+    `[session] own` does not name is one for all sessions."""
     parameters = _parameters(config, evidence, as_stated)
     problem = _followed(Problem(config, parameters, tuple(evidence), first_weights(config, evidence)))
     floor = _floor(evidence, problem.channels)
