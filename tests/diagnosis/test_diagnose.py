@@ -140,7 +140,9 @@ def test_a_pretension_that_differs_between_sessions_is_no_event() -> None:
     # how tight both are trades places with friction; by how much they differ does not
     assert found["tuesday"] / found["monday"] == pytest.approx(1.05 / 0.95, rel=0.02)
     assert d.verdict in ("consistent", "recalibrate")
-    assert d.augmented.heldout_rmse_rad < 0.8 * d.baseline.heldout_rmse_rad
+    # what one pretension for both leaves, it no longer does before anything is asked for
+    assert d.baseline.heldout_rmse_rad < 1.1 * d.noise_floor_rad
+    assert d.augmented.heldout_rmse_rad < 1.1 * d.noise_floor_rad
 
 
 @pytest.mark.parametrize("off", [0.95, 1.05])
