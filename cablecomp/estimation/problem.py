@@ -19,11 +19,11 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.limits import CARRYOVER_SD, HOPELESS, STEP
+from cablecomp.estimation.limits import HOPELESS, STEP
 from cablecomp.estimation.parameter import Parameter, own_of
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing, stood, with_common
-from cablecomp.estimation.zeros import Zeros
+from cablecomp.estimation.zeros import Zeros, zeros_of
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 Misfits: TypeAlias = dict[str, list[FloatArray]]
@@ -315,37 +315,8 @@ class Problem:
 
     def _zeros_of(self, channel: str) -> Zeros:
         sigma, spread = self.weighing.sigma[channel], self.weighing.zero_sd.get(channel, 0.0)
-        width = 2 if channel == MOTOR else 1
-        sessions = self.sessions
-        n_dep = len(self.evidence) if self.departs else 0
-        spread = max(spread, 1e-6 * sigma)
-        carried = [
-            r.carryover[channel].shape[1] if channel in r.counted and channel in r.carryover else 0
-            for r in self.evidence
-        ]
-        own = width * len(sessions)
-        free = own + n_dep
-        blocks = []
-        for k, r in enumerate(self.evidence):
-            if channel not in r.counted:
-                continue
-            kept = r.counted[channel]
-            w = r.weight[kept] / sigma
-            block = np.zeros((len(w), free + sum(carried)))
-            first = width * sessions.index(r.session)
-            block[:, first] = w
-            if width == 2:
-                block[:, first + 1] = w * r.at_rows("motor_position_rad")[kept]
-            if n_dep:
-                block[:, own + k] = w
-            if carried[k]:
-                at = free + sum(carried[:k])
-                block[:, at : at + carried[k]] = w[:, None] * r.carryover[channel][kept]
-            blocks.append(block)
-        matrix = np.vstack(blocks)
-        penalty = np.zeros((n_dep + sum(carried), matrix.shape[1]))
         moved = self.weighing.moved.get(channel, {})
-        departing = [1.0 / moved.get(r.name, spread) for r in self.evidence[:n_dep]]
-        penalty[:, own:] = np.diag(departing + [1.0 / CARRYOVER_SD] * sum(carried))
-        Q, R = np.linalg.qr(np.vstack([matrix, penalty]))
-        return Zeros(Q, R, len(penalty))
+        departs = (
+            [moved.get(r.name, max(spread, 1e-6 * sigma)) for r in self.evidence] if self.departs else []
+        )
+        return zeros_of(self.evidence, self.sessions, channel, sigma, departs)
