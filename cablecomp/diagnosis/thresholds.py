@@ -66,11 +66,9 @@ class Thresholds:
     has spoiled it, and the angle goes first (a motor torque of the wrong sign where the encoder had died)."""
     tightened_anew: float = 4.0
     """Twice the cost, for each session after the first, that a pretension of each session's own has to take off the
-    calibrated drive: two standard errors, ..."""
-    all_but_noise: float = 2.0
-    """... and what it may leave then, over what noise does (of 17 joints of trials seed 814 that nothing is missing of
-    and that one pretension left most of, 1.6 to 4.2 of the noise, ten are left 1.2 to 1.7 by it; of two whose cables
-    creep, trials 733/20 and 36, it leaves 2.1 and 3.0)."""
+    calibrated drive: two standard errors. It has to come near the noise (`near_noise`) by it, too: of 17 joints of
+    trials seed 814 that nothing is missing of and that one pretension left most of, 1.6 to 4.2 of the noise, ten are
+    left 1.2 to 1.7 by it; of two whose cables creep, trials 733/20 and 36, it leaves 2.1 and 3.0."""
     history: float = 0.15
     """Part of what is usually left over that an unknown history may still move the joint by where rows count."""
     history_most: float = 0.4

@@ -142,7 +142,6 @@ def test_a_pretension_that_differs_between_sessions_is_no_event() -> None:
     assert d.verdict in ("consistent", "recalibrate")
     # what one pretension for both leaves, it no longer does before anything is asked for
     assert d.baseline.heldout_rmse_rad < 1.1 * d.noise_floor_rad
-    assert d.augmented.heldout_rmse_rad < 1.1 * d.noise_floor_rad
 
 
 @pytest.mark.parametrize("off", [0.95, 1.05])

@@ -109,9 +109,8 @@ def _tightened_anew(fit: Fit, floor: Weighing, floor_rad: float) -> Fit:
     place = next((k for k, p in enumerate(problem.parameters) if p.name == PRETENSION), None)
     closed = problem.config.drive.circuit == "closed"
     sessions = len(problem.sessions)
-    if place is None or sessions < 2 or not closed or problem.states(PRETENSION):
-        return fit
-    if vague_drive(problem.parameters):
+    stands = problem.states(PRETENSION) or vague_drive(problem.parameters)
+    if place is None or sessions < 2 or not closed or stands:
         return fit
     x = np.concatenate((fit.x[:place], np.full(sessions, fit.x[place]), fit.x[place + 1 :]))
     own = solve(problem.with_own(place), x, 10)
@@ -119,7 +118,7 @@ def _tightened_anew(fit: Fit, floor: Weighing, floor_rad: float) -> Fit:
         return fit
     own = refit(own, weighed(own, floor), 8)
     asked = len(shown_apart(problem, kind_of_parts(problem))) > 1
-    return fit if asked and rms_left(own) >= LIMITS.all_but_noise * floor_rad else own
+    return fit if asked and rms_left(own) >= LIMITS.near_noise * floor_rad else own
 
 
 def _followed(problem: Problem) -> Problem:
