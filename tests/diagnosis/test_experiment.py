@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from turning import LIMITED, recorded
 
 from cablecomp.config import JointConfig, with_values
+from cablecomp.diagnosis.answer.entries import next_experiment
 from cablecomp.diagnosis.explain.experiment import best_experiment, candidates
 from cablecomp.diagnosis.locate.covariates import Covariates, covariates
 from cablecomp.effects import with_effects
@@ -43,6 +47,20 @@ def test_where_no_limit_is_stated_nothing_goes_beyond_what_was_recorded(seen: Co
         assert np.max(np.abs(asked)) <= most * (1.0 + 1e-9), protocol.name
 
 
+def test_a_joint_whose_load_is_neither_recorded_nor_limited_is_only_moved(seen: Covariates) -> None:
+    bare = LIMITED.model_copy(update={"limits": type(LIMITED.limits)()})
+    free = Covariates(**{**vars(seen), "values": {**seen.values, "load": np.zeros_like(seen.values["load"])}})
+    protocols = candidates(bare, free)
+    low, high = (f(seen.values["joint_angle"]) for f in (np.min, np.max))
+    for protocol in protocols:
+        asked = [protocol.reference(t) for t in np.linspace(0.0, protocol.duration_s, 500)]
+        assert {a.joint_torque_Nm for a in asked} == {0.0}, protocol.name
+        assert low <= min(a.joint_position_rad for a in asked), protocol.name
+        assert max(a.joint_position_rad for a in asked) <= high, protocol.name
+    loaded = {p.name for p in candidates(bare, seen)}
+    assert {p.name for p in protocols} < loaded
+
+
 def apart(a: JointConfig, b: JointConfig, seen: Covariates) -> float:
     found = best_experiment([a, b], seen, FLOOR_RAD, 20.0)
     assert found is not None
@@ -52,6 +70,31 @@ def apart(a: JointConfig, b: JointConfig, seen: Covariates) -> float:
 def test_a_bearing_is_set_apart_from_a_mount_and_nothing_from_itself(seen: Covariates) -> None:
     assert apart(MOUNT, MOUNT, seen) == pytest.approx(0.0, abs=1e-6)
     assert apart(MOUNT, BEARING, seen) > 1.0
+
+
+def test_nothing_is_proposed_that_sets_no_models_apart(seen: Covariates) -> None:
+    """A protocol whose answers are alike costs an afternoon at the bench: a note says what would help."""
+
+    def proposed(other: JointConfig) -> tuple[object, tuple[str, ...]]:
+        def fitted(joint: JointConfig) -> Any:
+            problem = SimpleNamespace(
+                joint=lambda *_: joint, evidence=[SimpleNamespace(columns=recorded(LIMITED))]
+            )
+            return SimpleNamespace(fit=SimpleNamespace(problem=problem, x=np.zeros(0)))
+
+        rival = SimpleNamespace(term=SimpleNamespace(name="rival"), model=fitted(other))
+        selection: Any = SimpleNamespace(final=fitted(MOUNT), rounds=[SimpleNamespace(tried=[rival])])
+        case: Any = SimpleNamespace(
+            drive=SimpleNamespace(fit=fitted(MOUNT).fit, floor_rad=FLOOR_RAD), covariates=[seen]
+        )
+        outcome: Any = SimpleNamespace(weighed=[SimpleNamespace(rivals=["rival"])])
+        return next_experiment(case, selection, outcome, [])
+
+    assert proposed(BEARING)[0] is not None
+    assert not proposed(BEARING)[1]
+    nothing, (note,) = proposed(MOUNT)
+    assert nothing is None
+    assert "by more than 0.0 noise floors" in note
 
 
 def test_what_a_straight_line_in_the_load_explains_sets_nothing_apart(seen: Covariates) -> None:

@@ -41,6 +41,7 @@ def diagnosis_of(
     """Everything found; `location`: where the calibrated drive's misfit lies."""
     drive, kept = case.drive, outcome.kept
     unseen, hidden = could_be_unseen(kept.fit, found.pool, outcome.names)
+    proposed, alike = next_experiment(case, found.selection, outcome, hidden)
     return Diagnosis(
         config=case.config,
         recordings=case.body.names,
@@ -62,12 +63,12 @@ def diagnosis_of(
         candidates=candidates(outcome.weighed, found.selection, found.final),
         not_excluded=(*tied_of(outcome.weighed, found.selection), *(((h.effect,), h.why) for h in hidden)),
         empirical=_laws(outcome),
-        next_experiment=next_experiment(case, found.selection, outcome, hidden),
+        next_experiment=proposed,
         could_be_unseen=tuple(unseen),
         remainder=remainder(case, outcome, rng),
         remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.names),
-        notes=notes(case),
+        notes=(*notes(case), *alike),
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates, outcome.empirical)),

@@ -16,7 +16,7 @@ from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_lev
 from cablecomp.diagnosis.explain.conformal import conformal_set, deficits
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.events import course_of
-from cablecomp.diagnosis.explain.experiment import best_experiment
+from cablecomp.diagnosis.explain.experiment import APART, best_experiment
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection
 from cablecomp.diagnosis.explain.unseen import Hidden
@@ -32,9 +32,15 @@ from cablecomp.estimation.evidence import JOINT, load_channel
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.profile import profile_interval
+from cablecomp.observer import Observer
 
 SAID = 4
 """Recordings whose clock is told in a note; of more, the file has it."""
+
+TOO_ALIKE = (
+    "no motion within the limits, or the reach of these recordings, sets the models that these data cannot tell apart "
+    "by more than {:.1f} noise floors (RMS): a load recorded (joint_torque_Nm), or wider [limits], may"
+)
 
 
 def named_of(w: Weighed, final: Model) -> Named:
@@ -189,8 +195,9 @@ def tested(selection: Selection, named: Sequence[str]) -> tuple[Tested, ...]:
 
 def next_experiment(
     case: Case, selection: Selection, outcome: Outcome, hidden: Sequence[Hidden]
-) -> tuple[str, str] | None:
-    """Where effects are tied, or one hides behind the calibration, what would set the predictions apart."""
+) -> tuple[tuple[str, str] | None, tuple[str, ...]]:
+    """Where effects are tied, or one hides behind the calibration, what would set the predictions apart: why, and the
+    protocol; or a note that nothing within the limits does."""
     first = case.drive.fit.problem.evidence[0]
     names = {n for w in outcome.weighed for n in w.rivals}
     models = [selection.final.fit.problem.joint(selection.final.fit.x, first)]
@@ -202,14 +209,21 @@ def next_experiment(
     if len(models) < 2:
         fit = outcome.kept.fit
         models = [fit.problem.joint(fit.x, first), *(h.joint for h in hidden[:1])]
+    models = [
+        m for m in models if not Observer(m).channels
+    ]  # a neighbour's channel is nothing that a motion makes
     if len(models) < 2:
-        return None
+        return None, ()
     temperature = float(np.mean(first.columns.get("temperature_degC", np.array([20.0]))))
     try:
         best = best_experiment(models, join(list(case.covariates)), case.drive.floor_rad, temperature)
     except InputError:
-        return None
-    return None if best is None else (best.why, best.protocol.to_toml())
+        return None, ()
+    if best is None:
+        return None, ()
+    if best.separation < APART:
+        return None, (TOO_ALIKE.format(best.separation),)
+    return (best.why, best.protocol.to_toml()), ()
 
 
 def remainder(case: Case, outcome: Outcome, rng: np.random.Generator) -> dict[str, object]:

@@ -27,6 +27,9 @@ from cablecomp.signal.smoothing import FloatArray
 STEPS = 2500
 """Instants at which a proposed motion is simulated."""
 
+APART = 0.5
+"""Noise floors (RMS) that a protocol has to set two models apart by; less is not worth anybody's time at the bench."""
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -38,7 +41,8 @@ class Experiment:
 
 
 class Reach(NamedTuple):
-    """What a protocol may use: largest load [N m], joint angles [rad], top speed of the joint [rad/s]."""
+    """What a protocol may use: largest load [N m; 0: none is known], joint angles [rad], top speed of the joint
+    [rad/s]."""
 
     load: float
     low: float
@@ -77,15 +81,43 @@ def _reach(config: JointConfig, seen: Covariates) -> Reach:
         low = config.limits.joint_position_min_rad
     if config.limits.joint_position_max_rad is not None:
         high = config.limits.joint_position_max_rad
-    return Reach(max(load, 1e-6), low, high, _top_speed(config, seen))
+    return Reach(load, low, high, _top_speed(config, seen))
 
 
 def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
-    """Protocols inside the configuration's limits; where it states none, inside those of the recordings."""
+    """Protocols inside the configuration's limits; where it states none, inside those of the recordings.
+
+    A joint whose load is neither recorded nor limited is only moved.
+    """
     reach = _reach(config, seen)
-    load, low, high, _ = reach
-    travel, middle, rate, quick = reach.travel, reach.middle, reach.rate, reach.quick
+    moved = _moved(reach)
+    return [*_loaded(reach), *moved] if reach.load > 0.0 else moved
+
+
+def _moved(reach: Reach) -> list[Protocol]:
+    """What a motor does by itself, whatever load is there."""
+    travel, middle = reach.travel, reach.middle
     start = {"start_position_rad": middle}
+    swings = (0.4, -0.4, 0.28, -0.2, 0.16, -0.08, 0.4, 0.0, 0.4, 0.2, 0.4)  # one way again and again, too
+    return [
+        Protocol(name="nested reversals of the joint", segment=(
+            NestedReversals(
+                channel="position", peaks=tuple(middle + share * travel for share in swings * 2),
+                rate=min(travel / 3.0, 0.5 * reach.speed),
+            ),
+        ), **start),
+        Protocol(name="quick and slow motion, load at rest", segment=tuple(
+            Ramp(duration_s=share * reach.quick, position_rad=middle + side * 0.4 * travel)
+            for share in (4.0, 1.0, 2.0, 1.4) * 4 for side in (1.0, -1.0)
+        ), **start),
+    ]  # fmt: skip
+
+
+def _loaded(reach: Reach) -> list[Protocol]:
+    """What needs a known load at the joint."""
+    load, low, high, _ = reach
+    travel, rate = reach.travel, reach.rate
+    start = {"start_position_rad": reach.middle}
     # every swing comes several times: what is judged on held-out blocks must stand in many of them
     swings = (load, -load, 0.7 * load, -0.5 * load, 0.4 * load, -0.2 * load)
     nested = NestedReversals(peaks=(*swings * 3, load), rate=rate)
@@ -114,10 +146,6 @@ def candidates(config: JointConfig, seen: Covariates) -> list[Protocol]:
                 peaks=(0.05 * load, -0.05 * load, 0.1 * load, -0.1 * load, load, -load) * 3,
                 rate=rate, dwell_s=1.0,
             ),
-        ), **start),
-        Protocol(name="quick and slow motion, load at rest", segment=tuple(
-            Ramp(duration_s=share * quick, position_rad=middle + side * 0.4 * travel)
-            for share in (4.0, 1.0, 2.0, 1.4) * 4 for side in (1.0, -1.0)
         ), **start),
         Protocol(name="wait for the temperature", segment=(
             Ramp(duration_s=4.0, load_Nm=0.8 * load), Wait(duration_s=30.0, why="let the temperature change"),
@@ -189,9 +217,8 @@ def _readings(
     columns["motor_torque_Nm"] = -ratio * columns["joint_torque_Nm"]
     found = []
     for model in models:
-        own = columns | {name: np.zeros(STEPS) for name in Observer(model).channels}
         try:
-            found.append(Observer(model).run(own)["joint_position_rad"])
+            found.append(Observer(model).run(columns)["joint_position_rad"])
         except InputError:
             return None
     return [*found, columns["joint_torque_Nm"]]
