@@ -89,7 +89,8 @@ class Parameter:
     the effect's others. `per_reading`: low..high are what the largest reading of the channel that the effect reads does
     (of a slack: shares of that reading): what a unit of it means, no configuration tells. `needs`: a channel without
     which it says nothing. `within_recording`: a time that a diagnosis asks up to the longest recording's; from there on
-    what follows is a drift, whatever it follows, and another effect the better word.
+    what follows is a drift, whatever it follows, and another effect the better word. `of_speed`: a shape that goes with
+    speed, asked for also where every sample is run.
     """
 
     name: str
@@ -122,6 +123,7 @@ class Parameter:
     per_reading: bool = False
     needs: str = ""
     within_recording: bool = False
+    of_speed: bool = False
 
     @property
     def shape(self) -> bool:

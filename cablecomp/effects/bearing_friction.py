@@ -21,13 +21,15 @@ from cablecomp.effects.base import (
 
 
 @term(
-    parameters=("torque", "growth", "load_coefficient", "presliding", "radius", "radial_at_rest"),
+    parameters=("torque", "growth", "load_coefficient", "presliding", "viscous", "radius", "radial_at_rest"),
     state=("z",),
 )
 def _hold_back(c: Any, p: Any, s: Any) -> None:
-    """p: torque [N m], growth [1/(N m)], load coefficient, presliding [rad], R [m], R (T_h + T_l) at rest [N m].
+    """p: torque [N m], growth [1/(N m)], load coefficient, presliding [rad], growth with speed [s/rad], R [m],
+    R (T_h + T_l) at rest [N m].
 
-    The first sample counts from the angle at uniform pretension, as the profiles do: z = 0 there.
+    The first sample counts from the angle at uniform pretension, as the profiles do: z = 0 there. The joint's speed is
+    the rigid drive's, where that is known beside the samples, and what the deflection adds since the last one.
     """
     radial = p.radial_at_rest
     if not math.isnan(c.tension_h):
@@ -44,6 +46,12 @@ def _hold_back(c: Any, p: Any, s: Any) -> None:
     else:
         c.moment_slope += limit / p.presliding
     c.moment += limit * z
+    if p.viscous > 0.0 and c.dt > 0.0 and not c.first:
+        speed = (c.joint - c.joint_old) / c.dt
+        if not math.isnan(c.motor_rate):
+            speed += c.rigid * (c.motor_rate - (c.motor - c.motor_old) / c.dt)
+        c.moment += p.torque * p.viscous * speed
+        c.moment_slope += p.torque * p.viscous / c.dt
     if c.commit:
         s.z = z
 
@@ -55,6 +63,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         growth=values["growth_per_Nm"],
         load_coefficient=values["load_coefficient"],
         presliding=values["presliding_rad"],
+        viscous=values["viscous_s_per_rad"],
         radius=drum_radius(config),
         radial_at_rest=cables * pretension_moment(config),
     )
@@ -64,11 +73,14 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 EFFECT = Effect(
     id="bearing_friction",
     statement="The output bearing holds the joint back with a nearly constant torque against its motion, "
-    "more under radial load, or where the joint's load tilts it; at a reversal it gives way elastically first.",
-    equation="M_cable = M - τ_b z, dz = dq_out/δ within -1 <= z <= 1, τ_b = τ_0 (1 + g |M|) + κ R (T_h + T_l)",
+    "more under radial load, where the joint's load tilts it, or, in grease, the quicker it turns; at a reversal it "
+    "gives way elastically first.",
+    equation="M_cable = M - τ_b z - τ_0 ν dq_out/dt, dz = dq_out/δ within -1 <= z <= 1, "
+    "τ_b = τ_0 (1 + g |M|) + κ R (T_h + T_l)",
     source="one elasto-plastic (Jenkins) element, the static limit of P. Dahl, A Solid Friction Model, "
     "1968; torque in proportion to the radial load: rolling bearing manufacturers' estimate M = mu "
-    "F d/2, of crossed rollers with the tilting moment in F",
+    "F d/2, of crossed rollers with the tilting moment in F; "
+    "a part in proportion to speed as they state it of grease",
     parameters=(
         Parameter(
             "torque_Nm",
@@ -120,6 +132,21 @@ EFFECT = Effect(
             log=True,
             role="presliding",
             minimum=1e-9,
+        ),
+        Parameter(
+            "viscous_s_per_rad",
+            "s/rad",
+            0.0,
+            0.005,
+            50.0,
+            "ν, growth with the joint's speed, over τ_0; 0: it does not",
+            log=True,
+            role="shape",
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.1, 1.0, 10.0),
+            of_speed=True,
+            needs="motor_torque_Nm",  # by the joint's angle alone it is a channel that comes late
         ),
     ),
     acts_through=("reversal", "velocity", "load_direction"),

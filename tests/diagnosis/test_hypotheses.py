@@ -234,6 +234,21 @@ def test_a_drag_of_the_motor_is_asked_for_where_the_load_is_read_there(load: str
     assert drags == (load == "motor_torque")
 
 
+@pytest.mark.parametrize("read", [True, False])
+def test_a_drag_of_the_joint_is_asked_for_where_the_motors_torque_is_read(read: bool) -> None:
+    """By the joint's angle alone it is a channel that comes late. Where every sample is run it is all that is asked."""
+    columns = recorded()
+    if read:
+        columns["motor_torque_Nm"] = 0.3 * columns["joint_torque_Nm"]
+    pool = hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used)
+    (own,) = [h for h in pool if h.name == "bearing_friction"]
+    assert any("viscous_s_per_rad" in further for further in own.further) == read
+    assert {name for further in own.further_at_speed for name in further} == (
+        {"viscous_s_per_rad"} if read else set()
+    )
+    assert len(own.further) > len(own.further_at_speed)
+
+
 def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
     """Below zero an event's size means cable l, of which an open circuit has none."""
     open_circuit = JOINT.model_copy(update={"drive": JOINT.drive.model_copy(update={"circuit": "open"})})

@@ -204,6 +204,18 @@ def test_bearing_friction_holds_back_more_where_the_load_tilts_the_bearing(
     assert found == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize("name", ["snow-closed-rig", "tendon-finger", "two-stage-series"])
+def test_bearing_friction_in_grease_drags_with_the_joints_speed(name: str) -> None:
+    config = joint(name)
+    columns = excitation(config)
+    torque = 0.02 * unit(config)
+    values = {"torque_Nm": torque, "load_coefficient": 0.0, "presliding_rad": 1e-3, "viscous_s_per_rad": 3.0}
+    found = run(config, columns, ("bearing_friction", values))["joint_position_rad"]
+    speed = np.concatenate(([0.0], np.diff(found) / np.diff(columns["time_s"])))
+    load = columns["joint_torque_Nm"] - torque * (presliding(found, 0.0, 1e-3) + 3.0 * speed)
+    assert found == pytest.approx(fed_with(config, columns, load), abs=1e-9)
+
+
 def test_bearing_friction_grows_with_its_load() -> None:
     config = joint("snow-open-rig")
     columns = excitation(config)

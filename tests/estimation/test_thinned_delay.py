@@ -1,4 +1,5 @@
-"""A late encoder on rows picked from many: what their spacing hides of the motion is told by its speed."""
+"""A late encoder, and a bearing that drags with speed, on rows picked from many: what their spacing hides of the motion
+is told by its speed."""
 
 from __future__ import annotations
 
@@ -13,27 +14,35 @@ from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.simulate import simulator
 from cablecomp.signal.smoothing import FloatArray
 
+DRAG = {"torque_Nm": 1e-6, "load_coefficient": 0.0, "presliding_rad": 1e-3, "viscous_s_per_rad": 4e4}
+"""Grease, and next to nothing else."""
 
-def shift(e: Evidence, delay_s: float, *, every: bool) -> FloatArray:
-    """What a delay does to the joint's readings on the judged rows, run on these alone or on all fine rows [rad]."""
+
+def shift(e: Evidence, effect: str, values: dict[str, float], *, every: bool) -> FloatArray:
+    """What an effect does to the joint's readings on the judged rows, run on these alone or on all fine rows [rad]."""
     kept = np.arange(len(e.columns["time_s"])) if every else e.rows
-    late = simulator(with_effects(JOINT, [("clock_skew", {"delay_s": delay_s})])).run(e, kept)
+    with_it = simulator(with_effects(JOINT, [(effect, values)])).run(e, kept)
     plain = simulator(JOINT).run(e, kept)
-    found = late.joint - plain.joint
+    found = with_it.joint - plain.joint
     return found[e.rows] if every else found
 
 
-@pytest.mark.parametrize("delay_s", [2e-4, 5e-3, 0.03])
-def test_a_delay_between_thinned_rows_is_what_it_is_between_all(delay_s: float) -> None:
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [*(("clock_skew", {"delay_s": late}) for late in (2e-4, 5e-3, 0.03)), ("bearing_friction", DRAG)],
+)
+def test_what_goes_with_speed_is_between_thinned_rows_what_it_is_between_all(
+    effect: str, values: dict[str, float]
+) -> None:
     e = gather(JOINT, "one", recorded(), "a", fine_rows=2000, judged_rows=150)
     assert np.median(np.diff(e.at_rows("time_s"))) > 0.03
-    true = shift(e, delay_s, every=True)
+    true = shift(e, effect, values, every=True)
     size = float(np.sqrt(np.mean(true**2)))
-    off = float(np.sqrt(np.mean((shift(e, delay_s, every=False) - true) ** 2)))
+    off = float(np.sqrt(np.mean((shift(e, effect, values, every=False) - true) ** 2)))
     assert off < 0.03 * size
     unknown = replace(e)
     unknown.__dict__["motor_rate"] = np.full(len(e.columns["time_s"]), np.nan)
-    straight = float(np.sqrt(np.mean((shift(unknown, delay_s, every=False) - true) ** 2)))
+    straight = float(np.sqrt(np.mean((shift(unknown, effect, values, every=False) - true) ** 2)))
     assert straight > 2.0 * off  # by straight lines
 
 

@@ -136,6 +136,12 @@ class Hypothesis:
         return next((p.name for p in own if p.role == role), "")
 
     @property
+    def further_at_speed(self) -> tuple[Mapping[str, float], ...]:
+        """What of `further` goes with speed: all of a law with rates, else what such a shape is."""
+        at_speed = {p.name for p in self.effect.parameters if self.effect.rates or p.of_speed}
+        return tuple(values for values in self.further if at_speed & set(values))
+
+    @property
     def trades(self) -> bool:
         """Whether it trades places with calibration and other effects of its kind: friction and stiffness in
         the load's path."""

@@ -89,8 +89,8 @@ def _plainly(here: Anchor, h: Hypothesis) -> tuple[Answer, Best] | None:
 def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
     """The best with one of the shapes that its starts leave out, where that promises enough more; an event is asked at
     every instant with each of them, then for its course."""
-    # where every run is dear no shape is asked for but by laws that need it so; of an event, its course alone
-    further = () if here.fit.problem.fine and not h.effect.rates else h.further
+    # where every run is dear no shape is asked for but what goes with speed; of an event, its course alone
+    further = h.further if not here.fit.problem.fine else h.further_at_speed
     if h.has_phase:
         pair = best_pair(here, h, further)
         worth = pair is not None and worth_a_shape(pair.by_channel, best.by_channel)
