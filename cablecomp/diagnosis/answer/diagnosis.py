@@ -14,7 +14,6 @@ from cablecomp.diagnosis.answer.augmented import (
 from cablecomp.diagnosis.answer.entries import (
     candidates,
     channel_word,
-    late_or_dragging,
     named_of,
     next_experiment,
     notes,
@@ -69,7 +68,7 @@ def diagnosis_of(
         remainder=remainder(case, outcome, rng),
         remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.names),
-        notes=(*notes(case), *late_or_dragging(case, outcome), *alike),
+        notes=(*notes(case), *alike),
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates, outcome.empirical)),

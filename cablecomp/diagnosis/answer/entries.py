@@ -28,7 +28,7 @@ from cablecomp.diagnosis.outcome import Case, Outcome
 from cablecomp.diagnosis.result import Named, Tested, Traces, Value
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, MOTOR, load_channel
+from cablecomp.estimation.evidence import JOINT, load_channel
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.profile import profile_interval
@@ -36,12 +36,6 @@ from cablecomp.observer import Observer
 
 SAID = 4
 """Recordings whose clock is told in a note; of more, the file has it."""
-
-LATE_OR_DRAGGING = (
-    "a joint that drags with its speed, as in grease, answers as one whose encoder comes late: the motor's torque, "
-    "recorded (motor_torque_Nm), tells them apart"
-)
-"""Beside a late encoder."""
 
 TOO_ALIKE = (
     "no motion within the limits, or the reach of these recordings, sets the models that these data cannot tell apart "
@@ -281,12 +275,6 @@ def notes(case: Case) -> tuple[str, ...]:
             f"{', '.join(begun[:SAID])}{more}"
         )
     return tuple(found)
-
-
-def late_or_dragging(case: Case, outcome: Outcome) -> tuple[str, ...]:
-    """A note beside a late encoder where no motor's torque tells it from a joint that drags with its speed."""
-    late = any(w.term.effect.id == "clock_skew" and w.term.amount.name == "delay_s" for w in outcome.named)
-    return (LATE_OR_DRAGGING,) if late and MOTOR not in case.drive.fit.problem.channels else ()
 
 
 def channel_word(channel: str) -> str:
