@@ -53,9 +53,9 @@ def told(said: str | None) -> tuple[float, float]:
     return float(found[1]), 1e-3 * float(found[2])
 
 
-def test_the_drag_that_is_told_does_to_the_plants_angle_what_the_delay_does() -> None:
-    drag, differs = told(drag_alike(late(recorded(dragging(0.7), 12.0))))
-    time, motor, load = course(12.0)
+def done(drag: float, loads: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """What the delay and what that drag do to the plant's angle [rad]."""
+    time, motor, load = course(12.0, loads)
 
     def angle(effects: list[EffectSpec]) -> FloatArray:
         return simulate(PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=effects).channels()[
@@ -63,10 +63,23 @@ def test_the_drag_that_is_told_does_to_the_plants_angle_what_the_delay_does() ->
         ]
 
     plain = angle([])
-    delayed = CubicSpline(time, plain)(time - LATE_S) - plain
-    dragged = angle(dragging(drag)) - plain
+    return CubicSpline(time, plain)(time - LATE_S) - plain, angle(dragging(drag)) - plain
+
+
+def test_the_drag_that_is_told_does_to_the_plants_angle_what_the_delay_does() -> None:
+    drag, differs = told(drag_alike(late(recorded(dragging(0.7), 12.0))))
+    delayed, dragged = done(drag)
     assert dragged @ delayed / (dragged @ dragged) == pytest.approx(1.0, abs=0.1)
     assert differs == pytest.approx(np.sqrt(np.mean((dragged - delayed) ** 2)), rel=0.2)
+
+
+def test_the_drag_is_told_of_a_joint_that_is_only_moved_too() -> None:
+    """Nobody hung a load on it, and none is recorded: the drag alone deflects it."""
+    columns = recorded(dragging(0.7), 12.0, 0.0)
+    del columns["joint_torque_Nm"]
+    drag, _ = told(drag_alike(late(columns)))
+    delayed, dragged = done(drag, 0.0)
+    assert dragged @ delayed / (dragged @ dragged) == pytest.approx(1.0, abs=0.1)
 
 
 def test_of_readings_that_are_late_no_drag_is_told() -> None:

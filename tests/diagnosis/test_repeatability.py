@@ -45,7 +45,7 @@ def test_nothing_is_said_where_nothing_repeats() -> None:
 
 
 def test_what_a_model_tells_apart_is_no_scatter() -> None:
-    """A joint read 50 ms late, at speeds that change by a quarter from cycle to cycle."""
+    """A joint read 50 ms late, at speeds that change by a quarter from cycle to cycle, under a light load."""
     rng = np.random.default_rng(12)
     period = np.repeat([8.0, 10.0, 7.0, 9.0, 11.0, 8.5], 400)
     time = np.cumsum(period) / 400.0
@@ -53,7 +53,13 @@ def test_what_a_model_tells_apart_is_no_scatter() -> None:
     motor = 0.8 * np.sin(phase)
     late = 0.05 * np.gradient(motor, time)
     joint = motor - late + 1e-5 * rng.standard_normal(len(time))
-    columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": joint}
+    load = 1e-3 * np.sin(phase)
+    columns = {
+        "time_s": time,
+        "motor_position_rad": motor,
+        "joint_torque_Nm": load,
+        "joint_position_rad": joint,
+    }
     evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
     seen = [covariates_of(CONFIG, evidence).at(evidence.rows)]
     known = np.interp(evidence.at_rows("time_s"), time, motor - late)
@@ -63,3 +69,17 @@ def test_what_a_model_tells_apart_is_no_scatter() -> None:
     assert told is not None
     assert without > 1e-3
     assert told == pytest.approx(1e-5, rel=0.25)
+
+
+def test_a_load_that_nobody_recorded_is_no_scatter() -> None:
+    """A joint that yields to its own inertia, swung at two frequencies; all of it comes again every 24 s."""
+    rng = np.random.default_rng(13)
+    time = np.arange(0.0, 96.0, 0.02)
+    slow, quick = 2.0 * np.pi / 8.0, 2.0 * np.pi / 3.0
+    motor = 0.6 * np.sin(slow * time) + 0.05 * np.sin(quick * time + 0.7)
+    acceleration = -0.6 * slow**2 * np.sin(slow * time) - 0.05 * quick**2 * np.sin(quick * time + 0.7)
+    joint = motor - 5e-3 * acceleration + 1e-5 * rng.standard_normal(len(time))
+    columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": joint}
+    evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
+    found = repeatability([evidence], [covariates_of(CONFIG, evidence).at(evidence.rows)])
+    assert found == pytest.approx(1e-5, rel=0.25)

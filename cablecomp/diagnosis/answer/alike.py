@@ -22,8 +22,8 @@ NEARER = 3
 
 
 def drag_alike(fit: Fit) -> str | None:
-    """One line where the joint's readings are late, by a fit to its angle alone under a measured load, and a drag in
-    proportion to its speed would leave about as much of the first recording; else None.
+    """One line where the joint's readings are late, by a fit to its angle alone under a measured load or none, and a
+    drag in proportion to its speed would leave about as much of the first recording; else None.
 
     A short delay takes late * dtheta/dt off the angle, a drag b [N m s/rad] the deflection under b * dtheta/dt: b is
     what comes nearest, with the drive's friction and its history in it.
@@ -32,7 +32,11 @@ def drag_alike(fit: Fit) -> str | None:
     first = problem.evidence[0]
     joint = problem.joint(fit.x, first)
     late = next((e.parameters.get("delay_s", 0.0) for e in joint.effect if e.id == "clock_skew"), 0.0)
-    if not late > 0.0 or problem.channels != (JOINT,) or load_channel(joint, first.columns) != LOAD:
+    if (
+        not late > 0.0
+        or problem.channels != (JOINT,)
+        or load_channel(joint, first.columns) not in (LOAD, None)
+    ):
         return None
     try:
         drag, differs = _drag(simulator(joint), first, late)
@@ -55,9 +59,10 @@ def _drag(drive: Simulator, recording: Evidence, late: float) -> tuple[float, fl
     before = drive.run(recording, rows)
     speed = np.gradient(before.joint, columns["time_s"])
     wanted = -late * speed
+    load = columns.get(LOAD, np.zeros_like(speed))
     drag, differs = late / float(np.median(before.compliance)), inf
     for _ in range(NEARER):
-        dragged = replace(recording, columns={**columns, LOAD: columns[LOAD] - drag * speed})
+        dragged = replace(recording, columns={**columns, LOAD: load - drag * speed})
         does = drive.run(dragged, rows).joint - before.joint
         along = float(does @ wanted)
         if not along > 0.0:

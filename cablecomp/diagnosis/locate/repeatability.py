@@ -1,5 +1,6 @@
 """What the machine itself repeats: the joint angle at the same motor angle, load and distance from the last
-reversals, what creeps with time taken off (a slip or a drift is something to explain, not what cannot be repeated), and
+reversals (where no load is recorded, at the same speed and acceleration, which a weight or an inertia goes with), what
+creeps with time taken off (a slip or a drift is something to explain, not what cannot be repeated), and
 what a model tells apart (a late channel differs at another speed, and that repeats)."""
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ def _repeats(c: Covariates) -> tuple[IntArray, FloatArray]:
     """Pairs of judged rows of a recording, far apart in time, in the same state, and by what their states and times
     still lie apart; none where too few repeat."""
     v = c.values
-    state = np.column_stack((v["motor_angle"], v["load"], c.motion_reversal, v["reversal"]))
+    loaded = np.ptp(v["load"]) > 0.0
+    loads = (v["load"], v["reversal"]) if loaded else (v["velocity"], v["acceleration"])
+    state = np.column_stack((v["motor_angle"], c.motion_reversal, *loads))
     span = np.ptp(state, axis=0)
     used = span > 0.0
     points = np.column_stack((state[:, used] / span[used], c.motion_direction, v["load_direction"]))
