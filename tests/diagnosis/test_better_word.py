@@ -7,8 +7,9 @@ from typing import cast
 
 import numpy as np
 import pytest
-from turning import JOINT, gathered, hypothesis
+from turning import JOINT, gathered, hypothesis, recorded
 
+from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.estimation.least_squares import Fit
@@ -44,6 +45,21 @@ def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
         values = {strands.key("yield_N"): held_N, strands.key("fraction"): 1.0}
         fit = SimpleNamespace(problem=bare, x=np.empty(0), values=values)
         assert better_word(cast("Fit", fit), strands) == word
+
+
+@pytest.mark.parametrize(("viscous", "word"), [(0.0, "presliding_rad"), (0.1, "presliding_rad"), (10.0, "")])
+def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
+    viscous: float, word: str
+) -> None:
+    """The joint moves at some 1 rad/s."""
+    columns = recorded(JOINT)
+    columns["motor_torque_Nm"] = 0.3 * columns["joint_torque_Nm"]
+    evidence = gather_body(JOINT, {"a/1": columns}).used
+    (bearing,) = (h for h in hypotheses(JOINT, evidence) if h.name == "bearing_friction")
+    values = {bearing.key("presliding_rad"): 1.0, bearing.key("viscous_s_per_rad"): viscous}
+    problem = SimpleNamespace(parameters=(), config=JOINT, evidence=evidence)
+    fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
+    assert better_word(cast("Fit", fit), bearing) == word
 
 
 def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:

@@ -3,6 +3,8 @@ that is its own."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from cablecomp.config import JointConfig
@@ -59,9 +61,20 @@ def better_word(fit: Fit, h: Hypothesis) -> str:
         below = p.least_is_another and own[p.name] < p.bounds(fit.problem.config)[0]
         if below or p.is_another(own, h.key(p.name) in on_high):
             return p.name
-        if p.role == "presliding" and own[p.name] > _widest_presliding(fit, h):
+        if p.role == "presliding" and own[p.name] > _widest_presliding(fit, h) and not _drags(fit, h, own):
             return p.name
     return ""
+
+
+def _drags(fit: Fit, h: Hypothesis, own: Mapping[str, float]) -> bool:
+    """Whether what goes with speed is most of a friction at the speed at which the joint is usually moved (RMS): within
+    which turn the rest builds up says nothing of it then."""
+    at_speed = sum(own[p.name] for p in h.effect.parameters if p.of_speed)
+    if not at_speed:
+        return False
+    rates = np.concatenate([e.motor_rate for e in fit.problem.evidence])
+    speed = fit.problem.config.drive.ratio * float(np.sqrt(np.nanmean(rates**2)))
+    return at_speed * speed > 1.0
 
 
 def _widest_presliding(fit: Fit, h: Hypothesis) -> float:
