@@ -10,7 +10,9 @@ import pytest
 from turning import JOINT, gathered, hypothesis, recorded
 
 from cablecomp.diagnosis.body import gather_body
+from cablecomp.diagnosis.explain.held_down import greased
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.estimation.least_squares import Fit
 
@@ -51,15 +53,24 @@ def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
 def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
     viscous: float, word: str
 ) -> None:
-    """The joint moves at some 1 rad/s."""
+    """The joint moves at some 1 rad/s. Beside a path's friction nothing tells whose grease it is."""
     columns = recorded(JOINT)
     columns["motor_torque_Nm"] = 0.3 * columns["joint_torque_Nm"]
     evidence = gather_body(JOINT, {"a/1": columns}).used
-    (bearing,) = (h for h in hypotheses(JOINT, evidence) if h.name == "bearing_friction")
+    bearing, path = (
+        next(h for h in hypotheses(JOINT, evidence) if h.name == name)
+        for name in ("bearing_friction", "routing_friction")
+    )
     values = {bearing.key("presliding_rad"): 1.0, bearing.key("viscous_s_per_rad"): viscous}
     problem = SimpleNamespace(parameters=(), config=JOINT, evidence=evidence)
     fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
     assert better_word(cast("Fit", fit), bearing) == word
+    alone, beside = (
+        cast("Model", SimpleNamespace(terms=terms, fit=fit)) for terms in ((bearing,), (bearing, path))
+    )
+    assert greased(alone, bearing) == ""
+    assert bool(greased(beside, bearing)) == (word == "")
+    assert greased(beside, path) == ""
 
 
 def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:

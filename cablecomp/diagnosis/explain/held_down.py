@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round
-from cablecomp.diagnosis.explain.plausible import better_word
+from cablecomp.diagnosis.explain.plausible import better_word, drags
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.ties import alone_by_far
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -50,6 +50,15 @@ def slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float)
     if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
         return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
     return ""
+
+
+def greased(final: Model, term: Hypothesis) -> str:
+    """What is to be said of a joint's friction that mostly goes with speed beside friction of the cable's path, whose
+    grease drags alike (735/42: a greased path, and this name with 0.98); "" of any other."""
+    along = any(isinstance(t, Hypothesis) and t.effect.id == "routing_friction" for t in final.terms)
+    if not (along and drags(final.fit, term)):
+        return ""
+    return "a drag in proportion to speed: grease in the cable's path, whose friction is there, drags alike"
 
 
 def hardly_ahead(term: Hypothesis, lead: float) -> str:

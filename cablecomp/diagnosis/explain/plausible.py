@@ -3,8 +3,6 @@ that is its own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from cablecomp.config import JointConfig
@@ -54,21 +52,27 @@ def better_word(fit: Fit, h: Hypothesis) -> str:
     """The shape of an effect that stands where another effect is the better word (`Parameter.is_another`); "" where
     none does. Near the most that is plausible it counts as on it; the least is the plain law but where that is said to
     be another (`Parameter.least_is_another`)."""
-    own = {p.name: fit.values.get(h.key(p.name), p.omitted or p.neutral) for p in h.effect.parameters}
+    own = _own(fit, h)
     at = zip(fit.problem.parameters, fit.x, strict=True)
     on_high = {p.base for p, x in at if p.value(float(x)) > LIMITS.near_bound * p.high}
     for p in h.effect.parameters:
         below = p.least_is_another and own[p.name] < p.bounds(fit.problem.config)[0]
         if below or p.is_another(own, h.key(p.name) in on_high):
             return p.name
-        if p.role == "presliding" and own[p.name] > _widest_presliding(fit, h) and not _drags(fit, h, own):
+        if p.role == "presliding" and own[p.name] > _widest_presliding(fit, h) and not drags(fit, h):
             return p.name
     return ""
 
 
-def _drags(fit: Fit, h: Hypothesis, own: Mapping[str, float]) -> bool:
+def _own(fit: Fit, h: Hypothesis) -> dict[str, float]:
+    """An effect's values as fitted."""
+    return {p.name: fit.values.get(h.key(p.name), p.omitted or p.neutral) for p in h.effect.parameters}
+
+
+def drags(fit: Fit, h: Hypothesis) -> bool:
     """Whether what goes with speed is most of a friction at the speed at which the joint is usually moved (RMS): within
     which turn the rest builds up says nothing of it then."""
+    own = _own(fit, h)
     at_speed = sum(own[p.name] for p in h.effect.parameters if p.of_speed)
     if not at_speed:
         return False

@@ -12,7 +12,7 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
-from cablecomp.diagnosis.explain.held_down import another, hardly_ahead, slight, too_little
+from cablecomp.diagnosis.explain.held_down import another, greased, hardly_ahead, slight, too_little
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
     Model,
@@ -154,8 +154,8 @@ def _weighed(
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
-    elif hardly := hardly_ahead(term, lead):
-        confidence, why_not = min(confidence, LIMITS.little_told), hardly
+    elif open_to := hardly_ahead(term, lead) or greased(final, term):
+        confidence, why_not = min(confidence, LIMITS.little_told), open_to
     better = None
     beaten_by = _beaten(selection, term, against)
     if beaten_by and of_rival.z < LIMITS.z_unbeaten:
