@@ -209,9 +209,8 @@ def next_experiment(
     if len(models) < 2:
         fit = outcome.kept.fit
         models = [fit.problem.joint(fit.x, first), *(h.joint for h in hidden[:1])]
-    models = [
-        m for m in models if not Observer(m).channels
-    ]  # a neighbour's channel is nothing that a motion makes
+    # a neighbour's channel is nothing that a motion makes
+    models = [m for m in models if not Observer(m).channels]
     if len(models) < 2:
         return None, ()
     temperature = float(np.mean(first.columns.get("temperature_degC", np.array([20.0]))))
