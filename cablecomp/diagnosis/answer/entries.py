@@ -39,7 +39,8 @@ SAID = 4
 
 TOO_ALIKE = (
     "no motion within the limits, or the reach of these recordings, sets the models that these data cannot tell apart "
-    "by more than {:.1f} noise floors (RMS): a load recorded (joint_torque_Nm), or wider [limits], may"
+    "by more than {:.1f} noise floors (RMS): a further channel (joint_torque_Nm, motor_torque_Nm, tensions), a closer "
+    "[tolerance] of what makes up for them, or wider [limits], may"
 )
 
 
