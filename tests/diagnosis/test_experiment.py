@@ -23,6 +23,8 @@ BEARING = with_effects(
     LIMITED, [("bearing_friction", {"torque_Nm": 0.05, "load_coefficient": 0.0, "presliding_rad": 2e-4})]
 )
 
+NEIGHBOUR = with_effects(LIMITED, [("crosstalk", {"load_coefficient": 0.1, "channel": "other_arm_Nm"})])
+
 
 @pytest.fixture(scope="module")
 def seen() -> Covariates:
@@ -75,24 +77,31 @@ def test_a_bearing_is_set_apart_from_a_mount_and_nothing_from_itself(seen: Covar
 def test_nothing_is_proposed_that_sets_no_models_apart(seen: Covariates) -> None:
     """A protocol whose answers are alike costs an afternoon at the bench: a note says what would help."""
 
-    def proposed(other: JointConfig) -> tuple[object, tuple[str, ...]]:
+    def proposed(final: JointConfig, *others: JointConfig) -> tuple[object, tuple[str, ...]]:
         def fitted(joint: JointConfig) -> Any:
             problem = SimpleNamespace(
                 joint=lambda *_: joint, evidence=[SimpleNamespace(columns=recorded(LIMITED))]
             )
             return SimpleNamespace(fit=SimpleNamespace(problem=problem, x=np.zeros(0)))
 
-        rival = SimpleNamespace(term=SimpleNamespace(name="rival"), model=fitted(other))
-        selection: Any = SimpleNamespace(final=fitted(MOUNT), rounds=[SimpleNamespace(tried=[rival])])
+        rivals = [
+            SimpleNamespace(term=SimpleNamespace(name=str(k)), model=fitted(other))
+            for k, other in enumerate(others)
+        ]
+        selection: Any = SimpleNamespace(final=fitted(final), rounds=[SimpleNamespace(tried=rivals)])
         case: Any = SimpleNamespace(
             drive=SimpleNamespace(fit=fitted(MOUNT).fit, floor_rad=FLOOR_RAD), covariates=[seen]
         )
-        outcome: Any = SimpleNamespace(weighed=[SimpleNamespace(rivals=["rival"])])
+        outcome: Any = SimpleNamespace(weighed=[SimpleNamespace(rivals=[r.term.name for r in rivals])])
         return next_experiment(case, selection, outcome, [])
 
-    assert proposed(BEARING)[0] is not None
-    assert not proposed(BEARING)[1]
-    nothing, (note,) = proposed(MOUNT)
+    experiment, notes = proposed(MOUNT, BEARING)
+    assert experiment is not None
+    assert not notes
+    # a neighbour that is at rest is told from a bearing; of more models it is left out
+    assert proposed(BEARING, NEIGHBOUR)[0] is not None
+    assert proposed(MOUNT, BEARING, NEIGHBOUR) == (experiment, notes)
+    nothing, (note,) = proposed(MOUNT, MOUNT)
     assert nothing is None
     assert "by more than 0.0 noise floors" in note
 

@@ -210,8 +210,9 @@ def next_experiment(
     if len(models) < 2:
         fit = outcome.kept.fit
         models = [fit.problem.joint(fit.x, first), *(h.joint for h in hidden[:1])]
-    # a neighbour's channel is nothing that a motion makes
-    models = [m for m in models if not Observer(m).channels]
+    # a neighbour is at rest meanwhile: what it does tells it from others, if from few
+    alone = [m for m in models if not Observer(m).channels]
+    models = alone if len(alone) > 1 else models
     if len(models) < 2:
         return None, ()
     temperature = float(np.mean(first.columns.get("temperature_degC", np.array([20.0]))))

@@ -217,8 +217,9 @@ def _readings(
     columns["motor_torque_Nm"] = -ratio * columns["joint_torque_Nm"]
     found = []
     for model in models:
+        own = columns | {name: np.zeros(STEPS) for name in Observer(model).channels}
         try:
-            found.append(Observer(model).run(columns)["joint_position_rad"])
+            found.append(Observer(model).run(own)["joint_position_rad"])
         except InputError:
             return None
     return [*found, columns["joint_torque_Nm"]]
