@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from cablecomp.config import JointConfig
@@ -18,6 +19,7 @@ from cablecomp.effects.base import (
     pretension_moment,
     term,
 )
+from cablecomp.effects.shared_shapes import dragging
 
 
 @term(
@@ -133,18 +135,8 @@ EFFECT = Effect(
             role="presliding",
             minimum=1e-9,
         ),
-        Parameter(
-            "viscous_s_per_rad",
-            "s/rad",
-            0.0,
-            0.005,
-            50.0,
-            "ν, growth with the joint's speed, over τ_0; 0: it does not",
-            log=True,
-            role="shape",
-            omitted=0.0,
-            minimum=0.0,
-            tries=(0.1, 1.0, 10.0),
+        replace(
+            dragging("joint's", "τ_0", 50.0, (0.1, 1.0, 10.0)),
             of_speed=True,
             needs="motor_torque_Nm",  # by the joint's angle alone it is a channel that comes late
         ),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, input_moment, term
+from cablecomp.effects.shared_shapes import dragging
 
 
 @term(parameters=("torque", "presliding", "viscous", "at_joint"), state=("z",))
@@ -73,18 +75,8 @@ EFFECT = Effect(
             role="presliding",
             minimum=1e-9,
         ),
-        Parameter(
-            "viscous_s_per_rad",
-            "s/rad",
-            0.0,
-            0.005,
-            5.0,
-            "ν, growth with the motor's speed, over τ_m",
-            log=True,
-            role="shape",
-            omitted=0.0,
-            minimum=0.0,
-            tries=(0.05, 0.5),
+        replace(
+            dragging("motor's", "τ_m", 5.0, (0.05, 0.5)),
             of_known_drive=True,
             of_motor_load=True,  # in a torque beside the load, what drags anywhere would be the motor's
         ),

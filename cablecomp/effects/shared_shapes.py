@@ -1,6 +1,6 @@
 """Parameters that several laws have for the same: when a slow course began; an amount that varies as the joint turns,
 by 1 + a cos(k q - φ), as a clearance that is widest where the joint mostly stands, a bracket softer across than along;
-how often in a turn a drum's wave comes.
+how often in a turn a drum's wave comes; how a friction grows with speed.
 """
 
 from __future__ import annotations
@@ -50,6 +50,23 @@ def repeated(text: str, *, tries: tuple[float, ...], of: str = "") -> Parameter:
         reach=1.0,
         is_another=at_most,
         of_known_drive=True,
+    )
+
+
+def dragging(whose: str, of: str, high: float, tries: tuple[float, ...]) -> Parameter:
+    """How a friction `of` that size grows with speed, in grease; `high`, `tries` [s/rad]: most, and where asked."""
+    return Parameter(
+        "viscous_s_per_rad",
+        "s/rad",
+        0.0,
+        0.005,
+        high,
+        f"ν, growth with the {whose} speed, over {of}; 0: it does not",
+        log=True,
+        role="shape",
+        omitted=0.0,
+        minimum=0.0,
+        tries=tries,
     )
 
 

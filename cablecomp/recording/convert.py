@@ -113,6 +113,6 @@ def _write(path: Path, ending: str, names: tuple[str, ...], blocks: Iterable[Blo
         whole = {n: np.concatenate([b.columns[n] for b in parts]) for n in names} if parts else {}
         if ending == ".npz":
             # numpy's stub takes `**` for `allow_pickle`, a bool
-            np.savez_compressed(path, **whole)  # type: ignore[arg-type]
+            np.savez_compressed(path, **whole)  # type: ignore[arg-type]  # numpy's stub: a name may be a flag
         else:
             write_parquet(path, whole)

@@ -56,7 +56,7 @@ def _write(folder: Path, trial: Trial, joint: str) -> None:
     for k, table in enumerate(trial.recordings, start=1):
         path = folder / "recordings" / f"recording-{k}.npz"
         # numpy's stub takes `**` for `allow_pickle`, a bool
-        np.savez(path, **table)  # type: ignore[arg-type]
+        np.savez(path, **table)  # type: ignore[arg-type]  # numpy's stub: a name may be a flag
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -219,7 +219,7 @@ def next_experiment(
     try:
         best = best_experiment(models, join(list(case.covariates)), case.drive.floor_rad, temperature)
     except InputError:
-        return None, ()
+        best = None
     if best is None:
         return None, ()
     if best.separation < APART:
