@@ -7,16 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from joints import SMALL, closed
-from small_drive import TOLERANT, calibrated, recorded
+from small_drive import TOLERANT, calibrated, course, recorded
 
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, hypotheses
 from cablecomp.diagnosis.explain.linear import anchor, contribution
+from cablecomp.diagnosis.explain.plausible import drags
 from cablecomp.diagnosis.explain.screening import ask, rough
+from cablecomp.estimation.least_squares import solve
 from cablecomp.estimation.parameter import reach_of
-from firmware_sim.plant import EffectSpec
+from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
 EVENT_S = 11.0
 
@@ -128,6 +130,23 @@ def test_an_amount_that_saturates_is_asked_for_far_beyond_what_shows(true: float
     (fit, *_) = rough([answer], 8)
     assert fit.cost < 0.05 * drive.fit.cost
     assert fit.values["effect.viscous_slip.drum"] == pytest.approx(1.0 - 2.0 * on_input, abs=0.05)
+
+
+@pytest.mark.parametrize("fine", [False, True])
+def test_a_joint_in_grease_is_asked_for_also_where_every_sample_is_run(fine: bool) -> None:
+    """Shapes are not, there, but one that goes with speed."""
+    grease = [EffectSpec("joint_viscous_friction", {"coefficient_Nms_per_rad": 0.5})]
+    columns = recorded(grease, 20.0)
+    played = simulate(PlantConfig.from_dict(closed(SMALL)), *course(20.0), effects=grease).channels()
+    noise = 1e-3 * np.random.default_rng(5).standard_normal(len(columns["time_s"]))
+    body, drive = calibrated(columns | {"motor_torque_Nm": played["motor_torque_Nm"] + noise})
+    fit = solve(drive.fit.problem.finely(), drive.fit.x) if fine else drive.fit
+    bearing = next(h for h in hypotheses(TOLERANT, body.used) if h.effect.id == "bearing_friction")
+    answer = ask(anchor(fit), bearing)
+    assert answer is not None
+    (found, *_) = rough([answer], 12)
+    assert found.cost < 0.1 * fit.cost
+    assert drags(found, bearing)
 
 
 def test_an_effect_is_asked_for_at_no_size_that_its_fit_may_not_reach() -> None:
