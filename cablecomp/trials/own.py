@@ -107,8 +107,7 @@ def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
             folder.mkdir(parents=True, exist_ok=True)
             drawn = piece(own.joint, own.recordings, wish.seconds, wish.seed, k)
             for n, table in enumerate(drawn.values(), start=1):
-                # numpy's stub takes `**` for `allow_pickle`, a bool
-                np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]  # numpy's stub: a name may be a flag
+                np.savez(folder / f"recording-{n}.npz", **table)  # type: ignore[arg-type]  # stub: `**` may be a flag
             write_joint(folder / JOINT_FILE, joint_of_piece(own.joint, drawn))
         return own.conceal(pieces, wish, own.out, lambda done, of: tell("concealing", done, of))
     except InputError:
