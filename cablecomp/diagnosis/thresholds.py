@@ -191,6 +191,20 @@ class Thresholds:
     roughly, and the fit decides: what a straight line promises is known no closer."""
     instants: int = 24
     """Instants at which an event is asked for at first, over all recordings; the best is then looked at closer."""
+    cycle_stretches: int = 160
+    """Stretches of time by which the cycle is looked for in which a payload comes and goes."""
+    least_cycle_s: float = 1.0
+    """Shortest such cycle [s]."""
+    cycle_periods: int = 60
+    """Cycles that are looked at, from the shortest to twice the recordings', evenly by their logarithm."""
+    cycle_starts: int = 12
+    """Starts of each that are looked at."""
+    cycle_held: tuple[float, ...] = (0.3, 0.5, 0.7)
+    """Shares of each for which it is held that are looked at."""
+    cycles: int = 4
+    """Cycles that are looked at more closely."""
+    always: float = 0.9
+    """Share of a weight that is there without the payload, at most, where a fit begins."""
     course_instants: int = 160
     """Instants between which an event that takes its time is looked for, by what it does from each of them on."""
     briefest: float = 0.03

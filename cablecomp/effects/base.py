@@ -41,6 +41,8 @@ Role = Literal[
     "step",
     "step size",
     "begin",
+    "cycle",
+    "cycle start",
     "reference",
     "length",
     "presliding",
@@ -50,10 +52,10 @@ Role = Literal[
     "slack",
 ]
 """An amount; or how: the phase of a wave [rad], which makes a pair with the amount; the instant of an event [s], how
-long it takes [s], how curved, when a further step comes [s] and how large it is; when a slow course began [s]; the
-reference of what the law reads; the length of cable in a path [m]; the turn in which friction builds up [rad]; a place
-on a drum [rad]; by how much another channel turns the joint; how much what is read grows with itself, up to which
-reading nothing happens; any other shape."""
+long it takes [s], how curved, when a further step comes [s] and how large it is; when a slow course began [s]; how what
+comes again and again does, and when once [s]; the reference of what the law reads; the length of cable in a path [m];
+the turn in which friction builds up [rad]; a place on a drum [rad]; by how much another channel turns the joint; how
+much what is read grows with itself, up to which reading nothing happens; any other shape."""
 
 
 def never(_values: Mapping[str, float], _on_high: bool) -> bool:

@@ -1,21 +1,32 @@
-"""Gravity load: the link's weight, which the torque channel does not contain."""
+"""Gravity load: the link's weight, or a payload that is picked up and put down, which the torque channel does not
+contain."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
 from cablecomp.errors import InputError
 
+LIFT_S: Final = 0.3
+"""Within which a payload is usually taken up or set down."""
 
-@term(parameters=("moment", "phase", "growth", "tilt", "lean", "upright", "channel"))
+
+@term(
+    parameters=(
+        *("moment", "phase", "growth", "tilt", "lean", "upright", "channel"),
+        *("period", "picked_up", "held", "always", "lift"),
+    )
+)
 def _weigh(c: Any, p: Any, s: Any) -> None:
     """p: greatest moment [N m], phase [rad], by what share it grows with the joint's angle [1/rad], turn of the base
     about the joint's axis and of that axis out of the level [rad per unit of the channel], its slope where the channel
-    is 0 [rad], the channel's place among the others (-1: none)."""
+    is 0 [rad], the channel's place among the others (-1: none); from one picking up to the next [s] (0: nothing is),
+    when one was [s], share of that time for which it is held, share of the moment that is always there, within which it
+    is taken up or set down [s]."""
     angle, slope = c.joint + p.phase, p.upright
     if p.channel >= 0.0:
         other = c.other[int(p.channel)]
@@ -23,6 +34,10 @@ def _weigh(c: Any, p: Any, s: Any) -> None:
             angle += p.tilt * other
             slope += p.lean * other
     moment = p.moment * math.cos(slope)
+    if p.period > 0.0:
+        since = (c.time - p.picked_up) % p.period
+        taken = min(since / p.lift, 1.0) - min(max((since - p.held * p.period) / p.lift, 0.0), 1.0)
+        moment *= p.always + (1.0 - p.always) * max(taken, 0.0)
     lever = moment * (1.0 + p.growth * c.joint)
     c.moment += lever * math.sin(angle)
     c.moment_slope += lever * math.cos(angle) + moment * p.growth * math.sin(angle)
@@ -43,6 +58,11 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         lean=values["lean_rad_per_unit"],
         upright=values["upright_rad"],
         channel=values["channel"],
+        period=values["period_s"],
+        picked_up=values["picked_up_s"],
+        held=values["held"],
+        always=values["always"],
+        lift=values["lift_s"],
     )
     return Change(terms=weight)
 
@@ -51,10 +71,11 @@ EFFECT = Effect(
     id="gravity_load",
     statement="The link's weight turns the joint, more or less by its position, and by how another "
     "joint has turned its base about this joint's axis or out of its plane; on a linkage its lever grows or shrinks on "
-    "the way. The torque channel does not show it.",
-    equation="M_cable = M - m g l (1 + p q_out) cos(l0 + l other(t)) sin(q_out + φ + t other(t))",
+    "the way; a payload is picked up and put down. The torque channel does not show it.",
+    equation="M_cable = M - m g l (a + (1 - a) g(t)) (1 + p q_out) cos(l0 + l other(t)) sin(q_out + φ + t other(t)), "
+    "g = 1 for h P from t_p, t_p + P, ... on, and 0 else; P = 0: g = 1",
     source="statics of a pendulum, of which the share across a leaning axis turns it; a linkage's lever to first order "
-    "in the joint's angle",
+    "in the joint's angle; a payload that is handled again and again, or once (P longer than the recording)",
     parameters=(
         Parameter(
             "moment_Nm",
@@ -110,6 +131,65 @@ EFFECT = Effect(
             role="shape",
             omitted=0.0,
             of="moment_Nm",
+        ),
+        Parameter(
+            "period_s",
+            "s",
+            0.0,
+            1.0,
+            3600.0,
+            "P, from one picking up of a payload to the next; 0: the weight is always there",
+            log=True,
+            role="cycle",
+            omitted=0.0,
+            minimum=0.0,
+        ),
+        Parameter(
+            "picked_up_s",
+            "s",
+            0.0,
+            0.0,
+            3600.0,
+            "t_p, when it is picked up, once",
+            role="cycle start",
+            omitted=0.0,
+        ),
+        Parameter(
+            "held",
+            "-",
+            0.5,
+            0.05,
+            0.95,
+            "h, share of P for which it is held",
+            role="cycle",
+            omitted=0.5,
+            minimum=0.0,
+            maximum=1.0,
+        ),
+        Parameter(
+            "always",
+            "-",
+            0.0,
+            0.0,
+            0.9,
+            "a, share of the moment that is there without it",
+            role="cycle",
+            omitted=0.0,
+            minimum=0.0,
+            maximum=1.0,
+        ),
+        Parameter(
+            "lift_s",
+            "s",
+            LIFT_S,
+            0.05,
+            2.0,
+            "within which it is taken up or set down",
+            log=True,
+            role="cycle",
+            held=True,
+            omitted=LIFT_S,
+            minimum=1e-3,
         ),
     ),
     acts_through=("joint_angle", "motor_angle", "other"),

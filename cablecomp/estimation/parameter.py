@@ -175,7 +175,7 @@ def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig)
     span = max(abs(low), abs(high))
     if p.role == "phase":
         return Parameter(name, value, -20.0, 20.0, False)
-    if p.role == "instant":
+    if p.role in ("instant", "cycle start"):
         return Parameter(
             name, value, value - INSTANT_REACH_S, value + INSTANT_REACH_S, False, INSTANT_STEP_S / STEP
         )

@@ -15,7 +15,7 @@ from cablecomp.signal.smoothing import FloatArray
 
 PRETENSION = "pretension_N"
 JOINT_ZERO, MOTOR_ZERO = "joint_position_offset_rad", "motor_torque_offset_Nm"
-ON_THE_CLOCK = ("instant", "begin")
+ON_THE_CLOCK = ("instant", "begin", "cycle start")
 """Roles of effects' parameters that are read on the recordings' clock."""
 
 

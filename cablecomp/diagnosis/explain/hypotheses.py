@@ -22,6 +22,8 @@ from cablecomp.estimation.simulate import load_of
 
 OF_COURSE: Final = ("duration", "curve", "step", "step size")
 """Roles of what tells an event's course beside its instant."""
+OF_CYCLE: Final = ("cycle", "cycle start")
+"""Roles of what tells how something comes and goes, again and again."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,11 @@ class Hypothesis:
     def of_course(self) -> frozenset[str]:
         """The names of what tells the event's course beside its instant."""
         return frozenset(p.name for p in self.effect.parameters if p.role in OF_COURSE)
+
+    @property
+    def cycle_start(self) -> str:
+        """The name of when what comes and goes comes, once; "" where its law knows no such."""
+        return self._of_role("cycle start")
 
     @property
     def goes_in_steps(self) -> bool:
@@ -256,7 +263,7 @@ def _by_amount(
     asked_together = {name for values in effect.tries for name in values}
     together = {p.name for p in own if p.omitted is not None and p.name in asked_together}
     # of an event, asked for by itself; of a channel that is not read
-    aside = (*OF_COURSE, *(() if channel else ("tilt",)))
+    aside = (*OF_COURSE, *OF_CYCLE, *(() if channel else ("tilt",)))
     shapes = [p for p in own if p.shape and not p.tries and p.name not in together and p.role not in aside]
     # an amount with a shape of its own is a hypothesis of its own
     shaped = {p.of for p in effect.parameters if not p.tries and p.name not in asked_together}

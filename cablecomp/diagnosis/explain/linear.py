@@ -76,7 +76,7 @@ class Anchor:
                 if (k, what) in self.over:
                     known[k] = self.over[k, what]
         try:
-            found = _with(self.fit.problem, h, values).misfits(self.fit.x, known)
+            found = with_effect(self.fit.problem, h, values).misfits(self.fit.x, known)
         except InputError:
             return None
         self.over.update({(k, what): of_recording(found, k) for k in after})
@@ -124,7 +124,7 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
             here.seen.keep(h, (start,), here.fit, [] if found is None else [found])
         if found is not None:
             d, size = found
-            answers.append(_linearly(here, h, start, d, size))
+            answers.append(linearly(here, h, start, d, size))
     best = _lowest(answers)
     if best is None or not h.effect.saturates:
         return best
@@ -134,7 +134,7 @@ def best_start(here: Anchor, h: Hypothesis, about: float | None = None) -> Best 
         other = min(max(part * best.size, low), high)
         shown = difference(here, h, {**best.values, h.amount.name: other})
         if shown is not None:
-            answers.append(_linearly(here, h, Start(best.values), shown, other))
+            answers.append(linearly(here, h, Start(best.values), shown, other))
     return _lowest(answers)
 
 
@@ -185,7 +185,7 @@ def promised(here: Anchor, h: Hypothesis, starts: Starts) -> float | None:
         return None
     if not found:
         return inf
-    best = _paired(here, h, starts[0], found) if len(starts) > 1 else _linearly(here, h, starts[0], *found[0])
+    best = _paired(here, h, starts[0], found) if len(starts) > 1 else linearly(here, h, starts[0], *found[0])
     return inf if best is None else best.cost
 
 
@@ -208,7 +208,7 @@ def _lowest(answers: Sequence[Best | None]) -> Best | None:
     return min((a for a in answers if a is not None), key=lambda a: a.cost, default=None)
 
 
-def _linearly(here: Anchor, h: Hypothesis, start: Start, d: FloatArray, size: float) -> Best | None:
+def linearly(here: Anchor, h: Hypothesis, start: Start, d: FloatArray, size: float) -> Best | None:
     """The linear answer by what a start adds at a size; None where that is nothing that the anchor cannot do."""
     left, own = here.beyond(here.fit.residual), here.beyond(d)
     energy, square = float(left @ left), float(own @ own)
@@ -303,11 +303,11 @@ def difference(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> F
         if here.rated is None:
             return None
         problem, before = problem.finely(), here.rated
-    found = _with(problem, h, values).followed(here.fit.x)
+    found = with_effect(problem, h, values).followed(here.fit.x)
     return None if found is None else before - found
 
 
-def _with(problem: Problem, h: Hypothesis, values: Mapping[str, float | str]) -> Problem:
+def with_effect(problem: Problem, h: Hypothesis, values: Mapping[str, float | str]) -> Problem:
     """The problem with an effect beside what the drive has, nothing of it free."""
     joint = problem.config.model_copy(update={"effect": (*problem.config.effect, h.entry(values))})
     return replace(problem, config=joint)

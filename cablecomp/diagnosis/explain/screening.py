@@ -15,6 +15,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.asked_events import best_course, best_event
+from cablecomp.diagnosis.explain.cycles import best_cycle
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.linear import (
     Anchor,
@@ -67,7 +68,7 @@ def ask(here: Anchor, h: Hypothesis) -> Answer | None:
     if found is None:
         return None
     plain, best = found
-    other = _shaped(here, h, best) if h.further or h.has_instant else None
+    other = _shaped(here, h, best) if h.further or h.has_instant or h.cycle_start else None
     return plain if other is None else replace(other, plain=plain)
 
 
@@ -92,7 +93,10 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
     # where every run is dear no shape is asked for but what goes with speed; of an event, its course alone
     further = h.further if not here.fit.problem.fine else h.further_at_speed
     if h.has_phase:
-        pair = best_pair(here, h, further)
+        pairs = [best_pair(here, h, further) if further else None]
+        if h.cycle_start and not (h.channel or here.fit.problem.fine):
+            pairs.append(best_cycle(here, h, best))
+        pair = min((p for p in pairs if p is not None), key=lambda p: p.cost, default=None)
         worth = pair is not None and worth_a_shape(pair.by_channel, best.by_channel)
         return _answer(here, h, pair) if pair is not None and worth else None
     if h.has_instant:

@@ -1,0 +1,163 @@
+"""What comes and goes again and again, a payload that is picked up and put down: in which cycle.
+
+With d_c(t) and d_s(t) what the effect's cosine and sine do while they are there, a course g(t) of 0 and 1 does about
+a_c d_c + a_s d_s at all times and b_c g d_c + b_s g d_s beside it: what any cycle takes off follows from the inner
+products of d_c and d_s over short stretches of time, without a run of the drive for each (`courses.py` does so for
+events).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_of
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
+from cablecomp.diagnosis.explain.linear import Anchor, Best, difference, linearly, with_effect
+from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.problem import Misfits
+from cablecomp.signal.smoothing import FloatArray
+
+
+class Cycle(NamedTuple):
+    """From one coming to the next, when one was [s], and for what share of that time it stays."""
+
+    period_s: float
+    start_s: float
+    held: float
+
+    @property
+    def turned(self) -> Cycle:
+        """There when this one is not."""
+        return Cycle(self.period_s, self.start_s + self.held * self.period_s, 1.0 - self.held)
+
+
+class Products(NamedTuple):
+    """Inner products, beyond what the anchor's parameters do, of what cosine and sine do in each stretch of time
+    (2, k, 2, k), and with what is left (2, k); the stretches' ends [s]."""
+
+    gram: FloatArray
+    along: FloatArray
+    ends_s: FloatArray
+
+
+def best_cycle(here: Anchor, h: Hypothesis, plain: Best) -> Best | None:
+    """The best linear answer over the cycles in which an effect with a phase may come and go, of this shape."""
+    products = _products(here, h, plain)
+    if products is None:
+        return None
+    cycle, pairs = _likeliest(products)
+    always, there = pairs[:2], pairs[:2] + pairs[2:]
+    if np.linalg.norm(always) > np.linalg.norm(there):
+        cycle, always, there = cycle.turned, there, always
+    size = min(float(np.linalg.norm(there)), h.amount.maximum)
+    if not size > 0.0:
+        return None
+    share = float(np.clip(always @ there / (there @ there), 0.0, LIMITS.always))
+    period, held, always_there, *_ = (p.name for p in h.effect.parameters if p.role == "cycle")
+    values = {
+        **plain.values,
+        h.amount.name: size,
+        h.phase: math.atan2(there[1], there[0]),
+        period: cycle.period_s,
+        h.cycle_start: cycle.start_s,
+        held: cycle.held,
+        always_there: share,
+    }
+    d = difference(here, h, values)
+    if d is None:
+        return None
+    here.seen.keep(h, (Start(values),), here.fit, [(d, size)])
+    return linearly(here, h, Start(values), d, size)
+
+
+def _products(here: Anchor, h: Hypothesis, plain: Best) -> Products | None:
+    """None where one of the two cannot be followed."""
+    problem = here.fit.problem
+    begins_s = np.concatenate([[before_all(problem)], instants_of(problem, LIMITS.cycle_stretches - 1)])
+    ends_s = np.append(begins_s, max(float(e.columns["time_s"][-1]) for e in problem.evidence) + 1.0)
+    parts = []
+    for phase in (0.0, 0.5 * math.pi):
+        over = _throughout(here, h, {**plain.values, h.amount.name: plain.size, h.phase: phase})
+        if over is None:
+            return None
+        rows = from_each(problem, over, here.misfits, begins_s)
+        rows[:, :-1] -= rows[:, 1:]
+        parts.append(rows / plain.size)
+    rows = np.concatenate(parts, axis=1)
+    own = here.beyond(np.concatenate([rows, np.zeros((len(problem.parameters), rows.shape[1]))]))
+    count = len(begins_s)
+    gram, along = own.T @ own, own.T @ here.beyond(here.fit.residual)
+    return Products(gram.reshape(2, count, 2, count), along.reshape(2, count), ends_s)
+
+
+def _throughout(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> Misfits | None:
+    """What the drive leaves with the effect there at all times."""
+    try:
+        return with_effect(here.fit.problem, h, values).misfits(here.fit.x)
+    except InputError:
+        return None
+
+
+def _likeliest(products: Products) -> tuple[Cycle, FloatArray]:
+    """The cycle that takes off most, and what is always there and what comes and goes: cosine and sine of each."""
+    begin, end = float(products.ends_s[1]), float(products.ends_s[-2])
+    shortest = max(4.0 * (end - begin) / len(products.ends_s), LIMITS.least_cycle_s)
+    periods = np.geomspace(shortest, max(2.0 * (end - begin), 2.0 * shortest), LIMITS.cycle_periods)
+    starts = np.arange(LIMITS.cycle_starts) / LIMITS.cycle_starts
+    best: list[tuple[float, Cycle]] = []
+    for period in periods.tolist():
+        cycles = [
+            Cycle(period, begin + s * period, held) for s in starts.tolist() for held in LIMITS.cycle_held
+        ]
+        gains, _ = _gains(products, cycles)
+        k = int(np.argmax(gains))
+        best.append((float(gains[k]), cycles[k]))
+    best.sort(key=lambda found: -found[0])
+    nearer = [_nearer(products, cycle) for _, cycle in best[: LIMITS.cycles]]
+    gains, pairs = _gains(products, nearer)
+    k = int(np.argmax(gains))
+    return nearer[k], pairs[k]
+
+
+def _nearer(products: Products, cycle: Cycle) -> Cycle:
+    """The cycle near this one that takes off most."""
+
+    def at(x: FloatArray) -> Cycle:
+        longer, later, more = x.tolist()
+        period = cycle.period_s * math.exp(longer)
+        return Cycle(period, cycle.start_s + later * period, min(max(cycle.held + more, 0.02), 0.98))
+
+    simplex = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, 0.1]])
+    options = {"initial_simplex": simplex, "maxiter": 120, "xatol": 1e-4, "fatol": 1e-3}
+
+    def left(x: FloatArray) -> float:
+        return -float(_gains(products, [at(x)])[0][0])
+
+    return at(minimize(left, np.zeros(3), method="Nelder-Mead", options=options).x)
+
+
+def _gains(products: Products, cycles: Sequence[Cycle]) -> tuple[FloatArray, FloatArray]:
+    """What each cycle takes off the cost, and with which cosine and sine at all times, and beside them while it is
+    there."""
+    there = np.stack([_there(c, products.ends_s) for c in cycles])
+    weights = np.stack([np.ones_like(there), there], axis=1)
+    gram = np.einsum("niabl,njl->niajb", np.tensordot(weights, products.gram, (2, 1)), weights)
+    gram = gram.reshape(-1, 4, 4)
+    along = np.einsum("nik,ak->nia", weights, products.along).reshape(-1, 4)
+    least = 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(4)
+    pairs = np.linalg.solve(gram + least, along[:, :, None])[:, :, 0]
+    return 0.5 * np.sum(along * pairs, axis=1), pairs
+
+
+def _there(cycle: Cycle, ends_s: FloatArray) -> FloatArray:
+    """For what share of each stretch of time it is there."""
+    since = (ends_s - cycle.start_s) / cycle.period_s
+    whole = np.floor(since)
+    so_long = cycle.period_s * (whole * cycle.held + np.minimum(since - whole, cycle.held))
+    return np.asarray(np.diff(so_long) / np.maximum(np.diff(ends_s), 1e-12), dtype=np.float64)
