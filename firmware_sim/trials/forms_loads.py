@@ -105,6 +105,20 @@ def _payload(rng: np.random.Generator, scene: Scene) -> Shape:
     return Shape(fixed, {"moment_Nm": 1.0}, 2.5 * torque_for_a_loop(scene), 0.6 * scene.joint.load_Nm)
 
 
+def _payloads(rng: np.random.Generator, scene: Scene) -> Shape:
+    period = log_uniform(rng, 5.0, 15.0)
+    fixed = {
+        "phase_rad": angle(rng),
+        "start_s": float(rng.uniform(0.0, period)),
+        "period_s": period,
+        "held": float(rng.uniform(0.35, 0.6)),
+        "uneven": float(rng.uniform(0.2, 0.4)),
+        "unlike": float(rng.uniform(0.3, 0.8)),
+        "lift_s": float(rng.uniform(0.1, 0.5)),
+    }
+    return Shape(fixed, {"moment_Nm": 1.0}, 2.5 * torque_for_a_loop(scene), 0.6 * scene.joint.load_Nm)
+
+
 def _cross(scene: Scene) -> float:
     return torque_for_a_loop(scene) / max(scene.plain.other_rms, 1e-9)
 
@@ -161,6 +175,7 @@ LOADS = (
     Suspect("gravity_load:tilting_base", TURNING, _tilting, neighbour=True, turned=True),
     Suspect("gravity_load:leaning_base", TURNING, _leaning, neighbour=True, turned=True),
     Suspect("gravity_load:picked_up", TURNING, _payload),
+    Suspect("gravity_load:sorted", TURNING, _payloads),
     Suspect("crosstalk:lagged", ANY, _late_neighbour, neighbour=True),
     Suspect("crosstalk:let_go", ANY, _passing_neighbour, neighbour=True),
     Suspect("crosstalk:quadratic", ANY, _bent_neighbour, neighbour=True),

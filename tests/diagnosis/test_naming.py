@@ -207,6 +207,21 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             Case({"gap_rad": 3e-3, "share": 0.8, "place_rad": 0.2, "width_rad": 0.3}, form=":worn"),
             ("swing", 0.4, 1.0),
         ),
+        (
+            "gravity_load",
+            Case(
+                {
+                    "moment_Nm": 0.15,
+                    "phase_rad": 0.4,
+                    "share": 0.2,
+                    "start_s": 2.0,
+                    "period_s": 5.0,
+                    "held": 0.6,
+                },
+                form=":picked_up",
+            ),
+            ("period_s", 4.95, 5.05),
+        ),
     ],
     ids=[
         "stiffens",
@@ -229,6 +244,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "tilts its bearing",
         "softer across",
         "worn",
+        "is picked up",
     ],
 )
 def test_what_goes_by_another_law_is_named_for_what_it_is(

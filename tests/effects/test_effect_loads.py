@@ -34,6 +34,24 @@ def test_a_weights_lever_may_grow_with_the_joint() -> None:
         assert found == pytest.approx(fed_with(config, columns, load), abs=1e-10)
 
 
+@pytest.mark.parametrize("always", [0.0, 0.4])
+def test_a_payload_weighs_while_it_is_held(always: float) -> None:
+    """For 0.7 s of every 2 s from 0.5 s on, taken up and set down within 0.2 s; before 0.5 s as after it."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    time, weight = columns["time_s"], 0.4 * unit(config)
+    lifts = np.array([0.0, 0.2, 0.7, 0.9])
+    at = np.concatenate([start + lifts for start in np.arange(time[0] - 3.5, time[-1] + 2.0, 2.0)])
+    shift = 0.5 - at[np.argmin(np.abs(at - 0.5))]
+    there = np.interp(time, at + shift, np.tile([0.0, 1.0, 1.0, 0.0], len(at) // 4))
+    cycle = {"period_s": 2.0, "picked_up_s": 0.5, "held": 0.35, "lift_s": 0.2, "always": always}
+    found = run(config, columns, ("gravity_load", {"moment_Nm": weight, "phase_rad": 0.7, **cycle}))
+    turned = found["joint_position_rad"]
+    load = columns["joint_torque_Nm"] - weight * (always + (1.0 - always) * there) * np.sin(turned + 0.7)
+    assert np.ptp(there) > 0.9
+    assert turned == pytest.approx(fed_with(config, columns, load), abs=1e-10)
+
+
 def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
     """As the same weight at the phase that the other joint's angle makes of it; where that is not read, as untilted."""
     config = joint(JOINTS[0])

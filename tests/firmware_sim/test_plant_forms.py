@@ -98,6 +98,7 @@ SIZES = {
     "gravity_load:tilting_base": {"moment_Nm": 0.3, "phase_rad": 0.2, "tilt_rad_per_unit": 0.4},
     "gravity_load:leaning_base": {"moment_Nm": 0.3, "phase_rad": 0.2, "lean_rad_per_unit": 0.4},
     "gravity_load:picked_up": {"moment_Nm": 0.3, "phase_rad": 0.2, "period_s": 1.5},
+    "gravity_load:sorted": {"moment_Nm": 0.3, "phase_rad": 0.2, "period_s": 1.5},
     "clamp_slip:gradual": {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 2.0},
     "clamp_slip:in_steps": {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 2.0, "cable_l": 1.0},
     "clamp_slip:unequal_steps": {"slip_m": 2e-4, "time_s": 1.0, "duration_s": 2.0, "growth": 2.0},

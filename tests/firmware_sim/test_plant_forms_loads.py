@@ -100,6 +100,11 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
         drawn.append(max(x - 0.3, drawn[-1]) if x > drawn[-1] else min(x + 0.3, drawn[-1]))
     lifts, edges = [0.5, 0.7, 1.3, 1.5, 2.1, 2.3, 2.9, 3.1, 3.7, 3.9], [0, 1, 1, 0, 0, 1, 1, 0, 0, 1]
     lifted = np.interp(T, lifts, edges)
+    # the second comes 0.4 · 0.618 of a period later, is 0.2071 lighter and held for 1 - 0.2 · 0.4142 as long
+    second_s = 0.5 + 2.0 + 0.8 * 0.618034
+    longer_s = 0.8 * (1.0 - 0.2 * 0.414214)
+    at = [0.5, 0.6, 1.3, 1.4, second_s, second_s + 0.1, second_s + longer_s, second_s + longer_s + 0.1]
+    sorted_out = np.interp(T, at, [0, 1, 1, 0, 0, 0.792893, 0.792893, 0])
     cases = {
         "gravity_load:sprung": (
             {"moment_Nm": 0.3, "phase_rad": 0.2, "spring_share": 0.5},
@@ -128,6 +133,19 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
                 "lift_s": 0.2,
             },
             -(0.075 + 0.225 * lifted) * np.sin(q + 0.2),
+        ),
+        "gravity_load:sorted": (
+            {
+                "moment_Nm": 0.3,
+                "phase_rad": 0.2,
+                "start_s": 0.5,
+                "period_s": 2.0,
+                "held": 0.4,
+                "uneven": 0.4,
+                "unlike": 0.5,
+                "lift_s": 0.1,
+            },
+            -0.3 * sorted_out * np.sin(q + 0.2),
         ),
         "crosstalk:lagged": ({"load_coefficient": 0.3, "lag_s": smooth}, 0.3 * late),
         "crosstalk:let_go": (

@@ -51,19 +51,19 @@ def best_cycle(here: Anchor, h: Hypothesis, plain: Best) -> Best | None:
     products = _products(here, h, plain)
     if products is None:
         return None
-    cycle, pairs = _likeliest(products)
-    always, there = pairs[:2], pairs[:2] + pairs[2:]
-    if np.linalg.norm(always) > np.linalg.norm(there):
-        cycle, always, there = cycle.turned, there, always
-    size = min(float(np.linalg.norm(there)), h.amount.maximum)
+    cycle, pairs = likeliest(products)
+    always, held_up = pairs[:2], pairs[:2] + pairs[2:]
+    if np.linalg.norm(always) > np.linalg.norm(held_up):
+        cycle, always, held_up = cycle.turned, held_up, always
+    size = min(float(np.linalg.norm(held_up)), h.amount.maximum)
     if not size > 0.0:
         return None
-    share = float(np.clip(always @ there / (there @ there), 0.0, LIMITS.always))
+    share = float(np.clip(always @ held_up / (held_up @ held_up), 0.0, LIMITS.always))
     period, held, always_there, *_ = (p.name for p in h.effect.parameters if p.role == "cycle")
     values = {
         **plain.values,
         h.amount.name: size,
-        h.phase: math.atan2(there[1], there[0]),
+        h.phase: math.atan2(held_up[1], held_up[0]),
         period: cycle.period_s,
         h.cycle_start: cycle.start_s,
         held: cycle.held,
@@ -104,7 +104,7 @@ def _throughout(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> 
         return None
 
 
-def _likeliest(products: Products) -> tuple[Cycle, FloatArray]:
+def likeliest(products: Products) -> tuple[Cycle, FloatArray]:
     """The cycle that takes off most, and what is always there and what comes and goes: cosine and sine of each."""
     begin, end = float(products.ends_s[1]), float(products.ends_s[-2])
     shortest = max(4.0 * (end - begin) / len(products.ends_s), LIMITS.least_cycle_s)
@@ -115,13 +115,13 @@ def _likeliest(products: Products) -> tuple[Cycle, FloatArray]:
         cycles = [
             Cycle(period, begin + s * period, held) for s in starts.tolist() for held in LIMITS.cycle_held
         ]
-        gains, _ = _gains(products, cycles)
-        k = int(np.argmax(gains))
-        best.append((float(gains[k]), cycles[k]))
+        gone, _ = gains(products, cycles)
+        k = int(np.argmax(gone))
+        best.append((float(gone[k]), cycles[k]))
     best.sort(key=lambda found: -found[0])
     nearer = [_nearer(products, cycle) for _, cycle in best[: LIMITS.cycles]]
-    gains, pairs = _gains(products, nearer)
-    k = int(np.argmax(gains))
+    gone, pairs = gains(products, nearer)
+    k = int(np.argmax(gone))
     return nearer[k], pairs[k]
 
 
@@ -137,16 +137,16 @@ def _nearer(products: Products, cycle: Cycle) -> Cycle:
     options = {"initial_simplex": simplex, "maxiter": 120, "xatol": 1e-4, "fatol": 1e-3}
 
     def left(x: FloatArray) -> float:
-        return -float(_gains(products, [at(x)])[0][0])
+        return -float(gains(products, [at(x)])[0][0])
 
     return at(minimize(left, np.zeros(3), method="Nelder-Mead", options=options).x)
 
 
-def _gains(products: Products, cycles: Sequence[Cycle]) -> tuple[FloatArray, FloatArray]:
+def gains(products: Products, cycles: Sequence[Cycle]) -> tuple[FloatArray, FloatArray]:
     """What each cycle takes off the cost, and with which cosine and sine at all times, and beside them while it is
     there."""
-    there = np.stack([_there(c, products.ends_s) for c in cycles])
-    weights = np.stack([np.ones_like(there), there], axis=1)
+    courses = np.stack([there(c, products.ends_s) for c in cycles])
+    weights = np.stack([np.ones_like(courses), courses], axis=1)
     gram = np.einsum("niabl,njl->niajb", np.tensordot(weights, products.gram, (2, 1)), weights)
     gram = gram.reshape(-1, 4, 4)
     along = np.einsum("nik,ak->nia", weights, products.along).reshape(-1, 4)
@@ -155,7 +155,7 @@ def _gains(products: Products, cycles: Sequence[Cycle]) -> tuple[FloatArray, Flo
     return 0.5 * np.sum(along * pairs, axis=1), pairs
 
 
-def _there(cycle: Cycle, ends_s: FloatArray) -> FloatArray:
+def there(cycle: Cycle, ends_s: FloatArray) -> FloatArray:
     """For what share of each stretch of time it is there."""
     since = (ends_s - cycle.start_s) / cycle.period_s
     whole = np.floor(since)

@@ -1,5 +1,5 @@
 """Unseen weight in other forms: held by a spring, on a linkage, on a base that tilts or leans, picked up and put
-down."""
+down in turn or as it comes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from firmware_sim.plant.assembly import Build
 from firmware_sim.plant.columns import LEAN, OTHER, TILT, TIME
 from firmware_sim.plant.effects.base import EffectKind, Parameter, form
-from firmware_sim.plant.forms.courses import held
+from firmware_sim.plant.forms.courses import held, ramp
 from firmware_sim.plant.records import Floats
 
 _MOMENT = Parameter("moment_Nm", "m g l", neutral=0.0)
@@ -135,4 +135,42 @@ PICKED_UP = form(
     _picked_up,
 )
 
-KINDS: tuple[EffectKind, ...] = (SPRUNG, LINKAGE, TILTING, LEANING, PICKED_UP)
+
+def _sorted(build: Build, p: Mapping[str, float]) -> None:
+    _weight(build, p)
+
+    def fill(inputs: Floats) -> None:
+        time = inputs[:, TIME]
+        there = np.zeros(len(time))
+        for k in range(int((float(time[-1]) - p["start_s"]) / p["period_s"]) + 2):
+            # multiples of the golden ratio and of the square root of 2: no time and no weight comes twice
+            later, lighter = (0.618034 * k) % 1.0, (0.414214 * k) % 1.0
+            begin = p["start_s"] + (k + p["uneven"] * later) * p["period_s"]
+            end = begin + p["held"] * (1.0 - 0.5 * p["uneven"] * lighter) * p["period_s"]
+            lifted = ramp(time, begin, p["lift_s"]) - ramp(time, end, p["lift_s"])
+            there += (1.0 - p["unlike"] * lighter) * lifted
+        inputs[:, LEAN] = 1.0 - there
+
+    build.schedules.append(fill)
+
+
+SORTED = form(
+    "gravity_load",
+    "sorted",
+    "Payloads of unlike weights that are picked up at uneven times, held for unlike times and put down: the cables "
+    "carry M − m_k g l sin(q + φ) while the k-th is held, and M else.",
+    (
+        _MOMENT,
+        _PHASE,
+        Parameter("start_s", "when the first is picked up", 0.0),
+        Parameter("period_s", "from one to the next, on an average", 10.0, 0.1),
+        Parameter("held", "share of that for which the first is held", 0.5, 0.05, 0.6),
+        Parameter("uneven", "share of the period by which the times differ", 0.4, 0.0, 0.4),
+        Parameter("unlike", "by what share of the heaviest the weights differ", 0.5, 0.0, 1.0),
+        Parameter("lift_s", "within which the weight is taken up or set down", 0.3, 1e-3),
+    ),
+    (*_ACTS, "time"),
+    _sorted,
+)
+
+KINDS: tuple[EffectKind, ...] = (SPRUNG, LINKAGE, TILTING, LEANING, PICKED_UP, SORTED)
