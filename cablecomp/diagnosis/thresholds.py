@@ -203,6 +203,10 @@ class Thresholds:
     """Shares of each for which it is held that are looked at."""
     cycles: int = 4
     """Cycles that are looked at more closely."""
+    cycled: float = 0.6
+    """Cost with the best of them over that of a weight that is always there, after a linear step, above which it is
+    taken to be always there: of so many cycles one takes up a part of anything (0.7 to 0.92 of what other effects left
+    in 11 trials of 60; 0.2 to 0.4 of what payloads did in 6)."""
     always: float = 0.9
     """Share of a weight that is there without the payload, at most, where a fit begins."""
     course_instants: int = 160

@@ -93,10 +93,11 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
     # where every run is dear no shape is asked for but what goes with speed; of an event, its course alone
     further = h.further if not here.fit.problem.fine else h.further_at_speed
     if h.has_phase:
-        pairs = [best_pair(here, h, further) if further else None]
         if h.cycle_start and not (h.channel or here.fit.problem.fine):
-            pairs.append(best_cycle(here, h, best))
-        pair = min((p for p in pairs if p is not None), key=lambda p: p.cost, default=None)
+            cycle = best_cycle(here, h, best)
+            if cycle is not None and worth_a_shape(cycle.by_channel, best.by_channel, LIMITS.cycled):
+                return _answer(here, h, cycle)
+        pair = best_pair(here, h, further) if further else None
         worth = pair is not None and worth_a_shape(pair.by_channel, best.by_channel)
         return _answer(here, h, pair) if pair is not None and worth else None
     if h.has_instant:
