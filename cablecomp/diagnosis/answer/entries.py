@@ -82,11 +82,10 @@ def _chosen(h: Hypothesis, fit: Fit) -> dict[str, Value]:
 
 
 def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple[list[Value], str]:
-    """The values with an event's instant, or one of what comes again and again, on the clock of the recording in which
-    it came, or after which; and that recording's name, "" where all share one clock."""
+    """The values with an event's instant on the clock of the recording in which it came, or after which; and that
+    recording's name, "" where all share one clock."""
     evidence = fit.problem.evidence
-    at = h.instant or h.cycle_start
-    when = next((v.value for v in values if at and v.name == h.key(at)), None)
+    when = next((v.value for v in values if h.has_instant and v.name == h.key(h.instant)), None)
     if when is None or not any(e.shift_s for e in evidence):
         return list(values), ""
     begun = [e for e in evidence if float(e.columns["time_s"][0]) <= when] or [evidence[0]]
@@ -96,7 +95,7 @@ def _in_its_recording(values: Sequence[Value], h: Hypothesis, fit: Fit) -> tuple
         interval = v.interval_95 and (v.interval_95[0] - e.shift_s, v.interval_95[1] - e.shift_s)
         return replace(v, value=v.value - e.shift_s, interval_95=interval)
 
-    return [moved(v) if v.name == h.key(at) else v for v in values], e.name
+    return [moved(v) if v.name == h.key(h.instant) else v for v in values], e.name
 
 
 def _depends(d: Dependence | None, final: Model) -> dict[str, object] | None:

@@ -47,7 +47,10 @@ class Products(NamedTuple):
 
 
 def best_cycle(here: Anchor, h: Hypothesis, plain: Best) -> Best | None:
-    """The best linear answer over the cycles in which an effect with a phase may come and go, of this shape."""
+    """The best linear answer over the cycles in which an effect with a phase may come and go, of this shape; None where
+    there is none, or recordings have clocks of their own, on which no cycle goes on."""
+    if any(e.shift_s for e in here.fit.problem.evidence):
+        return None
     products = _products(here, h, plain)
     if products is None:
         return None
