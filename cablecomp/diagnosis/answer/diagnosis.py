@@ -12,6 +12,7 @@ from cablecomp.diagnosis.answer.augmented import (
     with_tolerances_of,
 )
 from cablecomp.diagnosis.answer.entries import (
+    by_the_clock,
     candidates,
     channel_word,
     named_of,
@@ -68,7 +69,7 @@ def diagnosis_of(
         remainder=remainder(case, outcome, rng),
         remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.names),
-        notes=(*notes(case), *alike),
+        notes=(*notes(case), *by_the_clock(kept), *alike),
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates, outcome.empirical)),

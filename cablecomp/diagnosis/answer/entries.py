@@ -278,6 +278,23 @@ def notes(case: Case) -> tuple[str, ...]:
     return tuple(found)
 
 
+def by_the_clock(model: Model) -> tuple[str, ...]:
+    """What the written joint expects by the recordings' clock: effects that come and go."""
+    found = []
+    for term in (t for t in model.terms if isinstance(t, Hypothesis) and t.cycle_start):
+        own = {p.name: model.fit.values.get(term.key(p.name)) for p in term.effect.parameters}
+        when = own[term.cycle_start]
+        if when is None:
+            continue
+        period = next(p.name for p in term.effect.parameters if p.role == "cycle")
+        found.append(
+            f"the written joint expects the payload of {term.effect.id} every {own[period]:.4g} s from {when:.4g} s on "
+            f"by these recordings' clock; where another runs, set its `{term.cycle_start}`; where nothing is picked "
+            f"up, `{period} = 0` and `{term.amount.name}` to what is always there"
+        )
+    return tuple(found)
+
+
 def channel_word(channel: str) -> str:
     """A channel in the words of the covariates."""
     return {"motor_position_rad": "motor_angle", "joint_torque_Nm": "load"}.get(channel, channel)
