@@ -266,7 +266,10 @@ def test_a_payload_that_is_picked_up_and_put_down_is_told_by_its_cycle() -> None
     begun = told["picked_up_s"]
     assert isinstance(begun, Value)
     assert (begun.value - 2.0 + 2.5) % 5.0 - 2.5 == pytest.approx(0.0, abs=0.2)
-    assert any("every 5" in note and "`picked_up_s`" in note for note in found.notes)
+    period = told["period_s"]
+    assert isinstance(period, Value)
+    said = f"every {period.value:.4g} s from {begun.value:.4g} s on by these recordings' clock"
+    assert any(said in note for note in found.notes)
 
 
 def test_a_weight_turns_with_the_joint_that_carries_the_base_where_that_is_an_angle() -> None:
