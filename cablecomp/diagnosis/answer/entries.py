@@ -280,17 +280,18 @@ def notes(case: Case) -> tuple[str, ...]:
 
 def by_the_clock(model: Model) -> tuple[str, ...]:
     """What the written joint expects by the recordings' clock: effects that come and go."""
-    found = []
-    for term in (t for t in model.terms if isinstance(t, Hypothesis) and t.cycle_start):
-        own = {p.name: model.fit.values.get(term.key(p.name)) for p in term.effect.parameters}
-        when = own[term.cycle_start]
-        if when is None:
+    values, found = model.fit.values, []
+    for term in (t for t in model.terms if isinstance(t, Hypothesis)):
+        if not term.cycle_start or term.key(term.cycle_start) not in values:
             continue
-        period = next(p.name for p in term.effect.parameters if p.role == "cycle")
+        own = {p.name: values.get(term.key(p.name), p.neutral) for p in term.effect.parameters}
+        when = own[term.cycle_start]
+        period, _, always, *_ = (p.name for p in term.effect.parameters if p.role == "cycle")
+        there = own[term.amount.name] * own[always]
         found.append(
             f"the written joint expects the payload of {term.effect.id} every {own[period]:.4g} s from {when:.4g} s on "
             f"by these recordings' clock; where another runs, set its `{term.cycle_start}`; where nothing is picked "
-            f"up, `{period} = 0` and `{term.amount.name}` to what is always there"
+            f"up, `{period} = 0` and `{term.amount.name} = {there:.3g}`"
         )
     return tuple(found)
 
