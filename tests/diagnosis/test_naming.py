@@ -272,6 +272,21 @@ def test_a_payload_that_is_picked_up_and_put_down_is_told_by_its_cycle() -> None
     assert any(said in note for note in found.notes)
 
 
+def test_a_payload_that_is_picked_up_once_is_told_by_when() -> None:
+    """From 15 s of 40 on; how long it stays is not told, and the page says so."""
+    law = {"moment_Nm": 0.15, "phase_rad": 0.4, "share": 0.2, "start_s": 15.0, "period_s": 200.0, "held": 0.5}
+    found = diagnose(
+        TOLERANT, {"small/1": recording("gravity_load", Case(law, seconds=40.0, form=":picked_up"))}
+    )
+    assert [named.effect for named in found.named] == ["gravity_load"]
+    begun, moment = (found.named[0].parameters[k] for k in ("picked_up_s", "moment_Nm"))
+    assert isinstance(begun, Value)
+    assert isinstance(moment, Value)
+    assert begun.value == pytest.approx(15.0, abs=0.3)
+    assert moment.value == pytest.approx(0.15, abs=0.02)
+    assert any("seen once" in note for note in found.notes)
+
+
 def test_a_weight_turns_with_the_joint_that_carries_the_base_where_that_is_an_angle() -> None:
     """The same channel without a unit may be a neighbour's load, and turns nothing."""
     law = {"moment_Nm": 0.15, "phase_rad": 0.4, "tilt_rad_per_unit": 0.7}

@@ -281,6 +281,8 @@ def notes(case: Case) -> tuple[str, ...]:
 def by_the_clock(model: Model) -> tuple[str, ...]:
     """What the written joint expects by the recordings' clock: effects that come and go."""
     values, found = model.fit.values, []
+    time = [e.columns["time_s"] for e in model.fit.problem.evidence]
+    span = max(float(t[-1]) for t in time) - min(float(t[0]) for t in time)
     for term in (t for t in model.terms if isinstance(t, Hypothesis)):
         if not term.cycle_start or term.key(term.cycle_start) not in values:
             continue
@@ -288,9 +290,14 @@ def by_the_clock(model: Model) -> tuple[str, ...]:
         when = own[term.cycle_start]
         period, _, always, *_ = (p.name for p in term.effect.parameters if p.role == "cycle")
         there = own[term.amount.name] * own[always]
+        again = (
+            f"every {own[period]:.4g} s"
+            if 2.0 * own[period] <= span
+            else "(seen once: when again is not told)"
+        )
         found.append(
-            f"the written joint expects the payload of {term.effect.id} every {own[period]:.4g} s from {when:.4g} s on "
-            f"by these recordings' clock; where another runs, set its `{term.cycle_start}`; where nothing is picked "
+            f"the written joint expects the payload of {term.effect.id} {again} from {when:.4g} s on by these "
+            f"recordings' clock; where another runs, set its `{term.cycle_start}`; where nothing is picked "
             f"up, `{period} = 0` and `{term.amount.name} = {there:.3g}`"
         )
     return tuple(found)
