@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from small_drive import TOLERANT, calibrated, recorded
 
-from cablecomp.diagnosis.explain.cycles import Cycle, Products, gains, likeliest, there
+from cablecomp.diagnosis.explain.cycles import Cycle, Products, best_cycle, gains, likeliest, there
+from cablecomp.diagnosis.explain.hypotheses import hypotheses
+from cablecomp.diagnosis.explain.linear import anchor, best_pair
+from cablecomp.diagnosis.explain.screening import ask
+from firmware_sim.plant import EffectSpec
 
 ENDS_S = np.linspace(0.0, 30.0, 121)
 MIDDLE_S = 0.5 * (ENDS_S[1:] + ENDS_S[:-1])
@@ -61,3 +68,21 @@ def test_a_cycle_is_found_in_noise(cycle: Cycle) -> None:
     assert there(found, ENDS_S) == pytest.approx(there(cycle, ENDS_S), abs=0.35)
     assert np.mean(np.abs(there(found, ENDS_S) - there(cycle, ENDS_S))) < 0.02
     assert pairs == pytest.approx([0.18, 0.24, 0.42, 0.56], abs=0.1)
+
+
+@pytest.mark.parametrize("form", ["", ":picked_up"], ids=["always there", "picked up"])
+def test_a_weight_comes_and_goes_where_that_leaves_far_less_and_recordings_share_a_clock(form: str) -> None:
+    law = {"moment_Nm": 0.15, "phase_rad": 0.4}
+    cycle = {"share": 0.2, "start_s": 2.0, "period_s": 5.0, "held": 0.6} if form else {}
+    body, drive = calibrated(recorded([EffectSpec("gravity_load" + form, law | cycle)], 20.0))
+    weight = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "gravity_load")
+    here = anchor(drive.fit)
+    answer = ask(here, weight)
+    assert answer is not None
+    free = {p.base for p in answer.problem.parameters}
+    assert (weight.key("period_s") in free) == bool(form)
+    plain = best_pair(here, weight, [{}])
+    assert plain is not None
+    problem = drive.fit.problem
+    apart = replace(problem, evidence=tuple(replace(e, shift_s=100.0) for e in problem.evidence))
+    assert best_cycle(anchor(replace(drive.fit, problem=apart)), weight, plain) is None

@@ -40,10 +40,9 @@ def test_a_payload_weighs_while_it_is_held(always: float) -> None:
     config = joint(JOINTS[0])
     columns = excitation(config)
     time, weight = columns["time_s"], 0.4 * unit(config)
-    lifts = np.array([0.0, 0.2, 0.7, 0.9])
-    at = np.concatenate([start + lifts for start in np.arange(time[0] - 3.5, time[-1] + 2.0, 2.0)])
-    shift = 0.5 - at[np.argmin(np.abs(at - 0.5))]
-    there = np.interp(time, at + shift, np.tile([0.0, 1.0, 1.0, 0.0], len(at) // 4))
+    starts = 0.5 + 2.0 * np.arange(-2, int(time[-1]))
+    at = np.add.outer(starts, [0.0, 0.2, 0.7, 0.9]).ravel()
+    there = np.interp(time, at, np.tile([0.0, 1.0, 1.0, 0.0], len(starts)))
     cycle = {"period_s": 2.0, "picked_up_s": 0.5, "held": 0.35, "lift_s": 0.2, "always": always}
     found = run(config, columns, ("gravity_load", {"moment_Nm": weight, "phase_rad": 0.7, **cycle}))
     turned = found["joint_position_rad"]

@@ -286,19 +286,14 @@ def by_the_clock(model: Model) -> tuple[str, ...]:
     for term in (t for t in model.terms if isinstance(t, Hypothesis)):
         if not term.cycle_start or term.key(term.cycle_start) not in values:
             continue
-        own = {p.name: values.get(term.key(p.name), p.neutral) for p in term.effect.parameters}
-        when = own[term.cycle_start]
-        period, _, always, *_ = (p.name for p in term.effect.parameters if p.role == "cycle")
-        there = own[term.amount.name] * own[always]
-        again = (
-            f"every {own[period]:.4g} s"
-            if 2.0 * own[period] <= span
-            else "(seen once: when again is not told)"
+        amount, when, period, _, always = (
+            values[term.key(n)] for n in (term.amount.name, term.cycle_start, *term.of_cycle)
         )
+        again = f"every {period:.4g} s" if 2.0 * period <= span else "(seen once: when again is not told)"
         found.append(
             f"the written joint expects the payload of {term.effect.id} {again} from {when:.4g} s on by these "
             f"recordings' clock; where another runs, set its `{term.cycle_start}`; where nothing is picked "
-            f"up, `{period} = 0` and `{term.amount.name} = {there:.3g}`"
+            f"up, `{term.of_cycle[0]} = 0` and `{term.amount.name} = {amount * always:.3g}`"
         )
     return tuple(found)
 

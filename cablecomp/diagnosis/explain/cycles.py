@@ -62,7 +62,7 @@ def best_cycle(here: Anchor, h: Hypothesis, plain: Best) -> Best | None:
     if not size > 0.0:
         return None
     share = float(np.clip(always @ held_up / (held_up @ held_up), 0.0, LIMITS.always))
-    period, held, always_there, *_ = (p.name for p in h.effect.parameters if p.role == "cycle")
+    period, held, always_there = h.of_cycle
     values = {
         **plain.values,
         h.amount.name: size,

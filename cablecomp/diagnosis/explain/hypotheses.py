@@ -127,6 +127,11 @@ class Hypothesis:
         return self._of_role("cycle start")
 
     @property
+    def of_cycle(self) -> tuple[str, ...]:
+        """The names of how often that comes, for what share of the time it stays, what share is always there."""
+        return tuple(p.name for p in self.effect.parameters if p.role == "cycle" and not p.held)
+
+    @property
     def goes_in_steps(self) -> bool:
         """Whether it is an event whose law knows further steps."""
         return bool(self._further_steps)
