@@ -280,14 +280,19 @@ def notes(case: Case) -> tuple[str, ...]:
 
 def by_the_clock(model: Model) -> tuple[str, ...]:
     """What the written joint expects by the recordings' clock: effects that come and go."""
-    values, found = model.fit.values, []
-    time = [e.columns["time_s"] for e in model.fit.problem.evidence]
+    fit, found = model.fit, []
+    first = fit.problem.evidence[0]
+    stood = {
+        e.id: e.parameters for e in fit.problem.joint(fit.x, first).effect
+    }  # an amount may be a session's own
+    time = [e.columns["time_s"] for e in fit.problem.evidence]
     span = max(float(t[-1]) for t in time) - min(float(t[0]) for t in time)
     for term in (t for t in model.terms if isinstance(t, Hypothesis)):
-        if not term.cycle_start or term.key(term.cycle_start) not in values:
+        own = stood[term.effect.id]
+        if term.cycle_start not in own:
             continue
         amount, when, period, _, always = (
-            values[term.key(n)] for n in (term.amount.name, term.cycle_start, *term.of_cycle)
+            float(own[n]) for n in (term.amount.name, term.cycle_start, *term.of_cycle)
         )
         again = f"every {period:.4g} s" if 2.0 * period <= span else "(seen once: when again is not told)"
         found.append(
