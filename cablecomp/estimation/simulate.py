@@ -81,8 +81,10 @@ class Simulator:
             why = Refusal(status)
             refused = SlackError if why is Refusal.SLACK else InputError
             raise refused(f"{recording.name}: at {at:g} s {REASONS[why]}")
+        if not more:
+            return answer
         own = np.r_[0:place, place + more : len(outs)]
-        return Answer(*(column[own] for column in answer)) if more else answer
+        return Answer(*(column[own] for column in answer))
 
     def _readings(self, recording: Evidence, kept: IntArray) -> Readings:
         """The recording's fine rows `kept`."""

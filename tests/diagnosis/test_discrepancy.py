@@ -12,11 +12,13 @@ import pytest
 from linear_fit import Linear
 from turning import JOINT as CONFIG
 
-from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
+from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy, score_beside
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.scores import left_out, score_difference
+from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects import catalogue
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.signal.smoothing import FloatArray
@@ -66,6 +68,50 @@ def gains(other: FloatArray, y: FloatArray) -> tuple[float, float]:
     as_it_is = score_difference(having.left_out, lacking.left_out, GROUPS)
     let = [left_out_with_discrepancy(m, [named("routing_friction")], GROUPS) for m in (having, lacking)]
     return as_it_is.gain, score_difference(*let, GROUPS).gain
+
+
+def beside(other: FloatArray, y: FloatArray, **of_drive: Any) -> tuple[Model, Model]:
+    """A model with the law and another effect, and that with the law alone; `of_drive`: of a parameter of the drive."""
+    columns = {FRICTION: LAW, "gravity_load.moment_Nm": other}
+    found = []
+    for count in (2, 1):
+        names = list(columns)[:count]
+        fitted = model(y, {n: columns[n] for n in names})
+        fitted.fit.problem.parameters[0] = replace(fitted.fit.problem.parameters[0], **of_drive)
+        found.append(replace(fitted, terms=tuple(map(term, names))))
+    return found[0], found[1]
+
+
+def term(parameter: str) -> Hypothesis:
+    """The effect that has it, by this amount."""
+    name, _, amount = parameter.partition(".")
+    effect = catalogue()[name]
+    return Hypothesis(effect, name, effect.parameter(amount), (), two_sided=False)
+
+
+def test_what_the_form_of_the_first_law_hides_is_demanded() -> None:
+    """A second effect that is a third of what the law's form leaves (seed 7)."""
+    noise = 0.02 * np.random.default_rng(7).standard_normal(COUNT)
+    own = 0.2 * np.sin(6.0 * MOTOR + 1.0)
+    having, lacking = beside(own, LAW * (1.0 + 0.1 * TIME / 60.0) + own + noise)
+    assert not demanded(score_difference(having.left_out, lacking.left_out, GROUPS))
+    assert demanded(score_beside(having, lacking, GROUPS))
+
+
+def test_what_the_laws_as_they_are_tell_more_of_is_told_by_them() -> None:
+    """Another effect that goes as the law does, ever more, as no form of it does (seed 8)."""
+    noise = 0.1 * np.random.default_rng(8).standard_normal(COUNT)
+    having, lacking = beside(LAW * TIME / 60.0, LAW * (1.0 + TIME / 60.0) + noise)
+    plain = score_difference(having.left_out, lacking.left_out, GROUPS)
+    freely = [left_out_with_discrepancy(m, [term(FRICTION)], GROUPS) for m in (having, lacking)]
+    assert plain.z > score_difference(*freely, GROUPS).z
+    assert score_beside(having, lacking, GROUPS) == plain
+
+
+def test_of_a_drive_that_is_known_by_order_of_magnitude_laws_are_compared_as_they_are() -> None:
+    having, lacking = beside(LAW * TIME, LAW * (1.0 + 0.1 * TIME / 60.0), sd=3.0)
+    plain = score_difference(having.left_out, lacking.left_out, GROUPS)
+    assert score_beside(having, lacking, GROUPS) == plain
 
 
 @pytest.mark.parametrize(
