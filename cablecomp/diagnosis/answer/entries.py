@@ -281,10 +281,8 @@ def notes(case: Case) -> tuple[str, ...]:
 def by_the_clock(model: Model) -> tuple[str, ...]:
     """What the written joint expects by the recordings' clock: effects that come and go."""
     fit, found = model.fit, []
-    first = fit.problem.evidence[0]
-    stood = {
-        e.id: e.parameters for e in fit.problem.joint(fit.x, first).effect
-    }  # an amount may be a session's own
+    joint = fit.problem.joint(fit.x, fit.problem.evidence[0])  # an amount may be a session's own
+    stood = {e.id: e.parameters for e in joint.effect}
     time = [e.columns["time_s"] for e in fit.problem.evidence]
     span = max(float(t[-1]) for t in time) - min(float(t[0]) for t in time)
     for term in (t for t in model.terms if isinstance(t, Hypothesis)):
