@@ -18,6 +18,7 @@ from cablecomp.report.diagnosis_words import (
     depends,
     in_a_sentence,
     number,
+    percent,
     plain,
     repeats_limit,
     sentence,
@@ -37,9 +38,10 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     """The answer: names or new values on the left, measured, before and after on the right, numbers below."""
     words = f'<p class="verdict {_TONES[d.verdict]}">{escape(sentence(d.verdict))}</p>'
     words += page.paragraph(in_a_sentence(result))
-    words += "".join(_missing(m, bool(result["channels"]), unit) for m in result["missing_physics"])
+    missing = result["missing_physics"]
+    words += "".join(_missing(m, bool(result["channels"]), len(missing) > 1, unit) for m in missing)
     words += "".join(_law(law) for law in dependences(result) if not _of_a_name(law, result))
-    if not result["missing_physics"]:
+    if not missing:
         words += _without_a_name(result)
     words += page.paragraph(_left(result, unit))
     words += page.paragraph(_nameless(result)) if result["empirical"] else ""
@@ -57,17 +59,19 @@ def shown_first(d: Diagnosis) -> Traces | None:
     return max(d.traces, key=lambda t: float(np.mean(figures.residual(t, "before_rad") ** 2)), default=None)
 
 
-def _missing(m: Mapping[str, Any], several: bool, unit: Scale) -> str:
-    sure, gain = 100.0 * known(m["confidence"]), 100.0 * known(m["heldout_gain"])
+def _missing(m: Mapping[str, Any], several: bool, others: bool, unit: Scale) -> str:
+    """One name: how sure, what it takes off, its values; of `several` channels, beside `others`."""
+    sure = 100.0 * known(m["confidence"])
     lines = "; ".join(values_of(m))
     law = page.paragraph(f"{depends(m['depends_on'])}.") if m["depends_on"] else ""
-    moves = m["evidence"].get("moves_rad")
+    moves, gain = m["evidence"].get("moves_rad"), m["evidence"].get("gain")
     by = f", and moves the joint by {angle(moves, unit)} RMS" if moves else ""
+    beside = f" ({percent(gain)} of what the others leave)" if others and gain is not None else ""
     return (
         f'<div class="missing"><h3>{escape(sentence(plain(m["effect"])))}</h3>'
         f'<div class="sure"><i style="width:{sure:.0f}%"></i></div>'
-        f"<p><b>{sure:.0f} %</b> sure of the name; takes <b>{gain:.0f} %</b> off the held-out square"
-        f"{' of the channel in which it shows most' if several else ''}{by}.</p>"
+        f"<p><b>{sure:.0f} %</b> sure of the name; takes <b>{percent(known(m['heldout_gain']))}</b> off the held-out "
+        f"square{' of the channel in which it shows most' if several else ''}{beside}{by}.</p>"
         f'<p class="values">{escape(lines)}</p>{law}</div>'
     )
 
@@ -114,9 +118,8 @@ def _left(result: Mapping[str, Any], unit: Scale) -> str:
     size = angle(remainder["rmse_rad"], unit)
     if not remainder["structured"]:
         return f"What remains, {size} RMS, follows nothing that was asked."
-    share = 100.0 * known(remainder["share"])
     text = str(remainder["description"]).partition(";")[0]
-    return f"What remains: {size} RMS, {share:.0f} % of the calibrated drive's square; {text}."
+    return f"What remains: {size} RMS, {percent(known(remainder['share']))} of the calibrated drive's square; {text}."
 
 
 def _unseen(result: Mapping[str, Any]) -> str:

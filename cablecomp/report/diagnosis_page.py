@@ -33,6 +33,7 @@ from cablecomp.report.diagnosis_words import (
     covariate,
     dependences,
     depends,
+    percent,
     plain,
     sentence,
 )
@@ -101,7 +102,7 @@ def _missing(result: Mapping[str, Any]) -> Iterator[str]:
         if m["depends_on"]:
             yield page.paragraph(f"{depends(m['depends_on'])}.")
         yield page.paragraph(
-            f"Takes {100 * known(m['heldout_gain']):.1f} % off the calibrated "
+            f"Takes {percent(known(m['heldout_gain']))} off the calibrated "
             f"drive's held-out mean square; probability "
             f"that the name is right: {100 * known(m['confidence']):.0f} %. Source: {effect.source}."
         )

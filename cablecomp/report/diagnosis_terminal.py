@@ -14,6 +14,7 @@ from cablecomp.report.diagnosis_words import (
     dependences,
     depends,
     in_a_sentence,
+    percent,
     plain,
     repeats_limit,
     values_of,
@@ -50,7 +51,7 @@ def _missing(result: Mapping[str, Any]) -> Table:
         table.add_row(
             m["effect"],
             f"{100 * m['confidence']:.0f} %",
-            f"{100 * m['heldout_gain']:.0f} %",
+            percent(m["heldout_gain"]),
             ", ".join(values_of(m)),
         )
     return table

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
@@ -52,6 +53,13 @@ def covariate(name: str) -> str:
 def number(value: float | None, digits: int = 4) -> str:
     """A number with its significant digits; None is a dash."""
     return "–" if value is None else f"{value:.{digits}g}"
+
+
+def percent(share: float) -> str:
+    """A share in percent, with the digits that tell it from nothing and from all."""
+    rest = 100.0 * min(abs(share), abs(1.0 - share))
+    digits = math.ceil(-math.log10(rest)) if 1e-3 < rest < 1.0 else 0
+    return f"{100.0 * share:.{digits}f} %"
 
 
 def values_of(entry: Mapping[str, Any]) -> Iterator[str]:

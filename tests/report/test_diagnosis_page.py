@@ -21,6 +21,7 @@ from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_tables import between, interval
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
+from cablecomp.report.diagnosis_words import percent
 from cablecomp.report.replay_figures import Scale
 
 
@@ -67,6 +68,30 @@ def test_all_parts_of_the_result_are_on_the_page(found: Diagnosis) -> None:
         "kept for the end",
     ):
         assert part in text, part
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (0.0, "0 %"),
+        (1.0, "100 %"),
+        (0.354, "35 %"),
+        (-0.02, "-2 %"),
+        (0.0031, "0.3 %"),
+        (0.9996, "99.96 %"),
+        (1e-7, "0 %"),
+    ],
+)
+def test_a_small_share_is_not_said_to_be_none_nor_a_large_one_all(share: float, said: str) -> None:
+    assert percent(share) == said
+
+
+def test_a_name_beside_a_far_larger_one_says_what_it_takes_off_of_what_that_leaves(found: Diagnosis) -> None:
+    first = replace(found.named[0], evidence={"gain": 0.97})
+    second = replace(found.named[0], heldout_gain=0.0031, evidence={"gain": 0.447})
+    text = text_of(diagnosis_page(replace(found, named=(first, second))).split("</section>")[0])
+    assert re.search(r"takes 0.3 % off the held-out square.* \(45 % of what the others leave\)", text)
+    assert "of what the others leave" not in text_of(diagnosis_page(replace(found, named=(first,))))
 
 
 def test_the_answer_stands_before_everything_else(found: Diagnosis) -> None:
