@@ -12,19 +12,16 @@ import pytest
 from linear_fit import Linear
 from turning import JOINT as CONFIG
 
-from cablecomp.diagnosis.explain import rounds, selection, ties
-from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy, score_beside
-from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
+from cablecomp.diagnosis.explain.scores import left_out, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.effects import catalogue
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.estimation.parameter import DECADE, Parameter
+from cablecomp.estimation.parameter import Parameter
 from cablecomp.signal.smoothing import FloatArray
 
-FRICTION, DRIVE = "routing_friction.mu_angle", "EA_N"
+FRICTION = "routing_friction.mu_angle"
 BLOCKS, ROWS = 30, 20
 COUNT = BLOCKS * ROWS
 BLOCK = np.repeat(np.arange(BLOCKS), ROWS)
@@ -37,7 +34,7 @@ LAW = 5.0 * np.sign(np.gradient(MOTOR))
 
 
 def model(y: FloatArray, columns: Mapping[str, FloatArray]) -> Model:
-    """argmin |y - A x|^2 + |x/10|^2, a column each; named as parameters of effects, `EA_N` as the drive's."""
+    """argmin |y - A x|^2 + |x/10|^2, a column each; named as parameters of effects."""
     A, n = np.stack(list(columns.values()), axis=1), len(columns)
     J = np.vstack([-A, 0.1 * np.eye(n)])
     x = np.linalg.lstsq(-J, np.concatenate([y, np.zeros(n)]), rcond=None)[0]
@@ -49,9 +46,7 @@ def model(y: FloatArray, columns: Mapping[str, FloatArray]) -> Model:
     problem = SimpleNamespace(
         config=CONFIG,
         bounds=lambda: (np.full(n, -1e3), np.full(n, 1e3)),
-        parameters=[
-            Parameter(k if k == DRIVE else f"effect.{k}", 0.0, -1e3, 1e3, False, sd=1.0) for k in columns
-        ],
+        parameters=[Parameter(f"effect.{k}", 0.0, -1e3, 1e3, False, sd=1.0) for k in columns],
         channels=(JOINT,),
         evidence=(recording,),
         bases={JOINT: SimpleNamespace(penalty_rows=0)},
@@ -71,66 +66,6 @@ def gains(other: FloatArray, y: FloatArray) -> tuple[float, float]:
     as_it_is = score_difference(having.left_out, lacking.left_out, GROUPS)
     let = [left_out_with_discrepancy(m, [named("routing_friction")], GROUPS) for m in (having, lacking)]
     return as_it_is.gain, score_difference(*let, GROUPS).gain
-
-
-def beside(other: FloatArray, y: FloatArray, sd: float = 1.0) -> tuple[Model, Model]:
-    """A model with the law and another effect, and that with the law alone, of a drive known to `sd`."""
-    columns = {DRIVE: LOAD, FRICTION: LAW, "gravity_load.moment_Nm": other}
-    found = []
-    for count in (3, 2):
-        drive, *effects = list(columns)[:count]
-        fitted = model(y, {n: columns[n] for n in (drive, *effects)})
-        fitted.fit.problem.parameters[0] = replace(fitted.fit.problem.parameters[0], sd=sd)
-        found.append(replace(fitted, terms=tuple(map(term, effects))))
-    return found[0], found[1]
-
-
-def term(parameter: str) -> Hypothesis:
-    """The effect that has it, by this amount."""
-    name, _, amount = parameter.partition(".")
-    effect = catalogue()[name]
-    return Hypothesis(effect, name, effect.parameter(amount), (), two_sided=False)
-
-
-@pytest.mark.parametrize("sd", [0.1, DECADE], ids=["known", "by order of magnitude"])
-def test_what_the_form_of_the_first_law_hides_is_demanded_where_the_drive_is_known(sd: float) -> None:
-    """A second effect that is a third of what the law's form leaves (seed 7)."""
-    noise = 0.02 * np.random.default_rng(7).standard_normal(COUNT)
-    own = 0.2 * np.sin(6.0 * MOTOR + 1.0)
-    having, lacking = beside(own, LAW * (1.0 + 0.1 * TIME / 60.0) + own + noise, sd)
-    plain = score_difference(having.left_out, lacking.left_out, GROUPS)
-    found = score_beside(having, lacking, GROUPS)
-    assert not demanded(plain)
-    assert demanded(found) if sd < DECADE else found == plain
-
-
-def test_a_round_takes_what_the_form_of_the_first_law_hides_and_nothing_prunes_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The same, through the search: it enters, is worth its terms, and stays."""
-    noise = 0.02 * np.random.default_rng(7).standard_normal(COUNT)
-    own = 0.2 * np.sin(6.0 * MOTOR + 1.0)
-    having, lacking = beside(own, LAW * (1.0 + 0.1 * TIME / 60.0) + own + noise)
-    at: Any = SimpleNamespace(model=lacking, groups=GROUPS)
-    entered = rounds._compared([having], at, None, np.random.default_rng(0))
-    assert demanded(entered[0].difference)
-    assert ties.worth_its_terms(having, lacking, GROUPS)
-    later = replace(
-        having, terms=(*having.terms, term("bearing_friction.torque_Nm"))
-    )  # whose last is not asked
-    monkeypatch.setattr(selection, "without", lambda model, term, groups: lacking)
-    monkeypatch.setattr(selection, "implausible", lambda model: 0)
-    assert selection._pruned(later, [], GROUPS) is later
-
-
-def test_what_the_laws_as_they_are_tell_more_of_is_told_by_them() -> None:
-    """Another effect that goes as the law does, ever more, as no form of it does (seed 8)."""
-    noise = 0.1 * np.random.default_rng(8).standard_normal(COUNT)
-    having, lacking = beside(LAW * TIME / 60.0, LAW * (1.0 + TIME / 60.0) + noise)
-    plain = score_difference(having.left_out, lacking.left_out, GROUPS)
-    freely = [left_out_with_discrepancy(m, [term(FRICTION)], GROUPS) for m in (having, lacking)]
-    assert plain.z > score_difference(*freely, GROUPS).z
-    assert score_beside(having, lacking, GROUPS) == plain
 
 
 @pytest.mark.parametrize(

@@ -18,34 +18,16 @@ from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_
 from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, Hypothesis
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.scores import ScoreDifference, left_out_linearly, movable, score_difference
+from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.parameter import vague_drive
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
-
-
-def score_beside(model: Model, than: Model, groups: Groups) -> ScoreDifference:
-    """Score of a model against another, told apart where either way tells: with the laws of effects that both have as
-    they are, or in any form, for what one of these leaves for its form alone may hide what is put beside it.
-
-    As they are where the drive is known by order of magnitude only, whose fits no linear step follows when a part is
-    left out.
-    """
-    plain = score_difference(model.left_out, than.left_out, groups)
-    names = than.added & model.added
-    beside = [t for t in model.terms if isinstance(t, Hypothesis) and t.name in names]
-    if not beside or vague_drive(model.fit.problem.parameters):
-        return plain
-    mine, theirs = (left_out_with_discrepancy(m, beside, groups) for m in (model, than))
-    freely = score_difference(mine, theirs, groups)
-    return freely if freely.z > plain.z else plain
 
 
 def left_out_with_discrepancy(

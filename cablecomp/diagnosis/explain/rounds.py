@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
-from cablecomp.diagnosis.explain.discrepancy import score_beside
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor, likeliest
 from cablecomp.diagnosis.explain.model import (
@@ -35,6 +34,7 @@ from cablecomp.diagnosis.explain.scores import (
     demanded,
     left_out,
     scales,
+    score_difference,
     selected_in,
 )
 from cablecomp.diagnosis.explain.screening import Answer, ask_all, rough
@@ -256,7 +256,11 @@ def _compared(
     if not models:
         return []
     differences = {
-        m.name: score_beside(m, fine if fine is not None and m.fit.problem.fine else at.model, at.groups)
+        m.name: score_difference(
+            m.left_out,
+            fine.left_out if fine is not None and m.fit.problem.fine else at.model.left_out,
+            at.groups,
+        )
         for m in models
     }
     size = common(models, at.groups)

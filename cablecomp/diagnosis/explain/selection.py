@@ -8,7 +8,6 @@ import numpy as np
 
 from cablecomp.diagnosis.explain.asked_again import with_better_forms
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.discrepancy import score_beside
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
     Model,
@@ -25,7 +24,7 @@ from cablecomp.diagnosis.explain.model import (
     without,
 )
 from cablecomp.diagnosis.explain.rounds import Beginning, cold_starts, one_round
-from cablecomp.diagnosis.explain.scores import demanded, left_out
+from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.explain.ties import (
     alone_by_far,
@@ -217,7 +216,7 @@ def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
             smaller = without(model, term, groups)
             if smaller is None or implausible(smaller) > implausible(model):
                 continue
-            step = score_beside(model, smaller, groups)
+            step = score_difference(model.left_out, smaller.left_out, groups)
             first = term is model.terms[0]
             if not demanded(step, first=first) and (weakest is None or step.gain < weakest[0]):
                 weakest = (step.gain, smaller)

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cablecomp.diagnosis.explain.dependence import Dependence
-from cablecomp.diagnosis.explain.discrepancy import score_beside
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor
 from cablecomp.diagnosis.explain.model import (
@@ -162,4 +161,4 @@ def keeps(model: Model, before: Model) -> bool:
 
 def worth_its_terms(model: Model, than: Model, groups: Groups) -> bool:
     """Whether a model is worth its further terms."""
-    return demanded(score_beside(model, than, groups))
+    return demanded(score_difference(model.left_out, than.left_out, groups))
