@@ -11,7 +11,7 @@ from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Wound, set_pending, wrap_commit, wrap_eval
 from cablecomp.mechanics.records import IN, OUT, PLAYS
-from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, strain_of_tau, v_of_tau
+from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, groove_slope, strain_of_tau, v_of_tau
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
 
 STEEPEST_PLAY = 0.95  # growth of a play's radius with its input, at most: the output follows it still
@@ -43,8 +43,12 @@ def drum_eval(d: Drive, laws: Floats, c: int, end: int, tau: float, v: float, w:
     meet = wrap_eval(d.profiles[wrap], laws, cable.law[end], d.heights[wrap], w, v, tau, mu)
     set_pending(step, meet)
     slope = meet.slope
-    # where the cone cuts, turning by dw lowers the slipped part by mu dw
-    turn = tau - 1.0 - (mu * slope if v > meet.v else -mu * slope) if slope > 0.0 else tau - 1.0
+    turn = tau - 1.0
+    if (
+        slope > 0.0
+    ):  # where the cone cuts, turning by dw lowers the slipped part by as much as the cone falls there
+        falls = mu * groove_slope(laws, cable.law[end], w)
+        turn -= falls * slope if v > meet.v else -falls * slope
     return Wound(meet.total, slope, turn)
 
 

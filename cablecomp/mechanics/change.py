@@ -126,18 +126,17 @@ def law_tables(change: Change, config: JointConfig) -> Floats | None:
             return np.stack([stiffening_law(change.stiffening, change.steady, change.knee)] * LAWS)
         inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
         return np.stack([plain_law()] * LAWS) if inside or change.moves_pretension else None
+    out, wound = config.drive.stage[-1].wrap_output_rad, config.drive.stage[0].wrap_input_rad
+    grooves: dict[int, Factor] = {}
+    if by_joint is not None:
+        grooves |= {ON_H: lambda y: by_joint(y - out), ON_L: lambda y: by_joint(out - y)}
+    if by_motor is not None:  # the motor winds on what the joint winds off
+        grooves |= {IN_H: lambda y: by_motor(wound - y), IN_L: lambda y: by_motor(y - wound)}
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
 
-    def table(groove: Factor) -> Floats:
+    def table(groove: Factor | None) -> Floats:
         stiffness = change.stiffening, change.steady, change.knee
         return law_table(by_tension or np.ones_like, groove, widest, *stiffness)
 
-    elsewhere = table(np.ones_like)
-    laws = np.stack([elsewhere] * LAWS)
-    if by_joint is not None:
-        out = config.drive.stage[-1].wrap_output_rad
-        laws[ON_H], laws[ON_L] = table(lambda y: by_joint(y - out)), table(lambda y: by_joint(out - y))
-    if by_motor is not None:  # the motor winds on what the joint winds off
-        wound = config.drive.stage[0].wrap_input_rad
-        laws[IN_H], laws[IN_L] = table(lambda y: by_motor(wound - y)), table(lambda y: by_motor(y - wound))
-    return laws
+    elsewhere = table(None)
+    return np.stack([table(grooves[k]) if k in grooves else elsewhere for k in range(LAWS)])

@@ -11,6 +11,8 @@ import numpy as np
 
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
+    AREA_OF_V,
+    E_OF_V,
     GROOVED,
     HEAD,
     KNEE,
@@ -26,13 +28,20 @@ from cablecomp.mechanics.tables import (
     STIFF,
     STIFFENING,
     TABLED,
+    V_LOW,
+    V_PER,
     Floats,
     between,
     groove,
+    look_up,
     stiffening_strain,
     strain,
 )
 
+LEAST_TABLED = 0.2
+"""Rise of a piece from which on the tabled integral of its strain is exact enough: its error is divided by the rise."""
+SHORT_GROOVE = 0.25
+"""Arc [rad] within which five points see all that a groove has, a patch of a twentieth as wide included."""
 LEAST_CLOSED = 1e-6
 """Stiffening coefficient from which on a piece is done in closed form."""
 PI2_6 = math.pi**2 / 6.0
@@ -218,30 +227,51 @@ def _piece_of_line(
 
 @inner_kernel
 def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
-    """`piece` by Gauss-Legendre quadrature, for tabulated laws; 3 points on short pieces where friction has no
-    place."""
+    """`piece` for tabulated laws: on long pieces where friction has no place by the tabled integral of e over v, else
+    by Gauss-Legendre quadrature, of few points on short pieces."""
     dy = y2 - y1
     d = v2 - v1
-    total = 0.0
-    slope = 0.0
-    if laws[law, HEAD, GROOVED] == 0.0:
+    head = laws[law, HEAD]
+    if head[GROOVED] == 0.0:
         if abs(d) < 0.05:
-            for j in range(3):
-                e, de = strain(laws, law, v1 + d * SHORT_X[j])
-                total += SHORT_W[j] * e
-                slope += SHORT_W[j] * de
-        else:
-            for j in range(8):
-                e, de = strain(laws, law, v1 + d * LONG_X[j])
-                total += LONG_W[j] * e
-                slope += LONG_W[j] * de
-        return total * dy, slope * dy
+            return _table_sums(SHORT_X, SHORT_W, laws, law, v1, dy, d)
+        if abs(d) < LEAST_TABLED:
+            return _table_sums(MIDDLE_X, MIDDLE_W, laws, law, v1, dy, d)
+        if head[KNEE] > 0.0:
+            return _table_sums(LONG_X, LONG_W, laws, law, v1, dy, d)
+        low, per = head[V_LOW], head[V_PER]
+        area = look_up(laws, law, AREA_OF_V, low, per, v2) - look_up(laws, law, AREA_OF_V, low, per, v1)
+        risen = look_up(laws, law, E_OF_V, low, per, v2) - look_up(laws, law, E_OF_V, low, per, v1)
+        return area * dy / d, risen * dy / d
+    if dy < SHORT_GROOVE and abs(d) < 0.05:
+        return _groove_sums(MIDDLE_X, MIDDLE_W, laws, law, y1, v1, dy, d)
+    return _groove_sums(LONG_X, LONG_W, laws, law, y1, v1, dy, d)
+
+
+@inner_kernel
+def _table_sums(
+    x: Floats, weights: Floats, laws: Floats, law: int, v1: float, dy: float, d: float
+) -> tuple[float, float]:
+    """Weighted sums of e(v1 + d x) and of its derivative, times dy."""
+    total = slope = 0.0
+    for j in range(len(x)):
+        e, de = strain(laws, law, v1 + d * x[j])
+        total += weights[j] * e
+        slope += weights[j] * de
+    return total * dy, slope * dy
+
+
+@inner_kernel
+def _groove_sums(
+    x: Floats, weights: Floats, laws: Floats, law: int, y1: float, v1: float, dy: float, d: float
+) -> tuple[float, float]:
+    """The same where v rises with the groove coordinate g(y1 + dy x)."""
     s1 = groove(laws, law, y1)
-    span = groove(laws, law, y2) - s1
-    for j in range(8):
-        y = y1 + dy * LONG_X[j]
-        share = (groove(laws, law, y) - s1) / span if span > 0.0 else 0.0
-        e, de = strain(laws, law, v1 + d * share)
-        total += LONG_W[j] * e
-        slope += LONG_W[j] * de
+    span = groove(laws, law, y1 + dy) - s1
+    rise = d / span if span > 0.0 else 0.0
+    total = slope = 0.0
+    for j in range(len(x)):
+        e, de = strain(laws, law, v1 + rise * (groove(laws, law, y1 + dy * x[j]) - s1))
+        total += weights[j] * e
+        slope += weights[j] * de
     return total * dy, slope * dy

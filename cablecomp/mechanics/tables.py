@@ -1,11 +1,12 @@
 """Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
 
-`laws[law]` is a table of 4 rows: the head, whose places have names below, and three curves.
+`laws[law]` is a table of 6 rows: the head, whose places have names below, and five curves.
 Mode PLAIN is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `laws` is None for the plain drive without
 any change: the compiler then leaves out all code that a plain drive does not need. Mode STIFF is the plain friction of
 PLAIN with the stiffening law of the head. In mode TABLED row U_OF_V holds u = ln tau on an even grid of
 v = int du/m(e^u), row G_OF_Y the groove coordinate g(y) = int m_g dy on an even grid of y, row V_OF_U v on an even grid
-of u; e(tau) follows from u by the stiffening law in the head.
+of u; e(tau) follows from u by the stiffening law in the head. Where friction goes by tension, row E_OF_V holds e and
+row AREA_OF_V its integral on the grid of v.
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
 """
 
@@ -28,17 +29,20 @@ LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften furthe
 KNEE_HALF = 0.25  # half the tension over which a knee rises, over that amid it
 LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
 TAU: Floats = np.exp(LN_TAU)
+ABOUT_T0 = slice(int(np.searchsorted(LN_TAU, 0.0)) - 1, int(np.searchsorted(LN_TAU, 0.0)) + 1)
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
+THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 # laws: of the joint's own drum in chain h and l, of all other places, of the motor's own drum in chain h and l
 ON_H, ON_L, ELSEWHERE, IN_H, IN_L = constant(0), constant(1), constant(2), constant(3), constant(4)
 LAWS = 5
 # rows
-HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3)
+HEAD, U_OF_V, G_OF_Y, V_OF_U, E_OF_V, AREA_OF_V = (constant(k) for k in range(6))
+ROWS = 6
 (
     MODE,
-    V_LOW, V_STEP,  # grids: their first value, and from one to the next
-    Y_LOW, Y_STEP,
-    U_LOW, U_STEP,
+    V_LOW, V_PER,  # grids: their first value, and how many there are per unit
+    Y_LOW, Y_PER,
+    U_LOW, U_PER,
     STIFFENING, STEADY,  # b and w in EA(T) = EA/(w + (1 - w)/(1 + b (tau - 1)))
     GROOVED,  # 0 = g(y) is y itself
     BY_TENSION,  # 0 = v is ln tau itself
@@ -49,7 +53,7 @@ HEAD, U_OF_V, G_OF_Y, V_OF_U = constant(0), constant(1), constant(2), constant(3
 
 def plain_law() -> Floats:
     """The law of the thesis (constant mu, constant EA) in the form of a table."""
-    return np.zeros((4, 16))
+    return np.zeros((ROWS, 16))
 
 
 def stiffening_law(stiffening: float, steady: float = 0.0, knee: float = 0.0) -> Floats:
@@ -57,7 +61,7 @@ def stiffening_law(stiffening: float, steady: float = 0.0, knee: float = 0.0) ->
 
     f = 1/(1 + stiffening (tau - 1)); with a knee (1 - stiffening S(tau))/(1 - stiffening S(1)), where S rises from 0 to
     1 straight from 0.75 knee to 1.25 knee."""
-    table = np.zeros((4, 16))
+    table = np.zeros((ROWS, 16))
     table[HEAD, MODE] = STIFF
     _set_stiffness(table, stiffening, steady, knee)
     return table
@@ -74,38 +78,53 @@ def _set_stiffness(table: Floats, stiffening: float, steady: float, knee: float)
 
 def law_table(
     tension_factor: Callable[[Floats], Floats],
-    groove_factor: Callable[[Floats], Floats],
+    groove_factor: Callable[[Floats], Floats] | None,
     wrap_max_rad: float,
     stiffening: float = 0.0,
     steady: float = 0.0,
     knee: float = 0.0,
 ) -> Floats:
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
-    termination) and the tangent stiffness as `stiffening_law`; both factors are vectorised and positive."""
-    table = np.zeros((4, SIZE))
+    termination; None: the same everywhere) and the tangent stiffness as `stiffening_law`; both factors are vectorised
+    and positive."""
+    table = np.zeros((ROWS, SIZE))
     head = table[HEAD]
+    _set_stiffness(table, stiffening, steady, knee)
     by_tension = tension_factor(TAU)
     if np.any(by_tension != 1.0):
         v = _integral(LN_TAU, 1.0 / by_tension)
-        v -= np.interp(0.0, LN_TAU, v)
+        v -= CubicHermiteSpline(LN_TAU[ABOUT_T0], v[ABOUT_T0], 1.0 / by_tension[ABOUT_T0])(0.0)
         v_grid = np.linspace(v[0], v[-1], SIZE)
-        table[U_OF_V] = CubicHermiteSpline(v, LN_TAU, by_tension)(v_grid)
+        u = CubicHermiteSpline(v, LN_TAU, by_tension)(v_grid)
+        table[U_OF_V] = u
         table[V_OF_U] = v
         head[BY_TENSION] = 1.0
-        head[V_LOW], head[V_STEP] = v[0], v_grid[1] - v_grid[0]
-        head[U_LOW], head[U_STEP] = LN_TAU[0], LN_TAU[1] - LN_TAU[0]
+        head[V_LOW], head[V_PER] = v[0], 1.0 / (v_grid[1] - v_grid[0])
+        head[U_LOW], head[U_PER] = LN_TAU[0], 1.0 / (LN_TAU[1] - LN_TAU[0])
+        if knee == 0.0:
+            table[E_OF_V] = _strains(stiffening, steady, np.exp(u))
+            table[AREA_OF_V] = _integral(v_grid, table[E_OF_V])
     y = np.linspace(0.0, wrap_max_rad, SIZE)
-    by_place = groove_factor(y)
-    if np.any(by_place != 1.0):
+    by_place = None if groove_factor is None else groove_factor(y)
+    if by_place is not None and np.any(by_place != 1.0):
         table[G_OF_Y] = _integral(y, by_place)
         head[GROOVED] = 1.0
-        head[Y_STEP] = y[1] - y[0]
+        head[Y_PER] = 1.0 / y[1]
     if head[BY_TENSION] or head[GROOVED]:
         head[MODE] = TABLED
     else:
         head[MODE] = STIFF if stiffening != 0.0 else PLAIN
-    _set_stiffness(table, stiffening, steady, knee)
     return table
+
+
+def _strains(b: float, steady: float, tau: Floats) -> Floats:
+    """e(tau) of `stiffening_law` without a knee; straight on where the cable would soften beyond `LEAST_STIFFNESS`."""
+    if b == 0.0:
+        return tau - 1.0
+    stiffness = 1.0 + b * (tau - 1.0)
+    e = np.log(np.maximum(stiffness, LEAST_STIFFNESS)) / b
+    e += np.where(stiffness < LEAST_STIFFNESS, (stiffness - LEAST_STIFFNESS) / (b * LEAST_STIFFNESS), 0.0)
+    return steady * (tau - 1.0) + (1.0 - steady) * e
 
 
 def _integral(x: Floats, f: Floats) -> Floats:
@@ -117,45 +136,28 @@ def _integral(x: Floats, f: Floats) -> Floats:
 
 
 @inner_kernel
-def look_up(laws: Floats, law: int, row: int, low: float, step: float, x: float) -> float:
+def look_up(laws: Floats, law: int, row: int, low: float, per: float, x: float) -> float:
     """Cubic interpolation on an even grid (Catmull-Rom); straight beyond its ends."""
-    p = (x - low) / step
-    k = int(p)
-    if k < 1:
-        k = 1
-    if k > SIZE - 3:
-        k = SIZE - 3
-    t = p - k
-    if t < -1.0 or t > 2.0:
-        edge = 0 if t < 0.0 else SIZE - 2
-        return laws[law, row, edge] + (p - edge) * (laws[law, row, edge + 1] - laws[law, row, edge])
-    a, b, c, d = laws[law, row, k - 1], laws[law, row, k], laws[law, row, k + 1], laws[law, row, k + 2]
-    # Lagrange cubic through the four neighbours
-    return (
-        -a * t * (t - 1.0) * (t - 2.0) / 6.0
-        + b * (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0
-        - c * (t + 1.0) * t * (t - 2.0) / 2.0
-        + d * (t + 1.0) * t * (t - 1.0) / 6.0
-    )
+    return look_up_slope(laws, law, row, low, per, x)[0]
 
 
 @inner_kernel
-def look_up_slope(laws: Floats, law: int, row: int, low: float, step: float, x: float) -> tuple[float, float]:
+def look_up_slope(laws: Floats, law: int, row: int, low: float, per: float, x: float) -> tuple[float, float]:
     """As `look_up`, with its derivative by x."""
-    p = (x - low) / step
+    p = (x - low) * per
     k = min(max(int(p), 1), SIZE - 3)
     t = p - k
     if t < -1.0 or t > 2.0:
         edge = 0 if t < 0.0 else SIZE - 2
         rise = laws[law, row, edge + 1] - laws[law, row, edge]
-        return laws[law, row, edge] + (p - edge) * rise, rise / step
+        return laws[law, row, edge] + (p - edge) * rise, rise * per
     a, b, c, d = laws[law, row, k - 1], laws[law, row, k], laws[law, row, k + 1], laws[law, row, k + 2]
-    # the same cubic in powers of t
-    first = -a / 3.0 - b / 2.0 + c - d / 6.0
-    second = a / 2.0 - b + c / 2.0
-    third = (d - a) / 6.0 + (b - c) / 2.0
+    # Lagrange cubic through the four neighbours, in powers of t
+    first = c - 0.5 * b - THIRD * a - SIXTH * d
+    second = 0.5 * (a + c) - b
+    third = SIXTH * (d - a) + 0.5 * (b - c)
     value = b + t * (first + t * (second + t * third))
-    return value, (first + t * (2.0 * second + t * 3.0 * third)) / step
+    return value, (first + t * (2.0 * second + t * 3.0 * third)) * per
 
 
 @leaf_kernel
@@ -165,7 +167,17 @@ def groove(laws: Floats, law: int, y: float) -> float:
         return y
     if laws[law, HEAD, GROOVED] == 0.0:
         return y
-    return look_up(laws, law, G_OF_Y, laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_STEP], y)
+    return look_up(laws, law, G_OF_Y, laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_PER], y)
+
+
+@leaf_kernel
+def groove_slope(laws: Floats, law: int, y: float) -> float:
+    """dg/dy, friction at the place over mu; 1 for the plain law."""
+    if laws is None:
+        return 1.0
+    if laws[law, HEAD, GROOVED] == 0.0:
+        return 1.0
+    return look_up_slope(laws, law, G_OF_Y, laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_PER], y)[1]
 
 
 @leaf_kernel
@@ -184,13 +196,13 @@ def groove_inverse(laws: Floats, law: int, g: float, y_low: float, y_high: float
     """The y between y_low and y_high with groove coordinate g (Newton's method, or a bisection where that leaves the
     bracket)."""
     lo, hi = y_low, y_high
-    low, step = laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_STEP]
+    low, per = laws[law, HEAD, Y_LOW], laws[law, HEAD, Y_PER]
     g_lo, g_hi = groove(laws, law, lo), groove(laws, law, hi)
     y = lo
     if g_hi - g_lo > 0.0:
         y = lo + (hi - lo) * (g - g_lo) / (g_hi - g_lo)
     for _ in range(60):
-        found, slope = look_up_slope(laws, law, G_OF_Y, low, step, y)
+        found, slope = look_up_slope(laws, law, G_OF_Y, low, per, y)
         off = found - g
         if abs(off) < 1e-14 or hi - lo <= 0.0:
             return y
@@ -215,7 +227,7 @@ def v_of_tau(laws: Floats, law: int, tau: float) -> float:
         return u
     if laws[law, HEAD, BY_TENSION] == 0.0:
         return u
-    return look_up(laws, law, V_OF_U, laws[law, HEAD, U_LOW], laws[law, HEAD, U_STEP], u)
+    return look_up(laws, law, V_OF_U, laws[law, HEAD, U_LOW], laws[law, HEAD, U_PER], u)
 
 
 @leaf_kernel
@@ -231,7 +243,7 @@ def dv_dtau(laws: Floats, law: int, tau: float, v: float) -> float:
 @inner_kernel
 def _slope_table(laws: Floats, law: int, tau: float, v: float) -> float:
     return 1.0 / (
-        tau * look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)[1]
+        tau * look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_PER], v)[1]
     )
 
 
@@ -242,7 +254,7 @@ def tau_of_v(laws: Floats, law: int, v: float) -> float:
         return math.exp(v)
     if laws[law, HEAD, BY_TENSION] == 0.0:
         return math.exp(v)
-    return math.exp(look_up(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v))
+    return math.exp(look_up(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_PER], v))
 
 
 @leaf_kernel
@@ -302,9 +314,12 @@ def stiffening_strain(b: float, tau: float) -> tuple[float, float]:
 @inner_kernel
 def strain(laws: Floats, law: int, v: float) -> tuple[float, float]:
     """e and de/dv at the profile variable v (table mode)."""
+    head = laws[law, HEAD]
     u, du = v, 1.0
-    if laws[law, HEAD, BY_TENSION] != 0.0:
-        u, du = look_up_slope(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_STEP], v)
+    if head[BY_TENSION] != 0.0:
+        if head[KNEE] == 0.0:
+            return look_up_slope(laws, law, E_OF_V, head[V_LOW], head[V_PER], v)
+        u, du = look_up_slope(laws, law, U_OF_V, head[V_LOW], head[V_PER], v)
     tau = math.exp(u)
     e, de = _strain_in_part(laws, law, tau)
     return e, de * tau * du

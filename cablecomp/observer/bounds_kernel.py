@@ -33,8 +33,8 @@ from cablecomp.mechanics.tables import (
     GROOVED,
     HEAD,
     U_OF_V,
-    V_STEP,
-    Y_STEP,
+    V_PER,
+    Y_PER,
     dv_dtau,
     strain_of_tau,
     tau_of_v,
@@ -146,10 +146,10 @@ def steepest(laws: Floats | None) -> float:
     for law in laws:
         head = law[HEAD]
         if head[GROOVED]:
-            place = max(place, float(np.max(np.diff(law[G_OF_Y]) / head[Y_STEP])))
+            place = max(place, float(np.max(np.diff(law[G_OF_Y]) * head[Y_PER])))
         if head[BY_TENSION]:
             u = law[U_OF_V]
-            steep = (np.diff(u) / head[V_STEP])[np.abs(u[1:]) < 2.0]
+            steep = (np.diff(u) * head[V_PER])[np.abs(u[1:]) < 2.0]
             tension = max(tension, float(np.max(steep)))
     return place * tension
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from turning import JOINT, recorded
 
+from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence, gather, rows_for, thinned
 from cablecomp.estimation.simulate import simulator
@@ -40,6 +41,29 @@ def test_a_law_without_rates_is_told_on_thinned_rows_as_on_all() -> None:
     turned = e.at_rows("motor_position_rad")
     deflection = whole - np.polyval(np.polyfit(turned, whole, 1), turned)
     assert np.std(thin - whole) < 0.02 * np.std(deflection)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (("gravity_load", {"moment_Nm": 0.3, "phase_rad": 0.4}),),
+        (("pressure_dependent_friction", {"exponent": 0.4}),),
+        (
+            ("position_dependent_friction", {"amplitude": 0.5, "phase_rad": 0.3}),
+            ("bearing_friction", {"torque_Nm": 0.05, "load_coefficient": 0.0, "presliding_rad": 1e-4}),
+        ),
+    ],
+    ids=["plain", "weight", "pressure", "groove and bearing"],
+)
+def test_a_fit_runs_the_drive_as_the_observer_does(effects: tuple[tuple[str, dict[str, float]], ...]) -> None:
+    """Tensions are solved for less closely: far below what sensors tell (1e-7 rad), and what a fit's differences do."""
+    joint, columns = with_effects(JOINT, effects), recorded(noise_rad=0.0)
+    e = gathered(columns, 200)
+    quick = simulator(joint).run(e, np.arange(len(e.columns["time_s"]))).joint
+    exact = Observer(joint).run({k: e.columns[k] for k in columns})["joint_position_rad"]
+    assert np.max(np.abs(quick - exact)) < 1e-8
+    assert np.ptp(exact - JOINT.drive.ratio * e.columns["motor_position_rad"]) > 1e-3
 
 
 def test_holds_keep_rows_by_time() -> None:

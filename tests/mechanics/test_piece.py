@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from cablecomp.mechanics.piece import piece
-from cablecomp.mechanics.tables import LEAST_STIFFNESS, stiffening_law
+from cablecomp.mechanics.tables import LEAST_STIFFNESS, law_table, stiffening_law
 
 WIDTH_RAD = 2.0
 
@@ -67,3 +67,51 @@ def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
         found = sum(quad(strain, a, b, epsabs=1e-14, epsrel=1e-13)[0] for a, b in pairwise(parts))
         assert total == pytest.approx(WIDTH_RAD * found / (high - low), abs=2e-13)
         assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), abs=2e-12)
+
+
+@pytest.mark.parametrize("stiffening", [0.0, 0.5])
+@pytest.mark.parametrize("exponent", [-0.3, 0.4, 0.8])
+@pytest.mark.parametrize("rise", [0.01, 0.049, 0.051, 0.19, 0.21, 0.5])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_piece_under_friction_by_pressure_is_the_integral_of_its_strain(
+    exponent: float, rise: float, way: float, stiffening: float
+) -> None:
+    """mu = mu0 tau^-n: v = (tau^n - 1)/n, so tau = (1 + n v)^(1/n) on a piece that is straight in v; as exactly as
+    cubics between 4096 places are (the fourth power of a step of 6e-3)."""
+    law = np.stack([law_table(lambda tau: tau**-exponent, None, 1.0, stiffening)])
+
+    def strain(v: float) -> float:
+        longer = (1.0 + exponent * v) ** (1.0 / exponent) - 1.0
+        return float(np.log1p(stiffening * longer) / stiffening if stiffening else longer)
+
+    for begin in (-0.6, 0.0, 0.4):
+        end = begin + way * rise
+        taus = [(1.0 + exponent * v) ** (1.0 / exponent) for v in (begin, end)]
+        total, slope = piece(law, 0, 1.0, begin, taus[0], 1.0 + WIDTH_RAD, end, taus[1])
+        mean = quad(strain, begin, end, epsabs=1e-14, epsrel=1e-13)[0] / (end - begin)
+        assert total == pytest.approx(WIDTH_RAD * mean, rel=1e-8, abs=1e-9)
+        assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), rel=3e-7)
+
+
+@pytest.mark.parametrize("rise", [-0.3, -0.03, 0.03, 0.3])
+@pytest.mark.parametrize("width", [0.01, 0.2, 0.24, 0.26, 2.0])
+def test_a_piece_under_friction_by_place_is_the_integral_of_its_strain(width: float, rise: float) -> None:
+    """mu = mu0 (1 + a sin y): v rises by the share of g = y + a (1 - cos y) that is gone."""
+    law = np.stack([law_table(np.ones_like, lambda y: 1.0 + 0.6 * np.sin(y), 12.0)])
+
+    v = 0.1
+
+    def gone(y: float) -> float:
+        return float(y + 0.6 * (1.0 - np.cos(y)))
+
+    for begin in (0.0, 1.3, 4.0, 9.7):
+        end = begin + width
+        share = rise / (gone(end) - gone(begin))
+
+        def strain(y: float, share: float = share, begin: float = begin) -> float:
+            return float(np.expm1(v + share * (gone(y) - gone(begin))))
+
+        found = quad(strain, begin, end, epsabs=1e-14)[0]
+        total, slope = piece(law, 0, begin, v, np.exp(v), end, v + rise, np.exp(v + rise))
+        assert total == pytest.approx(found, rel=1e-9)
+        assert slope == pytest.approx(found + width, rel=1e-9)

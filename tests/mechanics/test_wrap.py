@@ -4,6 +4,8 @@ profile."""
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +13,10 @@ from numpy.typing import NDArray
 from wrap_energy import friction_work_J, stored_J
 
 from cablecomp.mechanics import arc
-from cablecomp.mechanics.cable import span_play
+from cablecomp.mechanics.cable import drum_eval, span_play
 from cablecomp.mechanics.profile import Meet, Points, set_pending, wrap_commit, wrap_eval, wrap_fill
 from cablecomp.mechanics.records import POINT, STEP
+from cablecomp.mechanics.tables import law_table
 
 Array = NDArray[np.float64]
 
@@ -63,6 +66,24 @@ def test_unwinding_moves_the_corner_by_half_and_erases_the_bump(now: float) -> N
         steps = [(w, np.log(peak)), (w, np.log(now)), (w - 1.0001 * erased_by, np.log(now))]
         p, n = one_wrap(steps, w, mu)
         assert np.max(p[:n]["v"]) <= np.log(now) + 1e-9
+
+
+@pytest.mark.parametrize("v", [0.08, -0.08])
+@pytest.mark.parametrize("w", [7.0, 8.2])
+def test_what_turning_does_under_friction_by_place_is_told(v: float, w: float) -> None:
+    """Where the cone of the end cuts the profile, it falls by mu (1 + a sin w) as the drum turns on (differences)."""
+    law = np.stack([law_table(np.ones_like, lambda y: 1.0 + 0.6 * np.sin(y), 12.0)])
+    p, cable = np.zeros(64, POINT), SimpleNamespace(mu=(0.1, 0.1), law=(0, 0), viscous=0.0)
+    n = wrap_fill(p, law, 0, w, 0.0, 0.0)
+    drive: Any = SimpleNamespace(cables=[cable], steps=np.zeros(2, STEP), profiles=[p], heights=[n])
+
+    def there(at: float) -> Any:
+        drive.steps = drive.steps.view(np.recarray)
+        return drum_eval.py_func(drive, law, 0, 0, np.exp(v), v, at)  # the kernel has no entry from Python
+
+    step = 1e-5
+    told = (there(w + step).total - there(w - step).total) / (2.0 * step)
+    assert there(w).by_wrap == pytest.approx(told, rel=1e-5)
 
 
 def test_a_belt_pulley_loses_what_slip_at_its_exit_takes() -> None:
