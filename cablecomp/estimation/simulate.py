@@ -30,7 +30,7 @@ _ANSWERS: Final[Mapping[str, str]] = {
 }
 
 
-SETTLED: Final = 1e-9
+SETTLED: Final = 1e-10
 """Share of T0 that a solved tension may still be off by: far below what a fit's steps and differences can tell."""
 HISTORY_STEP_S: Final = 0.05
 """Time from row to row of what went before a recording."""
