@@ -44,9 +44,7 @@ def drum_eval(d: Drive, laws: Floats, c: int, end: int, tau: float, v: float, w:
     set_pending(step, meet)
     slope = meet.slope
     turn = tau - 1.0
-    if (
-        slope > 0.0
-    ):  # where the cone cuts, turning by dw lowers the slipped part by as much as the cone falls there
+    if slope > 0.0:  # where the cone cuts, turning by dw lowers the slipped part as the cone falls there
         falls = mu * groove_slope(laws, cable.law[end], w)
         turn -= falls * slope if v > meet.v else -falls * slope
     return Wound(meet.total, slope, turn)

@@ -89,7 +89,6 @@ def law_table(
     and positive."""
     table = np.zeros((ROWS, SIZE))
     head = table[HEAD]
-    _set_stiffness(table, stiffening, steady, knee)
     by_tension = tension_factor(TAU)
     if np.any(by_tension != 1.0):
         v = _integral(LN_TAU, 1.0 / by_tension)
@@ -114,6 +113,7 @@ def law_table(
         head[MODE] = TABLED
     else:
         head[MODE] = STIFF if stiffening != 0.0 else PLAIN
+    _set_stiffness(table, stiffening, steady, knee)
     return table
 
 

@@ -93,6 +93,36 @@ def test_a_piece_under_friction_by_pressure_is_the_integral_of_its_strain(
         assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), rel=3e-7)
 
 
+@pytest.mark.parametrize("exponent", [-0.3, 0.5])
+@pytest.mark.parametrize("rise", [-0.6, 0.03, 0.6])
+def test_a_piece_across_a_knee_under_friction_by_pressure_is_the_integral_of_its_strain(
+    exponent: float, rise: float
+) -> None:
+    """Both: v = (tau^n - 1)/n, and compliance that falls by b as S rises from 0.75 u to 1.25 u."""
+    share, knee = 0.75, 1.1
+    law = np.stack([law_table(lambda tau: tau**-exponent, None, 1.0, share, 0.0, knee)])
+    bends = np.array([0.75 * knee, 1.25 * knee])
+
+    def tau_of(v: float) -> float:
+        return float((1.0 + exponent * v) ** (1.0 / exponent))
+
+    def compliance(tau: float) -> float:
+        low, at_1 = (float(np.interp(t, bends, [0.0, 1.0])) for t in (tau, 1.0))
+        return (1.0 - share * low) / (1.0 - share * at_1)
+
+    def strain(v: float) -> float:
+        tau = tau_of(v)
+        inside = [b for b in bends if min(1.0, tau) < b < max(1.0, tau)]
+        return float(quad(compliance, 1.0, tau, epsabs=1e-12, points=inside or None)[0])
+
+    for begin in (-0.25, 0.0, 0.1):
+        end = begin + rise
+        total, _ = piece(law, 0, 1.0, begin, tau_of(begin), 1.0 + WIDTH_RAD, end, tau_of(end))
+        inside = [v for v in (bends**exponent - 1.0) / exponent if min(begin, end) < v < max(begin, end)]
+        found = quad(strain, begin, end, epsabs=1e-11, points=inside or None)[0] / rise
+        assert total == pytest.approx(WIDTH_RAD * found, abs=3e-8)
+
+
 @pytest.mark.parametrize("rise", [-0.3, -0.03, 0.03, 0.3])
 @pytest.mark.parametrize("width", [0.01, 0.2, 0.24, 0.26, 2.0])
 def test_a_piece_under_friction_by_place_is_the_integral_of_its_strain(width: float, rise: float) -> None:
