@@ -41,7 +41,7 @@ from cablecomp.mechanics.tables import (
 LEAST_TABLED = 0.2
 """Rise of a piece from which on the tabled integral of its strain is exact enough: its error is divided by the rise."""
 SHORT_GROOVE = 0.25
-"""Arc [rad] within which five points see all that a groove has, a patch of a twentieth as wide included."""
+"""Arc [rad] on which five points lie no farther apart than eight do on longer pieces."""
 LEAST_CLOSED = 1e-6
 """Stiffening coefficient from which on a piece is done in closed form."""
 PI2_6 = math.pi**2 / 6.0
