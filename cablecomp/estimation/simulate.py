@@ -30,8 +30,6 @@ _ANSWERS: Final[Mapping[str, str]] = {
 }
 
 
-SETTLED: Final = 1e-10
-"""Share of T0 that a solved tension may still be off by: far below what a fit's steps and differences can tell."""
 HISTORY_STEP_S: Final = 0.05
 """Time from row to row of what went before a recording."""
 
@@ -138,4 +136,4 @@ def simulator(joint: JointConfig, fine: bool = False, beside: Change | None = No
     """Set the joint up, to run on judged rows or on all fine ones, with a change beside its own effects; raises
     InputError for values that its laws cannot take."""
     change = together([c for c in (extend(joint), beside) if c is not None]) if beside else extend(joint)
-    return Simulator(joint, assemble(joint, change, SETTLED), tuple(other_channels(joint)), fine)
+    return Simulator(joint, assemble(joint, change), tuple(other_channels(joint)), fine)

@@ -23,7 +23,6 @@ Row: TypeAlias = tuple[Any, ...]
 
 BEFORE_NODES = 8  # numbers of a grid before its nodes
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
-SETTLED = 1e-13  # step of a tension, as a share of T0, at which its solution counts as found
 
 
 @dataclass(frozen=True)
@@ -45,11 +44,11 @@ class Model:
         return named(self.fixed, self.layout, memory, heights)
 
 
-def assemble(config: JointConfig, change: Change | None = None, settled: float = SETTLED) -> Model:
-    """Arrays of the joint in `config` with the physics of `change`, its tensions solved for until they move by less
-    than `settled` of T0; raises InputError for pretensions that cannot settle."""
+def assemble(config: JointConfig, change: Change | None = None) -> Model:
+    """Arrays of the joint in `config` with the physics of `change`; raises InputError for pretensions that
+    cannot settle."""
     extra = change or Change()
-    circuits, chains = _circuits(config, settled)
+    circuits, chains = _circuits(config)
     cables = [row for sign, group in chains for row in _chain(group, sign, config, extra)]
     size = _places(len(circuits), len(cables), config.observer.max_pieces, extra)
     fixed = np.concatenate(
@@ -73,7 +72,7 @@ def assemble(config: JointConfig, change: Change | None = None, settled: float =
     return Model(fixed, layout, memory, heights, law_tables(extra, config))
 
 
-def _circuits(config: JointConfig, settled: float) -> tuple[list[Row], list[tuple[float, list[Stage]]]]:
+def _circuits(config: JointConfig) -> tuple[list[Row], list[tuple[float, list[Stage]]]]:
     """Records of the circuits in series, and the chains of cables in them, each with its sign."""
     stages = config.drive.stage
     closed = int(config.drive.circuit == "closed")
@@ -96,7 +95,6 @@ def _circuits(config: JointConfig, settled: float) -> tuple[list[Row], list[tupl
                 share=1.0 if chained else ratio,
                 radius=group[-1].output_radius_m,
                 slack=SLACK * group[-1].pretension_N,
-                settled=settled,
             )
         )
         chains += [(1.0, group), (-1.0, group)][: 1 + closed]
@@ -214,10 +212,10 @@ def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:
     """Cables hanging one behind the other settle at T0_i = T0_k N_ik R_k/R_i (thesis 5-1)."""
     last = config.drive.stage[-1]
     for number, (stage, ratio) in enumerate(zip(config.drive.stage, ratios, strict=True), start=1):
-        balanced = last.pretension_N * ratio * last.output_radius_m / stage.output_radius_m
-        if abs(stage.pretension_N - balanced) > 1e-3 * balanced:
+        settled = last.pretension_N * ratio * last.output_radius_m / stage.output_radius_m
+        if abs(stage.pretension_N - settled) > 1e-3 * settled:
             raise InputError(
                 f"{config.name}: key `drive.stage.{number - 1}.pretension_N` is "
                 f"{stage.pretension_N:g}; cables in a chain settle at "
-                f"{balanced:.6g} N there, given the output stage's pretension; write that value"
+                f"{settled:.6g} N there, given the output stage's pretension; write that value"
             )

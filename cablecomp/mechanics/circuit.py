@@ -71,8 +71,7 @@ def circuit_solve(
     closed = circuit.chains == 2
     radius = circuit.radius
     rigid = circuit.ratio * x_in
-    floor, settled = circuit.slack, circuit.settled
-    turned = max(settled, 1e-11)  # of angles: their last digits are those of the motor's
+    floor = circuit.slack
     pull = moment / radius
     x = x_guess
     last_l = d.states[first_l + count - 1]
@@ -109,14 +108,14 @@ def circuit_solve(
             by_h = -weight_h / (1.0 - on_h.by_shaft)
             if laws is None and count == 1 and abs(turn) <= SMALL and cable_nudge(d, first_h, 0.0, turn):
                 return Solved(x + turn, on_h.compliance / radius, STATUS_OK, by_h, by_l)
-            if abs(turn) <= (turned if iteration < 12 else 1e-9):
+            if abs(turn) <= (1e-11 if iteration < 12 else 1e-9):
                 return Solved(x + turn, on_h.compliance / radius, STATUS_OK, by_h, by_l)
             x += turn if iteration < 12 else off
             continue
         gap = on_h.theta + on_l.theta
         if tension <= lowest and gap >= 0.0:  # one side is slack: the other alone carries and positions
             new = rigid + on_h.theta if pull >= 0.0 else rigid - on_l.theta
-            if abs(new - x) <= turned:
+            if abs(new - x) <= 1e-11:
                 by_h = -weight_h / (1.0 - on_h.by_shaft) if pull >= 0.0 else 0.0
                 by_l = weight_l / (1.0 + on_l.by_shaft) if pull < 0.0 else 0.0
                 compliance = (on_h.compliance if pull >= 0.0 else on_l.compliance) / radius
@@ -130,7 +129,7 @@ def circuit_solve(
         step = (off * by_shaft - gap * (on_h.by_shaft - 1.0)) * scale
         turn = (gap * on_h.compliance - off * by_tension) * scale
         by_h, by_l = weight_h * on_l.compliance * scale, -weight_l * on_h.compliance * scale
-        if abs(step) <= (settled if iteration < 8 else turned) * unit and abs(turn) <= turned:
+        if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
             return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)
         if laws is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
             if abs(step) <= SMALL * min(tension, tension + pull):
@@ -146,7 +145,7 @@ def circuit_solve(
         if tension < lowest:
             tension = lowest
         elif iteration > 8 and high < 1e299:
-            if high - low <= turned * unit:
+            if high - low <= 1e-11 * unit:
                 return Solved(x, compliance, STATUS_OK, by_h, by_l)
             if not low < tension < high:
                 tension = 0.5 * (low + high)

@@ -100,7 +100,6 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
         slack = -1e300  # the largest trial moment that no open circuit can take
         followed = False
         excess = moved = 0.0
-        near = 10.0 * d.circuits[0].settled
         again, settled = AFRESH, False
         run_terms(d, terms)
         moment = load - x.moment
@@ -123,11 +122,11 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
             run_terms(d, terms)
             excess = moment - (load - x.moment)
             # as near as the last digits of moments and angle let it
-            scale = near * (abs(load) + abs(moment)) + 1e-15 + 4.0 * EPSILON * abs(x.moment_slope * x.joint)
+            scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15 + 4.0 * EPSILON * abs(x.moment_slope * x.joint)
             # settled, or nothing that the solve depends on has followed the angle
             same = x.length_h == before_h and x.length_l == before_l
             same = same and x.stiffness_h == stiff_h and x.stiffness_l == stiff_l
-            if abs(excess) <= scale and (abs(moved) <= near or same):
+            if abs(excess) <= scale and (abs(moved) <= 1e-12 or same):
                 settled = True
                 break
             # lengths that follow the angle turn it further: on to where that ends (Steffensen's step)

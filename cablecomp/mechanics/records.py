@@ -59,7 +59,6 @@ CIRCUIT = record(
         ("share", "f8"),  # of the joint's moment that this circuit carries, N_ik of the thesis (5-22)
         ("radius", "f8"),  # of the output pulley
         ("slack", "f8"),  # tension below which a cable counts as slack
-        ("settled", "f8"),  # step of a tension over T0 at which its solution counts as found
     ]
 )
 

@@ -57,12 +57,12 @@ def test_a_law_without_rates_is_told_on_thinned_rows_as_on_all() -> None:
     ids=["plain", "weight", "pressure", "groove and bearing"],
 )
 def test_a_fit_runs_the_drive_as_the_observer_does(effects: tuple[tuple[str, dict[str, float]], ...]) -> None:
-    """Tensions are solved for less closely: far below what sensors tell (1e-7 rad), and what a fit's differences do."""
+    """On the same rows, bit for bit."""
     joint, columns = with_effects(JOINT, effects), recorded(noise_rad=0.0)
     e = gathered(columns, 200)
     quick = simulator(joint).run(e, np.arange(len(e.columns["time_s"]))).joint
     exact = Observer(joint).run({k: e.columns[k] for k in columns})["joint_position_rad"]
-    assert np.max(np.abs(quick - exact)) < 1e-8
+    np.testing.assert_array_equal(quick, exact)
     assert np.ptp(exact - JOINT.drive.ratio * e.columns["motor_position_rad"]) > 1e-3
 
 
