@@ -162,6 +162,19 @@ def _stiff_sums(x: Floats, weights: Floats, b: float, v1: float, d: float) -> tu
 
 
 @inner_kernel
+def _strain_sums(
+    x: Floats, weights: Floats, laws: Floats, law: int, v1: float, dy: float, d: float
+) -> tuple[float, float]:
+    """Weighted sums of e(v1 + d x) and of its derivative, times dy."""
+    total = slope = 0.0
+    for j in range(len(x)):
+        e, de = strain(laws, law, v1 + d * x[j])
+        total += weights[j] * e
+        slope += weights[j] * de
+    return total * dy, slope * dy
+
+
+@inner_kernel
 def _piece_bent(
     laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
 ) -> tuple[float, float]:
@@ -200,12 +213,7 @@ def _piece_of_line(
     quadrature."""
     d = v2 - v1
     if abs(d) < 0.05:
-        total = slope = 0.0
-        for j in range(len(MIDDLE_X)):
-            e, de = strain(laws, law, v1 + d * MIDDLE_X[j])
-            total += MIDDLE_W[j] * e
-            slope += MIDDLE_W[j] * de
-        return total * dy, slope * dy
+        return _strain_sums(MIDDLE_X, MIDDLE_W, laws, law, v1, dy, d)
     head = laws[law, HEAD]
     knee, steady = head[KNEE], head[STEADY]
     at_1 = 1.0 - head[STIFFENING] * head[KNEE_RISE]
@@ -234,11 +242,11 @@ def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: flo
     head = laws[law, HEAD]
     if head[GROOVED] == 0.0:
         if abs(d) < 0.05:
-            return _table_sums(SHORT_X, SHORT_W, laws, law, v1, dy, d)
+            return _strain_sums(SHORT_X, SHORT_W, laws, law, v1, dy, d)
         if abs(d) < LEAST_TABLED:
-            return _table_sums(MIDDLE_X, MIDDLE_W, laws, law, v1, dy, d)
+            return _strain_sums(MIDDLE_X, MIDDLE_W, laws, law, v1, dy, d)
         if head[KNEE] > 0.0:
-            return _table_sums(LONG_X, LONG_W, laws, law, v1, dy, d)
+            return _strain_sums(LONG_X, LONG_W, laws, law, v1, dy, d)
         low, per = head[V_LOW], head[V_PER]
         area = look_up(laws, law, AREA_OF_V, low, per, v2) - look_up(laws, law, AREA_OF_V, low, per, v1)
         risen = look_up(laws, law, E_OF_V, low, per, v2) - look_up(laws, law, E_OF_V, low, per, v1)
@@ -246,19 +254,6 @@ def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: flo
     if dy < SHORT_GROOVE and abs(d) < 0.05:
         return _groove_sums(MIDDLE_X, MIDDLE_W, laws, law, y1, v1, dy, d)
     return _groove_sums(LONG_X, LONG_W, laws, law, y1, v1, dy, d)
-
-
-@inner_kernel
-def _table_sums(
-    x: Floats, weights: Floats, laws: Floats, law: int, v1: float, dy: float, d: float
-) -> tuple[float, float]:
-    """Weighted sums of e(v1 + d x) and of its derivative, times dy."""
-    total = slope = 0.0
-    for j in range(len(x)):
-        e, de = strain(laws, law, v1 + d * x[j])
-        total += weights[j] * e
-        slope += weights[j] * de
-    return total * dy, slope * dy
 
 
 @inner_kernel

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from cablecomp.mechanics.jit import constant, inner_kernel, leaf_kernel
+from cablecomp.mechanics.jit import constant, inner_kernel, kernel, leaf_kernel
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -91,22 +91,18 @@ def law_table(
     head = table[HEAD]
     by_tension = tension_factor(TAU)
     if np.any(by_tension != 1.0):
-        v = _integral(LN_TAU, 1.0 / by_tension)
+        v = _integral(LN_TAU[1] - LN_TAU[0], 1.0 / by_tension)
         v -= CubicHermiteSpline(LN_TAU[ABOUT_T0], v[ABOUT_T0], 1.0 / by_tension[ABOUT_T0])(0.0)
         v_grid = np.linspace(v[0], v[-1], SIZE)
-        u = CubicHermiteSpline(v, LN_TAU, by_tension)(v_grid)
-        table[U_OF_V] = u
+        table[U_OF_V] = CubicHermiteSpline(v, LN_TAU, by_tension)(v_grid)
         table[V_OF_U] = v
         head[BY_TENSION] = 1.0
         head[V_LOW], head[V_PER] = v[0], 1.0 / (v_grid[1] - v_grid[0])
         head[U_LOW], head[U_PER] = LN_TAU[0], 1.0 / (LN_TAU[1] - LN_TAU[0])
-        if knee == 0.0:
-            table[E_OF_V] = _strains(stiffening, steady, np.exp(u))
-            table[AREA_OF_V] = _integral(v_grid, table[E_OF_V])
     y = np.linspace(0.0, wrap_max_rad, SIZE)
     by_place = None if groove_factor is None else groove_factor(y)
     if by_place is not None and np.any(by_place != 1.0):
-        table[G_OF_Y] = _integral(y, by_place)
+        table[G_OF_Y] = _integral(y[1], by_place)
         head[GROOVED] = 1.0
         head[Y_PER] = 1.0 / y[1]
     if head[BY_TENSION] or head[GROOVED]:
@@ -114,22 +110,14 @@ def law_table(
     else:
         head[MODE] = STIFF if stiffening != 0.0 else PLAIN
     _set_stiffness(table, stiffening, steady, knee)
+    if head[BY_TENSION] and knee == 0.0:
+        _fill_strains(table[None], 0)
+        table[AREA_OF_V] = _integral(1.0 / head[V_PER], table[E_OF_V])
     return table
 
 
-def _strains(b: float, steady: float, tau: Floats) -> Floats:
-    """e(tau) of `stiffening_law` without a knee; straight on where the cable would soften beyond `LEAST_STIFFNESS`."""
-    if b == 0.0:
-        return tau - 1.0
-    stiffness = 1.0 + b * (tau - 1.0)
-    e = np.log(np.maximum(stiffness, LEAST_STIFFNESS)) / b
-    e += np.where(stiffness < LEAST_STIFFNESS, (stiffness - LEAST_STIFFNESS) / (b * LEAST_STIFFNESS), 0.0)
-    return steady * (tau - 1.0) + (1.0 - steady) * e
-
-
-def _integral(x: Floats, f: Floats) -> Floats:
-    """Running integral by Simpson's rule on the given grid's midpoints (trapezoid corrected by end slopes)."""
-    h = x[1] - x[0]
+def _integral(h: float, f: Floats) -> Floats:
+    """Running integral on a grid of step h by Simpson's rule on its midpoints (trapezoid corrected by end slopes)."""
     slope = np.gradient(f, h, edge_order=2)
     steps = h * (f[1:] + f[:-1]) / 2.0 - h * h * (slope[1:] - slope[:-1]) / 12.0
     return np.concatenate(([0.0], np.cumsum(steps)))
@@ -265,6 +253,13 @@ def strain_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
     if laws[law, HEAD, MODE] == PLAIN:
         return tau - 1.0, 1.0
     return _strain_in_part(laws, law, tau)
+
+
+@kernel
+def _fill_strains(laws: Floats, law: int) -> None:
+    """Write e at every v of the grid into row E_OF_V."""
+    for k in range(SIZE):
+        laws[law, E_OF_V, k] = strain_of_tau(laws, law, math.exp(laws[law, U_OF_V, k]))[0]
 
 
 @inner_kernel

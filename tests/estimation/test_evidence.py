@@ -60,10 +60,10 @@ def test_a_fit_runs_the_drive_as_the_observer_does(effects: tuple[tuple[str, dic
     """On the same rows, bit for bit."""
     joint, columns = with_effects(JOINT, effects), recorded(noise_rad=0.0)
     e = gathered(columns, 200)
-    quick = simulator(joint).run(e, np.arange(len(e.columns["time_s"]))).joint
-    exact = Observer(joint).run({k: e.columns[k] for k in columns})["joint_position_rad"]
-    np.testing.assert_array_equal(quick, exact)
-    assert np.ptp(exact - JOINT.drive.ratio * e.columns["motor_position_rad"]) > 1e-3
+    fitted = simulator(joint).run(e, np.arange(len(e.columns["time_s"]))).joint
+    observed = Observer(joint).run({k: e.columns[k] for k in columns})["joint_position_rad"]
+    np.testing.assert_array_equal(fitted, observed)
+    assert np.ptp(observed - JOINT.drive.ratio * e.columns["motor_position_rad"]) > 1e-3
 
 
 def test_holds_keep_rows_by_time() -> None:

@@ -128,7 +128,6 @@ def test_a_piece_across_a_knee_under_friction_by_pressure_is_the_integral_of_its
 def test_a_piece_under_friction_by_place_is_the_integral_of_its_strain(width: float, rise: float) -> None:
     """mu = mu0 (1 + a sin y): v rises by the share of g = y + a (1 - cos y) that is gone."""
     law = np.stack([law_table(np.ones_like, lambda y: 1.0 + 0.6 * np.sin(y), 12.0)])
-
     v = 0.1
 
     def gone(y: float) -> float:

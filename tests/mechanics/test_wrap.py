@@ -75,10 +75,10 @@ def test_what_turning_does_under_friction_by_place_is_told(v: float, w: float) -
     law = np.stack([law_table(np.ones_like, lambda y: 1.0 + 0.6 * np.sin(y), 12.0)])
     p, cable = np.zeros(64, POINT), SimpleNamespace(mu=(0.1, 0.1), law=(0, 0), viscous=0.0)
     n = wrap_fill(p, law, 0, w, 0.0, 0.0)
-    drive: Any = SimpleNamespace(cables=[cable], steps=np.zeros(2, STEP), profiles=[p], heights=[n])
+    steps = np.zeros(2, STEP).view(np.recarray)
+    drive: Any = SimpleNamespace(cables=[cable], steps=steps, profiles=[p], heights=[n])
 
     def there(at: float) -> Any:
-        drive.steps = drive.steps.view(np.recarray)
         return drum_eval.py_func(drive, law, 0, 0, np.exp(v), v, at)  # the kernel has no entry from Python
 
     step = 1e-5
