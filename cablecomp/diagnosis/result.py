@@ -82,8 +82,8 @@ class Errors:
 
 @dataclass(frozen=True)
 class Traces:
-    """One recording before and after: judged rows, predictions with the session's zeros in them; `counted`:
-    rows that count."""
+    """One recording before and after: judged rows, predictions with the session's zeros in them; measured:
+    NaN where nothing was read; `counted`: rows that count."""
 
     name: str
     session: str

@@ -58,13 +58,13 @@ class Evidence:
     """One recording, ready to be fitted.
 
     `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are
-    judged, thinned by travel; `counted`: by output channel, which of `rows` count; `weight`: root of the time
-    that a judged row stands for, over its mean; `noise`: 1-sigma of a reading by channel, as the data show it;
-    `outliers`: readings set aside; `unread`: channels left out, hardly read; `shift_s`: what was added to the
-    recording's own clock; `carryover`: by output channel, what histories that nobody recorded would add to the
-    judged rows, a column each; `hidden`: the gaps, by the fine row before each, in which the drive went where it was
-    not seen to; `apart`: by parameter, in this order, how the configuration states that the joint
-    stood apart in this recording.
+    judged, thinned by travel; `counted`: by output channel, which of `rows` count; `read`: by output channel, on which
+    fine rows it was read, and not bridged; `weight`: root of the time that a judged row stands for, over its mean;
+    `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside; `unread`: channels
+    left out, hardly read; `shift_s`: what was added to the recording's own clock; `carryover`: by output channel, what
+    histories that nobody recorded would add to the judged rows, a column each; `hidden`: the gaps, by the fine row
+    before each, in which the drive went where it was not seen to; `apart`: by parameter, in this order, how the
+    configuration states that the joint stood apart in this recording.
     """
 
     name: str
@@ -83,10 +83,15 @@ class Evidence:
     hidden: tuple[int, ...] = ()
     apart: Mapping[str, Apart] = field(default_factory=dict)
     unread: tuple[str, ...] = ()
+    read: Mapping[str, BoolArray] = field(default_factory=dict)
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""
         return self.columns[name][self.rows]
+
+    def read_at_rows(self, name: str) -> FloatArray:
+        """An output channel on the judged rows, NaN where it was not read."""
+        return np.where(self.read[name][self.rows], self.at_rows(name), np.nan)
 
     @cached_property
     def motor_rate(self) -> FloatArray:
@@ -167,14 +172,14 @@ def gather(
             f"{name}: motor angle and load were read together at {int(drivable.sum())} instants; {FEWEST} are needed"
         )
     raw, finite = _bridged(raw, good, drivable)
-    means, counted = _fine(raw, finite, noise, fine_rows, load)
+    means, read = _fine(raw, finite, noise, fine_rows, load)
     rows = thinned(means, load, judged_rows)
     time = means["time_s"][rows]
     share = np.gradient(time) if len(time) > 1 else np.ones(1)
     weight = np.sqrt(share / share.mean())
     return Evidence(
-        name, session, {}, means, rows, {k: v[rows] for k, v in counted.items()}, weight, noise, set_aside,
-        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread,
+        name, session, {}, means, rows, {k: v[rows] for k, v in read.items()}, weight, noise, set_aside,
+        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread, read=read,
     )  # fmt: skip
 
 
@@ -242,22 +247,22 @@ def _fine(
     fine_rows: int,
     load: str | None,
 ) -> tuple[dict[str, FloatArray], dict[str, BoolArray]]:
-    """Means of as many readings as leave `fine_rows`, inputs cleaned; and which of them count, by output channel. Of
-    readings on both sides of a gap nothing is made."""
+    """Means of as many readings as leave `fine_rows`, inputs cleaned; and which of these were read, by output channel.
+    Of readings on both sides of a gap nothing is made."""
     group = max(1, -(-len(raw["time_s"]) // fine_rows))
     whole = len(raw["time_s"]) // group * group
     time = raw["time_s"][:whole].reshape(-1, group)
     span = time[:, -1] - time[:, 0]
     near = span <= APART * np.median(span)
     means = {k: group_means(v[:whole], group)[near] for k, v in raw.items()}
-    counted = {k: (group_means(v[:whole].astype(np.float64), group) > 0.99)[near] for k, v in finite.items()}
+    read = {k: (group_means(v[:whole].astype(np.float64), group) > 0.99)[near] for k, v in finite.items()}
     for key in raw:
         is_input = key != "time_s" and (key not in OUTPUTS or key == load)
         if is_input and np.ptp(means[key]) > 0.0:
             means[key] = keep_corners(means["time_s"], means[key], noise[key] / np.sqrt(group))
     if load == MOTOR:
-        counted.pop(MOTOR)
-    return means, counted
+        read.pop(MOTOR)
+    return means, read
 
 
 def gaps_of(time: FloatArray) -> IntArray:

@@ -56,7 +56,13 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
 
 def shown_first(d: Diagnosis) -> Traces | None:
     """The recording to look at: where calibration alone leaves most."""
-    return max(d.traces, key=lambda t: float(np.mean(figures.residual(t, "before_rad") ** 2)), default=None)
+    return max(d.traces, key=_left_before, default=None)
+
+
+def _left_before(trace: Traces) -> float:
+    left = figures.residual(trace, "before_rad")
+    read = left[np.isfinite(left)]
+    return float(np.mean(read**2)) if len(read) else 0.0
 
 
 def _missing(m: Mapping[str, Any], several: bool, others: bool, unit: Scale) -> str:

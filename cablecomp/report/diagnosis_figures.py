@@ -110,7 +110,10 @@ def overlay(trace: Traces, intervals: Sequence[Sequence[float]], unit: Scale) ->
 def loops(trace: Traces, unit: Scale) -> Any:
     """Deflection against load (or motor angle, where that is what moves), before on the left, after on the right."""
     deflection = trace.measured_rad - trace.rigid_rad
-    moves = np.ptp(trace.rigid_rad) > np.ptp(deflection) or not np.ptp(trace.covariates["load"]) > 0.0
+    moves = (
+        np.ptp(trace.rigid_rad) > np.ptp(deflection[np.isfinite(deflection)])
+        or not np.ptp(trace.covariates["load"]) > 0.0
+    )
     name = "motor_angle" if moves else "load"
     x = trace.covariates[name]
     fig = make_subplots(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
@@ -129,11 +132,13 @@ def loops(trace: Traces, unit: Scale) -> Any:
 
 def energy_map(traces: Sequence[Traces], covariate: str, floor_rad: float) -> Any:
     """RMS residual over time and a covariate, in noise floors, before (above) and after (below), one colour scale."""
-    time = np.concatenate([t.covariates["time"] for t in traces])
-    values = np.concatenate([t.covariates[covariate] for t in traces])
+    seen = np.isfinite(_joined(traces, "before_rad"))
+    time = np.concatenate([t.covariates["time"] for t in traces])[seen]
+    values = np.concatenate([t.covariates[covariate] for t in traces])[seen]
     maps = []
     edges_t, edges_c = np.linspace(time.min(), time.max(), 61), _edges(values)
-    for residual in (_joined(traces, "before_rad"), _joined(traces, "after_rad")):
+    for key in ("before_rad", "after_rad"):
+        residual = _joined(traces, key)[seen]
         power, _, _ = np.histogram2d(time, values, bins=(edges_t, edges_c), weights=residual**2)
         count, _, _ = np.histogram2d(time, values, bins=(edges_t, edges_c))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -181,7 +186,8 @@ def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scal
         groups = [("", np.ones(len(values), dtype=np.bool_), "solid")]
     for key, name, colour in (("before_rad", "before", BEFORE), ("after_rad", "after", AFTER)):
         residual = _joined(traces, key)
-        for way, mask, dash in groups:
+        for way, rows, dash in groups:
+            mask = rows & np.isfinite(residual)
             if np.count_nonzero(mask) < 20:
                 continue
             centres, means = _binned(values[mask], residual[mask])
@@ -247,8 +253,13 @@ def dependence(points: Mapping[str, float], parameter: str, on: str) -> Any:
 
 
 def residual(trace: Traces, key: str) -> FloatArray:
-    """Measured minus predicted, `key` one of `before_rad`, `after_rad`."""
+    """Measured minus predicted, `key` one of `before_rad`, `after_rad`; NaN where nothing was measured."""
     return np.asarray(trace.measured_rad - getattr(trace, key), dtype=np.float64)
+
+
+def left_out(trace: Traces) -> Any:
+    """Rows that were measured and that nothing was fitted to."""
+    return ~np.asarray(trace.counted) & np.isfinite(trace.measured_rad)
 
 
 def _deflections(fig: Any, trace: Traces, shown: Any, unit: Scale) -> None:
@@ -306,7 +317,7 @@ def _bands(stretches: Sequence[Sequence[float]], colour: str, row: int) -> list[
 
 def _stretches(trace: Traces, shown: Any) -> list[tuple[float, float]]:
     """Times of the stretches that nothing was fitted to."""
-    out = np.concatenate(([False], ~np.asarray(trace.counted) & shown, [False]))
+    out = np.concatenate(([False], left_out(trace) & shown, [False]))
     starts = np.flatnonzero(out[1:] & ~out[:-1])
     ends = np.flatnonzero(out[:-1] & ~out[1:]) - 1
     time = trace.covariates["time"]

@@ -93,6 +93,10 @@ def test_what_is_no_reading_does_not_count_and_moves_nothing() -> None:
     np.testing.assert_allclose(
         e.at_rows("joint_position_rad")[far], broken["joint_position_rad"][e.rows[far]], atol=1e-12
     )
+    told = np.isfinite(
+        e.counting_from(len(e.rows)).read_at_rows("joint_position_rad")
+    )  # read, though nothing counts
+    np.testing.assert_array_equal(told, counted)
 
 
 def test_rows_of_all_recordings_are_shared_out_by_their_length() -> None:

@@ -18,10 +18,12 @@ from diagnosis_example import NOISE, example, without_a_name
 
 from cablecomp.diagnosis.result import Diagnosis, Law, Traces, Value, report_json
 from cablecomp.report import diagnosis_figures as figures
+from cablecomp.report.diagnosis_answer import shown_first
 from cablecomp.report.diagnosis_page import diagnosis_page
-from cablecomp.report.diagnosis_tables import between, interval
+from cablecomp.report.diagnosis_tables import between, by_recording, interval
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 from cablecomp.report.diagnosis_words import percent
+from cablecomp.report.page import number
 from cablecomp.report.replay_figures import Scale
 
 
@@ -128,6 +130,37 @@ def test_the_answer_speaks_of_shading_where_the_end_that_it_shows_is_shaded(
         0
     ]
     assert ("Shaded" in text_of(first)) is said
+
+
+def test_what_was_not_read_is_drawn_nowhere_and_is_in_no_number(found: Diagnosis) -> None:
+    """The joint's encoder silent for a while that the drive went on in: a gap in the line, and no row of any table."""
+    trace = found.traces[0]
+    silent = (np.arange(len(trace.counted)) >= 420) & (np.arange(len(trace.counted)) < 480)
+    gap = replace(
+        trace, measured_rad=np.where(silent, np.nan, trace.measured_rad), counted=trace.counted & ~silent
+    )
+    unit = Scale(1e3, "mrad")
+    lines = {line.name: np.asarray(line.y) for line in figures.at_a_glance(gap, unit).data}
+    shown = silent[-len(lines["measured"]) :]
+    assert shown.any()
+    for name in ("measured", "error before", "error after"):
+        np.testing.assert_array_equal(np.isnan(lines[name]), shown)
+    assert np.isfinite(lines["after"]).all()
+    assert not figures.end_is_shaded(replace(gap, counted=~silent))  # nothing was kept from the fit there
+    along = figures.along([gap], "load", NOISE, unit)
+    assert all(np.isfinite(np.asarray(line.y)).all() for line in along.data)
+    before, _ = (m.z for m in figures.energy_map([gap], "load", NOISE).data)
+    assert np.isfinite(before).any()
+    whole, cut = (re.findall(r"<td[^>]*>(.*?)</td>", by_recording([t], unit)) for t in (trace, gap))
+    rest = ~trace.counted  # from 0.85 on, where nothing is silent
+    assert whole[-2:] == cut[-2:]
+    rms = float(np.sqrt(np.mean(figures.residual(trace, "before_rad")[rest] ** 2)))
+    assert number(1e3 * rms, "mrad") in cut
+    loud = replace(gap, name="loud", measured_rad=gap.measured_rad + 1e-3)
+    first = shown_first(replace(found, traces=(gap, loud)))
+    assert first is not None
+    assert first.name == "loud"
+    assert "Before and after" in text_of(diagnosis_page(replace(found, traces=(gap,))))
 
 
 def test_the_terminal_answers_first(found: Diagnosis) -> None:

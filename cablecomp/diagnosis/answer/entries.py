@@ -313,13 +313,13 @@ def traces(before: Fit, after: Fit, seen: Sequence[Covariates], laws: Sequence[E
     rows = []
     lefts = (before.problem.left(before.x, own_zero=False), after.problem.left(after.x, own_zero=False))
     for k, (e, c) in enumerate(zip(before.problem.evidence, seen, strict=True)):
-        measured = e.at_rows(JOINT)
+        measured, read = e.at_rows(JOINT), e.read_at_rows(JOINT)
         rigid = ratio * e.at_rows("motor_position_rad")
         zero = float(np.median(measured - rigid))
         after_rad = measured - lefts[1][k] + sum(value_of(law, e) for law in laws)
         rows.append(
             Traces(
-                e.name, e.session, c.values, measured, measured - lefts[0][k], after_rad, rigid + zero,
+                e.name, e.session, c.values, read, measured - lefts[0][k], after_rad, rigid + zero,
                 e.counted[JOINT],
             )
         )  # fmt: skip

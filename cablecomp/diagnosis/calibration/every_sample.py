@@ -172,6 +172,7 @@ def _every_other(e: Evidence) -> Evidence:
         columns={k: v[e.rows][::2] for k, v in e.columns.items()},
         rows=np.arange(len(e.rows[::2])),
         counted={k: v[::2] for k, v in e.counted.items()},
+        read={k: v[e.rows][::2] for k, v in e.read.items()},
         weight=e.weight[::2],
         carryover={k: v[::2] for k, v in e.carryover.items()},
     )
