@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from turning import LIMITED, NOISE_RAD, after_a_history
 
 from cablecomp.diagnosis.answer.errors import errors_of
@@ -56,3 +57,18 @@ def test_what_a_gap_leaves_is_no_error_of_rows_that_alone_tell_it() -> None:
     drive = calibrate_drive(LIMITED, body.used, np.random.default_rng(0))
     assert any(e.hidden for e in drive.fit.problem.evidence)
     assert errors_of(drive.fit, body.final, body.final_by).heldout_rmse_rad < 1.3 * NOISE_RAD
+
+
+def test_a_recording_that_the_drive_cannot_follow_is_predicted_as_by_a_rigid_one() -> None:
+    """Motion beyond what is wound on the drums, kept for the end: no number would hide it, and hide a name with it."""
+    body = gather_body(LIMITED, {f"{k}/1": after_a_history(k) for k in range(2)})
+    drive = calibrate_drive(LIMITED, body.used, np.random.default_rng(0))
+    (one,) = body.final[:1]
+    count = len(one.columns["time_s"])
+    motor = np.linspace(0.0, 50.0, count)
+    joint = LIMITED.drive.ratio * motor + 0.01 * np.where(np.arange(count) % 2, 1.0, -1.0)
+    far = replace(
+        one, columns={**one.columns, "motor_position_rad": motor, JOINT: joint}, name="far", session="far"
+    )
+    error = errors_of(drive.fit, [far], "recording").final_rmse_rad
+    assert error == pytest.approx(0.01, rel=0.1)

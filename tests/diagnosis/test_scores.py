@@ -18,6 +18,8 @@ from cablecomp.diagnosis.explain.scores import (
     selected_in,
 )
 from cablecomp.diagnosis.folds import Groups
+from cablecomp.errors import InputError
+from cablecomp.estimation.limits import HOPELESS
 from cablecomp.estimation.parameter import Parameter
 from cablecomp.signal.smoothing import BoolArray, FloatArray
 
@@ -78,6 +80,28 @@ def test_of_a_drive_known_by_order_of_magnitude_recordings_are_left_out_one_by_o
     assert len(left) == parts
     assert sorted(f for some in left for f in some) == list(range(folds))
     np.testing.assert_array_equal(found, np.where(fold >= 0, 2.0, 1.0))
+
+
+@pytest.mark.parametrize("lost", ["the rest", "what is left out"])
+def test_what_cannot_be_followed_with_what_the_rest_tells_is_not_predicted(
+    monkeypatch: pytest.MonkeyPatch, lost: str
+) -> None:
+    """Of two parts the drive of the first cannot be run: in the fit of both it may leave as little as it likes."""
+    fold = np.repeat([0, 1], ROWS)
+    monkeypatch.setattr(scores, "_kept", lambda problem, out: out)
+
+    def again(fit: object, out: BoolArray, evaluations: int) -> SimpleNamespace:
+        if out[0] and lost == "the rest":
+            raise InputError("a drum runs out of cable")
+        return SimpleNamespace(x=out)
+
+    ones = np.ones(len(fold))
+    problem = SimpleNamespace(followed=lambda out: None if out[0] else 2.0 * ones)
+    monkeypatch.setattr(scores, "fitted_to_part", again)
+    fit = SimpleNamespace(residual=ones, problem=problem, x=np.empty(0))
+    g = Groups(np.arange(len(fold)), fold, "recording", np.zeros_like(fold))
+    found = left_out_exactly(fit, g)  # type: ignore[arg-type]  # a stand-in for a fit
+    np.testing.assert_array_equal(found, np.where(fold == 0, HOPELESS, 2.0))
 
 
 def test_what_only_interpolates_does_not_lead_on_data_left_out() -> None:

@@ -19,6 +19,7 @@ from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.experiment import APART, best_experiment
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection
+from cablecomp.diagnosis.explain.neighbours import not_told_apart
 from cablecomp.diagnosis.explain.unseen import Hidden
 from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.explain.weighing import Weighed
@@ -268,6 +269,11 @@ def notes(case: Case) -> tuple[str, ...]:
     unread = [f"{', '.join(e.unread)} of {short(e.name)}" for e in body.used if e.unread]
     if unread:
         found.append(f"hardly read, and left out: {'; '.join(unread)}")
+    for channel, share in not_told_apart(case.config, body.used).items():
+        found.append(
+            f"{channel} goes with the joint's own motion and load ({100 * share:.0f} % of it): whether a neighbour "
+            "loads the joint by it cannot be told from the joint's own drive, and is not asked"
+        )
     if body.clock_s:
         begun = [f"{short(name)} from {s:.4g} s" for name, s in body.clock_s.items()]
         more = f" and {len(begun) - SAID} more, `clock_s` in diagnosis.json" if len(begun) > SAID else ""

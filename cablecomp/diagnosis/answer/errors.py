@@ -13,7 +13,7 @@ from cablecomp.diagnosis.folds import Part, left_out_in_turn
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import INPUT, JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part, rms_left
 from cablecomp.estimation.limits import CARRYOVER_SD
 from cablecomp.estimation.parallel import side_by_side
@@ -47,14 +47,16 @@ def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
 def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
     """Weighted misfit of the joint angle [rad] on counted rows; laws, the zero and the recording's carry-over taken off
     (where the fit has not seen the recording: the session's; nor the session: as these rows, or the first of them,
-    tell), without rows at which a carry-over comes back that the rows seen have not told."""
+    tell), without rows at which a carry-over comes back that the rows seen have not told. Of recordings that the drive
+    cannot follow with what the fit tells: what a rigid one leaves."""
     problem = fit.problem
     zeros, carryover = problem.aside(fit.x)
+    parts = []
     try:
         misfits = problem.with_evidence(evidence).misfits(fit.x)[JOINT]
     except InputError:
-        return [np.full(1, np.nan)]
-    parts = []
+        zeros, carryover = {}, {}
+        misfits = [e.at_rows(JOINT) - problem.config.drive.ratio * e.at_rows(INPUT) for e in evidence]
     for e, m in zip(evidence, misfits, strict=True):
         kept = e.counted[JOINT]
         if not kept.any():

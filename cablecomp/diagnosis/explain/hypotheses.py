@@ -12,6 +12,7 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import Course
+from cablecomp.diagnosis.explain.neighbours import neighbours, varies
 from cablecomp.diagnosis.explain.starts import absolute, grid, width
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.effects.base import Role, at_most
@@ -220,8 +221,7 @@ def _of_effect(effect: Effect, config: JointConfig, evidence: Sequence[Evidence]
         return []
     channels = [""] if not effect.texts or effect.texts_optional else []
     if effect.texts:
-        others = (n for n in _others(evidence) if n.endswith(effect.channel_ends))
-        channels += [n for n in others if n not in config.condition.values()]
+        channels += [n for n in neighbours(config, evidence) if n.endswith(effect.channel_ends)]
     found = []
     for c in channels:
         read = _by_readings(effect, width(evidence, c)) if c else effect
@@ -319,13 +319,13 @@ def _tells(evidence: Sequence[Evidence], channel: str, load: str | None) -> bool
     input."""
     if channel in OUTPUTS and channel != load:
         return all(channel in e.counted for e in evidence)
-    return _varies(evidence, channel)
+    return varies(evidence, channel)
 
 
 def loaded(config: JointConfig, evidence: Sequence[Evidence]) -> bool:
     """Whether the recordings tell a load."""
     channel = load_channel(config, evidence[0].columns)
-    return channel is not None and _varies(evidence, channel)
+    return channel is not None and varies(evidence, channel)
 
 
 def _changes_sign(config: JointConfig, evidence: Sequence[Evidence]) -> bool:
@@ -333,15 +333,3 @@ def _changes_sign(config: JointConfig, evidence: Sequence[Evidence]) -> bool:
     loads = [load_of(config, e.columns) for e in evidence]
     low, high = min(float(np.nanmin(m)) for m in loads), max(float(np.nanmax(m)) for m in loads)
     return min(-low, high) > 0.05 * max(-low, high)
-
-
-def _varies(evidence: Sequence[Evidence], channel: str) -> bool:
-    return (
-        all(channel in e.columns for e in evidence)
-        and max(float(np.ptp(e.columns[channel])) for e in evidence) > 0.0
-    )
-
-
-def _others(evidence: Sequence[Evidence]) -> list[str]:
-    names = [n for n in evidence[0].columns if n.startswith("other_")]
-    return [n for n in names if _varies(evidence, n)]

@@ -22,6 +22,7 @@ from cablecomp.effects.catalogue import role_of
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
+from cablecomp.estimation.limits import HOPELESS
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -67,7 +68,8 @@ def left_out_linearly(residual: FloatArray, J: FloatArray, groups: Groups) -> Fl
 def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArray:
     """As `left_out`, each part really left out and the rest fitted again: for drives known by order of magnitude only,
     whose parameters trade places along bent valleys that no linear step follows. A part is some of the blocks, or a
-    recording where there are no more of them than a search looks at."""
+    recording where there are no more of them than a search looks at. Rows that the drive cannot follow with what the
+    rest tells of it are not predicted: they count as such."""
     n = len(groups.fold)
     r = fit.residual[:n].copy()
     parts = min(groups.folds, LIMITS.searched if groups.by == "recording" else LIMITS.refits)
@@ -75,6 +77,7 @@ def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArr
         out = (groups.fold >= 0) & (groups.fold % parts == k)
         if not out.any():
             continue
+        r[out] = HOPELESS
         try:
             again = fitted_to_part(fit, _kept(fit.problem, out), evaluations)
         except InputError:
