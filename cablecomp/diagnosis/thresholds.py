@@ -238,12 +238,12 @@ class Thresholds:
     conditions: int = 3
     """Values of a condition from which a gain by it may be asked for: two tell a line from nothing else."""
     own_motion: float = 0.9
-    """Share of a further channel that the joint's own motion and load tell, from which on it is asked for as no
-    neighbour's (in 109 recordings of neighbours, trials seed 738, at most 0.65; of two tensions of a sheath's own
-    cables 0.97 to 0.99: crosstalk of these came in beside friction of the path in four of six runs by other last
-    digits, and with 0.78 in one of them)."""
+    """Share of a further channel that the joint's own motion tells, from which on it is asked for as no neighbour's
+    (in 109 recordings of neighbours, trials seed 738, at most 0.56; of two tensions of a sheath's own cables 0.97 to
+    0.99: crosstalk of these came in beside friction of the path in four of six runs by other last digits, and with
+    0.78 in one of them)."""
     own_plays: tuple[float, ...] = (0.02, 0.1, 0.25)
-    """Half widths of the plays that this motion and load are taken through, in their ranges."""
+    """Half widths of the plays that this motion is taken through, in its range."""
     of_each: int = 2
     """Recordings of each value from which fewer are enough: with one left out, the others of its value still tell
     whether the parameter differs (a sheath at two bends, twice each: wires were to break at the first turn)."""

@@ -271,7 +271,7 @@ def notes(case: Case) -> tuple[str, ...]:
         found.append(f"hardly read, and left out: {'; '.join(unread)}")
     for channel, share in not_told_apart(case.config, body.used).items():
         found.append(
-            f"{channel} goes with the joint's own motion and load ({100 * share:.0f} % of it): whether a neighbour "
+            f"{channel} goes with the joint's own motion ({100 * share:.0f} % of it): whether a neighbour "
             "loads the joint by it cannot be told from the joint's own drive, and is not asked"
         )
     if body.clock_s:

@@ -1,7 +1,8 @@
-"""Which further channels may be a neighbour's: not what goes with the joint's own motion and load.
+"""Which further channels may be a neighbour's: not what goes with the joint's own motion.
 
 Tensions of the joint's own cables, a second encoder of its motor, a neighbour that moves in step: of such a channel any
-law of friction that the drive lacks makes a "neighbour" that loads it.
+law of friction that the drive lacks makes a "neighbour" that loads it. The load does not count as the joint's own: a
+torque channel may hold what a neighbour puts on it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import INPUT, Evidence
-from cablecomp.estimation.simulate import load_of
 from cablecomp.signal.smoothing import FloatArray
 
 
@@ -26,30 +26,24 @@ def varies(evidence: Sequence[Evidence], channel: str) -> bool:
 
 
 def neighbours(config: JointConfig, evidence: Sequence[Evidence]) -> list[str]:
-    """Further channels that vary, are no condition, and do not go with the joint's own motion and load."""
-    return [c for c in _further(config, evidence) if own_share(config, evidence, c) < LIMITS.own_motion]
+    """Further channels that vary, are no condition, and do not go with the joint's own motion."""
+    return [c for c in _further(config, evidence) if own_share(evidence, c) < LIMITS.own_motion]
 
 
 def not_told_apart(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str, float]:
-    """Further channels that do, and the share of each that the joint's own motion and load tell."""
-    shares = {c: own_share(config, evidence, c) for c in _further(config, evidence)}
+    """Further channels that do, and the share of each that the joint's own motion tells."""
+    shares = {c: own_share(evidence, c) for c in _further(config, evidence)}
     return {c: share for c, share in shares.items() if share >= LIMITS.own_motion}
 
 
-def own_share(config: JointConfig, evidence: Sequence[Evidence], channel: str) -> float:
-    """Share of a channel's variance within recordings that a linear law of motor angle and load (and of what follows
-    each through plays of several widths), each recording's own, accounts for."""
+def own_share(evidence: Sequence[Evidence], channel: str) -> float:
+    """Share of a channel's variance within recordings that a linear law of the motor's angle, its square, and what
+    follows it through plays of several widths, each recording's own, accounts for."""
     left = whole = 0.0
     for e in evidence:
         y = e.columns[channel] - np.mean(e.columns[channel])
-        motor = e.columns[INPUT]
-        load = np.broadcast_to(load_of(config, e.columns), motor.shape)
-        moved = [x / np.ptp(x) for x in (motor, load) if np.ptp(x) > 0.0]
-        columns = [
-            np.ones(len(y)),
-            *(f for x in moved for f in (x, x**2, *(_play(x, r) for r in LIMITS.own_plays))),
-        ]
-        A = np.stack(columns, axis=1)
+        motor = e.columns[INPUT] / max(float(np.ptp(e.columns[INPUT])), 1e-300)
+        A = np.stack([np.ones(len(y)), motor, motor**2, *(_play(motor, r) for r in LIMITS.own_plays)], axis=1)
         left += float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2))
         whole += float(np.sum(y**2))
     return 1.0 - left / whole
