@@ -16,7 +16,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.outliers import outliers, outliers_in_motion
-from cablecomp.mechanics.jit import njit
+from cablecomp.estimation.thinning import APART, thinned
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
 
@@ -39,9 +39,6 @@ SPARSE: Final = 0.6
 """Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
 DIED: Final = 10.0
 """Usual steps of such a channel beyond which it was not read for a while, or no more."""
-APART: Final = 3.0
-"""Times the usual span of the readings that make a fine row up to which they lie: what lies further apart lies on both
-sides of a gap."""
 OVERFLOWN: Final = 1e15
 """From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 
@@ -125,6 +122,14 @@ class Evidence:
         return replace(self, counted={k: v & later for k, v in self.counted.items()})
 
 
+def varies(evidence: Sequence[Evidence], channel: str) -> bool:
+    """Whether all recordings have the channel and one of them says more of it than one value."""
+    return (
+        all(channel in e.columns for e in evidence)
+        and max(float(np.ptp(e.columns[channel])) for e in evidence) > 0.0
+    )
+
+
 def noise_mean(evidence: Sequence[Evidence], channel: str) -> float:
     """1-sigma of a channel's reading, mean over the recordings; 0 where none shows any."""
     return float(np.mean([e.noise.get(channel, 0.0) for e in evidence]))
@@ -173,7 +178,8 @@ def gather(
         )
     raw, finite = _bridged(raw, good, drivable)
     means, read = _fine(raw, finite, noise, fine_rows, load)
-    rows = thinned(means, load, judged_rows)
+    drivers = [means[k] for k in (INPUT, *([load] if load else []))]
+    rows = thinned(means["time_s"], drivers, means[JOINT], judged_rows)
     time = means["time_s"][rows]
     share = np.gradient(time) if len(time) > 1 else np.ones(1)
     weight = np.sqrt(share / share.mean())
@@ -265,62 +271,11 @@ def _fine(
     return means, read
 
 
-def gaps_of(time: FloatArray) -> IntArray:
-    """Rows after which nothing was recorded for more than `APART` usual steps."""
-    steps = np.diff(time)
-    return np.flatnonzero(steps > APART * np.median(steps)) if len(steps) else np.zeros(0, dtype=np.int64)
-
-
 def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]:
     """(fine, judged) rows of each recording, out of its samples and of what all together may have."""
     total = sum(samples)
     fine = [max(LEAST_FINE, int(FINE_ROWS * n / total)) for n in samples]
     return fine, [max(60, min(int(judged * n / total), f)) for n, f in zip(samples, fine, strict=True)]
-
-
-def thinned(columns: Mapping[str, FloatArray], load: str | None, count: int) -> IntArray:
-    """About `count` rows, even in travel (motor, joint and load over their ranges, and a share of time), every turning
-    point of motor and load in between, and both sides of every gap."""
-    time = columns["time_s"]
-    n = len(time)
-    if n <= count:
-        return np.arange(n)
-    span = float(time[-1] - time[0]) or 1.0
-    travel = np.gradient(time) / span
-    drivers = [INPUT, *([load] if load else [])]
-    for key in (*drivers, JOINT):
-        values = columns[key]
-        width = float(np.ptp(values))
-        if width > 0.0:
-            step = np.abs(np.gradient(values)) / width
-            travel = travel + step / max(float(step.sum()), 1e-12)
-    total = np.cumsum(travel)
-    even = np.searchsorted(total, np.linspace(total[0], total[-1], count))
-    gaps = gaps_of(time)
-    kept = [even, np.array([0, n - 1]), gaps, gaps + 1]
-    for key in drivers:
-        kept.append(_turns(columns[key], 0.02 * float(np.ptp(columns[key]))))
-    return np.unique(np.clip(np.concatenate(kept), 0, n - 1)).astype(np.int64)
-
-
-@njit
-def _turns(values: FloatArray, least: float) -> IntArray:
-    """Indices at which the channel turned round by more than `least`."""
-    found = np.zeros(len(values), dtype=np.int64)
-    count, extreme, sign = 0, 0, 0.0
-    for k in range(1, len(values)):
-        move = values[k] - values[extreme]
-        if sign == 0.0:
-            if abs(move) > least:
-                sign = 1.0 if move > 0.0 else -1.0
-                extreme = k
-        elif sign * move > 0.0:
-            extreme = k
-        elif -sign * move > least and least > 0.0:
-            found[count] = extreme
-            count += 1
-            sign, extreme = -sign, k
-    return found[:count]
 
 
 def _in_order(name: str, columns: dict[str, FloatArray]) -> dict[str, FloatArray]:

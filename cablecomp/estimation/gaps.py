@@ -13,9 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.estimation.evidence import INPUT, Evidence, gaps_of
+from cablecomp.estimation.evidence import INPUT, Evidence
 from cablecomp.estimation.limits import DETOUR_BEYOND, DETOUR_LEAST, DETOUR_LEG, DETOUR_PARTS, GAPS_MOST
 from cablecomp.estimation.simulate import Unrecorded, load_of
+from cablecomp.estimation.thinning import gaps_of
 from cablecomp.signal.smoothing import FloatArray, IntArray
 
 

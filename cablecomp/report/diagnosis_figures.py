@@ -257,7 +257,7 @@ def residual(trace: Traces, key: str) -> FloatArray:
     return np.asarray(trace.measured_rad - getattr(trace, key), dtype=np.float64)
 
 
-def left_out(trace: Traces) -> Any:
+def not_fitted(trace: Traces) -> Any:
     """Rows that were measured and that nothing was fitted to."""
     return ~np.asarray(trace.counted) & np.isfinite(trace.measured_rad)
 
@@ -317,7 +317,7 @@ def _bands(stretches: Sequence[Sequence[float]], colour: str, row: int) -> list[
 
 def _stretches(trace: Traces, shown: Any) -> list[tuple[float, float]]:
     """Times of the stretches that nothing was fitted to."""
-    out = np.concatenate(([False], left_out(trace) & shown, [False]))
+    out = np.concatenate(([False], not_fitted(trace) & shown, [False]))
     starts = np.flatnonzero(out[1:] & ~out[:-1])
     ends = np.flatnonzero(out[:-1] & ~out[1:]) - 1
     time = trace.covariates["time"]

@@ -11,7 +11,7 @@ from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.result import Tested, Traces
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.report import page
-from cablecomp.report.diagnosis_figures import left_out, residual
+from cablecomp.report.diagnosis_figures import not_fitted, residual
 from cablecomp.report.diagnosis_words import plain
 from cablecomp.report.replay_figures import Scale
 from cablecomp.units import suffix_of
@@ -89,7 +89,7 @@ def by_recording(traces: Sequence[Traces], unit: Scale) -> str:
     """RMS error of each recording: on what counted in the fit, and on the rest."""
     rows = []
     for trace in traces:
-        for name, mask in (("fitted", np.asarray(trace.counted)), ("not fitted", left_out(trace))):
+        for name, mask in (("fitted", np.asarray(trace.counted)), ("not fitted", not_fitted(trace))):
             if np.count_nonzero(mask) < 3:
                 continue
             before, after = (

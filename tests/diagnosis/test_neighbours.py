@@ -14,7 +14,6 @@ from cablecomp.estimation.evidence import Evidence
 from cablecomp.signal.smoothing import FloatArray
 
 OTHER = "other_2_Nm"
-RNG = np.random.default_rng(20)
 
 
 def dragged(columns: dict[str, FloatArray]) -> FloatArray:
@@ -24,7 +23,7 @@ def dragged(columns: dict[str, FloatArray]) -> FloatArray:
     for k, value in enumerate(drive):
         at = min(max(at, value - 5.5), value + 5.5)
         found[k] = at
-    return found + 0.3 * RNG.standard_normal(len(drive))
+    return found + 0.3 * np.random.default_rng(20).standard_normal(len(drive))
 
 
 def elsewhere(columns: dict[str, FloatArray]) -> FloatArray:

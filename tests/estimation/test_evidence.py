@@ -10,20 +10,27 @@ from turning import JOINT, recorded
 
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence, gather, rows_for, thinned
+from cablecomp.estimation.evidence import Evidence, gather, rows_for
 from cablecomp.estimation.simulate import simulator
+from cablecomp.estimation.thinning import thinned
 from cablecomp.observer import Observer
-from cablecomp.signal.smoothing import FloatArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 
 def gathered(columns: dict[str, FloatArray], judged: int = 300) -> Evidence:
     return gather(JOINT, "one", columns, "all", fine_rows=5000, judged_rows=judged)
 
 
+def travelled(columns: dict[str, FloatArray], count: int) -> IntArray:
+    """Rows by travel of motor, load and joint."""
+    drivers = [columns["motor_position_rad"], columns["joint_torque_Nm"]]
+    return thinned(columns["time_s"], drivers, columns["joint_position_rad"], count)
+
+
 def test_thinning_keeps_every_turning_point() -> None:
     """Between two kept rows motor and load go one way, but for a fiftieth of their range."""
     columns = recorded()
-    rows = thinned(columns, "joint_torque_Nm", 150)
+    rows = travelled(columns, 150)
     assert len(rows) < 250
     for key in ("motor_position_rad", "joint_torque_Nm"):
         values = columns[key]
@@ -71,7 +78,7 @@ def test_holds_keep_rows_by_time() -> None:
     held = columns["time_s"] > 20.0
     for key in ("motor_position_rad", "joint_torque_Nm", "joint_position_rad"):
         columns[key][held] = columns[key][np.argmax(held)]
-    rows = thinned(columns, "joint_torque_Nm", 200)
+    rows = travelled(columns, 200)
     assert np.diff(columns["time_s"][rows]).max() < 2.0
     assert np.count_nonzero(held[rows]) > 20
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.courses import Course
-from cablecomp.diagnosis.explain.neighbours import neighbours, varies
+from cablecomp.diagnosis.explain.neighbours import neighbours
 from cablecomp.diagnosis.explain.starts import absolute, grid, width
 from cablecomp.effects import Effect, Parameter, catalogue
 from cablecomp.effects.base import Role, at_most
-from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, load_channel, varies
 from cablecomp.estimation.parameter import Parameter as Free
 from cablecomp.estimation.parameter import of_drive, of_effect, vague_drive
 from cablecomp.estimation.simulate import load_of

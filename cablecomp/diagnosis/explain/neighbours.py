@@ -13,16 +13,8 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import INPUT, Evidence
+from cablecomp.estimation.evidence import INPUT, Evidence, varies
 from cablecomp.signal.smoothing import FloatArray
-
-
-def varies(evidence: Sequence[Evidence], channel: str) -> bool:
-    """Whether all recordings have the channel and one of them says more of it than one value."""
-    return (
-        all(channel in e.columns for e in evidence)
-        and max(float(np.ptp(e.columns[channel])) for e in evidence) > 0.0
-    )
 
 
 def neighbours(config: JointConfig, evidence: Sequence[Evidence]) -> list[str]:
