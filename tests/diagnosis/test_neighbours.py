@@ -77,6 +77,14 @@ def test_its_unit_and_its_zero_decide_nothing(unit: float, shift: float) -> None
     assert 0.0 < shares[0] < 0.9
 
 
+def test_a_motor_that_is_held_tells_nothing_of_a_neighbour() -> None:
+    columns = recorded(seed=1)
+    held = columns | {"motor_position_rad": np.full(len(columns["time_s"]), 0.1), OTHER: elsewhere(columns)}
+    evidence = list(gather_body(JOINT, {"one": held}).used)
+    assert own_share(evidence, OTHER) == pytest.approx(0.0, abs=1e-9)
+    assert "crosstalk" in asked(evidence)
+
+
 def test_the_diagnosis_says_what_it_did_not_ask_and_why() -> None:
     columns = recorded(seed=1)
     found = diagnose(JOINT, {"one": {**columns, OTHER: dragged(columns)}})

@@ -34,7 +34,8 @@ def own_share(evidence: Sequence[Evidence], channel: str) -> float:
     left = whole = 0.0
     for e in evidence:
         y = e.columns[channel] - np.mean(e.columns[channel])
-        motor = e.columns[INPUT] / max(float(np.ptp(e.columns[INPUT])), 1e-300)
+        motor = e.columns[INPUT] - e.columns[INPUT][0]
+        motor = motor / (float(np.ptp(motor)) or 1.0)
         A = np.stack([np.ones(len(y)), motor, motor**2, *(_play(motor, r) for r in LIMITS.own_plays)], axis=1)
         left += float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2))
         whole += float(np.sum(y**2))
