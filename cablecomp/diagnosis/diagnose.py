@@ -30,6 +30,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parallel import algebra_in_one_thread
+from cablecomp.estimation.steadying import with_steady_readings
 
 NO_BETTER = "the joint's angle is predicted no better, or hardly, by it on data left out"
 
@@ -86,8 +87,10 @@ def _calibrated(
 
 
 def _counted(body: Body, fit: Fit) -> tuple[Evidence, ...]:
-    """The recordings kept for the end, counted from where their histories are forgotten, as the ones used are."""
-    return body.final if body.final_by == "block" else tuple(without_history(fit, body.final)[0])
+    """The recordings kept for the end, their readings averaged and counted from where their histories are forgotten, as
+    those of the ones used are."""
+    steady = with_steady_readings(fit.problem, fit.x, body.final)
+    return tuple(steady if body.final_by == "block" else without_history(fit, steady)[0])
 
 
 def _weighed(

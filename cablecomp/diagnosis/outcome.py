@@ -53,7 +53,7 @@ class Case:
         """Where the calibrated drive's misfit lies, before any name: on every fine row, and by what the drive itself
         makes of laws that change."""
         fit = every_row(self.drive.fit)
-        series = series_of(fit, self.on_every_row, self.drive.floor_rad)
+        series = series_of(fit, self.on_every_row, self.drive.fine_floor_rad)
         return locate(series, rng, sensitivities(fit), drive=responses(fit))
 
     def remainder_of(self, fit: Fit, rng: np.random.Generator) -> Remainder:

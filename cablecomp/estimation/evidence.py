@@ -61,7 +61,9 @@ class Evidence:
     left out, hardly read; `shift_s`: what was added to the recording's own clock; `carryover`: by output channel, what
     histories that nobody recorded would add to the judged rows, a column each; `hidden`: the gaps, by the fine row
     before each, in which the drive went where it was not seen to; `apart`: by parameter, in this order, how the
-    configuration states that the joint stood apart in this recording.
+    configuration states that the joint stood apart in this recording; `steady`: by output channel, its readings on the
+    judged rows with noise averaged off (`steadying.py`), and `quiet`: what part of a fine row's noise (variance) is
+    left in these.
     """
 
     name: str
@@ -81,10 +83,12 @@ class Evidence:
     apart: Mapping[str, Apart] = field(default_factory=dict)
     unread: tuple[str, ...] = ()
     read: Mapping[str, BoolArray] = field(default_factory=dict)
+    steady: Mapping[str, FloatArray] = field(default_factory=dict)
+    quiet: Mapping[str, float] = field(default_factory=dict)
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""
-        return self.columns[name][self.rows]
+        return self.steady[name] if name in self.steady else self.columns[name][self.rows]
 
     def read_at_rows(self, name: str) -> FloatArray:
         """An output channel on the judged rows, NaN where it was not read."""
@@ -110,6 +114,14 @@ class Evidence:
     def group(self) -> float:
         """Readings of which a fine row is the mean."""
         return max(1.0, self.samples / len(self.columns["time_s"]))
+
+    def noise_of_fine(self, name: str) -> float:
+        """1-sigma of a fine row's reading of a channel, out of that of a reading."""
+        return self.noise.get(name, 0.0) / float(np.sqrt(self.group))
+
+    def noise_at_rows(self, name: str) -> float:
+        """The same on the judged rows (root of its mean square, weighed)."""
+        return self.noise_of_fine(name) * float(np.sqrt(self.quiet.get(name, 1.0)))
 
     @property
     def rated(self) -> IntArray:

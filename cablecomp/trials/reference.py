@@ -25,6 +25,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Weighing
+from cablecomp.estimation.steadying import as_read
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.sealed import Truth
 
@@ -64,7 +65,7 @@ def measure_truth(
     rng = np.random.default_rng(seed)
     body = gather_body(config, recordings)
     places = {name: k for k, name in enumerate(recordings, start=1)}
-    drive = calibrate_drive(config, body.used, rng)
+    drive = _as_read(calibrate_drive(config, body.used, rng))
     groups = make_groups(drive.fit)
     evidence = drive.fit.problem.evidence
     rmse = _noise(evidence, places, angles)
@@ -85,6 +86,14 @@ def measure_truth(
         rest = _without(evidence, places, angles, "plain", f"without_{name}")
         decidable = decidable and _enough(_step(whole, drive, rest, groups))
     return Yardstick(rmse, baseline, decidable, step.gain, step.z)
+
+
+def _as_read(drive: Calibrated) -> Calibrated:
+    """The drive about readings as they are on judged rows, nothing averaged: what can be told has one yardstick,
+    whatever a diagnosis makes of what lies between them."""
+    problem = drive.fit.problem
+    raw = problem.with_evidence([as_read(e) for e in problem.evidence])
+    return replace(drive, fit=solve(raw, drive.fit.x, EVALUATIONS))
 
 
 def _noise(

@@ -13,7 +13,7 @@ from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.folds import kind_of_parts, shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError, SlackError
-from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel, noise_mean
+from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.history import forgotten, full_swing, with_own_carryover
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
 from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_OF_TORQUE
@@ -21,6 +21,7 @@ from cablecomp.estimation.multi_start import multi_start
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of, vague_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.estimation.standing import PRETENSION, in_its_place
+from cablecomp.estimation.steadying import with_steady_readings
 from cablecomp.signal.smoothing import FloatArray, keep_corners
 
 TORQUE_ZERO, TORQUE_GAIN = "joint_torque_offset_Nm", "joint_torque_gain"
@@ -38,12 +39,14 @@ NO_LESS = 0.9
 @dataclass(frozen=True)
 class Calibrated:
     """`fit`: the calibrated drive. `nominal`: the drive as configured, evaluated. `lost_rows`: judged rows
-    given up to unknown histories. `floor_rad`: RMS that the sensors' noise alone leaves. `floor`: least weights."""
+    given up to unknown histories. `floor_rad`: RMS that the sensors' noise alone leaves of judged rows, whose readings
+    are averaged, `fine_floor_rad`: of fine rows. `floor`: least weights."""
 
     fit: Fit
     nominal: Fit
     floor: Weighing
     floor_rad: float
+    fine_floor_rad: float
     lost_rows: int
 
 
@@ -59,9 +62,10 @@ def calibrate_drive(
     floor = _floor(evidence, problem.channels)
     fit = _begun(problem, floor)
     before = sum(int(e.counted[JOINT].sum()) for e in evidence)
-    sensors = floor
     for k in range(PASSES):
         left = rms_left(fit)
+        evidence = with_steady_readings(fit.problem, fit.x, evidence)
+        sensors = _floor(evidence, problem.channels)
         cut, constant = without_history(fit, evidence)
         zero_sd = {**sensors.zero_sd, JOINT: max(sensors.zero_sd[JOINT], constant)}
         floor = Weighing(sensors.sigma, zero_sd, history={JOINT: constant})
@@ -69,7 +73,7 @@ def calibrate_drive(
         fit = refit(fit, weighed(fit, floor), 6)
         if k > 0 and rms_left(fit) > NO_LESS * left:
             break
-    floor_rad = noise_floor(fit, rng)
+    floor_rad, fine_floor_rad = noise_floors(fit, rng)
     seen = tuple(replace(e, noise={**e.noise, JOINT: floor_rad}) for e in cut)
     fit = Fit(fit.problem.with_evidence(seen), fit.x, fit.residual, fit.J)
     fit = fit if as_stated else _tightened_anew(fit, floor, floor_rad)
@@ -79,7 +83,7 @@ def calibrate_drive(
     here = fit.problem.start
     nominal = Fit(fit.problem, here, fit.problem.residual(here), fit.problem.jacobian(here))
     lost = before - sum(int(e.counted[JOINT].sum()) for e in cut)
-    return Calibrated(fit, nominal, floor, floor_rad, lost)
+    return Calibrated(fit, nominal, floor, floor_rad, fine_floor_rad, lost)
 
 
 def _begun(problem: Problem, floor: Weighing) -> Fit:
@@ -248,13 +252,14 @@ def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing
 
 
 def _floor(evidence: Sequence[Evidence], channels: Sequence[str]) -> Weighing:
-    sigma = {c: max(noise_mean(evidence, c), 1e-9) for c in channels}
+    sigma = {c: max(float(np.mean([e.noise_at_rows(c) for e in evidence])), 1e-9) for c in channels}
     return Weighing(sigma, {c: 0.1 * s for c, s in sigma.items()})
 
 
-def noise_floor(fit: Fit, rng: np.random.Generator) -> float:
-    """RMS [rad] that noise alone leaves of a row: the joint encoder's own, and what noisy inputs do to the prediction
-    (friction remembers noise: so it is simulated, noise put on the cleaned inputs and cleaned off again)."""
+def noise_floors(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
+    """RMS [rad] that noise alone leaves of a judged row and of a fine one: the joint encoder's own, and what noisy
+    inputs do to the prediction (friction remembers noise: so it is simulated, noise put on the cleaned inputs and
+    cleaned off again)."""
     problem = fit.problem
     moved = []
     base = problem.misfits(fit.x)[JOINT]
@@ -266,8 +271,10 @@ def noise_floor(fit: Fit, rng: np.random.Generator) -> float:
         except InputError:
             continue
         moved += [np.std(a - b) ** 2 for a, b in zip(base, other, strict=True)]
-    own = float(np.mean([e.noise[JOINT] ** 2 / e.group for e in problem.evidence]))
-    return float(np.sqrt(own + (float(np.mean(moved)) if moved else 0.0)))
+    by_inputs = float(np.mean(moved)) if moved else 0.0
+    judged = np.mean([e.noise_at_rows(JOINT) ** 2 for e in problem.evidence])
+    fine = np.mean([e.noise_of_fine(JOINT) ** 2 for e in problem.evidence])
+    return float(np.sqrt(judged + by_inputs)), float(np.sqrt(fine + by_inputs))
 
 
 def _noise_replica(e: Evidence, rng: np.random.Generator) -> Evidence:

@@ -10,7 +10,6 @@ temperature, a neighbour) acts as the drive's sensitivities at that moment do (`
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,10 +17,11 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.locate.views import Response, Responses
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import INPUT, JOINT, Evidence
+from cablecomp.estimation.evidence import INPUT, JOINT
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import Simulator, simulator
+from cablecomp.estimation.steadying import on_every_row
 from cablecomp.mechanics.change import Change, Factor
 from cablecomp.signal.smoothing import FloatArray
 
@@ -97,22 +97,7 @@ def _slow(fit: Fit) -> tuple[tuple[str, FloatArray], ...]:
 
 
 def _about_every_row(problem: Problem) -> Problem:
-    return problem.with_evidence([_on_every_row(e) for e in problem.evidence])
-
-
-def _on_every_row(e: Evidence) -> Evidence:
-    """All fine rows judged: one counts where its judged neighbours do."""
-    every = np.arange(len(e.columns["time_s"]), dtype=np.int64)
-    return replace(
-        e,
-        rows=every,
-        counted={k: np.interp(every, e.rows, v.astype(np.float64)) > 0.99 for k, v in e.counted.items()},
-        weight=np.ones(len(every)),
-        carryover={
-            k: np.column_stack([np.interp(every, e.rows, column) for column in v.T])
-            for k, v in e.carryover.items()
-        },
-    )
+    return problem.with_evidence([on_every_row(e) for e in problem.evidence])
 
 
 def _run(problem: Problem, x: FloatArray, change: Change | None) -> list[Any] | None:
