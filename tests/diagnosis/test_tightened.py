@@ -20,7 +20,7 @@ RUBS = EffectSpec("bearing_friction", {"torque_Nm": 0.008, "presliding_rad": 1e-
 def mounted(factor: float, seed: int, effects: list[EffectSpec]) -> dict[str, FloatArray]:
     """What the plant shows whose cables are so many times as tight."""
     stage = {**SMALL, "pretension_N": factor * SMALL["pretension_N"]}
-    time, motor, load = course(20.0)
+    time, motor, load = course(30.0)
     found = simulate(PlantConfig.from_dict(closed(stage)), time, motor, load, effects=effects).channels()
     rng = np.random.default_rng(seed)
     noisy = {k: found[k] + sd * rng.standard_normal(len(time)) for k, sd in SMALL_NOISE.items()}

@@ -175,6 +175,7 @@ def _every_other(e: Evidence) -> Evidence:
         read={k: v[e.rows][::2] for k, v in e.read.items()},
         weight=e.weight[::2],
         carryover={k: v[::2] for k, v in e.carryover.items()},
+        steady={k: v[::2] for k, v in e.steady.items()},
     )
 
 
