@@ -45,6 +45,7 @@ def test_how_tight_cables_are_is_no_physics() -> None:
     found = said([])
     assert not found.named
     assert found.verdict == "recalibrate"
+    assert any("of a reading's noise, and errors are of such rows" in note for note in found.notes)
     assert found.baseline.heldout_rmse_rad < 1.2 * found.noise_floor_rad
     told = {v.session: v.value for v in found.calibration if v.name.startswith("pretension_N")}
     apart = np.array([told[f"s{k}"] for k in range(len(FACTORS))]) / told["s0"]

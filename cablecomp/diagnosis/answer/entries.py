@@ -263,6 +263,12 @@ def notes(case: Case) -> tuple[str, ...]:
     if drive.lost_rows:
         total = sum(len(e.rows) for e in body.used)
         found.append(f"{drive.lost_rows} of {total} rows given up to the history before the first sample")
+    left = [e.quiet.get(JOINT, 1.0) / e.group for e in drive.fit.problem.evidence]
+    if min(left) < 1.0:
+        found.append(
+            "what was read between the rows that are judged is averaged into them: they have "
+            f"{100 * float(np.sqrt(np.mean(left))):.0f} % of a reading's noise, and errors are of such rows"
+        )
     outliers = sum(e.outliers for e in body.used)
     if outliers:
         found.append(f"{outliers} single readings set aside as outliers")
