@@ -57,7 +57,8 @@ class Evidence:
     `columns`: canonical channels on the fine rows, inputs cleaned of noise; `rows`: the fine rows that are
     judged, thinned by travel; `counted`: by output channel, which of `rows` count; `read`: by output channel, on which
     fine rows it was read, and not bridged; `weight`: root of the time that a judged row stands for, over its mean;
-    `noise`: 1-sigma of a reading by channel, as the data show it; `outliers`: readings set aside; `unread`: channels
+    `noise`: 1-sigma of a reading by channel, as the data show it (of the joint's angle, once the drive is calibrated:
+    what noise leaves on judged rows, the inputs' in it); `outliers`: readings set aside; `unread`: channels
     left out, hardly read; `shift_s`: what was added to the recording's own clock; `carryover`: by output channel, what
     histories that nobody recorded would add to the judged rows, a column each; `hidden`: the gaps, by the fine row
     before each, in which the drive went where it was not seen to; `apart`: by parameter, in this order, how the
@@ -120,7 +121,7 @@ class Evidence:
         return self.noise.get(name, 0.0) / float(np.sqrt(self.group))
 
     def noise_at_rows(self, name: str) -> float:
-        """The same on the judged rows (root of its mean square, weighed)."""
+        """The same on the judged rows (root of its mean square, weighed); before `noise` holds what is left there."""
         return self.noise_of_fine(name) * float(np.sqrt(self.quiet.get(name, 1.0)))
 
     @property

@@ -78,3 +78,9 @@ tolerance is stated: what calibrating two sensors apart leaves (blind trials dra
 load that the motor's torque does not show is answered by friction of the motor, or by a weight."""
 HOPELESS: Final = 30.0
 """Weighted residual of a trial that the drive cannot follow: far worse than any real one."""
+AVERAGED_MOST: Final = 12
+"""Fine rows on either side that a judged row's readings are averaged over, at most: in a hold, where rows are far
+apart, a drift is not straight for ever."""
+AVERAGED_AGREE: Final = 2.0
+"""Deviations about each of ever wider means within which all of them have to agree: at 1.5 chance alone parts so many
+that what is left is 12 % noisier than its number says."""

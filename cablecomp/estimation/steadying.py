@@ -12,20 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.limits import AVERAGED_AGREE, AVERAGED_MOST
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
-
-WIDEST: Final = 12
-"""Fine rows on either side, at most: in a hold, where rows are far apart, a drift is not straight for ever."""
-AGREE: Final = 2.0
-"""Deviations about each mean within which all of them have to agree: at 1.5 chance alone parts so many that what is
-left is 12 % noisier than its number says."""
 
 
 class Steadied(NamedTuple):
@@ -47,16 +42,17 @@ def steadied(values: FloatArray, read: BoolArray, rows: IntArray, sigma: float) 
         return Steadied(at, part)
     most = np.zeros(len(rows), dtype=np.int64)
     before, after = np.diff(rows)[:-1], np.diff(rows)[1:]
-    most[1:-1] = np.minimum((np.minimum(before, after) - 1) // 2, WIDEST)
-    low, high, total = at - AGREE * sigma, at + AGREE * sigma, at.copy()
+    most[1:-1] = np.minimum((np.minimum(before, after) - 1) // 2, AVERAGED_MOST)
+    reach = AVERAGED_AGREE * sigma
+    low, high, total = at - reach, at + reach, at.copy()
     going = read[rows]
     for width in range(1, int(most.max()) + 1):
         k = np.flatnonzero(going & (most >= width))
         left, right = rows[k] - width, rows[k] + width
         total[k] += values[left] + values[right]
         mean, rest = total[k] / (2 * width + 1), 1.0 / (2 * width + 1)
-        low[k] = np.maximum(low[k], mean - AGREE * sigma * np.sqrt(rest))
-        high[k] = np.minimum(high[k], mean + AGREE * sigma * np.sqrt(rest))
+        low[k] = np.maximum(low[k], mean - reach * np.sqrt(rest))
+        high[k] = np.minimum(high[k], mean + reach * np.sqrt(rest))
         agreed = (low[k] <= high[k]) & read[left] & read[right]
         going[k[~agreed]] = False
         at[k[agreed]], part[k[agreed]] = mean[agreed], rest

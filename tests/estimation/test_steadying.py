@@ -12,7 +12,8 @@ from small_drive import TOLERANT, course
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.estimation.evidence import JOINT, gather
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.steadying import WIDEST, on_every_row, steadied, with_steady_readings
+from cablecomp.estimation.limits import AVERAGED_MOST
+from cablecomp.estimation.steadying import on_every_row, steadied, with_steady_readings
 from cablecomp.signal.smoothing import FloatArray, IntArray
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
@@ -30,7 +31,7 @@ def every(step: int) -> IntArray:
     return np.arange(0, N, step, dtype=np.int64)
 
 
-@pytest.mark.parametrize(("step", "width"), [(3, 1), (7, 3), (8, 3), (9, 4), (100, WIDEST)])
+@pytest.mark.parametrize(("step", "width"), [(3, 1), (7, 3), (8, 3), (9, 4), (100, AVERAGED_MOST)])
 def test_white_noise_about_a_line_falls_with_the_root_of_what_is_averaged(step: int, width: int) -> None:
     line, values = line_with_noise()
     found = steadied(values, np.ones(N, dtype=np.bool_), every(step), SIGMA)
@@ -81,7 +82,7 @@ def test_rows_at_the_ends_and_beside_each_other_stay_as_they_were_read() -> None
     kept = [0, 2, 3, 5]
     assert np.array_equal(found.values[kept], values[rows[kept]])
     assert np.array_equal(found.part[kept], np.ones(4))
-    assert found.part[1] == 1.0 / (2 * WIDEST + 1)
+    assert found.part[1] == 1.0 / (2 * AVERAGED_MOST + 1)
 
 
 @pytest.mark.parametrize("rows", [[], [5], [0, N - 1]])
