@@ -11,33 +11,16 @@ import math
 from cablecomp.mechanics.circuit import Solved, circuit_commit, circuit_solve
 from cablecomp.mechanics.drive import Drive, Terms
 from cablecomp.mechanics.jit import constant, inlined_kernel, inner_kernel
-from cablecomp.mechanics.pointer import call_term
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
+from cablecomp.mechanics.together import balance, run_terms, show_tensions, solve_together
 
 UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
 """Share of the moments by which a row may miss its balance after all iterations, and how far its angle may still turn;
 farther off it is refused."""
-EPSILON = 2.3e-16
-"""Last digit of 1."""
 AFRESH = constant(False)
 """Nothing was solved just now that the next solution is near to (for a plain False circuits are compiled twice)."""
-
-
-@inner_kernel
-def run_terms(d: Drive, terms: Terms) -> None:
-    """Let every term add its part to the context."""
-    x = d.context
-    x.moment = x.moment_slope = x.length_h = x.length_l = 0.0
-    x.pretension_h = x.pretension_l = x.stiffness_h = x.stiffness_l = 1.0
-    x.reading = x.motor_moment = 0.0
-    context = terms.memory[d.size.context_at :]
-    for k in range(d.size.terms):
-        call = terms.calls[k]
-        call_term(
-            call.address, context, terms.parameters[call.parameters_at :], terms.memory[call.state_at :]
-        )
 
 
 @inner_kernel
@@ -77,16 +60,6 @@ def _solve_all(d: Drive, laws: Floats, moment: float, again: bool) -> Solved:
 
 
 @inlined_kernel
-def _show_tensions(d: Drive) -> None:
-    """Write the tensions at the output pulley into the context."""
-    circuit = d.circuits[d.size.circuits - 1]
-    d.context.tension_h = d.states[circuit.first[0] + circuit.count - 1].tension
-    d.context.tension_l = math.nan
-    if circuit.chains == 2:
-        d.context.tension_l = d.states[circuit.first[1] + circuit.count - 1].tension
-
-
-@inlined_kernel
 def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
     """Joint angle under the context's load: with terms, the moment they take and the angle they see are solved
     together."""
@@ -102,6 +75,16 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
         excess = moved = 0.0
         again, settled = AFRESH, False
         run_terms(d, terms)
+        if d.size.circuits == 1 and x.follows == 0.0:
+            guess = x.joint
+            _distribute(d)
+            solved = solve_together(d, terms, laws)
+            if solved.status == STATUS_OK:
+                x.joint = solved.angle
+                x.compliance = solved.compliance
+                return STATUS_OK
+            x.joint = guess
+            run_terms(d, terms)
         moment = load - x.moment
         for _ in range(60):
             _distribute(d)
@@ -118,11 +101,10 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
                 break
             moved = solved.angle - x.joint
             x.joint = solved.angle
-            _show_tensions(d)
+            show_tensions(d)
             run_terms(d, terms)
             excess = moment - (load - x.moment)
-            # as near as the last digits of moments and angle let it
-            scale = 1e-12 * (abs(load) + abs(moment)) + 1e-15 + 4.0 * EPSILON * abs(x.moment_slope * x.joint)
+            scale = balance(d, moment)
             # settled, or nothing that the solve depends on has followed the angle
             same = x.length_h == before_h and x.length_l == before_l
             same = same and x.stiffness_h == stiff_h and x.stiffness_l == stiff_l
@@ -155,7 +137,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
                 solved = Solved(solved.angle, solved.compliance, status, 0.0, 0.0)
     x.joint = solved.angle
     x.compliance = solved.compliance
-    _show_tensions(d)
+    show_tensions(d)
     return solved.status
 
 

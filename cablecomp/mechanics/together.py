@@ -1,0 +1,127 @@
+"""A circuit and the terms beside it solved together, where nothing but the terms' moment follows the joint's angle.
+
+What a term takes out of the load path turns with the angle that the cables come to: an inertia, a weight, a bearing.
+Newton's method on all three balances at once (T_l, the joint's angle, the moment on the drum) evaluates the cables once
+a step; to settle them anew for every trial moment, as is done where lengths or stiffness follow the angle as well
+(`joint.py`), takes about twice as many evaluations.
+"""
+
+from __future__ import annotations
+
+import math
+
+from cablecomp.mechanics.circuit import Chain, Solved, chain_eval
+from cablecomp.mechanics.drive import Drive, Terms
+from cablecomp.mechanics.jit import inner_kernel
+from cablecomp.mechanics.nudge import SMALL, cable_nudge
+from cablecomp.mechanics.pointer import call_term
+from cablecomp.mechanics.profile import Floats
+from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK
+
+MOST = 10  # steps; where a kink keeps them from settling, the bracketed way does
+EPSILON = 2.3e-16
+"""Last digit of 1."""
+
+
+@inner_kernel
+def run_terms(d: Drive, terms: Terms) -> None:
+    """Let every term add its part to the context."""
+    x = d.context
+    x.moment = x.moment_slope = x.length_h = x.length_l = 0.0
+    x.pretension_h = x.pretension_l = x.stiffness_h = x.stiffness_l = 1.0
+    x.reading = x.motor_moment = 0.0
+    context = terms.memory[d.size.context_at :]
+    for k in range(d.size.terms):
+        call = terms.calls[k]
+        call_term(
+            call.address, context, terms.parameters[call.parameters_at :], terms.memory[call.state_at :]
+        )
+
+
+@inner_kernel
+def show_tensions(d: Drive) -> None:
+    """Write the tensions at the output pulley into the context."""
+    circuit = d.circuits[d.size.circuits - 1]
+    d.context.tension_h = d.states[circuit.first[0] + circuit.count - 1].tension
+    d.context.tension_l = math.nan
+    if circuit.chains == 2:
+        d.context.tension_l = d.states[circuit.first[1] + circuit.count - 1].tension
+
+
+@inner_kernel
+def balance(d: Drive, moment: float) -> float:
+    """How exactly a moment [N m] on the drum can meet the load less what the terms take: to the last digits of moments
+    and angle."""
+    x = d.context
+    return 1e-12 * (abs(x.load) + abs(moment)) + 1e-15 + 4.0 * EPSILON * abs(x.moment_slope * x.joint)
+
+
+@inner_kernel
+def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
+    """The joint's only circuit under the context's load, from the context's angle and with the terms run there.
+
+    STATUS_DIVERGED: not found this way, and nothing said of whether there is a solution.
+    """
+    x = d.context
+    circuit = d.circuits[0]
+    first_h, first_l, count = circuit.first[0], circuit.first[1], circuit.count
+    closed = circuit.chains == 2
+    radius, floor = circuit.radius, circuit.slack
+    rigid = circuit.ratio * x.motor
+    angle = x.joint
+    moment = x.load - x.moment
+    length_h, length_l, stiffness_h, stiffness_l = x.length_h, x.length_l, x.stiffness_h, x.stiffness_l
+    last_l = d.states[first_l + count - 1]
+    unit = d.cables[first_l + count - 1].T0
+    pull = moment / radius
+    tension = unit * last_l.pretension
+    if closed:
+        tension = last_l.unloaded - last_l.share * pull + last_l.miss
+    on_h = on_l = Chain(0.0, 0.0, 0.0)
+    nowhere = Solved(angle, 0.0, STATUS_DIVERGED, 0.0, 0.0)
+    for _ in range(MOST):
+        if not (tension > floor and tension + pull > floor):
+            return nowhere
+        on_h = chain_eval(d, laws, first_h, count, tension + pull, x.motor, angle)
+        if closed:
+            on_l = chain_eval(d, laws, first_l, count, tension, x.motor, angle)
+        x.joint = angle
+        show_tensions(d)
+        run_terms(d, terms)
+        same = x.length_h == length_h and x.length_l == length_l
+        if not (same and x.stiffness_h == stiffness_h and x.stiffness_l == stiffness_l):
+            x.follows = 1.0
+            return nowhere
+        excess = moment - (x.load - x.moment)
+        slope = x.moment_slope
+        # off: the cables' turn less the angle; gap: between the two chains. The moment's step is put in
+        eased, softer = on_h.compliance * excess / radius, on_h.compliance * slope / radius
+        off = rigid + on_h.theta - angle - eased
+        by_angle = on_h.by_shaft - 1.0 - softer
+        step, turn, compliance = 0.0, -off / by_angle, on_h.compliance / radius
+        if closed:
+            gap = on_h.theta + on_l.theta - eased
+            by_tension, by_shaft = on_h.compliance + on_l.compliance, on_h.by_shaft + on_l.by_shaft - softer
+            scale = 1.0 / (by_tension * by_angle - on_h.compliance * by_shaft)
+            step = (off * by_shaft - gap * by_angle) * scale
+            turn = (gap * on_h.compliance - off * by_tension) * scale
+            compliance = on_h.compliance * on_l.compliance / by_tension / radius
+        raised = -(excess + slope * turn)
+        pulled = step + raised / radius
+        exact = abs(excess) <= balance(d, moment)
+        if exact and abs(step) <= 1e-13 * unit and abs(turn) <= 1e-11:
+            return Solved(angle + turn, compliance, STATUS_OK, 0.0, 0.0)
+        if laws is None and count == 1 and abs(turn) <= SMALL:
+            if abs(step) <= SMALL * tension and abs(pulled) <= SMALL * (tension + pull):
+                done = cable_nudge(d, first_h, pulled, turn)
+                if done and (not closed or cable_nudge(d, first_l, step, turn)):
+                    x.joint = angle + turn
+                    show_tensions(d)
+                    run_terms(d, terms)
+                    if abs(moment + raised - (x.load - x.moment)) <= balance(d, moment):
+                        return Solved(angle + turn, compliance, STATUS_OK, 0.0, 0.0)
+        angle += turn
+        tension += step
+        moment += raised
+        pull = moment / radius
+    return nowhere
