@@ -20,6 +20,9 @@ class Thresholds:
     rows: int = 1200
     """Judged rows of all recordings together while hypotheses are compared: a friction loop is told from another by
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
+    rows_of_few: int = 800
+    """The same of fewer than `recordings`. Since what lies between is averaged into them, a third of the rows more took
+    a fifth of the time more and named as many (trials of seeds 738 and 739: 47 of 55 singles either way)."""
     rows_each: int = 120
     """Judged rows that a recording has at least, however many recordings there are: six strokes of twenty."""
     searched: int = 9
