@@ -91,8 +91,7 @@ def gather_body(
     _need_alike(recordings)
     sessions = session_names(config, names, mode)
     samples = [len(recordings[n]["time_s"]) for n in names]
-    few = len(names) < LIMITS.recordings
-    wanted = rows if rows is not None else LIMITS.rows_of_few if few else LIMITS.rows
+    wanted = LIMITS.rows if rows is None else rows
     fine, judged = rows_for(samples, max(wanted, LIMITS.rows_each * len(names)))
     found = []
     after = -np.inf

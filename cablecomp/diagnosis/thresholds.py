@@ -20,9 +20,6 @@ class Thresholds:
     rows: int = 1200
     """Judged rows of all recordings together while hypotheses are compared: a friction loop is told from another by
     its shape, which some hundred rows a stroke hold; cost is in proportion."""
-    rows_of_few: int = 800
-    """The same of fewer than `recordings`. Since what lies between is averaged into them, a third of the rows more took
-    a fifth of the time more and named as many (trials of seeds 738 and 739: 47 of 55 singles either way)."""
     rows_each: int = 120
     """Judged rows that a recording has at least, however many recordings there are: six strokes of twenty."""
     searched: int = 9
@@ -371,7 +368,9 @@ class Thresholds:
     slight: float = 0.03
     """Share of the mismatch that an effect beside others has to take off, alone or as the last to come, or it is held
     down like one that takes off little: where another takes off nearly all, its form is as large (trials seeds 649 to
-    653: of seven such names, said with 0.60 to 0.84, two were right; of late channels, which are apart, all seven)."""
+    653: of seven such names, said with 0.60 to 0.84, two were right; of late channels, which are apart, all seven). Not
+    if it is missed by `z`, as a further one has to be: since the readings are averaged, of seven such of seeds 738 to
+    817 that had half a confidence and more, six were right."""
     slight_gain: float = 0.35
     """Or this share of what is left without it."""
     slight_by_chance: float = 0.06

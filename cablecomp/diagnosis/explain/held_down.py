@@ -39,13 +39,15 @@ def too_little(removes: float, left: float) -> str:
 def slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float) -> str:
     """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
     the mismatch and `own` of what is left without it; "" of one that does more. What takes off no more than a tie is
-    not missed, whatever it does alone. What is late differs in time, which no form does, but chance may.
+    not missed, whatever it does alone; what a further effect would have to be missed by tells it from a form. What is
+    late differs in time, which no form does, but chance may.
     """
     if sum(isinstance(t, Hypothesis) for t in final.terms) < 2:
         return ""
     if own.gain < LIMITS.tie:
         return "without it the others predict data left out as well"
-    if removes < LIMITS.slight and own.gain < LIMITS.slight_gain and term.amount.unit != "s":
+    slightly = removes < LIMITS.slight and own.gain < LIMITS.slight_gain and own.z < LIMITS.z
+    if slightly and term.amount.unit != "s":
         return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
     if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
         return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
