@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -25,6 +26,7 @@ from cablecomp.mechanics.jit import constant, inner_kernel, kernel, leaf_kernel
 Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
+KEPT = 64  # tables that are at hand: of the laws that a fit goes to and fro between
 LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften further
 KNEE_HALF = 0.25  # half the tension over which a knee rises, over that amid it
 LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
@@ -87,9 +89,22 @@ def law_table(
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination; None: the same everywhere) and the tangent stiffness as `stiffening_law`; both factors are vectorised
     and positive."""
+    by_tension = tension_factor(TAU)
+    y = np.linspace(0.0, wrap_max_rad, SIZE)
+    by_place = None if groove_factor is None else groove_factor(y)
+    place = b"" if by_place is None else by_place.tobytes()
+    return _tabled(by_tension.tobytes(), place, wrap_max_rad, stiffening, steady, knee).copy()
+
+
+@lru_cache(KEPT)
+def _tabled(
+    tension: bytes, place: bytes, wrap_max_rad: float, stiffening: float, steady: float, knee: float
+) -> Floats:
+    """The table by both factors on their grids (place: none, and the same everywhere); a fit that changes no law asks
+    for the same one again and again."""
     table = np.zeros((ROWS, SIZE))
     head = table[HEAD]
-    by_tension = tension_factor(TAU)
+    by_tension = np.frombuffer(tension)
     if np.any(by_tension != 1.0):
         v = _integral(LN_TAU[1] - LN_TAU[0], 1.0 / by_tension)
         v -= CubicHermiteSpline(LN_TAU[ABOUT_T0], v[ABOUT_T0], 1.0 / by_tension[ABOUT_T0])(0.0)
@@ -99,12 +114,12 @@ def law_table(
         head[BY_TENSION] = 1.0
         head[V_LOW], head[V_PER] = v[0], 1.0 / (v_grid[1] - v_grid[0])
         head[U_LOW], head[U_PER] = LN_TAU[0], 1.0 / (LN_TAU[1] - LN_TAU[0])
-    y = np.linspace(0.0, wrap_max_rad, SIZE)
-    by_place = None if groove_factor is None else groove_factor(y)
-    if by_place is not None and np.any(by_place != 1.0):
-        table[G_OF_Y] = _integral(y[1], by_place)
+    by_place = np.frombuffer(place)
+    if np.any(by_place != 1.0):
+        step = wrap_max_rad / (SIZE - 1)
+        table[G_OF_Y] = _integral(step, by_place)
         head[GROOVED] = 1.0
-        head[Y_PER] = 1.0 / y[1]
+        head[Y_PER] = 1.0 / step
     if head[BY_TENSION] or head[GROOVED]:
         head[MODE] = TABLED
     else:

@@ -73,6 +73,10 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
     length_h, length_l, stiffness_h, stiffness_l = x.length_h, x.length_l, x.stiffness_h, x.stiffness_l
     last_l = d.states[first_l + count - 1]
     unit = d.cables[first_l + count - 1].T0
+    if x.moment_slope * x.compliance > 1.0:
+        # what a first guess of the angle makes of the terms is far off: as it was, and what came on
+        before = last_l.tension if closed else unit * last_l.pretension
+        moment = radius * (d.states[first_h + count - 1].tension - before) + x.load - x.load_old
     pull = moment / radius
     tension = unit * last_l.pretension
     if closed:
