@@ -34,6 +34,7 @@ def joint_start(
     x = d.context
     x.time = time
     x.first = 1.0
+    x.follows = 0.0
     x.motor = x.motor_old = motor
     angle = motor
     rigid = 1.0

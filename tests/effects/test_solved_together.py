@@ -1,0 +1,59 @@
+"""A moment that follows the joint's angle, solved with the cables' tensions at once: the same joint as by settling the
+cables for every trial moment, which is how it goes where lengths follow the angle as well."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import excitation, joint, typical, unit
+
+from cablecomp.config import JointConfig
+from cablecomp.effects import extend, with_effects
+from cablecomp.mechanics.assemble import assemble
+from cablecomp.observer.compiled import CompiledJoint
+from cablecomp.signal.smoothing import FloatArray
+
+JOINTS = ("snow-closed-rig", "tendon-finger", "snow-open-rig", "capstan-arm", "two-stage-series")
+STIFF = {"torque_Nm": 0.3, "presliding_rad": 1e-7, "load_coefficient": 0.02}
+"""A bearing that hardly gives way: it takes what the cables bring, and slips."""
+
+
+def stepped(config: JointConfig, one_by_one: bool) -> tuple[FloatArray, float]:
+    """Joint angles [rad] over an excitation, and whether a row was left to the other way at the end."""
+    columns = excitation(config)
+    found = CompiledJoint(assemble(config, extend(config)), 1)
+    found.start(0.0, 0.0)
+    context = found.named.context
+    angles = []
+    for k, time in enumerate(columns["time_s"]):
+        context.follows = 1.0 if one_by_one else context.follows
+        found.put_other([columns["other_neighbour_Nm"][k]])
+        found.put_sample(time, columns["motor_position_rad"][k], columns["joint_torque_Nm"][k], 0.0, 20.0)
+        assert found.step(True) == (1, 0)
+        angles.append(float(found.joint[0]))
+    return np.array(angles), float(context.follows)
+
+
+@pytest.mark.parametrize("name", JOINTS)
+@pytest.mark.parametrize("effect", ["inertial_load", "gravity_load", "bearing_friction", "stiff bearing"])
+def test_a_row_is_the_same_whichever_way_it_is_solved(name: str, effect: str) -> None:
+    config = joint(name)
+    if effect == "stiff bearing":
+        entry = ("bearing_friction", {**STIFF, "torque_Nm": 0.3 * unit(config)})
+    else:
+        entry = (effect, typical(effect, config))
+    config = with_effects(config, [entry])
+    together, apart = stepped(config, one_by_one=False), stepped(config, one_by_one=True)
+    assert np.ptp(together[0]) > 0.01
+    assert together[0] == pytest.approx(apart[0], abs=1e-10)
+    assert together[1] == 0.0
+
+
+def test_a_length_that_follows_the_angle_is_left_to_the_other_way_until_the_joint_starts_anew() -> None:
+    config = joint(JOINTS[0])
+    config = with_effects(config, [("pulley_runout", typical("pulley_runout", config))])
+    assert stepped(config, one_by_one=False)[1] == 1.0
+    found = CompiledJoint(assemble(config, extend(config)), 1)
+    found.named.context.follows = 1.0
+    found.start(0.0, 0.0)
+    assert found.named.context.follows == 0.0
