@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from joints import SMALL, closed
 
@@ -12,6 +13,7 @@ from cablecomp.config import parse_joint
 from cablecomp.diagnosis.explain import rounds
 from cablecomp.diagnosis.explain.dependence import Dependence, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
+from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 
@@ -98,3 +100,28 @@ def test_a_share_with_a_bound_is_begun_with_most_of_it_as_well(effect: str, shar
         (values,) = found
         assert values["EA_N"] == 2e4
         assert values[h.key(amount.name)] == pytest.approx(share)
+
+
+def test_an_effect_with_pretensions_of_each_sessions_own_may_do_better_than_what_helps_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Both are tried, whichever helps."""
+
+    def tried(chosen: list[str], *_: Any) -> list[Any]:
+        gains = {"alone": 0.1, "together": 0.3}
+        return [
+            SimpleNamespace(difference=ScoreDifference(gains[c], 4.0, 4.0), term=c, model=c) for c in chosen
+        ]
+
+    for name, answer in {
+        "_asked": [],
+        "_begun": ([], []),
+        "_chosen": ["alone"],
+        "_pairs": ["together"],
+    }.items():
+        monkeypatch.setattr(rounds, name, lambda *_, answer=answer: answer)
+    monkeypatch.setattr(rounds, "_tried", tried)
+    at: Any = SimpleNamespace(model="before", number=1)
+    found = rounds.one_round(at, np.random.default_rng(0))
+    assert [t.term for t in found.tried] == ["together", "alone"]
+    assert found.accepted is found.tried[0]
