@@ -102,16 +102,15 @@ def test_a_share_with_a_bound_is_begun_with_most_of_it_as_well(effect: str, shar
         assert values[h.key(amount.name)] == pytest.approx(share)
 
 
-def test_an_effect_with_pretensions_of_each_sessions_own_may_do_better_than_what_helps_alone(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("z", "both"), [(0.0, True), (4.0, True), (6.0, False)])
+def test_an_effect_with_pretensions_of_each_sessions_own_is_tried_beside_what_hardly_helps_alone(
+    z: float, both: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both are tried, whichever helps."""
+    """Of two in turn that of which more is taken off is accepted; what surely helps alone is."""
 
     def tried(chosen: list[str], *_: Any) -> list[Any]:
-        gains = {"alone": 0.1, "together": 0.3}
-        return [
-            SimpleNamespace(difference=ScoreDifference(gains[c], 4.0, 4.0), term=c, model=c) for c in chosen
-        ]
+        found = {"alone": ScoreDifference(0.1, z, z), "together": ScoreDifference(0.3, 4.0, 4.0)}
+        return [SimpleNamespace(difference=found[c], term=c, model=c) for c in chosen]
 
     for name, answer in {
         "_asked": [],
@@ -123,5 +122,5 @@ def test_an_effect_with_pretensions_of_each_sessions_own_may_do_better_than_what
     monkeypatch.setattr(rounds, "_tried", tried)
     at: Any = SimpleNamespace(model="before", number=1)
     found = rounds.one_round(at, np.random.default_rng(0))
-    assert [t.term for t in found.tried] == ["together", "alone"]
+    assert [t.term for t in found.tried] == (["together", "alone"] if both else ["alone"])
     assert found.accepted is found.tried[0]

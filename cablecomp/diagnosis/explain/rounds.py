@@ -106,8 +106,10 @@ def one_round(at: Beginning, rng: np.random.Generator) -> Round:
         answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], at) else a for a in answers]
     begun = _begun(at, answers)
     tried = _tried(_chosen(*begun, at), at, fine, rng)
-    pairs = _tried(_pairs(begun[0], at), at, fine, rng)
-    tried = sorted([*tried, *pairs], key=lambda t: -t.difference.gain)
+    if not any(t.difference.z > LIMITS.z_sure for t in _good(tried, at)):
+        tried = sorted(
+            [*tried, *_tried(_pairs(begun[0], at), at, fine, rng)], key=lambda t: -t.difference.gain
+        )
     good = _good(tried, at)
     return Round(at.model, tuple(tried), good[0] if good else None)
 
