@@ -37,7 +37,7 @@ class Solved(NamedTuple):
     by_l: float  # of cable l
 
 
-@inner_kernel
+@inlined_kernel
 def chain_eval(
     d: Drive, laws: Floats, first: int, count: int, tension: float, x_in: float, x_out: float
 ) -> Chain:

@@ -90,12 +90,12 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
         if closed:
             on_l = chain_eval(d, laws, first_l, count, tension, x.motor, angle)
         x.joint = angle
-        show_tensions(d)
-        run_terms(d, terms)
-        same = x.length_h == length_h and x.length_l == length_l
-        if not (same and x.stiffness_h == stiffness_h and x.stiffness_l == stiffness_l):
-            x.follows = 1.0
-            return nowhere
+        if x.moment_slope != 0.0:
+            x.moment_follows = 1.0
+        follows = x.moment_follows != 0.0  # else the terms are looked at again at the end alone
+        if follows:
+            show_tensions(d)
+            run_terms(d, terms)
         excess = moment - (x.load - x.moment)
         slope = x.moment_slope
         # off: the cables' turn less the angle; gap: between the two chains. The moment's step is put in
@@ -112,20 +112,26 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
             compliance = on_h.compliance * on_l.compliance / by_tension / radius
         raised = -(excess + slope * turn)
         pulled = step + raised / radius
-        exact = abs(excess) <= balance(d, moment)
-        if exact and abs(step) <= 1e-13 * unit and abs(turn) <= 1e-11:
-            return Solved(angle + turn, compliance, STATUS_OK, 0.0, 0.0)
-        if laws is None and count == 1 and abs(turn) <= SMALL:
+        done = abs(excess) <= balance(d, moment) and abs(step) <= 1e-13 * unit and abs(turn) <= 1e-11
+        nudged = False
+        if not done and laws is None and count == 1 and abs(turn) <= SMALL:
             if abs(step) <= SMALL * tension and abs(pulled) <= SMALL * (tension + pull):
-                done = cable_nudge(d, first_h, pulled, turn)
-                if done and (not closed or cable_nudge(d, first_l, step, turn)):
-                    x.joint = angle + turn
-                    show_tensions(d)
-                    run_terms(d, terms)
-                    if abs(moment + raised - (x.load - x.moment)) <= balance(d, moment):
-                        return Solved(angle + turn, compliance, STATUS_OK, 0.0, 0.0)
+                nudged = cable_nudge(d, first_h, pulled, turn)
+                nudged = nudged and (not closed or cable_nudge(d, first_l, step, turn))
         angle += turn
         tension += step
         moment += raised
         pull = moment / radius
+        if nudged or (done and not follows):
+            x.joint = angle
+            show_tensions(d)
+            run_terms(d, terms)
+            done = abs(moment - (x.load - x.moment)) <= balance(d, moment)
+        if done or follows or nudged:
+            same = x.length_h == length_h and x.length_l == length_l
+            if not (same and x.stiffness_h == stiffness_h and x.stiffness_l == stiffness_l):
+                x.lengths_follow = 1.0
+                return nowhere
+        if done:
+            return Solved(angle, compliance, STATUS_OK, 0.0, 0.0)
     return nowhere

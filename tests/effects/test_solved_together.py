@@ -26,12 +26,12 @@ def stepped(config: JointConfig, one_by_one: bool) -> tuple[FloatArray, float]:
     context = found.named.context
     angles = []
     for k, time in enumerate(columns["time_s"]):
-        context.follows = 1.0 if one_by_one else context.follows
+        context.lengths_follow = 1.0 if one_by_one else context.lengths_follow
         found.put_other([columns["other_neighbour_Nm"][k]])
         found.put_sample(time, columns["motor_position_rad"][k], columns["joint_torque_Nm"][k], 0.0, 20.0)
         assert found.step(True) == (1, 0)
         angles.append(float(found.joint[0]))
-    return np.array(angles), float(context.follows)
+    return np.array(angles), float(context.lengths_follow)
 
 
 @pytest.mark.parametrize("name", JOINTS)
@@ -54,6 +54,6 @@ def test_a_length_that_follows_the_angle_is_left_to_the_other_way_until_the_join
     config = with_effects(config, [("pulley_runout", typical("pulley_runout", config))])
     assert stepped(config, one_by_one=False)[1] == 1.0
     found = CompiledJoint(assemble(config, extend(config)), 1)
-    found.named.context.follows = 1.0
+    found.named.context.lengths_follow = 1.0
     found.start(0.0, 0.0)
-    assert found.named.context.follows == 0.0
+    assert found.named.context.lengths_follow == 0.0
