@@ -14,7 +14,8 @@ from cablecomp.mechanics.jit import constant, inlined_kernel, inner_kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
-from cablecomp.mechanics.together import balance, run_terms, show_tensions, solve_together
+from cablecomp.mechanics.terms import balance, run_terms, show_tensions
+from cablecomp.mechanics.together import solve_together
 
 UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
 """Share of the moments by which a row may miss its balance after all iterations, and how far its angle may still turn;

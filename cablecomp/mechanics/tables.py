@@ -88,12 +88,12 @@ def law_table(
 ) -> Floats:
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination; None: the same everywhere) and the tangent stiffness as `stiffening_law`; both factors are vectorised
-    and positive."""
+    and positive. The table may be kept for others, and is not to be written to."""
     by_tension = tension_factor(TAU)
     y = np.linspace(0.0, wrap_max_rad, SIZE)
     by_place = None if groove_factor is None else groove_factor(y)
     place = b"" if by_place is None else by_place.tobytes()
-    return _tabled(by_tension.tobytes(), place, wrap_max_rad, stiffening, steady, knee).copy()
+    return _tabled(by_tension.tobytes(), place, wrap_max_rad, stiffening, steady, knee)
 
 
 @lru_cache(KEPT)
@@ -128,6 +128,7 @@ def _tabled(
     if head[BY_TENSION] and knee == 0.0:
         _fill_strains(table[None], 0)
         table[AREA_OF_V] = _integral(1.0 / head[V_PER], table[E_OF_V])
+    table.setflags(write=False)
     return table
 
 

@@ -3,23 +3,38 @@ cables for every trial moment, which is how it goes where lengths follow the ang
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from effect_cases import excitation, joint, typical, unit
+from effect_cases import excitation, joint, register_alone, typical, unit
 
 from cablecomp.config import JointConfig
 from cablecomp.effects import extend, with_effects
+from cablecomp.effects.base import term
 from cablecomp.mechanics.assemble import assemble
+from cablecomp.mechanics.drive import N_SIZES
+from cablecomp.mechanics.flat import records
+from cablecomp.mechanics.records import TERM
 from cablecomp.observer.compiled import CompiledJoint
 from cablecomp.signal.smoothing import FloatArray
 
 JOINTS = ("snow-closed-rig", "tendon-finger", "snow-open-rig", "capstan-arm", "two-stage-series")
-STIFF = {"torque_Nm": 0.3, "presliding_rad": 1e-7, "load_coefficient": 0.02}
+STIFF = {"presliding_rad": 1e-7, "load_coefficient": 0.02}
 """A bearing that hardly gives way: it takes what the cables bring, and slips."""
 
 
-def stepped(config: JointConfig, one_by_one: bool) -> tuple[FloatArray, float]:
-    """Joint angles [rad] over an excitation, and whether a row was left to the other way at the end."""
+@term(parameters=("stiffness",), state=("looked",))
+def _spring_that_counts(c: Any, p: Any, s: Any) -> None:
+    """A spring at the joint, and how often it was looked at."""
+    c.moment += p.stiffness * c.joint
+    c.moment_slope += p.stiffness
+    s.looked += 1.0
+
+
+def stepped(config: JointConfig, one_by_one: bool) -> tuple[FloatArray, float, float]:
+    """Joint angles [rad] over an excitation; whether a row was left to the other way at the end; the first number of
+    the first term's state."""
     columns = excitation(config)
     found = CompiledJoint(assemble(config, extend(config)), 1)
     found.start(0.0, 0.0)
@@ -31,7 +46,8 @@ def stepped(config: JointConfig, one_by_one: bool) -> tuple[FloatArray, float]:
         found.put_sample(time, columns["motor_position_rad"][k], columns["joint_torque_Nm"][k], 0.0, 20.0)
         assert found.step(True) == (1, 0)
         angles.append(float(found.joint[0]))
-    return np.array(angles), float(context.lengths_follow)
+    first = records(found.arrays.layout, N_SIZES, (1,), TERM)[0]
+    return np.array(angles), float(context.lengths_follow), float(found.memory[first.state_at])
 
 
 @pytest.mark.parametrize("name", JOINTS)
@@ -47,6 +63,19 @@ def test_a_row_is_the_same_whichever_way_it_is_solved(name: str, effect: str) ->
     assert np.ptp(together[0]) > 0.01
     assert together[0] == pytest.approx(apart[0], abs=1e-10)
     assert together[1] == 0.0
+
+
+def test_a_row_that_is_solved_at_once_is_not_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring is looked at before, after each step, and when the row is kept; were the row left to the other way, once
+    and more beside what that looks itself."""
+    register_alone(
+        monkeypatch, "spring", "stiffness", lambda values: _spring_that_counts(stiffness=values["stiffness"])
+    )
+    config = joint(JOINTS[0])
+    config = with_effects(config, [("spring", {"stiffness": unit(config)})])
+    together, apart = stepped(config, one_by_one=False), stepped(config, one_by_one=True)
+    assert together[0] == pytest.approx(apart[0], abs=1e-10)
+    assert together[2] < apart[2] + len(together[0])
 
 
 def test_a_length_that_follows_the_angle_is_left_to_the_other_way_until_the_joint_starts_anew() -> None:

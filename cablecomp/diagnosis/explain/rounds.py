@@ -134,7 +134,7 @@ def _tried(
 
 def _pairs(begun: Sequence[Begun], at: Beginning) -> list[Begun]:
     """The effects that came nearest, each with a pretension of every session's own: where the drive is known by order
-    of magnitude, and what one of them adds does not help alone."""
+    of magnitude, without which one of them may hardly help."""
     cold = at.cold
     if cold is None or at.number == 0 or at.pace.over or at.model.fit.problem.fine:
         return []
