@@ -17,6 +17,7 @@ from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.outliers import outliers, outliers_in_motion
 from cablecomp.estimation.thinning import APART, thinned
+from cablecomp.observer.rows import Readings
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
 
@@ -103,6 +104,11 @@ class Evidence:
         return np.asarray(np.where(np.isfinite(rate), rate, np.nan), dtype=np.float64)
 
     @cached_property
+    def readings(self) -> dict[tuple[bytes, tuple[str, ...]], Readings]:
+        """What the kernel reads, by the fine rows and the further channels that were asked for (`simulate.py`)."""
+        return {}
+
+    @cached_property
     def deflection_rad(self) -> float:
         """How far the joint's angle goes beside a straight line over the motor's, from its 1 to its 99 % quantile."""
         joint, motor = self.columns[JOINT], self.columns[INPUT]
@@ -124,7 +130,7 @@ class Evidence:
         """The same on the judged rows (root of its mean square, weighed); before `noise` holds what is left there."""
         return self.noise_of_fine(name) * float(np.sqrt(self.quiet.get(name, 1.0)))
 
-    @property
+    @cached_property
     def rated(self) -> IntArray:
         """The fine rows at which a law with rates is run."""
         return np.union1d(self.rows, np.arange(0, len(self.columns["time_s"]), RATED))

@@ -64,7 +64,7 @@ class Simulator:
 
     def run(self, recording: Evidence, kept: IntArray, unrecorded: Unrecorded | None = None) -> Answer:
         """The kernel's answers on the fine rows `kept`."""
-        read = self._readings(recording, kept)
+        read = self._known_readings(recording, kept)
         place, more = 0, 0
         if unrecorded is not None:
             place, more = int(np.searchsorted(kept, unrecorded.after, side="right")), len(unrecorded.path)
@@ -85,6 +85,16 @@ class Simulator:
             return answer
         own = np.r_[0:place, place + more : len(outs)]
         return Answer(*(column[own] for column in answer))
+
+    def _known_readings(self, recording: Evidence, kept: IntArray) -> Readings:
+        """The same, kept with the recording (the kernel only reads them), but where the load is the motor's torque less
+        a zero, which a fit moves."""
+        if load_channel(self.joint, recording.columns) == MOTOR:
+            return self._readings(recording, kept)
+        key = kept.tobytes(), self.others
+        if key not in recording.readings:
+            recording.readings[key] = self._readings(recording, kept)
+        return recording.readings[key]
 
     def _readings(self, recording: Evidence, kept: IntArray) -> Readings:
         """The recording's fine rows `kept`."""
