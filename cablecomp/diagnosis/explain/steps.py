@@ -17,6 +17,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 ALIKE: Final = 1e-4
 """Share of a column that others beside cannot do, below which they are the same step."""
+LEAST: Final = 1e-9
+"""Share of a column's square that is added to it, so that columns that are nothing can be divided by."""
 MOST_MOVES: Final = 6
 """Rounds in which steps are moved, one after another; few are needed."""
 
@@ -66,8 +68,21 @@ def moved_closer(gram: FloatArray, along: FloatArray, steps: Steps) -> Steps:
 
 
 def _best_two(gram: FloatArray, along: FloatArray) -> Steps | None:
-    found = [s for k in range(len(along)) if (s := _added(gram, along, (k,))) is not None]
-    return max(found, key=lambda s: s.taken, default=None)
+    """The two of one sign that take off most together: `_added` beside every single one, all at once."""
+    square = np.diag(gram)
+    alone = np.maximum(square * (1.0 + LEAST), 1e-300)[:, None]
+    # row j: beside step j, column k: what that one cannot do of it
+    own = square - gram**2 / alone
+    free = along - gram * (along[:, None] / alone)
+    size = np.where(own > ALIKE * square, free / np.maximum(own, 1e-300), 0.0)
+    rest = (along[:, None] - gram * size) / alone
+    taken = along[:, None] * rest + along * size
+    able = (size > 0.0) & (rest > 0.0)
+    if not able.any():
+        return None
+    j, k = np.unravel_index(int(np.argmax(np.where(able, taken, -np.inf))), taken.shape)
+    both = sorted([(int(j), float(rest[j, k])), (int(k), float(size[j, k]))])
+    return Steps(tuple(at for at, _ in both), np.array([s for _, s in both]), float(taken[j, k]))
 
 
 def _one_more(gram: FloatArray, along: FloatArray, steps: Steps) -> Steps | None:
@@ -79,7 +94,7 @@ def _added(gram: FloatArray, along: FloatArray, others: tuple[int, ...]) -> Step
     """These steps and the one beside them that takes off most, all of the sign asked for; None where there is none."""
     o = list(others)
     # what the others cannot do of each column, and of what is left
-    bound = gram[np.ix_(o, o)] + 1e-9 * np.diag(gram[o, o])
+    bound = gram[np.ix_(o, o)] + LEAST * np.diag(gram[o, o])
     per = np.linalg.lstsq(bound, np.column_stack((gram[o], along[o])))[0]
     own = np.diag(gram) - np.einsum("ok,ok->k", gram[o], per[:, :-1])
     free = along - gram[o].T @ per[:, -1]
