@@ -36,8 +36,9 @@ def test_it_is_there_for_its_share_of_every_stretch() -> None:
     fine = np.linspace(ENDS_S[0], ENDS_S[-1], 1200001)[:-1]
     held = np.mod(fine - cycle.start_s, cycle.period_s) < cycle.held * cycle.period_s
     expected = held.reshape(len(MIDDLE_S), -1).mean(axis=1)
-    assert there(cycle, ENDS_S) == pytest.approx(expected, abs=1e-3)
-    assert there(cycle.turned, ENDS_S) == pytest.approx(1.0 - expected, abs=1e-3)
+    assert there([cycle], ENDS_S)[0] == pytest.approx(expected, abs=1e-3)
+    assert 0.0 <= cycle.turned(0.0).start_s < cycle.period_s
+    assert there([cycle.turned(0.0)], ENDS_S)[0] == pytest.approx(1.0 - expected, abs=1e-3)
 
 
 def test_what_a_cycle_takes_off_is_that_of_least_squares() -> None:
@@ -45,7 +46,7 @@ def test_what_a_cycle_takes_off_is_that_of_least_squares() -> None:
     rows = by_stretches(*rng.standard_normal((2, 1200)))
     left = rng.standard_normal(1200)
     for cycle in (Cycle(7.0, 3.1, 0.4), Cycle(50.0, 12.0, 0.5)):
-        courses = np.stack([np.ones(len(MIDDLE_S)), there(cycle, ENDS_S)])
+        courses = np.stack([np.ones(len(MIDDLE_S)), there([cycle], ENDS_S)[0]])
         A = np.einsum("rak,ik->ria", rows, courses).reshape(1200, 4)
         pairs, rest, *_ = np.linalg.lstsq(A, left)
         gone, found = gains(products(rows, left), [cycle])
@@ -62,11 +63,11 @@ def test_a_cycle_is_found_in_noise(cycle: Cycle) -> None:
         2.3 * np.linspace(0.0, 30.0, 1200)
     )
     rows = by_stretches(np.cos(angle), np.sin(angle))
-    course = 0.3 + 0.7 * there(cycle, ENDS_S)
+    course = 0.3 + 0.7 * there([cycle], ENDS_S)[0]
     left = np.einsum("rak,a,k->r", rows, [0.6, 0.8], course) + 0.2 * rng.standard_normal(1200)
     found, pairs = likeliest(products(rows, left))
-    assert there(found, ENDS_S) == pytest.approx(there(cycle, ENDS_S), abs=0.35)
-    assert np.mean(np.abs(there(found, ENDS_S) - there(cycle, ENDS_S))) < 0.02
+    assert there([found], ENDS_S)[0] == pytest.approx(there([cycle], ENDS_S)[0], abs=0.35)
+    assert np.mean(np.abs(there([found], ENDS_S)[0] - there([cycle], ENDS_S)[0])) < 0.02
     assert pairs == pytest.approx([0.18, 0.24, 0.42, 0.56], abs=0.1)
 
 

@@ -8,12 +8,14 @@ events).
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from cablecomp.diagnosis.explain.courses import before_all, from_each, instants_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
@@ -23,6 +25,11 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.problem import Misfits
 from cablecomp.signal.smoothing import FloatArray
 
+CLOSER: Final = 6
+"""How often a cycle's neighbours are looked at, twice as near each time."""
+MOVES: Final = np.linspace(-1.0, 1.0, 5)
+"""How far these stand off, over the largest that is looked at."""
+
 
 class Cycle(NamedTuple):
     """From one coming to the next, when one was [s], and for what share of that time it stays."""
@@ -31,19 +38,30 @@ class Cycle(NamedTuple):
     start_s: float
     held: float
 
-    @property
-    def turned(self) -> Cycle:
-        """There when this one is not."""
-        return Cycle(self.period_s, self.start_s + self.held * self.period_s, 1.0 - self.held)
+    def turned(self, begin_s: float) -> Cycle:
+        """There when this one is not; its first coming after `begin_s` is told."""
+        later = (self.start_s + self.held * self.period_s - begin_s) % self.period_s
+        return Cycle(self.period_s, begin_s + later, 1.0 - self.held)
 
 
-class Products(NamedTuple):
+@dataclass(frozen=True)
+class Products:
     """Inner products, beyond what the anchor's parameters do, of what cosine and sine do in each stretch of time
     (2, k, 2, k), and with what is left (2, k); the stretches' ends [s]."""
 
     gram: FloatArray
     along: FloatArray
     ends_s: FloatArray
+
+    @cached_property
+    def by_stretch(self) -> FloatArray:
+        """The first, a row for each stretch: k, 4 k."""
+        return np.ascontiguousarray(np.moveaxis(self.gram, 1, 0).reshape(len(self.ends_s) - 1, -1))
+
+    @cached_property
+    def throughout(self) -> FloatArray:
+        """Those of all stretches together with each: 2, 2, k."""
+        return np.asarray(self.gram.sum(axis=1), dtype=np.float64)
 
 
 def best_cycle(here: Anchor, h: Hypothesis, plain: Best) -> Best | None:
@@ -56,8 +74,6 @@ def best_cycle(here: Anchor, h: Hypothesis, plain: Best) -> Best | None:
         return None
     cycle, pairs = likeliest(products)
     always, held_up = pairs[:2], pairs[:2] + pairs[2:]
-    if np.linalg.norm(always) > np.linalg.norm(held_up):
-        cycle, always, held_up = cycle.turned, held_up, always
     size = min(float(np.linalg.norm(held_up)), h.amount.maximum)
     if not size > 0.0:
         return None
@@ -108,7 +124,8 @@ def _throughout(here: Anchor, h: Hypothesis, values: dict[str, float | str]) -> 
 
 
 def likeliest(products: Products) -> tuple[Cycle, FloatArray]:
-    """The cycle that takes off most, and what is always there and what comes and goes: cosine and sine of each."""
+    """The cycle that takes off most, and what is always there and what comes and goes: cosine and sine of each. Of two
+    that are there by turns, which do the same, the one while more is there."""
     begin, end = float(products.ends_s[1]), float(products.ends_s[-2])
     shortest = max(4.0 * (end - begin) / len(products.ends_s), LIMITS.least_cycle_s)
     periods = np.geomspace(shortest, max(2.0 * (end - begin), 2.0 * shortest), LIMITS.cycle_periods)
@@ -125,42 +142,53 @@ def likeliest(products: Products) -> tuple[Cycle, FloatArray]:
     nearer = [_nearer(products, cycle) for _, cycle in best[: LIMITS.cycles]]
     gone, pairs = gains(products, nearer)
     k = int(np.argmax(gone))
-    return nearer[k], pairs[k]
+    cycle, always, beside = nearer[k], pairs[k, :2], pairs[k, 2:]
+    if np.linalg.norm(always) > np.linalg.norm(always + beside):
+        cycle, always, beside = cycle.turned(begin), always + beside, -beside
+    return cycle, np.concatenate([always, beside])
 
 
 def _nearer(products: Products, cycle: Cycle) -> Cycle:
-    """The cycle near this one that takes off most."""
-
-    def at(x: FloatArray) -> Cycle:
-        longer, later, more = x.tolist()
-        period = cycle.period_s * math.exp(longer)
-        return Cycle(period, cycle.start_s + later * period, min(max(cycle.held + more, 0.02), 0.98))
-
-    simplex = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, 0.1]])
-    options = {"initial_simplex": simplex, "maxiter": 120, "xatol": 1e-4, "fatol": 1e-3}
-
-    def left(x: FloatArray) -> float:
-        return -float(gains(products, [at(x)])[0][0])
-
-    return at(minimize(left, np.zeros(3), method="Nelder-Mead", options=options).x)
+    """The cycle near this one that takes off most: ever closer about the best of a few longer, later, fuller ones."""
+    width = 1.0
+    for _ in range(CLOSER):
+        near = [
+            Cycle(
+                cycle.period_s * math.exp(0.03 * longer),
+                cycle.start_s + 0.05 * later * cycle.period_s,
+                min(max(cycle.held + 0.1 * more, 0.02), 0.98),
+            )
+            for longer, later, more in itertools.product((width * MOVES).tolist(), repeat=3)
+        ]
+        gone, _ = gains(products, near)
+        cycle = near[int(np.argmax(gone))]
+        width *= 0.5
+    return cycle
 
 
 def gains(products: Products, cycles: Sequence[Cycle]) -> tuple[FloatArray, FloatArray]:
     """What each cycle takes off the cost, and with which cosine and sine at all times, and beside them while it is
     there."""
-    courses = np.stack([there(c, products.ends_s) for c in cycles])
-    weights = np.stack([np.ones_like(courses), courses], axis=1)
-    gram = np.einsum("niabl,njl->niajb", np.tensordot(weights, products.gram, (2, 1)), weights)
-    gram = gram.reshape(-1, 4, 4)
-    along = np.einsum("nik,ak->nia", weights, products.along).reshape(-1, 4)
-    least = 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(4)
-    pairs = np.linalg.solve(gram + least, along[:, :, None])[:, :, 0]
-    return 0.5 * np.sum(along * pairs, axis=1), pairs
+    courses = there(cycles, products.ends_s)
+    count, stretches = courses.shape
+    gram = np.empty((count, 2, 2, 2, 2))  # at all times or while there, cosine or sine; twice
+    gram[:, 0, :, 0] = products.throughout.sum(axis=2)
+    gram[:, 0, :, 1] = np.moveaxis(products.throughout @ courses.T, 2, 0)
+    gram[:, 1, :, 0] = np.swapaxes(gram[:, 0, :, 1], 1, 2)
+    each = (courses @ products.by_stretch).reshape(count, 4, stretches)
+    gram[:, 1, :, 1] = (each @ courses[:, :, None]).reshape(count, 2, 2)
+    along = np.empty((count, 2, 2))
+    along[:, 0], along[:, 1] = products.along.sum(axis=1), courses @ products.along.T
+    square, right = gram.reshape(-1, 4, 4), along.reshape(-1, 4)
+    least = 1e-9 * np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(4)
+    pairs = np.linalg.solve(square + least, right[:, :, None])[:, :, 0]
+    return 0.5 * np.sum(right * pairs, axis=1), pairs
 
 
-def there(cycle: Cycle, ends_s: FloatArray) -> FloatArray:
-    """For what share of each stretch of time it is there."""
-    since = (ends_s - cycle.start_s) / cycle.period_s
+def there(cycles: Sequence[Cycle], ends_s: FloatArray) -> FloatArray:
+    """For what share of each stretch of time each of them is there, cycles x stretches."""
+    period, start, held = np.array(cycles).T[:, :, None]
+    since = (ends_s - start) / period
     whole = np.floor(since)
-    so_long = cycle.period_s * (whole * cycle.held + np.minimum(since - whole, cycle.held))
+    so_long = period * (whole * held + np.minimum(since - whole, held))
     return np.asarray(np.diff(so_long) / np.maximum(np.diff(ends_s), 1e-12), dtype=np.float64)
