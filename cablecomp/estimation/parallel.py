@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import functools
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import ParamSpec, TypeVar
@@ -19,11 +20,23 @@ MOST = 4
 """Threads; beyond, the interpreter between kernel calls is what they wait for."""
 
 
+_HERE = threading.local()
+"""`aside`: whether this thread is one of those that do the work."""
+
+
 def side_by_side(work: Callable[[A], B], items: Sequence[A]) -> Iterator[B]:
     """Results in the order of the items; `work` must not depend on the order in which they are done. As many threads as
-    the process has cores, or as `OMP_NUM_THREADS` allows it."""
-    with ThreadPoolExecutor(max(1, min(MOST, _threads(), len(items)))) as pool:
+    the process has cores, or as `OMP_NUM_THREADS` allows it; of work that is itself done so, this one alone."""
+    threads = 1 if getattr(_HERE, "aside", False) else min(MOST, _threads(), len(items))
+    if threads < 2:
+        yield from map(work, items)
+        return
+    with ThreadPoolExecutor(threads, initializer=_aside) as pool:
         yield from pool.map(work, items)
+
+
+def _aside() -> None:
+    _HERE.aside = True
 
 
 def _threads() -> int:

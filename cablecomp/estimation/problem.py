@@ -20,6 +20,7 @@ from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
 from cablecomp.estimation.limits import HOPELESS, STEP
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.parameter import Parameter, own_of
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.standing import standing, stood, with_common
@@ -190,16 +191,19 @@ class Problem:
         here = self.residual(x) if base is None else base
         high = self.bounds()[1]
         columns = np.empty((len(here), len(x)))
-        known = self._known(x) if beside is None or len(beside) < len(x) else None
-        for k, p in enumerate(self.parameters):
-            if beside is not None and k in beside:
-                columns[:, k] = beside[k]
-                continue
+        told = {} if beside is None else beside
+        known = self._known(x) if len(told) < len(x) else None
+
+        def column(k: int) -> FloatArray:
             step = STEP if x[k] + STEP <= high[k] else -STEP
             moved = x.copy()
             moved[k] += step
-            there = self._beside(moved, known, p.session)
-            columns[:, k] = (there - here) / step
+            there = self._beside(moved, known, self.parameters[k].session)
+            return np.asarray((there - here) / step, dtype=np.float64)
+
+        asked = [k for k in range(len(x)) if k not in told]
+        for k, found in (*told.items(), *zip(asked, side_by_side(column, asked), strict=True)):
+            columns[:, k] = found
         return columns
 
     def _known(self, x: FloatArray) -> Misfits | None:

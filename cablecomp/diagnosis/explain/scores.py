@@ -23,9 +23,10 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part
 from cablecomp.estimation.limits import HOPELESS
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 
 def left_out(fit: Fit, groups: Groups) -> FloatArray:
@@ -73,26 +74,24 @@ def left_out_exactly(fit: Fit, groups: Groups, evaluations: int = 4) -> FloatArr
     n = len(groups.fold)
     r = fit.residual[:n].copy()
     parts = min(groups.folds, LIMITS.searched if groups.by == "recording" else LIMITS.refits)
-    for k in range(parts):
-        out = (groups.fold >= 0) & (groups.fold % parts == k)
-        if not out.any():
-            continue
-        r[out] = HOPELESS
+    outs = [(groups.fold >= 0) & (groups.fold % parts == k) for k in range(parts)]
+    outs = [out for out in outs if out.any()]
+
+    def predicted(out: BoolArray) -> FloatArray | None:
         try:
             again = fitted_to_part(fit, _kept(fit.problem, out), evaluations)
         except InputError:
-            continue
-        found = fit.problem.followed(again.x)
-        if found is not None:
-            r[out] = found[:n][out]
+            return None
+        return fit.problem.followed(again.x)
+
+    for out, found in zip(outs, side_by_side(predicted, outs), strict=True):
+        r[out] = HOPELESS if found is None else found[:n][out]
     return r
 
 
-def _kept(problem: Problem, out: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Evidence]:
+def _kept(problem: Problem, out: BoolArray) -> list[Evidence]:
     """The recordings with the rows that are out not counted; those with nothing left go."""
-    masks: list[dict[str, np.ndarray[tuple[int], np.dtype[np.bool_]]]] = [
-        dict(e.counted) for e in problem.evidence
-    ]
+    masks: list[dict[str, BoolArray]] = [dict(e.counted) for e in problem.evidence]
     for c, span in problem.spans().items():
         owners = problem.owners(c)
         gone = out[span]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -42,6 +43,7 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.problem import Weighing
 
 
@@ -149,7 +151,7 @@ def _carried(
         if others and not any(others[0] is m for m in kept) and not outdoes(fresh[0], others[0], groups):
             kept.append(others[0])
     sharper = searching(fresh[0].fit)
-    again = [with_better_forms(reweighed(m, sharper, groups), groups) for m in kept]
+    again = list(side_by_side(lambda m: with_better_forms(reweighed(m, sharper, groups), groups), kept))
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
     if not carried:
         return None
@@ -208,12 +210,14 @@ def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
     alone explains by far the most: that several others together do as well is chance rather than physics."""
     while len(model.terms) > 1:
         weakest: tuple[float, Model] | None = None
-        for term in model.terms[:-1]:
-            if any(isinstance(t, Dependence) and t.belongs_to(term) for t in model.terms):
-                continue
-            if alone_by_far(rounds, term):
-                continue
-            smaller = without(model, term, groups)
+        bound = [t for t in model.terms if isinstance(t, Dependence)]
+        asked = [
+            term
+            for term in model.terms[:-1]
+            if not any(t.belongs_to(term) for t in bound) and not alone_by_far(rounds, term)
+        ]
+        fewer = side_by_side(partial(without, model, groups=groups), asked)
+        for term, smaller in zip(asked, fewer, strict=True):
             if smaller is None or implausible(smaller) > implausible(model):
                 continue
             step = score_difference(model.left_out, smaller.left_out, groups)

@@ -14,6 +14,7 @@ from cablecomp.diagnosis.explain.linear import Anchor, anchor, contribution
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
 
@@ -46,11 +47,9 @@ def could_be_unseen(
     here = anchor(fit, reach=0.0)  # what a calibration within its tolerances may do, it may
     found, hidden = [], []
     held = {entry.id for entry in fit.problem.config.effect}
-    for h in pool:
-        if h.name in named or (h.effect.id in held and not h.channel):
-            continue
-        shapes = range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
-        made = _made(here, h, shapes)
+    asked = [h for h in pool if h.name not in named and (h.effect.id not in held or h.channel)]
+    for h, made in zip(asked, side_by_side(lambda h: _made(here, h, _shapes(h)), asked), strict=True):
+        shapes = _shapes(h)
         sizes = _bounds(here, h, made)
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
@@ -69,6 +68,11 @@ def could_be_unseen(
             behind = [_hidden(here, h, k, *m) for k, m in zip(shapes, made, strict=True) if m is not None]
             hidden += sorted((b for b in behind if b is not None), key=lambda b: -b.visible)[:1]
     return found, sorted(hidden, key=lambda b: -b.visible)[: LIMITS.hidden_most]
+
+
+def _shapes(h: Hypothesis) -> range:
+    """Which of its starts are looked at."""
+    return range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
 
 
 def _made(here: Anchor, h: Hypothesis, shapes: Sequence[int]) -> list[tuple[FloatArray, float] | None]:

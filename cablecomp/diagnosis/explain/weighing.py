@@ -31,6 +31,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.signal.smoothing import FloatArray
 
 NO_SIZE: Final = ("length", "instant", "duration")
@@ -73,8 +74,9 @@ def weigh(
     able = {t.term.name for r in selection.rounds for t in r.tried if t.difference.gain > 0.0}
     pool = [h for h in found.pool if h.name in able]
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
-    weighed = [_weighed(found, t, pool, left, locate, share_left, rng) for t in terms]
-    return sorted(one_in_series(weighed), key=lambda w: -w.confidence)
+    drawn = zip(terms, rng.spawn(len(terms)), strict=True)
+    weighed = side_by_side(lambda t: _weighed(found, t[0], pool, left, locate, share_left, t[1]), [*drawn])
+    return sorted(one_in_series(list(weighed)), key=lambda w: -w.confidence)
 
 
 def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
