@@ -29,11 +29,8 @@ LOCATED = {
 """What the plant has, how large its loads are, and the covariates along which its law changes."""
 
 
-def case_of(
-    effect: str, values: dict[str, float], loads: float, *, locked: bool = False, late_s: float = 0.0
-) -> Case:
-    specs = [EffectSpec(effect, values), *([EffectSpec("clock_skew", {"delay_s": late_s})] if late_s else [])]
-    body, drive = calibrated(recorded(specs, 90.0, loads, locked=locked))
+def case_of(effect: str, values: dict[str, float], loads: float, *, locked: bool = False) -> Case:
+    body, drive = calibrated(recorded([EffectSpec(effect, values)], 90.0, loads, locked=locked))
     left = left_on_every_row(drive.fit)
     seen = (covariates_of(TOLERANT, e, m) for e, m in zip(drive.fit.problem.evidence, left, strict=True))
     return Case(TOLERANT, body, drive, tuple(seen))
@@ -46,19 +43,6 @@ def test_the_covariate_along_which_a_law_changes_comes_first(effect: str) -> Non
     assert first.covariate in covariates
     assert first.p_value <= 0.002
     assert first.share > 0.3
-
-
-def test_a_channel_a_little_late_does_not_come_before_what_is_missing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def first(late_s: float) -> str:
-        case = case_of("nonlinear_cable", {"stiffening": 0.6}, 1.0, late_s=late_s)
-        return case.located(np.random.default_rng(0)).mismatch[0].covariate
-
-    assert first(4e-5) == "load"
-    assert first(1e-3) == "velocity"  # now that is what is the matter
-    monkeypatch.setattr("cablecomp.diagnosis.locate.location._MOSTLY_LATE", 0.0)
-    assert first(4e-5) == "velocity"
 
 
 def test_the_fit_on_every_row_predicts_the_judged_rows_alike() -> None:

@@ -20,13 +20,6 @@ _TIE: Final = 0.05
 _NEAR: Final = 0.9
 """Share over the first one's from which a covariate that is followed beyond chance is told before one that is not
 (trials seeds 624, 626, 627, 631, 632, looked at: 127 of 148 located for 124; 0.5 lost one of them and a stranger)."""
-_LATE: Final = ("velocity", "load_rate")
-"""What of the joint's angle a channel that comes a little late leaves goes by."""
-_MOSTLY_LATE: Final = 0.6
-"""Share of the mismatch from which it is lateness that is to be told (trials seeds 738 to 741 and 160 more, looked at:
-172 of 207 located for 159; 0.5 to 0.9 do as well)."""
-_RATHER_LATE: Final = 2.5
-"""The same, over what anything else accounts for of the rest."""
 _CHANCE: Final = 0.05
 """p-value below which something is followed beyond chance."""
 _MOST_INTERVALS: Final = 40
@@ -108,9 +101,9 @@ class _Ground:
         """Normal equations of the residual on a basis, block by block."""
         return block_sums(self.beyond(basis), self.residual, self.weight, self.block, self.nuisance)
 
-    def without(self, columns: FloatArray) -> _Ground:
-        """The same with what these columns explain taken off too."""
-        own = _orthonormal(np.column_stack((self.nuisance, columns)), self.weight)
+    def with_path(self) -> _Ground:
+        """The same with what a plain loop explains taken off too."""
+        own = _orthonormal(np.column_stack((self.nuisance, load_path(self.series))), self.weight)
         return replace(self, nuisance=own, residual=_beyond(self.residual, own, self.weight))
 
 
@@ -140,19 +133,11 @@ def locate(
     longer than the residual remembers: noise cannot tell, a dependence is destroyed. p-values compare with
     the largest score over all views of each surrogate. `nuisance` (n x p): sensitivities of the prediction
     to the calibration parameters; what they can explain is not counted, for the covariate or against it. `drive`:
-    what the drive itself makes of laws that change along a covariate; then what a channel that comes a little late
-    leaves is not counted either, unless that is most of it: few recordings are without, and what it is beside is asked.
+    what the drive itself makes of laws that change along a covariate.
     Near ties go to the covariate that leaves less to the other, and to one that is followed beyond chance.
     """
     ground, said = _ground(series, nuisance, drive)
-    signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, int(ground.block.max()) + 1))
-    answers, highest = _asked(ground, said, signs)
-    in_time = None if said is None else _in_time(ground)
-    if in_time is not None:
-        bare, late = in_time
-        beside, beyond = _asked(bare, said, signs)
-        if late < _RATHER_LATE * max(a.share for a in beside):
-            ground, answers, highest = bare, beside, beyond
+    answers, highest = _asked(ground, said, rng, surrogates)
     regressors = np.column_stack((np.ones(ground.series.samples), load_path(ground.series)))
     pieces = segment(ground.series.residual / ground.series.sigma, regressors)
     mismatch = tuple(
@@ -173,18 +158,14 @@ def beyond_chance_first(mismatch: tuple[Mismatch, ...]) -> tuple[Mismatch, ...]:
     return (first, *(m for m in mismatch if m is not first))
 
 
-def _in_time(ground: _Ground) -> tuple[_Ground, float] | None:
-    """The ground without what late channels leave, and the share of it; None where that is most of it, or nothing."""
-    columns = np.column_stack([ground.series.covariates.values[name] for name in _LATE])
-    share = float(gains(ground.sums(columns)).sum()) / ground.excess
-    return (ground.without(columns), share) if 0.0 < share < _MOSTLY_LATE else None
-
-
-def _asked(ground: _Ground, drive: Responses | None, signs: FloatArray) -> tuple[list[_Answer], FloatArray]:
-    """What every view accounts for; and of each surrogate (signs of blocks) the largest score over all of them."""
-    grounds = {False: ground, True: ground.without(load_path(ground.series))}
+def _asked(
+    ground: _Ground, drive: Responses | None, rng: np.random.Generator, surrogates: int
+) -> tuple[list[_Answer], FloatArray]:
+    """What every view accounts for; and of each surrogate the largest score over all of them."""
+    grounds = {False: ground, True: ground.with_path()}
+    signs = rng.choice(np.array([-1.0, 1.0]), size=(surrogates, int(ground.block.max()) + 1))
     answers: list[_Answer] = []
-    highest = np.full(len(signs), -np.inf)
+    highest = np.full(surrogates, -np.inf)
     for view in views(ground.series, drive):
         here = grounds[view.beyond_loop]
         sums = here.sums(view.basis)
