@@ -48,8 +48,7 @@ def could_be_unseen(
     found, hidden = [], []
     held = {entry.id for entry in fit.problem.config.effect}
     asked = [h for h in pool if h.name not in named and (h.effect.id not in held or h.channel)]
-    for h, made in zip(asked, side_by_side(lambda h: _made(here, h, _shapes(h)), asked), strict=True):
-        shapes = _shapes(h)
+    for h, made in zip(asked, side_by_side(lambda h: _made(here, h), asked), strict=True):
         sizes = _bounds(here, h, made)
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))
@@ -65,7 +64,7 @@ def could_be_unseen(
             }
         )
         if not (h.has_instant or h.has_phase):
-            behind = [_hidden(here, h, k, *m) for k, m in zip(shapes, made, strict=True) if m is not None]
+            behind = [_hidden(here, h, k, *m) for k, m in zip(_shapes(h), made, strict=True) if m is not None]
             hidden += sorted((b for b in behind if b is not None), key=lambda b: -b.visible)[:1]
     return found, sorted(hidden, key=lambda b: -b.visible)[: LIMITS.hidden_most]
 
@@ -75,11 +74,11 @@ def _shapes(h: Hypothesis) -> range:
     return range(0, len(h.starts), 1 + (len(h.starts) - 1) // LIMITS.unseen_shapes)
 
 
-def _made(here: Anchor, h: Hypothesis, shapes: Sequence[int]) -> list[tuple[FloatArray, float] | None]:
-    """What an effect does in each of these shapes, and of which size: what shows in one is about that in the next."""
+def _made(here: Anchor, h: Hypothesis) -> list[tuple[FloatArray, float] | None]:
+    """What an effect does in each of its shapes, and of which size: what shows in one is about that in the next."""
     made: list[tuple[FloatArray, float] | None] = []
     about = None
-    for k in shapes:
+    for k in _shapes(h):
         made.append(contribution(here, h, h.starts[k], about))
         about = made[-1][1] if made[-1] is not None else about
     return made
