@@ -12,11 +12,18 @@ from typing import NamedTuple
 
 from cablecomp.mechanics.cable import cable_commit, cable_eval
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, leaf_kernel
 from cablecomp.mechanics.nudge import SMALL, cable_nudge
 from cablecomp.mechanics.profile import Floats
 from cablecomp.mechanics.records import OUT
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK, STATUS_SLACK
+
+SETTLED, SETTLED_VISCOUS = 1e-9, 1e-13
+"""A last step so small, as a share of T0 and in rad, is taken without evaluating the cables once more.
+
+Angle and tensions are right to its square; the profiles end off by it, which later steps take off or cut away and never
+add up, as a profile follows its end without stretching any error. A viscous profile goes on settling with every
+evaluation."""
 
 
 class Chain(NamedTuple):
@@ -61,6 +68,21 @@ def chain_eval(
     return Chain(theta, compliance, by_shaft)
 
 
+@leaf_kernel
+def settled_at(d: Drive) -> float:
+    """The last step that is taken without a further look."""
+    return SETTLED if d.size.grids == 0 else SETTLED_VISCOUS
+
+
+@inner_kernel
+def pass_on(d: Drive, first: int, count: int, step: float) -> None:
+    """Raise the pending tensions of a chain by what its output cable's rises by at the last, `step` [N]."""
+    for c in range(first, first + count):
+        rise = step * d.cables[c].scale
+        d.states[c].tension += rise
+        d.states[c].tension_in += rise
+
+
 @inner_kernel
 def circuit_solve(
     d: Drive, laws: Floats, ic: int, moment: float, x_in: float, x_guess: float, again: bool
@@ -92,6 +114,7 @@ def circuit_solve(
         tension = unit * last_l.pretension
         if tension + pull <= floor:
             return Solved(x, 0.0, STATUS_SLACK, by_h, by_l)
+    settled = settled_at(d)
     low, high = lowest, 1e300
     on_h = on_l = Chain(0.0, 0.0, 0.0)
     for iteration in range(80):
@@ -129,7 +152,9 @@ def circuit_solve(
         step = (off * by_shaft - gap * (on_h.by_shaft - 1.0)) * scale
         turn = (gap * on_h.compliance - off * by_tension) * scale
         by_h, by_l = weight_h * on_l.compliance * scale, -weight_l * on_h.compliance * scale
-        if abs(step) <= (1e-13 if iteration < 8 else 1e-11) * unit and abs(turn) <= 1e-11:
+        if abs(step) <= settled * unit and abs(turn) <= max(settled, 1e-11):
+            pass_on(d, first_h, count, step)
+            pass_on(d, first_l, count, step)
             return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)
         if laws is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
             if abs(step) <= SMALL * min(tension, tension + pull):

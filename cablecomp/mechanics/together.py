@@ -8,7 +8,7 @@ a step; to settle them anew for every trial moment, as is done where lengths or 
 
 from __future__ import annotations
 
-from cablecomp.mechanics.circuit import Chain, Solved, chain_eval
+from cablecomp.mechanics.circuit import Chain, Solved, chain_eval, pass_on, settled_at
 from cablecomp.mechanics.drive import Drive, Terms
 from cablecomp.mechanics.jit import inner_kernel
 from cablecomp.mechanics.nudge import SMALL, cable_nudge
@@ -44,6 +44,7 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
     tension = unit * last_l.pretension
     if closed:
         tension = last_l.unloaded - last_l.share * pull + last_l.miss
+    settled = settled_at(d)
     on_h = on_l = Chain(0.0, 0.0, 0.0)
     nowhere = Solved(angle, 0.0, STATUS_DIVERGED, 0.0, 0.0)
     for _ in range(MOST):
@@ -75,12 +76,18 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
             compliance = on_h.compliance * on_l.compliance / by_tension / radius
         raised = -(excess + slope * turn)
         pulled = step + raised / radius
-        done = abs(excess) <= balance(d, moment) and abs(step) <= 1e-13 * unit and abs(turn) <= 1e-11
+        near = max(balance(d, moment), settled * unit * radius)
+        small = abs(step) <= settled * unit and abs(turn) <= max(settled, 1e-11)
+        done = small and abs(raised) <= near
         nudged = False
         if not done and laws is None and count == 1 and abs(turn) <= SMALL:
             if abs(step) <= SMALL * tension and abs(pulled) <= SMALL * (tension + pull):
                 nudged = cable_nudge(d, first_h, pulled, turn)
                 nudged = nudged and (not closed or cable_nudge(d, first_l, step, turn))
+        if done:
+            pass_on(d, first_h, count, pulled)
+            if closed:
+                pass_on(d, first_l, count, step)
         angle += turn
         tension += step
         moment += raised
@@ -89,7 +96,7 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
             x.joint = angle
             show_tensions(d)
             run_terms(d, terms)
-            done = abs(moment - (x.load - x.moment)) <= balance(d, moment)
+            done = abs(moment - (x.load - x.moment)) <= near
         if done or follows or nudged:
             same = x.length_h == length_h and x.length_l == length_l
             if not (same and x.stiffness_h == stiffness_h and x.stiffness_l == stiffness_l):
