@@ -292,11 +292,12 @@ _COMPILING = threading.Lock()
 class CompiledTerm:
     """A term function compiled to machine code when it is first used."""
 
-    def __init__(self, function: TermFunction, parameters: Names, state: Names) -> None:
+    def __init__(self, function: TermFunction, parameters: Names, state: Names, rings: Names) -> None:
         self._function = function
         self._parameters = _record(parameters)
-        self._state = _record(state)
-        self._state_size = self._state.itemsize // 8 if state else 0
+        self._state = _record((*state, *rings))
+        self._state_size = self._state.itemsize // 8 if state or rings else 0
+        self._ring_size = _record(rings).itemsize // 8 if rings else 0
         self._address: int | None = None
         self._entry: Any = None
 
@@ -320,7 +321,9 @@ class CompiledTerm:
         record = np.zeros(1, self._parameters)
         for name, value in values.items():
             record[name] = value
-        return (Term(self.address, tuple(record.view(np.float64).tolist()), self._state_size),)
+        return (
+            Term(self.address, tuple(record.view(np.float64).tolist()), self._state_size, self._ring_size),
+        )
 
 
 NOTHING = "nothing"  # the field of a record without any: a record cannot be empty
@@ -331,11 +334,14 @@ def _record(names: Names) -> np.dtype[Any]:
     return np.dtype(fields or [(NOTHING, "f8")])
 
 
-def term(parameters: Names, state: Names = ()) -> Callable[[TermFunction], CompiledTerm]:
+def term(parameters: Names, state: Names = (), rings: Names = ()) -> Callable[[TermFunction], CompiledTerm]:
     """Make a function f(c, p, s) a term: c context (`mechanics.records.CONTEXT`), p its parameters, s its own
     state, by name.
 
     A name with a length, `("readings", 256)`, is an array. The function must add to the context only, and
     change `s` only when `c.commit` is set: the solver calls it several times a step. State starts at zero.
+
+    `rings` are arrays of the state that a refused sample does not put back, so that long ones cost a step nothing:
+    the function may write them only where nothing in `state`, as it was before that step, has it read again.
     """
-    return lambda function: CompiledTerm(function, parameters, state)
+    return lambda function: CompiledTerm(function, parameters, state, rings)

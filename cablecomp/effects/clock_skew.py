@@ -23,21 +23,13 @@ UNKNOWN = 1e300
 
 @term(
     parameters=("delay", "of_load", "drift", "since"),
-    state=(
-        "start",
-        "count",
-        "newest",
-        "cursor",
-        ("times", SLOTS),
-        ("readings", SLOTS),
-        ("angles", SLOTS),
-        ("rates", SLOTS),
-    ),
+    state=("start", "count", "cursor", "time", "reading", "angle", "rate"),
+    rings=(("times", SLOTS), ("readings", SLOTS), ("angles", SLOTS), ("rates", SLOTS)),
 )
 def _look_back(c: Any, p: Any, s: Any) -> None:
     """p: delay [s], whether of the deflection alone, by how much it grows in a second, since when [s] (none: with the
-    first sample); s: since when, count, place of the newest, of the last one read, times and readings in a ring, and of
-    the rigid drive's angle and speed.
+    first sample); s: since when, how many readings are kept, number of the last one read, the newest one (its time, the
+    reading, the rigid drive's angle and speed), and in rings those before.
 
     Positive delay: straight interpolation of the past, the rigid drive's part of it by a cubic where its speed is known
     and bends evenly (rows picked from many, some hundredths of a second apart: straight, a twentieth of a short delay
@@ -54,27 +46,31 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
     span = abs(delay)
     times, readings = s.times, s.readings
     value = c.joint + c.reading if p.of_load == 0.0 else c.joint - c.rigid * c.motor
-    count, newest, cursor = int(s.count), int(s.newest), int(s.cursor)
+    count, cursor = int(s.count), int(s.cursor)
+    newest = count - 1
     wanted = now - span
     angles, rates = s.angles, s.rates
     angle, rate = c.rigid * c.motor, UNKNOWN if math.isnan(c.motor_rate) else c.rigid * c.motor_rate
     past, past_time = value, now
     if count > 0:
-        while cursor != newest and times[(cursor + 1) % SLOTS] <= wanted:
-            cursor = (cursor + 1) % SLOTS
-        past, past_time = readings[cursor], times[cursor]
+        while cursor < newest and (s.time if cursor == newest - 1 else times[(cursor + 1) % SLOTS]) <= wanted:
+            cursor += 1
+        past_time, past, past_angle, past_rate = s.time, s.reading, s.angle, s.rate
         after_time, after, after_angle, after_rate = now, value, angle, rate
-        if cursor != newest:
-            after_at = (cursor + 1) % SLOTS
-            after_time, after = times[after_at], readings[after_at]
-            after_angle, after_rate = angles[after_at], rates[after_at]
+        if cursor < newest:
+            at = cursor % SLOTS
+            past_time, past, past_angle, past_rate = times[at], readings[at], angles[at], rates[at]
+            after_time, after, after_angle, after_rate = s.time, s.reading, s.angle, s.rate
+            if cursor < newest - 1:
+                at = (cursor + 1) % SLOTS
+                after_time, after, after_angle, after_rate = times[at], readings[at], angles[at], rates[at]
         if past_time < wanted and after_time > past_time:
             length = after_time - past_time
             part = (wanted - past_time) / length
             past += (after - past) * part
             past_time = wanted
-            straight = (after_angle - angles[cursor]) / length
-            begins, ends = rates[cursor] - straight, after_rate - straight
+            straight = (after_angle - past_angle) / length
+            begins, ends = past_rate - straight, after_rate - straight
             if p.of_load == 0.0 and abs(begins + ends) <= EVENLY * abs(ends - begins):
                 past += length * part * (1.0 - part) * ((1.0 - part) * begins - part * ends)
     if delay > 0.0:
@@ -83,15 +79,15 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
         c.reading += (value - past) * span / (now - past_time)
     if c.commit:
         s.start = start
-        if count == 0:
-            s.count, times[0], readings[0], angles[0], rates[0] = 1.0, now, value, angle, rate
-            s.newest = s.cursor = 0.0
-        elif now == times[newest]:
-            readings[newest], angles[newest], rates[newest] = value, angle, rate
-        elif now - times[newest] >= span / STEPS_PER_DELAY:
-            newest = (newest + 1) % SLOTS
-            times[newest], readings[newest], angles[newest], rates[newest] = now, value, angle, rate
-            s.newest, s.cursor = float(newest), float(cursor)
+        passed = now - s.time
+        if count == 0 or passed == 0.0 or passed >= span / STEPS_PER_DELAY:
+            if count > 0 and passed > 0.0:
+                at = newest % SLOTS
+                times[at], readings[at], angles[at], rates[at] = s.time, s.reading, s.angle, s.rate
+                s.cursor = float(cursor)
+            if count == 0 or passed > 0.0:
+                s.count = float(count + 1)
+            s.time, s.reading, s.angle, s.rate = now, value, angle, rate
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:

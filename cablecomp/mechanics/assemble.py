@@ -143,9 +143,19 @@ def _terms(extra: Change, size: Mapping[str, int]) -> list[Row]:
     state_at = size["filter_at"] + floats(records.FILTER)
     rows = []
     for term in extra.terms:
-        rows.append(_row(records.TERM, address=term.address, parameters_at=parameters_at, state_at=state_at))
+        end_at = state_at + term.state_size
+        rows.append(
+            _row(
+                records.TERM,
+                address=term.address,
+                parameters_at=parameters_at,
+                state_at=state_at,
+                ring_at=end_at - term.ring_size,
+                end_at=end_at,
+            )
+        )
         parameters_at += len(term.parameters)
-        state_at += term.state_size
+        state_at = end_at
     return rows
 
 

@@ -25,11 +25,12 @@ Factor = Callable[[Floats], Floats]
 
 @dataclass(frozen=True)
 class Term:
-    """A compiled term: its address, its parameters, the size of its state."""
+    """A compiled term: its address, its parameters, the size of its state, and of the rings at the state's end."""
 
     address: int
     parameters: tuple[float, ...]
     state_size: int
+    ring_size: int = 0
 
 
 @dataclass(frozen=True)

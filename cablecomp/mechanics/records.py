@@ -101,12 +101,15 @@ SENSOR = record(
     ]
 )
 
-# A term of further physics: its compiled function, where its parameters lie in `fixed`, its state in `memory`.
+# A term of further physics: its compiled function, where its parameters lie in `fixed`, its state in `memory`, and what
+# of that need not be kept for a refused sample (`effects.base.term`).
 TERM = record(
     [
         ("address", "i8"),
         ("parameters_at", "i8"),
         ("state_at", "i8"),
+        ("ring_at", "i8"),
+        ("end_at", "i8"),
     ]
 )
 

@@ -128,15 +128,26 @@ def predict(d: Drive, terms: Terms, laws: Floats, read: Any, answer: Any) -> int
 
 
 @inner_kernel
-def keep(d: Drive, memory: Floats) -> None:
-    """Copy everything but the profiles (which nothing but a commit touches) aside."""
-    copy_floats(memory, 0, memory, d.size.spare_at, d.size.steps_at)
+def keep(d: Drive, terms: Terms) -> None:
+    """Copy everything but the profiles (which nothing but a commit touches) and the terms' rings aside."""
+    _copy_all(d, terms, 0, d.size.spare_at)
 
 
 @inner_kernel
-def put_back(d: Drive, memory: Floats) -> None:
+def put_back(d: Drive, terms: Terms) -> None:
     """Undo what happened since `keep`, bit for bit."""
-    copy_floats(memory, d.size.spare_at, memory, 0, d.size.steps_at)
+    _copy_all(d, terms, d.size.spare_at, 0)
+
+
+@inlined_kernel
+def _copy_all(d: Drive, terms: Terms, source: int, target: int) -> None:
+    begin = 0
+    for k in range(d.size.terms):
+        call = terms.calls[k]
+        if call.ring_at < call.end_at:
+            copy_floats(terms.memory, source + begin, terms.memory, target + begin, call.ring_at - begin)
+            begin = call.end_at
+    copy_floats(terms.memory, source + begin, terms.memory, target + begin, d.size.steps_at - begin)
 
 
 @kernel
@@ -154,13 +165,13 @@ def step_rows(
     d, terms = drive(fixed, layout, memory, heights), terms_of(fixed, layout, memory)
     for k in range(rows.shape[0]):
         answer = answer_in(outs[k])
-        keep(d, memory)
+        keep(d, terms)
         status = predict(d, terms, laws, readings_in(rows[k]), answer)
         if commit and status == STATUS_OK:
             answer.strength = strength_used(d)
             status = joint_commit(d, terms, laws) if answer.strength <= 1.0 else STATUS_BREAKS
         if status != STATUS_OK or not commit:
-            put_back(d, memory)
+            put_back(d, terms)
         if status != STATUS_OK:
             return k, status
     return rows.shape[0], STATUS_OK

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_cases import excitation, joint, run, still
 
-from cablecomp.effects import with_effects
+from cablecomp.effects import extend, with_effects
+from cablecomp.effects.base import term
+from cablecomp.mechanics.assemble import assemble
+from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import Observer
+from cablecomp.observer.compiled import CompiledJoint
 from cablecomp.signals import Sample
 
 JOINTS = ("snow-closed-rig", "snow-open-rig", "two-stage-series")
@@ -135,3 +141,35 @@ def test_samples_of_one_instant_replace_each_other() -> None:
     for time in (0.0, 0.01, 0.01, 0.01, 0.02):
         last = observer.step(Sample(time, 0.1 * time, 0.0))
     assert last.joint_position_rad == pytest.approx(0.001, abs=1e-12)
+
+
+def test_a_refused_sample_leaves_no_trace_in_what_a_late_encoder_remembers() -> None:
+    """Rings are not put back: what a refused sample has written to them is never read."""
+
+    @term(parameters=("from_s", "to_s"))
+    def refusing(c, p, s):  # type: ignore[no-untyped-def]  # the kernel gives them their types
+        if c.commit and p.from_s < c.time < p.to_s:
+            c.reading = np.nan
+
+    config = joint()
+    late = extend(with_effects(config, [("clock_skew", {"delay_s": 0.02})]))
+    time = np.sort(np.append(np.linspace(0.0, 2.0, 1000), np.linspace(0.5, 1.5, 400)))
+    time = np.repeat(time, 1 + np.arange(len(time)) % 2)  # some of one instant
+    motor = np.sin(5.0 * time + 0.2 * np.random.default_rng(1).standard_normal(len(time)))
+
+    window = (time > 0.7) & (time < 0.9)
+
+    def angles(ends: tuple[float, float], taken: np.ndarray) -> np.ndarray:
+        terms = (*late.terms, *refusing(from_s=ends[0], to_s=ends[1]))
+        found = CompiledJoint(assemble(config, replace(late, terms=terms)), 0)
+        found.start(0.0, 0.0)
+        answers = []
+        for k in np.flatnonzero(taken):
+            found.put_sample(time[k], motor[k], 0.0, np.nan, np.nan)
+            if found.step(True)[1] == STATUS_OK:
+                answers.append(found.joint[0])
+        return np.array(answers)
+
+    found = angles((0.7, 0.9), np.full(len(time), True))
+    assert len(found) == np.sum(~window) < len(time)
+    assert np.array_equal(found, angles((9.0, 9.0), ~window))
