@@ -152,15 +152,18 @@ def _relax(s: Slide) -> tuple[int, float]:
 @inner_kernel
 def _front(s: Slide) -> int:
     """The deepest node that moves, or their number if none does; deep cable may still creep while the cable outside of
-    it sticks."""
-    half = 0.5 * s.mu * s.h
+    it sticks.
+
+    A face slips here as it does for `_side`, to the last bit: one that had just begun to there, and not yet here, went
+    on slipping while the node inside of it stood still.
+    """
+    per_h = 1.0 / s.h
     for j in range(s.nodes - 1):
-        a, b = s.new[j], s.new[j + 1]
-        if abs(b - a) > half * (a + b) or a != s.old[j]:
+        if _side(s.new[j], s.new[j + 1], per_h, s.mu) != 0 or s.new[j] != s.old[j]:
             return j
     last = s.nodes - 1
-    a, b = s.new[last], s.tau
-    return last if abs(b - a) > 0.5 * s.mu * s.gap * (a + b) or a != s.old[last] else s.nodes
+    moves = _side(s.new[last], s.tau, 1.0 / s.gap, s.mu) != 0 or s.new[last] != s.old[last]
+    return last if moves else s.nodes
 
 
 class Face(NamedTuple):
