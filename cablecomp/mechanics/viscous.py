@@ -17,6 +17,8 @@ from cablecomp.mechanics.records import WET_NODES
 
 STIFFEST = 1e7  # diffusion number per step at which slip on a grid of WET_NODES is over within it
 EVEN = 1e-13  # change of a node, over T0, up to which a step is balanced
+ROUNDING = 1e-15  # balance to the last digits
+FLICKER = 6  # steps of Newton's method after which `EVEN` will do, as far as a step's own digits go
 LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 
 
@@ -139,12 +141,12 @@ def _relax(s: Slide) -> tuple[int, float]:
     """
     first, moved = s.nodes, Moved(False, 0.0, 0.0)
     even = EVEN * max(1.0, s.rate / (1e4 * s.h * s.h))  # rounding grows with what is weighed up
-    for _ in range(60):
+    for k in range(60):
         first = _front(s)
         if first == s.nodes:
             return first, 0.5 * s.gap
         moved = _newton(s, first)
-        if moved.done or _unbalanced(s, max(first - 1, 0)) <= even:
+        if moved.done or _unbalanced(s, max(first - 1, 0)) <= (ROUNDING if k < FLICKER else even):
             break
     return first, moved.slope
 

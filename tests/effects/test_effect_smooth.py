@@ -1,0 +1,75 @@
+"""A joint's angle follows its readings without a jump: what a fit goes down has no steps that nobody put there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import Columns, joint, neighbour_Nm, typical
+
+from cablecomp.config import JointConfig
+from cablecomp.effects import catalogue, with_effects
+from cablecomp.errors import InputError
+from cablecomp.observer import Observer
+
+TINY = 1e-10
+JUMP = 1e-7
+"""Share of what the joint gives way by that a change of the readings by `TINY` of them may not reach: the steepest laws
+(a clearance just closing) make a thousand times of it."""
+OPEN = ("snow-open-rig",)
+
+
+def course(config: JointConfig, seed: int, samples: int = 1500) -> Columns:
+    """A minute of slow motion and load, each of three tones."""
+    rng = np.random.default_rng([seed, 7])
+    time = 0.04 * np.arange(samples)
+
+    def tones(peak: float) -> np.ndarray:
+        parts = [
+            np.sin(2.0 * np.pi * rng.uniform(0.05, 0.5) * time + rng.uniform(0.0, 6.0)) for _ in range(3)
+        ]
+        return np.asarray(peak / 3.0 * sum(parts))
+
+    load = tones(neighbour_Nm(config))
+    if config.drive.circuit == "open":
+        load -= 1.2 * load.min()
+    return {
+        "time_s": time,
+        "motor_position_rad": tones(0.3 / config.drive.ratio),
+        "joint_torque_Nm": load,
+        "temperature_degC": 20.0 + 3.0 * np.sin(0.1 * time),
+        "other_neighbour_Nm": neighbour_Nm(config) * np.cos(0.7 * time),
+    }
+
+
+def jump(config: JointConfig, columns: Columns) -> float:
+    """The most by which a row moves where motor and load are as much larger, over what the joint gives way by."""
+    angles = []
+    for factor in (1.0, 1.0 + TINY):
+        read = columns | {k: factor * columns[k] for k in ("motor_position_rad", "joint_torque_Nm")}
+        angles.append(Observer(config).run(read)["joint_position_rad"])
+    gives = np.ptp(angles[0] - config.drive.ratio * columns["motor_position_rad"])
+    return float(np.max(np.abs(angles[1] - angles[0])) / gives)
+
+
+@pytest.mark.parametrize("name", sorted(catalogue()))
+@pytest.mark.parametrize("rig", ["snow-closed-rig", *OPEN])
+def test_no_row_jumps(name: str, rig: str) -> None:
+    config = joint(rig, breaking_force_N=None)
+    values = typical(name, config)
+    looked = 0
+    for seed in range(3):
+        try:
+            found = jump(with_effects(config, ((name, values),)), course(config, seed))
+        except InputError:  # an open circuit's cable that this effect lets slacken
+            assert rig in OPEN
+            continue
+        looked += 1
+        assert found < JUMP
+    assert looked
+
+
+@pytest.mark.parametrize("coefficient", [0.5, 3.0, 20.0, 150.0, 1000.0])
+def test_no_row_jumps_where_slip_is_viscous(coefficient: float) -> None:
+    config = joint()
+    wet = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": coefficient}),))
+    assert max(jump(wet, course(config, seed)) for seed in range(3)) < JUMP
