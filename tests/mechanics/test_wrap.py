@@ -7,6 +7,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -154,3 +155,26 @@ def test_a_pressed_play_holds_more_the_more_it_is_pressed() -> None:
             / (2.0 * step),
             abs=1e-8,
         )
+
+
+@numba.njit
+def near_change(p: Points, n: int, near: float, far: float) -> float:
+    """How much cable an arc of mu = 1 takes up between its near end and the point that sticks."""
+    return float(arc.arc_meet(p, None, n, near, far, 1.0).change)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.8])
+def test_an_arc_about_to_slide_takes_up_as_much_as_just_before(way: float, share: float) -> None:
+    """To the last bit of the limit, where rounding says whether the slip zones touch or overlap."""
+    width = 0.0316
+    p = np.zeros(64, POINT)
+    n = arc.arc_fill(p, None, width, 0.0)
+    n = arc.arc_commit(
+        p, None, n, -0.08 * way, (width - 0.08) * way, 1.0
+    )  # slid as a whole, and now the other way
+    middle = (2.0 * share * width - 0.08) * way
+    before = near_change(p, n, middle, middle - (width - 1e-8) * way)
+    for ulps in range(-6, 7):
+        limit = middle - width * way * (1.0 + ulps * 2.0**-53)
+        assert near_change(p, n, middle, limit) == pytest.approx(before, abs=2e-8)
