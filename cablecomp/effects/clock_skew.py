@@ -15,8 +15,11 @@ SLOTS = 256
 STEPS_PER_DELAY = 200.0
 LONGEST_S = 1.0
 """What a delay grows to at most, however long a clock drifts."""
-EVENLY = 0.25
-"""Of what the speed changes by from row to row, how far off its mean may be where it bends evenly: at a corner half."""
+EVENLY = 0.2
+"""Of what the speed changes by from row to row, how far off its mean may be where it bends evenly; twice as far off it
+counts as straight, and in between as partly bent (at a corner it is off by half)."""
+LEAST = 1e-300
+"""So that a speed that does not change at all divides nothing by zero."""
 UNKNOWN = 1e300
 """A speed that nothing bends evenly with."""
 
@@ -71,8 +74,10 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
             past_time = wanted
             straight = (after_angle - past_angle) / length
             begins, ends = past_rate - straight, after_rate - straight
-            if p.of_load == 0.0 and abs(begins + ends) <= EVENLY * abs(ends - begins):
-                past += length * part * (1.0 - part) * ((1.0 - part) * begins - part * ends)
+            even = 2.0 - abs(begins + ends) / (EVENLY * abs(ends - begins) + LEAST)
+            if p.of_load == 0.0 and even > 0.0:
+                bent = length * part * (1.0 - part) * ((1.0 - part) * begins - part * ends)
+                past += min(even, 1.0) * bent
     if delay > 0.0:
         c.reading += past - value
     elif past_time < now:

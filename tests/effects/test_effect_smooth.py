@@ -7,9 +7,13 @@ import pytest
 from effect_cases import Columns, joint, neighbour_Nm, typical
 
 from cablecomp.config import JointConfig
-from cablecomp.effects import catalogue, with_effects
+from cablecomp.effects import catalogue, extend, with_effects
 from cablecomp.errors import InputError
+from cablecomp.mechanics.assemble import assemble
+from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import Observer
+from cablecomp.observer.compiled import CompiledJoint
+from cablecomp.observer.rows import answers, readings
 
 TINY = 1e-10
 JUMP = 1e-7
@@ -18,8 +22,8 @@ JUMP = 1e-7
 OPEN = ("snow-open-rig",)
 
 
-def course(config: JointConfig, seed: int, samples: int = 1500) -> Columns:
-    """A minute of slow motion and load, each of three tones."""
+def course(config: JointConfig, seed: int, samples: int = 1500, digits: bool = False) -> Columns:
+    """A minute of slow motion and load, each of three tones; `digits`: read in steps of a 500th of the largest."""
     rng = np.random.default_rng([seed, 7])
     time = 0.04 * np.arange(samples)
 
@@ -27,7 +31,8 @@ def course(config: JointConfig, seed: int, samples: int = 1500) -> Columns:
         parts = [
             np.sin(2.0 * np.pi * rng.uniform(0.05, 0.5) * time + rng.uniform(0.0, 6.0)) for _ in range(3)
         ]
-        return np.asarray(peak / 3.0 * sum(parts))
+        whole = np.asarray(peak / 3.0 * sum(parts))
+        return np.round(whole / peak * 500.0) / 500.0 * peak if digits else whole
 
     load = tones(neighbour_Nm(config))
     if config.drive.circuit == "open":
@@ -73,3 +78,24 @@ def test_no_row_jumps_where_slip_is_viscous(coefficient: float) -> None:
     config = joint()
     wet = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": coefficient}),))
     assert max(jump(wet, course(config, seed)) for seed in range(3)) < JUMP
+
+
+@pytest.mark.parametrize("delay", [-0.03, 0.004, 0.03])
+def test_no_row_jumps_where_speeds_are_read_in_steps(delay: float) -> None:
+    """Of a speed that is read in steps the last digit says whether it bends evenly."""
+    config = joint()
+    late = with_effects(config, (("clock_skew", {"delay_s": delay}),))
+    for seed in range(5):
+        columns = course(config, seed, 1000, digits=True)
+        angles = []
+        for factor in (1.0, 1.0 + TINY):
+            read = readings(1000, 0)
+            read.time[:], read.load[:] = columns["time_s"], columns["joint_torque_Nm"]
+            read.motor[:] = factor * columns["motor_position_rad"]
+            read.motor_rate[:] = np.gradient(read.motor, read.time)
+            run = CompiledJoint(assemble(late, extend(late)), 0)
+            run.start(0.0, float(read.motor[0]))
+            outs, answer = answers(1000)
+            assert run.run(read.rows, outs, False, None, np.empty((1000, 2))) == (1000, STATUS_OK)
+            angles.append(answer.joint.copy())
+        assert np.max(np.abs(angles[1] - angles[0])) < JUMP * 1e-2  # of what the cables give way by
