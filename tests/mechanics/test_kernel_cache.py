@@ -17,9 +17,8 @@ from cablecomp.effects.clock_skew import SLOTS
 from cablecomp.effects.clock_skew import _look_back as look_back
 from cablecomp.mechanics.jit import CACHE, cached, drop_cut_short
 
-STATE = (
-    "start", "count", "newest", "cursor", ("times", SLOTS), ("readings", SLOTS), ("angles", SLOTS), ("rates", SLOTS),
-)  # fmt: skip
+STATE = ("start", "count", "cursor", "time", "reading", "angle", "rate")
+RINGS = tuple((name, SLOTS) for name in ("times", "readings", "angles", "rates"))
 
 MODULE = """
 from cablecomp.mechanics.jit import njit
@@ -75,7 +74,7 @@ def test_threads_that_compile_at_a_time_keep_their_code_in_one_folder() -> None:
 def test_the_term_of_an_effect_is_read_from_disk_once_it_is_compiled() -> None:
     """Not compiled again by every process that has the effect."""
     assert look_back.address
-    again = CompiledTerm(look_back._function, ("delay", "of_load", "drift", "since"), STATE)
+    again = CompiledTerm(look_back._function, ("delay", "of_load", "drift", "since"), STATE, RINGS)
     assert again.address != 0
     assert sum(again._entry.stats.cache_hits.values()) == 1
     assert not again._entry.stats.cache_misses
