@@ -99,9 +99,8 @@ def arc_meet(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float) -
             near = min(max(0.5 * (width + (v1 - v2) / (s1 * mu)), 0.0), width)
             tent = v1 - s1 * mu * near
             swap = (_strain(laws, tent) - _strain(laws, _value(p, n, near))) / (2.0 * s1 * mu)
-        elif (
-            near <= width and far >= 0.0
-        ):  # the whole arc is about to slide: both cones meet the profile at one point
+        elif near <= width and far >= 0.0:
+            # about to slide as a whole: both cones meet the profile at one point
             near = 0.5 * (near + far)
         else:  # the whole arc slides one way
             near = width if abs(v1 - p[0].v) > abs(v2 - p[n - 1].v) else 0.0

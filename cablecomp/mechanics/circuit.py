@@ -18,12 +18,12 @@ from cablecomp.mechanics.profile import Floats
 from cablecomp.mechanics.records import OUT
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK, STATUS_SLACK
 
-SETTLED, SETTLED_VISCOUS = 1e-9, 1e-13
+SETTLED, SETTLED_VISCOUS = 1e-9, 1e-11
 """A last step so small, as a share of T0 and in rad, is taken without evaluating the cables once more.
 
 Angle and tensions are right to its square; the profiles end off by it, which later steps take off or cut away and never
-add up, as a profile follows its end without stretching any error. A viscous profile goes on settling with every
-evaluation."""
+add up, as a profile follows its end without stretching any error. A viscous one balances the nearer to its rounding the
+smaller the step."""
 
 
 class Chain(NamedTuple):
@@ -152,7 +152,7 @@ def circuit_solve(
         step = (off * by_shaft - gap * (on_h.by_shaft - 1.0)) * scale
         turn = (gap * on_h.compliance - off * by_tension) * scale
         by_h, by_l = weight_h * on_l.compliance * scale, -weight_l * on_h.compliance * scale
-        if abs(step) <= settled * unit and abs(turn) <= max(settled, 1e-11):
+        if abs(step) <= settled * unit and abs(turn) <= settled:
             pass_on(d, first_h, count, step)
             pass_on(d, first_l, count, step)
             return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)

@@ -200,7 +200,10 @@ GRID = record(
         ("angle_try", "f8"),
         ("end_try", "f8"),
         ("time_try", "f8"),
-        ("rate_try", "f8"),  # rad^2 that stretch diffused in that step
+        (
+            "rate_try",
+            "f8",
+        ),  # rad^2 that stretch diffused in that step; negative: `upper` may be of other faces than slip now
         ("first_try", "f8"),  # the deepest node that moved; count_try if none did
         ("total_try", "f8"),  # integral of T/T0 - 1 over the nodes
         ("tau", "f8", (WET_NODES,)),

@@ -77,7 +77,7 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
         raised = -(excess + slope * turn)
         pulled = step + raised / radius
         near = max(balance(d, moment), settled * unit * radius)
-        small = abs(step) <= settled * unit and abs(turn) <= max(settled, 1e-11)
+        small = abs(step) <= settled * unit and abs(turn) <= settled
         done = small and abs(raised) <= near
         nudged = False
         if not done and laws is None and count == 1 and abs(turn) <= SMALL:

@@ -17,8 +17,7 @@ from cablecomp.mechanics.records import WET_NODES
 
 STIFFEST = 1e7  # diffusion number per step at which slip on a grid of WET_NODES is over within it
 EVEN = 1e-13  # change of a node, over T0, up to which a step is balanced
-ROUNDING = 1e-15  # balance to the last digits
-FLICKER = 6  # steps of Newton's method after which `EVEN` will do, as far as a step's own digits go
+FLICKER = 6  # steps of Newton's method after which less will do, as far as a stiff step's own digits go
 LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 
 
@@ -72,8 +71,9 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
     rate = min(rate, STIFFEST * h * h)
     # a further evaluation within the same step starts from the last one's answer
     again = grid.time_try == context.time and int(grid.count_try) == count
-    alike = again and grid.rate_try == rate and count - before <= 1
-    grid.time_try, grid.rate_try = context.time, rate
+    alike = again and abs(grid.rate_try) == rate and count - before <= 1
+    sure = grid.rate_try > 0.0
+    grid.time_try = context.time
     for j in range(before, count):  # cable that arrived since: linear in between
         y = j * h
         w_old, t_old = grid.angle, grid.end
@@ -83,16 +83,19 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
             old[j] = t_old + (y - w_old) / (w - w_old) * (tau - t_old)
     last = (count - 1) * h
     slide = Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate)
-    moved = Moved(False, 0.0, 0.0)
+    moved, first = Moved(False, 0.0, 0.0), 0
     if alike:
-        moved = _follow(slide, int(grid.first_try))
+        first = int(grid.first_try)
+        moved = _follow(slide, first)
         grid.total_try += moved.change
     slope = moved.slope
-    if not moved.done:
+    solved = moved.done and (sure or _unbalanced(slide, max(min(first, count) - 1, 0)) <= EVEN)
+    if not solved:
         if not again:
             copy_floats(old, 0, new, 0, count)
-        first, slope = _relax(slide)
+        first, slope, sure = _relax(slide)
         grid.first_try = first
+        grid.rate_try = rate if sure else -rate
         total = 0.0
         for j in range(count - 1):
             total += 0.5 * h * (new[j] + new[j + 1] - 2.0)
@@ -133,8 +136,9 @@ def _follow(s: Slide, first: int) -> Moved:
 
 
 @inner_kernel
-def _relax(s: Slide) -> tuple[int, float]:
-    """Implicit step of all nodes; returns the deepest that moved, and the derivative of the integral by the end value.
+def _relax(s: Slide) -> tuple[int, float, bool]:
+    """Implicit step of all nodes; returns the deepest that moved, the derivative of the integral by the end value, and
+    whether the elimination that `upper` keeps is sure to be that of the faces which slip now.
 
     The equations are linear as long as no face begins or ceases to slip: Newton's method is there after one step once
     it knows which faces do. One that only rounding moves may change its side for ever, so it is balance that counts.
@@ -144,11 +148,11 @@ def _relax(s: Slide) -> tuple[int, float]:
     for k in range(60):
         first = _front(s)
         if first == s.nodes:
-            return first, 0.5 * s.gap
+            return first, 0.5 * s.gap, True
         moved = _newton(s, first)
-        if moved.done or _unbalanced(s, max(first - 1, 0)) <= (ROUNDING if k < FLICKER else even):
+        if moved.done or _unbalanced(s, max(first - 1, 0)) <= (EVEN if k < FLICKER else even):
             break
-    return first, moved.slope
+    return first, moved.slope, moved.done
 
 
 @inner_kernel

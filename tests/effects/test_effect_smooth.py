@@ -73,11 +73,11 @@ def test_no_row_jumps(name: str, rig: str) -> None:
     assert looked
 
 
-@pytest.mark.parametrize("coefficient", [0.5, 3.0, 20.0, 150.0, 1000.0])
+@pytest.mark.parametrize("coefficient", [0.2, 0.5, 1.0, 3.0, 20.0, 150.0, 1000.0])
 def test_no_row_jumps_where_slip_is_viscous(coefficient: float) -> None:
     config = joint()
     wet = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": coefficient}),))
-    assert max(jump(wet, course(config, seed)) for seed in range(3)) < JUMP
+    assert max(jump(wet, course(config, seed)) for seed in range(8)) < JUMP
 
 
 @pytest.mark.parametrize("delay", [-0.03, 0.004, 0.03])
