@@ -84,14 +84,13 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
         c.reading += (value - past) * span / (now - past_time)
     if c.commit:
         s.start = start
-        passed = now - s.time
-        if count == 0 or passed == 0.0 or passed >= span / STEPS_PER_DELAY:
-            if count > 0 and passed > 0.0:
+        same = count > 0 and now == s.time
+        if count == 0 or same or now - s.time >= span / STEPS_PER_DELAY:
+            if count > 0 and not same:
                 at = newest % SLOTS
                 times[at], readings[at], angles[at], rates[at] = s.time, s.reading, s.angle, s.rate
                 s.cursor = float(cursor)
-            if count == 0 or passed > 0.0:
-                s.count = float(count + 1)
+            s.count = float(count if same else count + 1)
             s.time, s.reading, s.angle, s.rate = now, value, angle, rate
 
 

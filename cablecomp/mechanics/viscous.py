@@ -89,7 +89,8 @@ def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) ->
         moved = _follow(slide, first)
         grid.total_try += moved.change
     slope = moved.slope
-    solved = moved.done and (sure or _unbalanced(slide, max(min(first, count) - 1, 0)) <= EVEN)
+    # what is not sure may have been the elimination of other faces: balance says
+    solved = moved.done and (sure or _unbalanced(slide, max(first - 1, 0)) <= EVEN)
     if not solved:
         if not again:
             copy_floats(old, 0, new, 0, count)
