@@ -168,6 +168,9 @@ class Thresholds:
     """Standard errors by which such a model has to predict better than one that keeps these effects, beside another
     (the jaw's recordings one by one: its path alone explains most, by far; with the motor's friction beside it, the
     jaw's own in its place predicts better by one standard error)."""
+    surest: float = 0.9
+    """Share of resampled data that choose an effect alone, from which another one, beside further effects, takes its
+    place if it predicts clearly better there (`z_dethrone`), and not where it does as well."""
     hopeless: float = 2.5
     """A hypothesis whose rough fit leaves this many times the cost of the best one's is not fitted to the end."""
     close: float = 2.0
@@ -398,6 +401,10 @@ class Thresholds:
     presliding: float = 0.12
     """Share of the joint's deflection within which a bearing's friction builds up, at most, where the drive is known
     (trials seeds 705 to 802: of names with a wider one 14 of 17 were wrong, of narrower ones 18 of 140)."""
+    mixed_drag: tuple[float, float] = (0.35, 3.0)
+    """What goes with speed of a joint's friction over what does not, at the usual speed, between which it is no name:
+    whatever yields late seems to drag in part (trials seeds 738 to 744: five of five such names were wrong, at 0.7 to
+    1.8, of greased guides, strands, a frame that flexes, jitter; right ones had 0.18 and less, drags 4.9 and more)."""
     by_far: float = 0.25
     """Share of what the best other effect leaves alone, below which an effect with a shape on the bound beyond which
     another would be the better word is that word itself (`649/66`, a key on springs: 0.15)."""

@@ -10,7 +10,7 @@ import pytest
 from turning import JOINT, gathered, hypothesis, recorded
 
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.held_down import greased
+from cablecomp.diagnosis.explain.held_down import another_time, greased
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.plausible import better_word
@@ -49,11 +49,20 @@ def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
         assert better_word(cast("Fit", fit), strands) == word
 
 
-@pytest.mark.parametrize(("viscous", "word"), [(0.0, "presliding_rad"), (0.1, "presliding_rad"), (10.0, "")])
+@pytest.mark.parametrize(
+    ("viscous", "word", "mixed"),
+    [
+        (0.0, "presliding_rad", False),
+        (0.1, "presliding_rad", False),
+        (2.0, "presliding_rad", True),
+        (30.0, "", False),
+    ],
+)
 def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
-    viscous: float, word: str
+    viscous: float, word: str, mixed: bool
 ) -> None:
-    """The joint moves at some 1 rad/s. Beside a path's friction nothing tells whose grease it is."""
+    """The joint moves at some 0.3 rad/s. Beside a path's friction nothing tells whose grease it is; and what drags in
+    part may be anything that yields late."""
     columns = recorded(JOINT)
     columns["motor_torque_Nm"] = 0.3 * columns["joint_torque_Nm"]
     evidence = gather_body(JOINT, {"a/1": columns}).used
@@ -71,6 +80,23 @@ def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
     assert greased(alone, bearing) == ""
     assert bool(greased(beside, bearing)) == (word == "")
     assert greased(beside, path) == ""
+    assert bool(another_time(alone, bearing)) == mixed
+    assert another_time(beside, path) == ""
+
+
+@pytest.mark.parametrize(("period_s", "longer"), [(0.0, False), (5.0, False), (60.0, True)])
+def test_a_payload_that_comes_once_goes_like_a_load_that_is_read_with_a_drift(
+    period_s: float, longer: bool
+) -> None:
+    columns = recorded(JOINT)
+    assert float(np.ptp(columns["time_s"])) < 60.0
+    evidence = gather_body(JOINT, {"a/1": columns, "a/2": columns}).used
+    weight = next(h for h in hypotheses(JOINT, evidence) if h.name == "gravity_load")
+    problem = SimpleNamespace(parameters=(), config=JOINT, evidence=evidence)
+    fit = SimpleNamespace(problem=problem, x=np.empty(0), values={weight.key("period_s"): period_s})
+    said = another_time(cast("Model", SimpleNamespace(terms=(weight,), fit=fit)), weight)
+    assert ("its cycle of 60 s is longer than each recording" in said) is longer
+    assert bool(said) is longer
 
 
 def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:
@@ -88,6 +114,19 @@ def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone()
 
     assert word(0.4) == "stiffening_per_Nm"
     assert word(1.8) == ""
+
+
+@pytest.mark.parametrize(
+    ("stiffening", "power", "word"), [(2.0, 1e-4, "power"), (2.0, 0.4, ""), (0.0, 1e-4, "")]
+)
+def test_a_coupling_that_yields_at_once_and_then_no_more_is_better_called_play(
+    stiffening: float, power: float, word: str
+) -> None:
+    coupling = hypothesis("series_compliance", "series_compliance")
+    problem = SimpleNamespace(parameters=(), config=JOINT)
+    values = {coupling.key("stiffening_per_Nm"): stiffening, coupling.key("power"): power}
+    fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
+    assert better_word(cast("Fit", fit), coupling) == word
 
 
 @pytest.mark.parametrize(

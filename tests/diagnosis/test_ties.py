@@ -16,7 +16,10 @@ from cablecomp.diagnosis.folds import Groups
 
 def model(more: float, *names: str, parameters: int = 2) -> Model:
     """A model with these terms that leaves noise of deviation one and a wave of this size."""
-    terms: Any = tuple(SimpleNamespace(name=n, effect=SimpleNamespace(id=n.partition(":")[0])) for n in names)
+    terms: Any = tuple(
+        SimpleNamespace(name=n, effect=SimpleNamespace(id=n.partition(":")[0]), has_instant=n == "slip")
+        for n in names
+    )
     fit: Any = SimpleNamespace(problem=SimpleNamespace(parameters=range(parameters)), values={})
     return Model(terms, fit, NOISE + more * WAVE)
 
@@ -86,6 +89,23 @@ def test_what_explains_most_alone_stands_where_it_predicts_as_well(
     two = model(0.0, "jaw", "motor", parameters=3)
     assert ties.with_the_first(two, rounds(("jaw", 0.1), ("path", 0.9)), GROUPS).name == final
     assert replaced == ["jaw"]
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "final"), [("path", 0.9, "path"), ("path", 0.7, "jaw"), ("slip", 0.9, "jaw")]
+)
+def test_what_nearly_all_data_choose_alone_need_not_be_the_simpler_law(
+    monkeypatch: pytest.MonkeyPatch, name: str, share: float, final: str
+) -> None:
+    """With a parameter more than what is in its place, and as good; an event is the best of many."""
+
+    def in_its_place(m: Model, term: Any, other: Any, values: Any, groups: Groups) -> Model:
+        return model(0.02, other.name, "motor", parameters=4)
+
+    monkeypatch.setattr(ties, "_in_its_place", in_its_place)
+    two = model(0.0, "jaw", "motor", parameters=3)
+    found = ties.with_the_first(two, rounds(("jaw", 1.0 - share), (name, share)), GROUPS)
+    assert found.name == f"{final} + motor"
 
 
 def test_what_explains_most_alone_but_is_not_plausible_takes_no_place(

@@ -142,7 +142,7 @@ def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form
     asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
     term = asked[name]
     model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
-    said = slight(model, term, ScoreDifference(gain, z, z), share)
+    said = slight(model, term, (), ScoreDifference(gain, z, z), share)
     assert bool(said) is bool(expected)
     assert expected in said
 
@@ -196,27 +196,36 @@ def test_what_trials_say_not_to_exclude_is_told_where_nothing_has_a_name(
 
 
 @pytest.mark.parametrize(
-    ("alone", "scores", "by"),
+    ("alone", "scores", "surest", "by"),
     [
-        ({"a": 0.6, "b": 0.5}, {"b": -0.1}, "b"),
-        ({"a": 0.6, "b": 0.5}, {"b": 0.1}, ""),
-        ({"a": 0.6, "b": 0.5}, {"b": -0.007}, ""),  # a tie
-        ({"a": 0.6, "b": 0.1}, {"b": -0.1}, ""),  # what explains most by far alone stands
-        ({"a": 0.0}, {"b": -0.1}, "b"),  # what nobody tried alone does not
-        ({"a": 0.6, "b": 0.5, "c": 0.5}, {"b": -0.1, "c": -0.4}, "c"),
+        ({"a": 0.6, "b": 0.5}, {"b": -0.1}, False, "b"),
+        ({"a": 0.6, "b": 0.5}, {"b": 0.1}, False, ""),
+        ({"a": 0.6, "b": 0.5}, {"b": -0.007}, False, ""),  # a tie
+        ({"a": 0.6, "b": 0.1}, {"b": -0.1}, False, ""),  # what explains most by far alone stands
+        ({"a": 0.0}, {"b": -0.1}, False, "b"),  # what nobody tried alone does not
+        ({"a": 0.6, "b": 0.5, "c": 0.5}, {"b": -0.1, "c": -0.4}, False, "c"),
+        (
+            {"a": 0.6, "b": 0.5},
+            {"b": -0.1},
+            True,
+            "",
+        ),  # by one standard error, nearly all data choose the first
+        ({"a": 0.6, "b": 0.5}, {"b": -0.2}, True, "b"),  # by two
     ],
 )
 def test_an_effect_in_whose_place_another_predicts_better_is_beaten_by_it(
-    monkeypatch: pytest.MonkeyPatch, alone: dict[str, float], scores: dict[str, float], by: str
+    monkeypatch: pytest.MonkeyPatch, alone: dict[str, float], scores: dict[str, float], surest: bool, by: str
 ) -> None:
     def tried_alone(selection: Any, name: str) -> Any:
         return iter([alone[name]] if name in alone else [])
 
     monkeypatch.setattr(weighing, "_alone", tried_alone)
     monkeypatch.setattr(weighing, "_share", lambda selection, gone: gone)
+    monkeypatch.setattr(weighing, "surest_alone", lambda rounds, term: surest)
     term = cast(Hypothesis, SimpleNamespace(name="a"))
     differences = {name: ScoreDifference(gain, 10.0 * gain, 0.0) for name, gain in scores.items()}
-    assert weighing._beaten(cast(Any, None), term, differences) == by
+    selection: Any = SimpleNamespace(rounds=())
+    assert weighing._beaten(selection, term, differences) == by
 
 
 @pytest.mark.parametrize(
@@ -309,3 +318,25 @@ def test_a_shape_at_which_another_effect_is_the_better_word_has_no_name_but_alon
     found = another(model, term, rounds, lead)
     assert said in found
     assert bool(found) is bool(said)
+    # beside the clearance that a coupling would be, being ahead of others is not enough
+    beside: Any = SimpleNamespace(terms=(term, asked["termination_backlash"]), fit=model.fit)
+    assert bool(another(beside, term, rounds, lead)) is (bool(said) or (term.effect.in_series and not by_far))
+
+
+def test_what_nearly_all_data_choose_alone_is_not_held_down_where_others_do_as_well_together() -> None:
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    first, other = asked["bearing_friction"], asked["series_compliance"]
+    large = ScoreDifference(0.9, 9.0, 9.0)
+
+    def rounds(share: float) -> Any:
+        tried = [
+            SimpleNamespace(term=h, model=SimpleNamespace(terms=(h,)), difference=large, selected_in=s)
+            for h, s in ((first, share), (other, 1.0 - share))
+        ]
+        return [SimpleNamespace(tried=tried)]
+
+    model: Any = SimpleNamespace(terms=(other, first))
+    none = ScoreDifference(-0.01, -0.4, -0.4)
+    assert slight(model, first, rounds(0.95), none, 0.11) == ""
+    assert "without it the others predict" in slight(model, first, rounds(0.8), none, 0.11)
+    assert "without it the others predict" in slight(model, other, rounds(0.95), none, 0.11)

@@ -7,23 +7,26 @@ from collections.abc import Sequence
 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round
-from cablecomp.diagnosis.explain.plausible import better_word, drags
+from cablecomp.diagnosis.explain.plausible import better_word, drag_at_speed, drags
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.ties import alone_by_far
+from cablecomp.diagnosis.explain.ties import alone_by_far, surest_alone
 from cablecomp.diagnosis.thresholds import LIMITS
 
 
 def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float) -> str:
     """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
     that is alone by far, but where it is known that the other is none of the catalogue's. What gives way in series
-    would be the other of a coupling and a clearance: it is none if it is ahead of its rivals, `lead` standard errors.
+    would be the other of a coupling and a clearance: it is none if it is ahead of its rivals, `lead` standard errors,
+    and not beside the other.
     """
     stretched = better_word(final.fit, term)
     if not stretched:
         return ""
     if term.effect.parameter(stretched).another_is_unlisted:
         return f"with this `{stretched}` it stands for physics that has no name here"
-    if alone_by_far(rounds, term) or (term.effect.in_series and lead >= LIMITS.z_unbeaten):
+    in_series = [t for t in final.terms if isinstance(t, Hypothesis) and t.effect.in_series]
+    ahead = len(in_series) == 1 and term.effect.in_series and lead >= LIMITS.z_unbeaten
+    if ahead or alone_by_far(rounds, term):
         return ""
     return f"with this `{stretched}` another effect is the better word"
 
@@ -36,15 +39,18 @@ def too_little(removes: float, left: float) -> str:
     return f"it takes off {removes:.0%} of the mismatch, and {left:.0%} of it, beyond noise, is left"
 
 
-def slight(final: Model, term: Hypothesis, own: ScoreDifference, removes: float) -> str:
+def slight(
+    final: Model, term: Hypothesis, rounds: Sequence[Round], own: ScoreDifference, removes: float
+) -> str:
     """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
     the mismatch and `own` of what is left without it; "" of one that does more. What takes off no more than a tie is
-    not missed, whatever it does alone; what a further effect would have to be missed by tells it from a form. What is
-    late differs in time, which no form does, but chance may.
+    not missed, whatever it does alone, unless nearly all data choose it alone: that others do as well together is
+    chance then. What a further effect would have to be missed by tells it from a form. What is late differs in time,
+    which no form does, but chance may.
     """
     if sum(isinstance(t, Hypothesis) for t in final.terms) < 2:
         return ""
-    if own.gain < LIMITS.tie:
+    if own.gain < LIMITS.tie and not surest_alone(rounds, term):
         return "without it the others predict data left out as well"
     slightly = removes < LIMITS.slight and own.gain < LIMITS.slight_gain and own.z < LIMITS.z
     if slightly and term.amount.unit != "s":
@@ -61,6 +67,24 @@ def greased(final: Model, term: Hypothesis) -> str:
     if not (along and drags(final.fit, term)):
         return ""
     return "a drag in proportion to speed: grease in the cable's path, whose friction is there, drags alike"
+
+
+def another_time(final: Model, term: Hypothesis) -> str:
+    """What is to be said of an effect whose course in time others have as well: a friction of which a part goes with
+    speed and a part does not, as whatever yields late seems to (a greased guide, strands, a frame that flexes); a
+    payload of which no recording shows a whole cycle, as a torque sensor that drifts. "" of any other."""
+    fit = final.fit
+    low, high = LIMITS.mixed_drag
+    if low < drag_at_speed(fit, term) < high:
+        return "in part it goes with speed and in part it does not: whatever yields late does alike"
+    if term.cycle_start not in (p.name for p in term.effect.parameters):
+        return ""
+    period = fit.values.get(term.key(term.of_cycle[0]), 0.0)
+    time = [e.columns["time_s"] for e in fit.problem.evidence]
+    longest = max(float(t[-1] - t[0]) for t in time)
+    if period <= longest:
+        return ""
+    return f"its cycle of {period:.3g} s is longer than each recording: a load that is read with a drift goes alike"
 
 
 def hardly_ahead(term: Hypothesis, lead: float) -> str:

@@ -70,15 +70,19 @@ def _own(fit: Fit, h: Hypothesis) -> dict[str, float]:
 
 
 def drags(fit: Fit, h: Hypothesis) -> bool:
-    """Whether what goes with speed is most of a friction at the speed at which the joint is usually moved (RMS): within
-    which turn the rest builds up says nothing of it then."""
+    """Whether what goes with speed is most of a friction: within which turn the rest builds up says nothing of it
+    then."""
+    return drag_at_speed(fit, h) > 1.0
+
+
+def drag_at_speed(fit: Fit, h: Hypothesis) -> float:
+    """What goes with speed of a friction over what does not, at the speed at which the joint is usually moved (RMS)."""
     own = _own(fit, h)
     at_speed = sum(own[p.name] for p in h.effect.parameters if p.of_speed)
     if not at_speed:
-        return False
+        return 0.0
     rates = np.concatenate([e.motor_rate for e in fit.problem.evidence])
-    speed = fit.problem.config.drive.ratio * float(np.sqrt(np.nanmean(rates**2)))
-    return at_speed * speed > 1.0
+    return at_speed * fit.problem.config.drive.ratio * float(np.sqrt(np.nanmean(rates**2)))
 
 
 def _widest_presliding(fit: Fit, h: Hypothesis) -> float:

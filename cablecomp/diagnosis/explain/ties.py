@@ -12,6 +12,7 @@ from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
     Term,
+    Tried,
     amount_resolved,
     bears,
     common,
@@ -101,8 +102,9 @@ def implausible(model: Model) -> int:
 
 def with_the_first(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
     """The model with what explains most alone in the place of an effect that was tried alone too, where that predicts
-    as well: two that stand in for each other are told apart by what they explain alone, if by anything."""
-    alone = [t for t in rounds[0].tried if len(t.model.terms) == 1]
+    as well: two that stand in for each other are told apart by what they explain alone, if by anything. What nearly all
+    data choose alone need not be the simpler law."""
+    alone = _tried_alone(rounds)
     first = max(alone, key=lambda t: t.selected_in, default=None)
     if first is None or keeps(model, first.model) or not demanded(first.difference, first=True):
         return model
@@ -111,8 +113,27 @@ def with_the_first(model: Model, rounds: Sequence[Round], groups: Groups) -> Mod
         return model
     swapped = [_in_its_place(model, t, term, values, groups) for t in model.terms if t.name in others]
     plain = [m for m in swapped if m is not None and implausible(m) <= implausible(model)]
-    as_well = [m for m in plain if not outdoes(model, m, groups)]
-    return simplest_first([*ranked(as_well, groups)[:1], model], groups)[0]
+    as_well = ranked([m for m in plain if not outdoes(model, m, groups)], groups)[:1]
+    if as_well and surest_alone(rounds, term):
+        return as_well[0]
+    return simplest_first([*as_well, model], groups)[0]
+
+
+def surest_alone(rounds: Sequence[Round], term: Hypothesis) -> bool:
+    """Whether nearly all resampled data choose this effect where each is alone beside the calibrated drive. Not of an
+    event: the best of many instants follows much of what it is not."""
+    first = max(_tried_alone(rounds), key=lambda t: t.selected_in, default=None)
+    return (
+        first is not None
+        and first.term.name == term.name
+        and not term.has_instant
+        and first.selected_in >= LIMITS.surest
+        and demanded(first.difference, first=True)
+    )
+
+
+def _tried_alone(rounds: Sequence[Round]) -> list[Tried]:
+    return [t for t in rounds[0].tried if len(t.model.terms) == 1] if rounds else []
 
 
 def _in_its_place(

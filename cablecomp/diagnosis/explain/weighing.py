@@ -12,7 +12,14 @@ from cablecomp.diagnosis.explain.confidence import features, learnt
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
-from cablecomp.diagnosis.explain.held_down import another, greased, hardly_ahead, slight, too_little
+from cablecomp.diagnosis.explain.held_down import (
+    another,
+    another_time,
+    greased,
+    hardly_ahead,
+    slight,
+    too_little,
+)
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
     Model,
@@ -24,6 +31,7 @@ from cablecomp.diagnosis.explain.model import (
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
+from cablecomp.diagnosis.explain.ties import surest_alone
 from cablecomp.diagnosis.explain.usual import lost_in_usual
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
@@ -151,12 +159,12 @@ def _weighed(
         too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
-    elif small := slight(final, term, own, removes):
+    elif small := slight(final, term, selection.rounds, own, removes):
         confidence, why_not = min(confidence, LIMITS.little_told), small
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
-    elif open_to := hardly_ahead(term, lead) or greased(final, term):
+    elif open_to := hardly_ahead(term, lead) or greased(final, term) or another_time(final, term):
         confidence, why_not = min(confidence, LIMITS.little_told), open_to
     better = None
     beaten_by = _beaten(selection, term, against)
@@ -205,6 +213,8 @@ def _beaten(selection: Selection, term: Hypothesis, differences: Mapping[str, Sc
 
     least = LIMITS.rival_alone * alone(term.name)
     ahead = [name for name, d in differences.items() if d.gain < -LIMITS.tie and alone(name) >= least]
+    if surest_alone(selection.rounds, term):
+        ahead = [name for name in ahead if differences[name].z <= -LIMITS.z_dethrone]
     return min(ahead, key=lambda name: differences[name].z, default="")
 
 
