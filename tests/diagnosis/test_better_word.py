@@ -10,7 +10,7 @@ import pytest
 from turning import JOINT, gathered, hypothesis, recorded
 
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.held_down import another_time, greased
+from cablecomp.diagnosis.explain.held_down import greased, in_part_a_drag
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.plausible import better_word
@@ -80,23 +80,8 @@ def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
     assert greased(alone, bearing) == ""
     assert bool(greased(beside, bearing)) == (word == "")
     assert greased(beside, path) == ""
-    assert bool(another_time(alone, bearing)) == mixed
-    assert another_time(beside, path) == ""
-
-
-@pytest.mark.parametrize(("period_s", "longer"), [(0.0, False), (5.0, False), (60.0, True)])
-def test_a_payload_that_comes_once_goes_like_a_load_that_is_read_with_a_drift(
-    period_s: float, longer: bool
-) -> None:
-    columns = recorded(JOINT)
-    assert float(np.ptp(columns["time_s"])) < 60.0
-    evidence = gather_body(JOINT, {"a/1": columns, "a/2": columns}).used
-    weight = next(h for h in hypotheses(JOINT, evidence) if h.name == "gravity_load")
-    problem = SimpleNamespace(parameters=(), config=JOINT, evidence=evidence)
-    fit = SimpleNamespace(problem=problem, x=np.empty(0), values={weight.key("period_s"): period_s})
-    said = another_time(cast("Model", SimpleNamespace(terms=(weight,), fit=fit)), weight)
-    assert ("its cycle of 60 s is longer than each recording" in said) is longer
-    assert bool(said) is longer
+    assert bool(in_part_a_drag(alone, bearing)) == mixed
+    assert in_part_a_drag(beside, path) == ""
 
 
 def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:

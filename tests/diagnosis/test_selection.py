@@ -6,9 +6,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from grouped import GROUPS, NOISE, WAVE
 
+from cablecomp.diagnosis.explain import model as model_module
 from cablecomp.diagnosis.explain import selection, ties
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
@@ -127,13 +129,51 @@ def test_what_alone_explains_by_far_the_most_is_not_left_out(
 ) -> None:
     """Of three effects the first two are not missed beside the others; the last to come stays."""
 
-    def without(m: Model, term: Any, groups: Any) -> Model:
+    def without(m: Model, term: Any, groups: Any, known: Any) -> Model:
         return replace(m, terms=tuple(t for t in m.terms if t is not term))
 
     monkeypatch.setattr(selection, "without", without)
     monkeypatch.setattr(selection, "implausible", lambda m: 0)
     monkeypatch.setattr(selection, "alone_by_far", lambda rounds, term: term.name == by_far)
     assert selection._pruned(model(1.0, "a", "b", "c"), [], GROUPS).name == left
+
+
+def fitted(left: Any, *names: str, fine: bool = False, weighing: str = "its own") -> Model:
+    fit: Any = SimpleNamespace(problem=SimpleNamespace(fine=fine, weighing=weighing))
+    return replace(model(1.0, *names), fit=fit, left_out=left)
+
+
+@pytest.mark.parametrize(
+    ("known", "left"),
+    [
+        ([], 1.0),
+        ([fitted(NOISE + 0.1 * WAVE, "a")], 0.1),
+        ([fitted(NOISE + 0.2 * WAVE, "a"), fitted(NOISE + 0.1 * WAVE, "a")], 0.1),
+        ([fitted(NOISE + 3.0 * WAVE, "a")], 1.0),  # it predicts worse
+        ([fitted(NOISE, "b"), fitted(NOISE, "a", "b"), fitted(NOISE, "a", fine=True)], 1.0),  # or is another
+        ([fitted(NOISE[:-1], "a")], 1.0),  # or about other recordings
+    ],
+)
+def test_an_effect_is_not_missed_for_the_valley_in_which_it_has_left_the_others(
+    monkeypatch: pytest.MonkeyPatch, known: list[Model], left: float
+) -> None:
+    """A known model of the terms that are left, with the weights that are held against, where it predicts better."""
+
+    def reweighed(m: Model, weighing: Any, groups: Any) -> Model:
+        return fitted(m.left_out, *m.added, weighing=weighing)
+
+    monkeypatch.setattr(model_module, "reweighed", reweighed)
+    like = fitted(NOISE, "a", "b", weighing="like")
+    stuck = fitted(NOISE + WAVE, "a", weighing="like")
+    found = model_module.or_known(stuck, frozenset("a"), like, known, GROUPS)
+    assert found is not None
+    np.testing.assert_array_equal(found.left_out, NOISE + left * WAVE)
+    assert found.fit.problem.weighing == "like"
+
+
+def test_where_nothing_was_found_without_it_a_known_model_is() -> None:
+    like = fitted(NOISE, "a", "b")
+    assert model_module.or_known(None, frozenset("a"), like, [fitted(NOISE, "b")], GROUPS) is None
 
 
 def test_what_the_last_round_demanded_and_the_best_lacks_is_asked_for_again() -> None:

@@ -268,10 +268,32 @@ def test_what_alone_explains_by_far_the_most_is_its_own_word(
 def test_what_bends_to_the_form_of_others_has_to_be_clearly_ahead_of_them(
     name: str, lead: float, hardly: bool
 ) -> None:
-    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
-    said = hardly_ahead(asked[name], lead)
+    evidence = gather_body(JOINT, {"a/1": recorded()}).used
+    asked = {h.name: h for h in hypotheses(JOINT, evidence)}
+    problem = SimpleNamespace(evidence=evidence)
+    model: Any = SimpleNamespace(fit=SimpleNamespace(problem=problem, values={}))
+    said = hardly_ahead(model, asked[name], lead)
     assert bool(said) is hardly
     assert not hardly or (f"by {lead:.1f} standard errors; 2 are asked" in said)
+
+
+@pytest.mark.parametrize(
+    ("period_s", "lead", "hardly"),
+    [(0.0, 0.5, False), (5.0, 0.5, False), (60.0, 0.5, True), (60.0, 2.5, False)],
+)
+def test_a_payload_of_which_no_recording_shows_a_cycle_has_to_be_ahead_of_a_load_read_with_a_drift(
+    period_s: float, lead: float, hardly: bool
+) -> None:
+    columns = recorded()
+    assert 5.0 < float(np.ptp(columns["time_s"])) < 60.0
+    evidence = gather_body(JOINT, {"a/1": columns, "a/2": columns}).used
+    weight = next(h for h in hypotheses(JOINT, evidence) if h.name == "gravity_load")
+    values = {weight.key("period_s"): period_s}
+    fit = SimpleNamespace(problem=SimpleNamespace(evidence=evidence), values=values)
+    model: Any = SimpleNamespace(terms=(weight,), fit=fit)
+    said = hardly_ahead(model, weight, lead)
+    assert ("no recording shows a whole cycle" in said) is hardly
+    assert bool(said) is hardly
 
 
 @pytest.mark.parametrize(

@@ -69,30 +69,31 @@ def greased(final: Model, term: Hypothesis) -> str:
     return "a drag in proportion to speed: grease in the cable's path, whose friction is there, drags alike"
 
 
-def another_time(final: Model, term: Hypothesis) -> str:
-    """What is to be said of an effect whose course in time others have as well: a friction of which a part goes with
-    speed and a part does not, as whatever yields late seems to (a greased guide, strands, a frame that flexes); a
-    payload of which no recording shows a whole cycle, as a torque sensor that drifts. "" of any other."""
-    fit = final.fit
+def in_part_a_drag(final: Model, term: Hypothesis) -> str:
+    """What is to be said of a friction of which a part goes with speed and a part does not, as whatever yields late
+    seems to (a greased guide, strands, a frame that flexes); "" of any other."""
     low, high = LIMITS.mixed_drag
-    if low < drag_at_speed(fit, term) < high:
-        return "in part it goes with speed and in part it does not: whatever yields late does alike"
-    if term.cycle_start not in (p.name for p in term.effect.parameters):
+    if not low < drag_at_speed(final.fit, term) < high:
         return ""
-    period = fit.values.get(term.key(term.of_cycle[0]), 0.0)
-    time = [e.columns["time_s"] for e in fit.problem.evidence]
-    longest = max(float(t[-1] - t[0]) for t in time)
-    if period <= longest:
-        return ""
-    return f"its cycle of {period:.3g} s is longer than each recording: a load that is read with a drift goes alike"
+    return "in part it goes with speed and in part it does not: whatever yields late does alike"
 
 
-def hardly_ahead(term: Hypothesis, lead: float) -> str:
-    """What is to be said of an effect that bends to what others' forms leave and is not clearly ahead, `lead` standard
-    errors, of none or of its nearest rival; "" of any other."""
-    if not term.effect.pliant or lead >= LIMITS.z_pliant:
+def hardly_ahead(final: Model, term: Hypothesis, lead: float) -> str:
+    """What is to be said of an effect that bends to what others' forms leave, or of a payload of which no recording
+    shows a whole cycle, that is not clearly ahead, `lead` standard errors, of none or of its nearest rival; "" of any
+    other."""
+    if lead >= LIMITS.z_pliant:
+        return ""
+    asked = f"by {lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
+    if term.effect.pliant:
+        left = "a curve or a step that other effects' forms leave as well"
+        return f"{left}, ahead of its nearest rival or of none {asked}"
+    if not term.cycle_start:
+        return ""
+    period = final.fit.values.get(term.key(term.of_cycle[0]), 0.0)
+    time = [e.columns["time_s"] for e in final.fit.problem.evidence]
+    if period <= max(float(t[-1] - t[0]) for t in time):
         return ""
     return (
-        f"a curve or a step that other effects' forms leave as well, ahead of its nearest rival or of none by "
-        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
+        f"no recording shows a whole cycle, as of a load that is read with a drift, and it is ahead {asked}"
     )

@@ -92,6 +92,16 @@ class Selection:
     groups: Groups
     seen: Seen
 
+    @property
+    def known(self) -> list[Model]:
+        """Every model that was fitted to the end on the way."""
+        return [self.baseline, *fitted_in(self.rounds)]
+
+
+def fitted_in(rounds: Sequence[Round]) -> list[Model]:
+    """The models of these rounds that were fitted to the end."""
+    return [t.model for r in rounds for t in r.tried]
+
 
 def ranked(models: Sequence[Model], groups: Groups) -> list[Model]:
     """By loss on data left out, each set of physics once: of two that end alike (an effect asked for by two of its
@@ -214,16 +224,40 @@ def finely(model: Model, groups: Groups) -> Model:
     return Model(model.terms, fit, left_out(fit, groups))
 
 
-def without(model: Model, term: Term, groups: Groups) -> Model | None:
-    """The model without one of its terms, refitted."""
+def without(model: Model, term: Term, groups: Groups, known: Sequence[Model] = ()) -> Model | None:
+    """The model without one of its terms, refitted; or a `known` one of just the terms that are left (`or_known`): an
+    effect is not missed because the others stand in a valley, or have shapes, that are theirs only beside it."""
     kept = tuple(t for t in model.terms if t is not term)
     problem = stripped(model.fit.problem, term)
     start = placed(model.fit, problem)
+    found = None
     try:
         fit = solve(problem, start, LIMITS.settled, LIMITS.tolerance, derivative_of_rest(model.fit, problem))
+        found = Model(kept, fit, left_out(fit, groups))
     except InputError:
-        return None
-    return Model(kept, fit, left_out(fit, groups))
+        pass
+    return or_known(found, frozenset(t.name for t in kept), model, known, groups)
+
+
+def or_known(
+    found: Model | None, names: frozenset[str], like: Model, known: Sequence[Model], groups: Groups
+) -> Model | None:
+    """The model that was found, or the best `known` one of these terms, with the weights of the model that it is held
+    against (`like`), where that predicts better."""
+    problem, rows = like.fit.problem, len(like.left_out)
+    of_these = [
+        m
+        for m in known
+        if m.added == names and m.fit.problem.fine == problem.fine and len(m.left_out) == rows
+    ]
+    if not of_these:
+        return found
+    size = common([like, *of_these], groups)
+    best = min(of_these, key=lambda m: loss(m, size, groups))
+    if found is not None and loss(best, size, groups) >= loss(found, size, groups):
+        return found
+    best = reweighed(best, problem.weighing, groups)
+    return best if found is None or loss(best, size, groups) < loss(found, size, groups) else found
 
 
 def stripped(problem: Problem, term: Term) -> Problem:

@@ -15,7 +15,7 @@ from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor, likeliest
-from cablecomp.diagnosis.explain.model import Model, placed
+from cablecomp.diagnosis.explain.model import Model, or_known, placed
 from cablecomp.diagnosis.explain.plausible import better_word
 from cablecomp.diagnosis.explain.scores import (
     ScoreDifference,
@@ -72,10 +72,11 @@ def rivals(
     pool: Sequence[Hypothesis],
     groups: Groups,
     seen: Seen,
+    known: Sequence[Model],
     rng: np.random.Generator,
 ) -> Rivals:
     """Every effect that promises something, and for an event what is none, fitted in a term's place: beside `base`,
-    the model without it; `seen`: what the search saw of them."""
+    the model without it, or as a `known` model has it; `seen`: what the search saw of them."""
     here = anchor(base.fit, seen=seen)
     beside = [t for t in base.terms if isinstance(t, Hypothesis)]
     ids = {t.effect.id for t in beside}
@@ -102,7 +103,11 @@ def rivals(
         # what only its most extreme shape fits is another effect's to explain
         if fit is None or better_word(fit, a.hypothesis):
             continue
-        models[a.hypothesis.name] = other = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
+        begun = Model((*base.terms, a.hypothesis), fit, left_out(fit, groups))
+        other = or_known(begun, begun.added, model, known, groups) or begun
+        if better_word(other.fit, a.hypothesis):
+            other = begun
+        models[a.hypothesis.name] = other
         theirs = left_out_with_discrepancy(other, beside, groups)
         differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
         theirs_freely = left_out_with_discrepancy(other, beside, groups, own=a.hypothesis)

@@ -77,12 +77,13 @@ def search(drive: Calibrated, pool: Sequence[Hypothesis], rng: np.random.Generat
 
 def done_without(found: Search, term: Term, drive: Calibrated) -> Search | None:
     """The search's model without one of its terms; None where it cannot follow the recordings then."""
-    smaller = without(found.final, term, found.groups)
+    known = found.selection.known
+    smaller = without(found.final, term, found.groups, known)
     if smaller is None:
         return None
     final = _settled(smaller.terms, smaller.fit, drive, found.groups)
     whole = found.selection.final is found.final
-    about = final if whole else without(found.selection.final, term, found.selection.groups)
+    about = final if whole else without(found.selection.final, term, found.selection.groups, known)
     if about is None:
         return None
     return replace(found, final=final, selection=replace(found.selection, final=about))

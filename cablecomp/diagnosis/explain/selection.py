@@ -18,6 +18,7 @@ from cablecomp.diagnosis.explain.model import (
     amount_resolved,
     bears,
     common,
+    fitted_in,
     loss,
     ranked,
     reweighed,
@@ -79,7 +80,7 @@ def select(
             break
         latest = []
         for model, start in beam:
-            known = [t.model for r in (*rounds, *latest) for t in r.tried]
+            known = fitted_in((*rounds, *latest))
             latest.append(
                 one_round(Beginning(model, start, pool, groups, pace, number, cold, known, seen), rng)
             )
@@ -216,7 +217,7 @@ def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
             for term in model.terms[:-1]
             if not any(t.belongs_to(term) for t in bound) and not alone_by_far(rounds, term)
         ]
-        fewer = side_by_side(partial(without, model, groups=groups), asked)
+        fewer = side_by_side(partial(without, model, groups=groups, known=fitted_in(rounds)), asked)
         for term, smaller in zip(asked, fewer, strict=True):
             if smaller is None or implausible(smaller) > implausible(model):
                 continue

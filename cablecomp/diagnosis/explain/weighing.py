@@ -14,9 +14,9 @@ from cablecomp.diagnosis.explain.discrepancy import left_out_with_discrepancy
 from cablecomp.diagnosis.explain.events import untold
 from cablecomp.diagnosis.explain.held_down import (
     another,
-    another_time,
     greased,
     hardly_ahead,
+    in_part_a_drag,
     slight,
     too_little,
 )
@@ -115,13 +115,13 @@ def _weighed(
     """One effect of the final model, `pool`: what may stand in for it."""
     selection = found.selection
     final, groups = selection.final, selection.groups
-    bare = without(final, term, groups)
+    bare = without(final, term, groups, selection.known)
     own, instead = ALONE, Rivals()
     if bare is not None:
         others = [t for t in bare.terms if isinstance(t, Hypothesis)]
         having, lacking = (left_out_with_discrepancy(m, others, groups) for m in (final, bare))
         own = score_difference(having, lacking, groups)
-        instead = rivals(final, term, bare, pool, groups, selection.seen, rng)
+        instead = rivals(final, term, bare, pool, groups, selection.seen, selection.known, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
     nearest = min(against.values(), key=lambda v: v.z, default=NO_RIVAL)
     # an event of any course predicts nothing of a part left out: it is weighed as it goes
@@ -164,7 +164,7 @@ def _weighed(
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
-    elif open_to := hardly_ahead(term, lead) or greased(final, term) or another_time(final, term):
+    elif open_to := hardly_ahead(final, term, lead) or greased(final, term) or in_part_a_drag(final, term):
         confidence, why_not = min(confidence, LIMITS.little_told), open_to
     better = None
     beaten_by = _beaten(selection, term, against)
