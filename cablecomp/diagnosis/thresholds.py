@@ -386,7 +386,8 @@ class Thresholds:
     """Standard errors by which an effect that bends to what other effects' forms leave (a coupling, a slip) has to be
     ahead of none and of its nearest rival, either in any form: below it 19 of 31 such names, said with 0.5 to 0.95,
     were wrong (trials seeds 685 to 710: 11 of 19; 712 to 716: 8 of 12), of all others below it, delays apart, 35 of
-    165."""
+    165. So has a payload of which no recording shows a whole cycle: three of four such names (738 to 744) were a torque
+    sensor's drift."""
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""

@@ -15,6 +15,7 @@ from cablecomp.diagnosis.explain import selection, ties
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import ScoreDifference
+from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.signal.smoothing import FloatArray
 
 
@@ -169,6 +170,13 @@ def test_an_effect_is_not_missed_for_the_valley_in_which_it_has_left_the_others(
     assert found is not None
     np.testing.assert_array_equal(found.left_out, NOISE + left * WAVE)
     assert found.fit.problem.weighing == "like"
+
+
+def test_every_model_that_was_fitted_on_the_way_is_known() -> None:
+    tried: Any = [SimpleNamespace(model=model(1.0, *names)) for names in ("a", "b", "ab")]
+    rounds: Any = (SimpleNamespace(tried=tried[:2]), SimpleNamespace(tried=tried[2:]))
+    found = model_module.Selection(model(1.0), rounds, model(1.0, "a"), GROUPS, Seen())
+    assert [m.added for m in found.known] == [set(), {"a"}, {"b"}, {"a", "b"}]
 
 
 def test_where_nothing_was_found_without_it_a_known_model_is() -> None:
