@@ -402,10 +402,11 @@ class Thresholds:
     presliding: float = 0.12
     """Share of the joint's deflection within which a bearing's friction builds up, at most, where the drive is known
     (trials seeds 705 to 802: of names with a wider one 14 of 17 were wrong, of narrower ones 18 of 140)."""
-    mixed_drag: tuple[float, float] = (0.35, 3.0)
+    mixed_drag: tuple[float, float] = (0.6, 3.0)
     """What goes with speed of a joint's friction over what does not, at the usual speed, between which it is no name:
-    whatever yields late seems to drag in part (trials seeds 738 to 744: five of five such names were wrong, at 0.7 to
-    1.8, of greased guides, strands, a frame that flexes, jitter; right ones had 0.18 and less, drags 4.9 and more)."""
+    whatever yields late seems to drag in part (trials seeds 738 to 744: five of five such names were wrong, at 0.66 to
+    1.8, of greased guides, strands, a frame that flexes, jitter; right ones had 0.18 and less, drags 4.9 and more).
+    Greased bearings of the plant (LuGre) drag by up to 0.6."""
     by_far: float = 0.25
     """Share of what the best other effect leaves alone, below which an effect with a shape on the bound beyond which
     another would be the better word is that word itself (`649/66`, a key on springs: 0.15)."""

@@ -54,7 +54,7 @@ def test_strands_that_nothing_holds_are_better_called_a_compliance() -> None:
     [
         (0.0, "presliding_rad", False),
         (0.1, "presliding_rad", False),
-        (2.0, "presliding_rad", True),
+        (3.0, "presliding_rad", True),
         (30.0, "", False),
     ],
 )
