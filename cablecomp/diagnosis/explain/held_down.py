@@ -78,22 +78,26 @@ def in_part_a_drag(final: Model, term: Hypothesis) -> str:
     return "in part it goes with speed and in part it does not: whatever yields late does alike"
 
 
-def hardly_ahead(final: Model, term: Hypothesis, lead: float) -> str:
-    """What is to be said of an effect that bends to what others' forms leave, or of a payload of which no recording
-    shows a whole cycle, that is not clearly ahead, `lead` standard errors, of none or of its nearest rival; "" of any
-    other."""
-    if lead >= LIMITS.z_pliant:
+def hardly_ahead(term: Hypothesis, lead: float) -> str:
+    """What is to be said of an effect that bends to what others' forms leave and is not clearly ahead, `lead` standard
+    errors, of none or of its nearest rival; "" of any other."""
+    if not term.effect.pliant or lead >= LIMITS.z_pliant:
         return ""
-    asked = f"by {lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
-    if term.effect.pliant:
-        left = "a curve or a step that other effects' forms leave as well"
-        return f"{left}, ahead of its nearest rival or of none {asked}"
-    if not term.cycle_start:
+    return (
+        f"a curve or a step that other effects' forms leave as well, ahead of its nearest rival or of none by "
+        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
+    )
+
+
+def seen_once(final: Model, term: Hypothesis, lead: float) -> str:
+    """The same of a payload of which no recording shows a whole cycle: a torque sensor that drifts reads alike."""
+    if not term.cycle_start or lead >= LIMITS.z_pliant:
         return ""
     period = final.fit.values.get(term.key(term.of_cycle[0]), 0.0)
     time = [e.columns["time_s"] for e in final.fit.problem.evidence]
     if period <= max(float(t[-1] - t[0]) for t in time):
         return ""
     return (
-        f"no recording shows a whole cycle, as of a load that is read with a drift, and it is ahead {asked}"
+        f"no recording shows a whole cycle, as of a load that is read with a drift, and it is ahead by "
+        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
     )

@@ -17,6 +17,7 @@ from cablecomp.diagnosis.explain.held_down import (
     greased,
     hardly_ahead,
     in_part_a_drag,
+    seen_once,
     slight,
     too_little,
 )
@@ -164,7 +165,12 @@ def _weighed(
     elif term.name in found.put_in and not demanded(own):
         confidence = min(confidence, LIMITS.little_told)
         why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
-    elif open_to := hardly_ahead(final, term, lead) or greased(final, term) or in_part_a_drag(final, term):
+    elif open_to := (
+        hardly_ahead(term, lead)
+        or seen_once(final, term, lead)
+        or greased(final, term)
+        or in_part_a_drag(final, term)
+    ):
         confidence, why_not = min(confidence, LIMITS.little_told), open_to
     better = None
     beaten_by = _beaten(selection, term, against)
