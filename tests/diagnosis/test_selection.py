@@ -179,9 +179,11 @@ def test_every_model_that_was_fitted_on_the_way_is_known() -> None:
     assert [m.added for m in found.known] == [set(), {"a"}, {"b"}, {"a", "b"}]
 
 
-def test_where_nothing_was_found_without_it_a_known_model_is() -> None:
-    like = fitted(NOISE, "a", "b")
-    assert model_module.or_known(None, frozenset("a"), like, [fitted(NOISE, "b")], GROUPS) is None
+def test_where_nothing_was_found_without_it_a_known_model_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_module, "reweighed", lambda m, weighing, groups: m)
+    like, known = fitted(NOISE, "a", "b"), fitted(NOISE + WAVE, "a")
+    assert model_module.or_known(None, frozenset("a"), like, [known], GROUPS) is known
+    assert model_module.or_known(None, frozenset("c"), like, [known], GROUPS) is None
 
 
 def test_what_the_last_round_demanded_and_the_best_lacks_is_asked_for_again() -> None:

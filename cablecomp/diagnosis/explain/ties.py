@@ -158,12 +158,8 @@ def _in_its_place(
 def alone_by_far(rounds: Sequence[Round], term: Term) -> bool:
     """Whether any other effect, beside the calibrated drive, leaves far more of the loss on data left out: no other is
     the better word then, and no two of them together."""
-    if not rounds:
-        return False
     leaves = [
-        (t.term, 1.0 - t.difference.gain)
-        for t in rounds[0].tried
-        if len(t.model.terms) == 1 and isinstance(t.term, Hypothesis)
+        (t.term, 1.0 - t.difference.gain) for t in _tried_alone(rounds) if isinstance(t.term, Hypothesis)
     ]
     own = min((left for h, left in leaves if h.name == term.name), default=1.0)
     others = (left for h, left in leaves if isinstance(term, Hypothesis) and not h.same_as(term))
