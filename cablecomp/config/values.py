@@ -7,14 +7,14 @@ ID.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
 
 from cablecomp.config.drive import Stage
-from cablecomp.config.options import Sensors
+from cablecomp.config.options import EffectEntry, Sensors
 from cablecomp.config.schema import JointConfig
 from cablecomp.config.sessions import Session
 from cablecomp.errors import InputError
@@ -26,39 +26,47 @@ SENSOR_KEYS: Final = tuple(Sensors.model_fields)
 def with_values(config: JointConfig, values: Mapping[str, float]) -> JointConfig:
     """The configuration with these values in place of its own (`offset[k]` of single recordings is left out); raises
     InputError for one that no drive can have."""
-    stages: list[dict[str, Any]] = []
+    stages: list[dict[str, float]] = []
     sensors: dict[str, Any] = {}
-    effects: list[tuple[str, dict[str, Any]]] = []
+    effects: dict[int, dict[str, Any]] = {}
+    # a fit calls this for every value that it tries: what stays as it is is not made anew
     for name, value in values.items():
         key, _, which = name.partition(".")
         if name.startswith("effect."):
-            effects = effects or [(e.id, e.parameters) for e in config.effect]
             identifier, parameter = effect_name(name)
-            next(p for i, p in effects if i == identifier)[parameter] = value
+            place = next(k for k, e in enumerate(config.effect) if e.id == identifier)
+            effects.setdefault(place, {})[parameter] = value
         elif key in STAGE_KEYS:
-            stages = stages or [dict(stage) for stage in config.drive.stage]
+            stages = stages or [{} for _ in config.drive.stage]
             places = range(len(stages)) if not which else (int(which) - 1,)
-            factor = value / stages[places[0]][key]
-            for place in places:
-                stages[place][key] *= factor
+            before = [stages[k].get(key, getattr(config.drive.stage[k], key)) for k in places]
+            for k, old in zip(places, before, strict=True):
+                stages[k][key] = old * (value / before[0])
             stages[places[0]][key] = value
         elif name in SENSOR_KEYS:
             sensors[name] = value
-    # a fit calls this for every value that it tries: what stays as it is is not made anew
     changed: dict[str, Any] = {}
     if stages:
-        changed["drive"] = config.drive.model_copy(update={"stage": _stages(config.name, stages)})
+        moved = zip(config.drive.stage, stages, strict=True)
+        anew = tuple(_stage(config.name, stage, new) for stage, new in moved)
+        changed["drive"] = config.drive.model_copy(update={"stage": anew})
     if sensors:
         changed["sensors"] = config.sensors.model_copy(update=sensors)
     if effects:
-        entries = zip(config.effect, effects, strict=True)
-        changed["effect"] = tuple(type(e)(id=i, **p) for e, (i, p) in entries)
+        changed["effect"] = tuple(
+            e if k not in effects else with_parameters(e, effects[k]) for k, e in enumerate(config.effect)
+        )
     return config.model_copy(update=changed) if changed else config
 
 
-def _stages(name: str, stages: Sequence[Mapping[str, Any]]) -> tuple[Stage, ...]:
+def with_parameters(entry: EffectEntry, values: Mapping[str, Any]) -> EffectEntry:
+    """The entry with these parameters in place of its own; an effect's own checks come when it is used."""
+    return EffectEntry.model_construct(None, id=entry.id, **{**entry.parameters, **values})
+
+
+def _stage(name: str, stage: Stage, new: Mapping[str, float]) -> Stage:
     try:
-        return tuple(Stage(**s) for s in stages)
+        return Stage(**{**dict(stage), **new}) if new else stage
     except ValidationError as error:
         first = error.errors()[0]
         where, value = first["loc"][0], first["input"]

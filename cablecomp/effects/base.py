@@ -13,6 +13,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -263,9 +264,19 @@ class Effect:
     rank: int = 0
     """Terms run in rising rank; a term that sees the sum of the others (a delay) ranks last."""
 
+    @cached_property
+    def by_name(self) -> Mapping[str, Parameter]:
+        """Its parameters by their names."""
+        return {p.name: p for p in self.parameters}
+
+    @cached_property
+    def amounts(self) -> tuple[str, ...]:
+        """Names of the parameters that say how much of it there is."""
+        return tuple(p.name for p in self.parameters if not p.shape)
+
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name."""
-        return next(p for p in self.parameters if p.name == name)
+        return self.by_name[name]
 
     def covariates(self, channel: str) -> tuple[str, ...]:
         """`acts_through` with the channel that it reads in place of `other`, as `other:<name>`."""

@@ -136,8 +136,8 @@ def _empirical(config: JointConfig) -> list[Term]:
 def _change(effect: Effect, values: Mapping[str, float], config: JointConfig) -> Change:
     """What the effect changes; nothing at all where every value that says how much is neutral, and where the load is
     read at the motor, which feels the effect."""
-    amounts = [p for p in effect.parameters if not p.shape]
-    if amounts and all(values[p.name] == p.neutral for p in amounts):
+    amounts = effect.amounts
+    if amounts and all(values[name] == effect.by_name[name].neutral for name in amounts):
         return Change()
     if effect.felt_by_motor and config.observer.load == "motor_torque":
         return Change()
@@ -155,25 +155,26 @@ def _look_up(name: str) -> Effect:
 
 def _values(effect: Effect, entry: EffectEntry, config: JointConfig) -> dict[str, float]:
     """The parameters of one entry, complete and finite; a channel becomes its place among the others."""
-    allowed = {p.name for p in effect.parameters} | set(effect.texts)
-    values = {p.name: p.omitted for p in effect.parameters if p.omitted is not None}
-    for key, value in entry.parameters.items():
-        if key not in allowed:
-            raise InputError(
-                f"{config.name}: unknown key `effect.{key}` of effect `{effect.id}`; "
-                f"it takes {', '.join(sorted(allowed))}"
-            )
+    known = effect.by_name
+    values = {name: p.omitted for name, p in known.items() if p.omitted is not None}
+    given = entry.parameters
+    for key, value in given.items():
         if key in effect.texts:
             values[key] = float(_place(str(value), config))
+        elif key in known:
+            values[key] = _number(value, known[key], config)
         else:
-            values[key] = _number(value, effect.parameter(key), config)
+            raise InputError(
+                f"{config.name}: unknown key `effect.{key}` of effect `{effect.id}`; "
+                f"it takes {', '.join(sorted((*known, *effect.texts)))}"
+            )
     if effect.texts_optional:
         values |= {key: -1.0 for key in effect.texts if key not in values}
-    missing = [name for name in sorted(allowed) if name not in values]
+    missing = [name for name in (*known, *effect.texts) if name not in values]
     if missing:
-        raise InputError(f"{config.name}: effect `{effect.id}` lacks key `{missing[0]}`; add it")
-    amounts = [p.name for p in effect.parameters if not p.shape]
-    if amounts and not entry.parameters.keys() & set(amounts):
+        raise InputError(f"{config.name}: effect `{effect.id}` lacks key `{min(missing)}`; add it")
+    amounts = effect.amounts
+    if amounts and not any(name in given for name in amounts):
         raise InputError(f"{config.name}: effect `{effect.id}` says not how much; add {_any_of(amounts)}")
     return values
 
@@ -184,20 +185,21 @@ def _any_of(names: Sequence[str]) -> str:
 
 def _number(value: object, parameter: Parameter, config: JointConfig) -> float:
     """The value of a parameter, within what its law can take."""
-    key = f"{config.name}: key `effect.{parameter.name}` is {value!r}"
+
+    def refused(accepted: str) -> InputError:
+        return InputError(
+            f"{config.name}: key `effect.{parameter.name}` is {value!r}{accepted} [{parameter.unit}] is accepted"
+        )
+
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{key}; a finite number [{parameter.unit}] is accepted")
+        raise refused("; a finite number")
     if not parameter.minimum <= value <= parameter.maximum:
-        raise InputError(
-            f"{key}; {parameter.minimum:g} to {parameter.maximum:g} [{parameter.unit}] is accepted"
-        )
-    of_l = {"never": False, "below zero": value < 0.0, "always": value != 0.0}[parameter.of_cable_l]
-    if of_l and config.drive.circuit == "open":
-        most = parameter.maximum if parameter.of_cable_l == "below zero" else 0.0
-        raise InputError(
-            f"{key}, which is of cable l; an open circuit has none: {f'0 to {most:g}' if most else '0'} "
-            f"[{parameter.unit}] is accepted"
-        )
+        raise refused(f"; {parameter.minimum:g} to {parameter.maximum:g}")
+    if parameter.of_cable_l != "never" and config.drive.circuit == "open":
+        below = parameter.of_cable_l == "below zero"
+        if value < 0.0 if below else value != 0.0:
+            most = f"0 to {parameter.maximum:g}" if below and parameter.maximum else "0"
+            raise refused(f", which is of cable l; an open circuit has none: {most}")
     return float(value)
 
 

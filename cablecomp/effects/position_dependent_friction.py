@@ -10,28 +10,28 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Floats, Parameter
 from cablecomp.effects.shared_shapes import repeated
-from cablecomp.mechanics.change import Factor
+from cablecomp.mechanics.change import Factor, Law, Product
 
 
 def _groove(values: Mapping[str, float]) -> Factor | None:
     """Of the output drum: the wave, and the patch."""
     wave = _wave(values["amplitude"], values["phase_rad"], values["order"])
-    height, place, width = values["patch"], values["place_rad"], values["width_rad"]
-    if height == 0.0:
+    if values["patch"] == 0.0:
         return wave
-
-    def factor(angle: Floats) -> Floats:
-        rough = 1.0 + height / (1.0 + ((angle - place) / width) ** 4)
-        return np.asarray(rough if wave is None else rough * wave(angle), dtype=np.float64)
-
-    return factor
+    patch = Law(_rough, (values["patch"], values["place_rad"], values["width_rad"]))
+    return patch if wave is None else Product((patch, wave))
 
 
 def _wave(amplitude: float, phase_rad: float, order: float = 1.0) -> Factor | None:
-    def factor(angle: Floats) -> Floats:
-        return np.asarray(1.0 + amplitude * np.cos(order * angle - phase_rad), dtype=np.float64)
+    return Law(_uneven, (amplitude, phase_rad, order)) if amplitude else None
 
-    return factor if amplitude else None
+
+def _uneven(angle: Floats, amplitude: float, phase_rad: float, order: float) -> Floats:
+    return np.asarray(1.0 + amplitude * np.cos(order * angle - phase_rad), dtype=np.float64)
+
+
+def _rough(angle: Floats, height: float, place: float, width: float) -> Floats:
+    return np.asarray(1.0 + height / (1.0 + ((angle - place) / width) ** 4), dtype=np.float64)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:

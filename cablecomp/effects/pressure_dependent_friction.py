@@ -10,6 +10,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Floats, Parameter, Restated
+from cablecomp.mechanics.change import Law
 
 NEUTRAL_PLACE: Final = 1.0
 """Tension over T0 at which it gives way, where none is given."""
@@ -24,15 +25,14 @@ LEAST_PRESSED: Final = 0.1
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    exponent, lost, place = values["exponent"], values["lost"], values["place"]
-    adhesion, power = values["adhesion"], values["adhesion_power"]
+    numbers = ("exponent", "lost", "place", "adhesion", "adhesion_power")
+    return Change(tension_factor=Law(_factor, tuple(values[name] for name in numbers)))
 
-    def factor(tau: Floats) -> Floats:
-        by_power = tau**-exponent
-        stuck = 1.0 + adhesion * (np.maximum(tau, LEAST_PRESSED) ** -power - 1.0)
-        return np.asarray(by_power * stuck * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
 
-    return Change(tension_factor=factor)
+def _factor(tau: Floats, exponent: float, lost: float, place: float, adhesion: float, power: float) -> Floats:
+    by_power = tau**-exponent
+    stuck = 1.0 + adhesion * (np.maximum(tau, LEAST_PRESSED) ** -power - 1.0)
+    return np.asarray(by_power * stuck * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
 
 
 def _grows_both_ways(values: Mapping[str, float], _on_high: bool) -> bool:

@@ -210,12 +210,13 @@ def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Chan
 
 
 def _laws(stage: Stage, sign: float, config: JointConfig, extra: Change) -> tuple[int, int]:
-    """Law tables of a cable's output drum and of its input drum: the joint's has its own, the motor's where its groove
-    is uneven (tables that are alike are one, and stay in the processor's cache)."""
+    """Law tables of a cable's output drum and of its input drum: the joint's and the motor's have their own where their
+    grooves are uneven."""
     first, last = config.drive.stage[0], config.drive.stage[-1]
-    uneven = stage is first and extra.motor_angle_factor is not None
     on_joint, on_motor = (ON_H, IN_H) if sign > 0.0 else (ON_L, IN_L)
-    return on_joint if stage is last else ELSEWHERE, on_motor if uneven else ELSEWHERE
+    uneven_out = stage is last and extra.joint_angle_factor is not None
+    uneven_in = stage is first and extra.motor_angle_factor is not None
+    return on_joint if uneven_out else ELSEWHERE, on_motor if uneven_in else ELSEWHERE
 
 
 def _check_pretensions(config: JointConfig, ratios: Sequence[float]) -> None:

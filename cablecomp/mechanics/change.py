@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.mechanics.tables import (
-    IN_H,
-    IN_L,
-    LAWS,
-    ON_H,
-    ON_L,
     Floats,
     law_table,
     plain_law,
@@ -21,6 +17,34 @@ from cablecomp.mechanics.tables import (
 )
 
 Factor = Callable[[Floats], Floats]
+
+KEPT = 32
+"""Law tables that are at hand: of the laws that a fit goes to and fro between."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A factor by its function of the argument and of numbers: the same as another with the same ones, so that a fit
+    that changes neither has its tables made once."""
+
+    function: Callable[..., Floats]
+    numbers: tuple[float, ...]
+
+    def __call__(self, x: Floats) -> Floats:
+        return self.function(x, *self.numbers)
+
+
+@dataclass(frozen=True)
+class Product:
+    """Factors that multiply."""
+
+    factors: tuple[Factor, ...]
+
+    def __call__(self, x: Floats) -> Floats:
+        total = np.ones_like(x)
+        for factor in self.factors:
+            total = total * factor(x)
+        return total
 
 
 @dataclass(frozen=True)
@@ -101,19 +125,13 @@ def together(changes: Sequence[Change]) -> Change:
 
 
 def _product(factors: Sequence[Factor | None]) -> Factor | None:
-    given = [f for f in factors if f is not None]
-
-    def product(x: Floats) -> Floats:
-        total = np.ones_like(x)
-        for factor in given:
-            total = total * factor(x)
-        return total
-
-    return product if given else None
+    given = tuple(f for f in factors if f is not None)
+    return Product(given) if given else None
 
 
 def law_tables(change: Change, config: JointConfig) -> Floats | None:
-    """Law tables (`tables.py`) for the output drums of chain h and l, for all other places, for the input drums.
+    """Law tables (`tables.py`), as many as there are unlike ones: for all places, or for all but the joint's own drum
+    in chain h and l, and the motor's. They may be kept for others, and are not to be written to.
 
     None where terms are all that is added: the kernel then runs the plain drive's own, quicker code.
     """
@@ -124,20 +142,32 @@ def law_tables(change: Change, config: JointConfig) -> Floats | None:
     )
     if by_tension is None and by_joint is None and by_motor is None:
         if change.stiffening != 0.0:
-            return np.stack([stiffening_law(change.stiffening, change.steady, change.knee)] * LAWS)
+            return stiffening_law(change.stiffening, change.steady, change.knee)[None]
         inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
-        return np.stack([plain_law()] * LAWS) if inside or change.moves_pretension else None
+        return plain_law()[None] if inside or change.moves_pretension else None
     out, wound = config.drive.stage[-1].wrap_output_rad, config.drive.stage[0].wrap_input_rad
-    grooves: dict[int, Factor] = {}
-    if by_joint is not None:
-        grooves |= {ON_H: lambda y: by_joint(y - out), ON_L: lambda y: by_joint(out - y)}
-    if by_motor is not None:  # the motor winds on what the joint winds off
-        grooves |= {IN_H: lambda y: by_motor(wound - y), IN_L: lambda y: by_motor(y - wound)}
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
+    stiffness = change.stiffening, change.steady, change.knee
+    return _law_tables(by_tension, by_joint, by_motor, out, wound, widest, stiffness)
 
-    def table(groove: Factor | None) -> Floats:
-        stiffness = change.stiffening, change.steady, change.knee
-        return law_table(by_tension or np.ones_like, groove, widest, *stiffness)
 
-    elsewhere = table(None)
-    return np.stack([table(grooves[k]) if k in grooves else elsewhere for k in range(LAWS)])
+@lru_cache(KEPT)
+def _law_tables(
+    by_tension: Factor | None,
+    by_joint: Factor | None,
+    by_motor: Factor | None,
+    out: float,
+    wound: float,
+    widest: float,
+    stiffness: tuple[float, float, float],
+) -> Floats:
+    """By `ELSEWHERE`, `ON_H`, `ON_L`, `IN_H`, `IN_L`; wraps on the joint's and the motor's drum, the widest of all."""
+    grooves: list[Factor | None] = [None]
+    if by_joint is not None:
+        grooves += [lambda y: by_joint(y - out), lambda y: by_joint(out - y)]
+    if by_motor is not None:  # the motor winds on what the joint winds off
+        grooves += [None] * (3 - len(grooves)) + [
+            lambda y: by_motor(wound - y),
+            lambda y: by_motor(y - wound),
+        ]
+    return np.stack([law_table(by_tension or np.ones_like, groove, widest, *stiffness) for groove in grooves])

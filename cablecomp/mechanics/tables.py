@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -26,7 +25,6 @@ from cablecomp.mechanics.jit import constant, inner_kernel, kernel, leaf_kernel
 Floats: TypeAlias = NDArray[np.float64]
 
 SIZE = 4096
-KEPT = 64  # tables that are at hand: of the laws that a fit goes to and fro between
 LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften further
 KNEE_HALF = 0.25  # half the tension over which a knee rises, over that amid it
 LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
@@ -34,9 +32,8 @@ TAU: Floats = np.exp(LN_TAU)
 ABOUT_T0 = slice(int(np.searchsorted(LN_TAU, 0.0)) - 1, int(np.searchsorted(LN_TAU, 0.0)) + 1)
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
 THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
-# laws: of the joint's own drum in chain h and l, of all other places, of the motor's own drum in chain h and l
-ON_H, ON_L, ELSEWHERE, IN_H, IN_L = constant(0), constant(1), constant(2), constant(3), constant(4)
-LAWS = 5
+# laws: of all places but those with a groove of their own, of the joint's own drum in chain h and l, of the motor's
+ELSEWHERE, ON_H, ON_L, IN_H, IN_L = (constant(k) for k in range(5))
 # rows
 HEAD, U_OF_V, G_OF_Y, V_OF_U, E_OF_V, AREA_OF_V = (constant(k) for k in range(6))
 ROWS = 6
@@ -88,23 +85,10 @@ def law_table(
 ) -> Floats:
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination; None: the same everywhere) and the tangent stiffness as `stiffening_law`; both factors are vectorised
-    and positive. The table may be kept for others, and is not to be written to."""
-    by_tension = tension_factor(TAU)
-    y = np.linspace(0.0, wrap_max_rad, SIZE)
-    by_place = None if groove_factor is None else groove_factor(y)
-    place = b"" if by_place is None else by_place.tobytes()
-    return _tabled(by_tension.tobytes(), place, wrap_max_rad, stiffening, steady, knee)
-
-
-@lru_cache(KEPT)
-def _tabled(
-    tension: bytes, place: bytes, wrap_max_rad: float, stiffening: float, steady: float, knee: float
-) -> Floats:
-    """The table by both factors on their grids (place: none, and the same everywhere); a fit that changes no law asks
-    for the same one again and again."""
+    and positive."""
     table = np.zeros((ROWS, SIZE))
     head = table[HEAD]
-    by_tension = np.frombuffer(tension)
+    by_tension = tension_factor(TAU)
     if np.any(by_tension != 1.0):
         v = _integral(LN_TAU[1] - LN_TAU[0], 1.0 / by_tension)
         v -= CubicHermiteSpline(LN_TAU[ABOUT_T0], v[ABOUT_T0], 1.0 / by_tension[ABOUT_T0])(0.0)
@@ -114,8 +98,8 @@ def _tabled(
         head[BY_TENSION] = 1.0
         head[V_LOW], head[V_PER] = v[0], 1.0 / (v_grid[1] - v_grid[0])
         head[U_LOW], head[U_PER] = LN_TAU[0], 1.0 / (LN_TAU[1] - LN_TAU[0])
-    by_place = np.frombuffer(place)
-    if np.any(by_place != 1.0):
+    by_place = None if groove_factor is None else groove_factor(np.linspace(0.0, wrap_max_rad, SIZE))
+    if by_place is not None and np.any(by_place != 1.0):
         step = wrap_max_rad / (SIZE - 1)
         table[G_OF_Y] = _integral(step, by_place)
         head[GROOVED] = 1.0
@@ -128,7 +112,6 @@ def _tabled(
     if head[BY_TENSION] and knee == 0.0:
         _fill_strains(table[None], 0)
         table[AREA_OF_V] = _integral(1.0 / head[V_PER], table[E_OF_V])
-    table.setflags(write=False)
     return table
 
 
