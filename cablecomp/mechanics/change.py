@@ -63,7 +63,7 @@ class Change:
 
     terms: tuple[Term, ...] = ()
     tension_factor: Factor | None = None
-    """mu/mu0 as a function of tau = T/T0, vectorised."""
+    """mu/mu0 as a function of tau = T/T0, vectorised; hashable, as its tables are kept (a `Law`, or any function)."""
     joint_angle_factor: Factor | None = None
     """mu/mu0 of the output drum's groove, by the joint angle [rad] at which the cable departs there."""
     motor_angle_factor: Factor | None = None

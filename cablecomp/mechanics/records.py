@@ -68,7 +68,7 @@ CABLE = record(
         ("radius", "f8", (2,)),
         ("mu", "f8", (2,)),
         ("wrap", "f8", (2,)),  # wrap angle at position zero
-        ("law", "i8", (2,)),  # its law table: ON_H, ON_L, ELSEWHERE, IN_H, IN_L
+        ("law", "i8", (2,)),  # its law tables: ELSEWHERE, ON_H, ON_L, IN_H, IN_L
         ("length", "f8"),  # of the free span
         ("EA", "f8"),
         ("T0", "f8"),
