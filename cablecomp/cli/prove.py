@@ -52,7 +52,10 @@ def prove_blindly(
     out: Annotated[Path, out_option("folder for trials, verdicts, answer and page")] = Path("prove"),
     kinds: Annotated[str, typer.Option(help="what the joints conceal, in turn; one given twice comes twice")] = KINDS,
     laws: Annotated[str, typer.Option(help="catalogue, other, mixed, or latest")] = "mixed",
-    imperfections: Annotated[str, typer.Option(help="of the world: none, some, or all")] = "some",
+    imperfections: Annotated[
+        str,
+        typer.Option(help="of the world: none, some, all, or vague (all, of a drive known by order of magnitude)"),
+    ] = "some",
     workers: Annotated[int, typer.Option(min=1, help="processes on this machine")] = 2,
     scheduler: Annotated[
         str | None, typer.Option(help="address of a Dask scheduler to diagnose on, in place of --workers")

@@ -72,7 +72,7 @@ def settled(how: Imperfections, rates: Mapping[str, float], floor_rad: float) ->
 
 
 def draw_imperfections(rng: np.random.Generator, amount: str, kind: str) -> Imperfections:
-    """Draw which imperfections a trial of this kind has (`amount`: none, some or all) and their numbers.
+    """Draw which imperfections a trial of this kind has (`amount`: none, some, all or vague) and their numbers.
 
     The same numbers are drawn whatever is taken, so that trials with and without differ by nothing else.
     """
@@ -82,8 +82,11 @@ def draw_imperfections(rng: np.random.Generator, amount: str, kind: str) -> Impe
         numbers = _NUMBERS[name](rng)
         if name == "companions" and kind not in ("single", "stranger", "motor"):
             continue
-        if amount == "all" or (amount == "some" and chosen):
+        if amount in ("all", "vague") or (amount == "some" and chosen):
             found[name] = numbers
+    if amount == "vague":
+        (aside,) = rng.spawn(1)
+        found["vague"] = _vague(aside)
     return Imperfections(found)
 
 
@@ -162,6 +165,13 @@ def _configuration(rng: np.random.Generator) -> dict[str, Any]:
         "beyond_tolerance": str(rng.choice(["EA_N", "pretension_N", "mu_output", "mu_input"])),
         "sigmas": float(rng.uniform(2.0, 3.5) * rng.choice((-1.0, 1.0))),
     }
+
+
+def _vague(rng: np.random.Generator) -> dict[str, Any]:
+    """By what the drive is stated off, each in ln: what one would guess of a machine that one has not built."""
+    decades = {"EA_N": 0.4, "pretension_N": 0.25, "mu_output": 0.3, "mu_input": 0.3}
+    guessed = {key: float(math.log(10.0) * rng.uniform(-d, d)) for key, d in decades.items()}
+    return {**guessed, "input_radius_m": float(rng.normal(0.0, 0.01))}
 
 
 def _gain(rng: np.random.Generator) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """`python -m firmware_sim.trials.make`: trials with their truth beside them, one folder each, to learn on.
 
-`--seed S --count N [--laws catalogue|other|mixed|latest] [--imperfections none|some|all] [--kinds K,…] --out DIR
+`--seed S --count N [--laws catalogue|other|mixed|latest] [--imperfections none|some|all|vague] [--kinds K,…] --out DIR
 [--first F] [--workers W]`. Folder DIR/00000 holds `recordings/…csv.gz`, `joint.toml`, `truth.json` and `truth.npz`.
 A trial depends on the seed, its number and what was asked for, not on how many are made.
 """

@@ -26,7 +26,8 @@ T = TypeVar("T")
 
 KINDS = ("single", "pair", "none", "stranger", "sessions", "confounded", "motor")
 """What a trial holds; `motor`: an effect that shows in the motor's torque alone."""
-IMPERFECTIONS = ("none", "some", "all")
+IMPERFECTIONS = ("none", "some", "all", "vague")
+"""Of the world; `vague`: all of them, and the drive known by order of magnitude only, in the same recordings."""
 ALIKE = frozenset({
     "bearing_friction:by_moment",
     "clamp_slip:gradual", "clamp_slip:in_steps", "clamp_slip:other_cable", "clamp_slip:overload",

@@ -14,7 +14,7 @@ from firmware_sim.trials.confounded import draw_truth
 from firmware_sim.trials.courses import KINDS, RATES_HZ, Course, draw_course
 from firmware_sim.trials.history import uneven, with_history
 from firmware_sim.trials.imperfections import Imperfections, draw_imperfections, drawn_numbers, settled
-from firmware_sim.trials.joints import DrawnJoint, draw_joint, log_uniform
+from firmware_sim.trials.joints import OFF_NOMINAL, DrawnJoint, draw_joint, log_uniform
 from firmware_sim.trials.legs import Leg, legs_of
 from firmware_sim.trials.measures import PlainDrive
 from firmware_sim.trials.order import Order, Wanted, concealable, order
@@ -31,6 +31,10 @@ SAMPLES = (10_000, 12_000)
 RECORDINGS = {1: 0.2, 2: 0.5, 3: 0.3}
 CONFOUNDED_RECORDINGS = 2
 FAR_SMALLER = 1.0 / 3.0  # at most so large is a companion meant to be, of what the trial is about
+BY_ORDER, RATIO_MEASURED = (
+    1.0,
+    0.02,
+)  # tolerances of a drive that one has not built: a decade; its ratio, from its angles
 _ATTEMPTS = 80
 _PAIRS = 3
 
@@ -104,6 +108,8 @@ def _draw(rng: np.random.Generator, wanted: Wanted, asked: Order) -> World | Non
     how = settled(how, _channel_rates(scene.plain, usable(joint).motor_per_joint, courses), floor)
     if "configuration" in how:
         joint = _off(joint, how, scene.plain)
+    if "vague" in how:
+        joint = _guessed(joint, how)
     needed = any(s.neighbour for s in asked.suspects)
     other = (NEIGHBOUR_ANGLE if turns else NEIGHBOUR_LOAD) if needed or rng.uniform() < 0.6 else ""
     if asked.case is not None:
@@ -286,3 +292,14 @@ def _off(joint: DrawnJoint, how: Imperfections, plain: PlainDrive) -> DrawnJoint
     values[key] = true * math.exp(numbers["sigmas"] * joint.tolerance[key])
     stated = {name: float(f"{value:.4e}") for name, value in values.items()}
     return replace(joint, nominal=replace(joint.nominal, stages=(StageConfig(**stated),)))
+
+
+def _guessed(joint: DrawnJoint, how: Imperfections) -> DrawnJoint:
+    """The drive stated by order of magnitude only, and its ratio by measure: what hardware has that nobody drew."""
+    stage = joint.nominal.stages[0]
+    off = {key: value * math.exp(how["vague"].get(key, 0.0)) for key, value in stage.__dict__.items()}
+    stated = {name: float(f"{value:.4e}") for name, value in off.items()}
+    tolerance = {"input_radius_m": RATIO_MEASURED, **dict.fromkeys(OFF_NOMINAL, BY_ORDER)}
+    return replace(
+        joint, nominal=replace(joint.nominal, stages=(StageConfig(**stated),)), tolerance=tolerance
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import json
+import tomllib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -127,6 +128,31 @@ def test_a_neighbour_that_turns_the_base_is_known_by_its_angle_and_one_that_load
         wanted = Wanted(7, ("single",), laws, "some")
         number = next(k for k in range(400) if order(wanted, k).suspects[0].id == form)
         assert draw_world(wanted, number).other == f"other_neighbour_{unit}"
+
+
+def test_a_vague_drive_is_the_same_trial_stated_by_order_of_magnitude(tmp_path: Path) -> None:
+    for amount in ("all", "vague"):
+        make(Wanted(11, ("single", "none"), "other", amount), 2, tmp_path / amount)
+    for number in ("00000", "00001"):
+        known, vague = (tmp_path / amount / number for amount in ("all", "vague"))
+        recordings = sorted(p.relative_to(known) for p in (known / "recordings").rglob("*.gz"))
+        assert recordings
+        assert all((known / p).read_bytes() == (vague / p).read_bytes() for p in recordings)
+        (stated, stage), (guessed, guess) = (_stated(folder) for folder in (known, vague))
+        assert max(stated.values()) <= 0.3
+        assert guessed == {"input_radius_m": 0.02} | dict.fromkeys(stated, 1.0)
+        off = {key: guess[key] / stage[key] for key in stage}
+        assert all(off[key] == 1.0 for key in off.keys() - guessed.keys())
+        assert all(0.39 < off[key] < 2.6 for key in stated)
+        assert max(abs(np.log(off[key])) for key in stated) > 0.3
+        truth = _truth(vague)[0]
+        assert truth["effects"] == _truth(known)[0]["effects"]
+        assert "vague" in truth["imperfections"]
+
+
+def _stated(folder: Path) -> tuple[dict[str, float], dict[str, float]]:
+    joint = tomllib.loads((folder / "joint.toml").read_text())
+    return joint["tolerance"], joint["drive"]["stage"][0]
 
 
 def test_a_companion_is_smaller_than_what_the_trial_is_about() -> None:
