@@ -30,7 +30,9 @@ from cablecomp.observer.bounds_kernel import (
 )
 
 OUTWARD = 1e-11  # rounding of solved tensions, as a share of T0
-ROUNDING = 1e-11  # of solved angles [rad], as the solver stops there
+# of solved angles [rad]: a solver's last steps, taken unseen, leave them off by 5e-11 at the most in 25 000 random
+# histories of a joint with short wraps
+ROUNDING = 1e-10
 
 
 class Shafts(NamedTuple):
