@@ -31,10 +31,8 @@ SAMPLES = (10_000, 12_000)
 RECORDINGS = {1: 0.2, 2: 0.5, 3: 0.3}
 CONFOUNDED_RECORDINGS = 2
 FAR_SMALLER = 1.0 / 3.0  # at most so large is a companion meant to be, of what the trial is about
-BY_ORDER, RATIO_MEASURED = (
-    1.0,
-    0.02,
-)  # tolerances of a drive that one has not built: a decade; its ratio, from its angles
+BY_ORDER = 1.0  # tolerance of what is guessed of a drive that one has not built: a decade
+RATIO_MEASURED = 0.02  # of its ratio, which its two angles tell
 _ATTEMPTS = 80
 _PAIRS = 3
 
