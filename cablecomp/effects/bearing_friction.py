@@ -17,8 +17,8 @@ from cablecomp.effects.base import (
     drum_radius,
     per_moment,
     pretension_moment,
-    term,
 )
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import dragging
 
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension, term, wrap_deflection
+from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension, wrap_deflection
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.course import COURSE, CURVE, DURATION, LENGTHS, STEPS, course, gone
 from cablecomp.errors import InputError
 from cablecomp.mechanics.change import Term

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.base import Change, Effect, Parameter
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import begun
 
 SLOTS = 256

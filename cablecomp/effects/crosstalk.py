@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term, wrap_deflection
+from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, wrap_deflection
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.lag import lagged
 
 

@@ -6,7 +6,7 @@ import math
 from typing import Any, Final
 
 from cablecomp.config import Empirical, JointConfig
-from cablecomp.effects.base import term
+from cablecomp.effects.compiled_term import term
 from cablecomp.errors import InputError
 from cablecomp.mechanics.change import Term
 from cablecomp.mechanics.jit import njit

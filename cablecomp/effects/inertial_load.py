@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment, term
+from cablecomp.effects.base import Change, Effect, Parameter, pretension_moment
+from cablecomp.effects.compiled_term import term
 
 GAP = 5.0
 """Steps of the last one's length beyond which the motion in between is not known."""

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, input_moment, term
+from cablecomp.effects.base import Change, Effect, Parameter, input_moment
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import dragging
 
 

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, pretension_moment, term
+from cablecomp.effects.base import LEAST_PRETENSION, Change, Effect, Parameter, pretension_moment
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import begun
 
 ROOM_DEGC: Final = 20.0

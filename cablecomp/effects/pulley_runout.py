@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment, term
+from cablecomp.effects.base import Change, Effect, Parameter, drum_radius, pretension_moment
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import repeated
 
 

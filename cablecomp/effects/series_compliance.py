@@ -8,15 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import (
-    Change,
-    Effect,
-    Parameter,
-    per_moment,
-    pretension_moment,
-    term,
-    wrap_compliance,
-)
+from cablecomp.effects.base import Change, Effect, Parameter, per_moment, pretension_moment, wrap_compliance
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.lag import lagged
 from cablecomp.effects.shared_shapes import varied, varying
 

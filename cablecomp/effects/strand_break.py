@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter, term
+from cablecomp.effects.base import Change, Effect, Parameter
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.course import COURSE, CURVE, DURATION, LENGTHS, STEPS, course, gone
 
 

@@ -8,15 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import (
-    Change,
-    Effect,
-    Parameter,
-    at_most,
-    pretension_moment,
-    term,
-    wrap_deflection,
-)
+from cablecomp.effects.base import Change, Effect, Parameter, at_most, pretension_moment, wrap_deflection
+from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import varied, varying
 from cablecomp.errors import InputError
 

@@ -15,8 +15,8 @@ from cablecomp.effects.base import (
     Restated,
     cable_strain,
     pretension_moment,
-    term,
 )
+from cablecomp.effects.compiled_term import term
 
 
 @term(parameters=("coefficient", "bend", "reference", "lag", "hanging"), state=("time", "warm"))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.effects import Change, Effect, Parameter, catalogue, register, with_effects
-from cablecomp.effects.base import CompiledTerm
+from cablecomp.effects.compiled_term import CompiledTerm
 from cablecomp.effects.course import FURTHER
 from cablecomp.observer import Observer
 

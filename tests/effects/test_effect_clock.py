@@ -9,7 +9,7 @@ import pytest
 from effect_cases import excitation, joint, run, still
 
 from cablecomp.effects import extend, with_effects
-from cablecomp.effects.base import term
+from cablecomp.effects.compiled_term import term
 from cablecomp.mechanics.assemble import assemble
 from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer import Observer

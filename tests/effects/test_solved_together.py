@@ -11,7 +11,7 @@ from effect_cases import excitation, joint, register_alone, typical, unit
 
 from cablecomp.config import JointConfig
 from cablecomp.effects import extend, with_effects
-from cablecomp.effects.base import term
+from cablecomp.effects.compiled_term import term
 from cablecomp.mechanics.assemble import assemble
 from cablecomp.mechanics.drive import N_SIZES
 from cablecomp.mechanics.flat import records

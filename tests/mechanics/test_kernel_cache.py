@@ -12,9 +12,9 @@ from pathlib import Path
 import numba
 import pytest
 
-from cablecomp.effects.base import CompiledTerm
 from cablecomp.effects.clock_skew import SLOTS
 from cablecomp.effects.clock_skew import _look_back as look_back
+from cablecomp.effects.compiled_term import CompiledTerm
 from cablecomp.mechanics.jit import CACHE, cached, drop_cut_short
 
 STATE = ("start", "count", "cursor", "time", "reading", "angle", "rate")

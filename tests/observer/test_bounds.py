@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as some
 from observer_joints import joint, knots, pull_unit, run
 
@@ -29,6 +29,9 @@ JOINTS = {
     ),
 }
 shares = some.lists(some.floats(-1.0, 1.0), min_size=4, max_size=9)
+STILL = [0.0] * 4
+HELD = [-1.0, 0.75, *[0.0] * 10]
+"""At an even load a solver stops a billionth of T0 short, row by row: the angle of short wraps goes by 1.6e-11 rad."""
 
 
 def span(config: JointConfig) -> float:
@@ -41,6 +44,7 @@ def span(config: JointConfig) -> float:
 @given(
     before=shares, after=shares, turns_before=shares, turns=shares, turning=some.sampled_from([0.0, 0.2, 1.5])
 )
+@example(before=STILL, after=HELD, turns_before=STILL, turns=STILL, turning=0.0)
 def test_truth_lies_within(
     name: str,
     before: list[float],
@@ -63,20 +67,6 @@ def test_truth_lies_within(
     assert np.all(low[known] <= truth[known])
     assert np.all(truth[known] <= high[known])
     assert np.all(seen["deflection_rad"][known] >= low[known])
-
-
-def test_truth_lies_within_where_last_steps_that_nobody_saw_add_up() -> None:
-    """At an even load the solver stops a billionth of T0 short, row by row, and the angle goes by 1.6e-11 rad."""
-    config = JOINTS["closed, short wraps"]
-    load = span(config) * knots([-1.0, 0.75, *[0.0] * 10])
-    true, bounded = Observer(config), Observer(config, bounds=True)
-    run(true, np.zeros(37), np.zeros(37))
-    truth = run(true, load, np.zeros_like(load), 10.0)["deflection_rad"]
-    seen = run(bounded, load, np.zeros_like(load), 10.0)
-    known = np.isfinite(seen["deflection_low_rad"])
-    assert np.count_nonzero(known) > 100
-    assert np.all(seen["deflection_low_rad"][known] < truth[known])
-    assert np.all(truth[known] < seen["deflection_high_rad"][known])
 
 
 def width(seen: dict[str, np.ndarray]) -> np.ndarray:
