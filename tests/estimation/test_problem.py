@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from cablecomp.estimation.least_squares import covariance, inside, solve, weighe
 from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
+from cablecomp.estimation.simulate import Simulator
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
@@ -240,3 +242,32 @@ def test_an_amount_is_begun_where_it_was_seen_however_far_its_bounds(three: tupl
         begun = inside(p, np.append(p.start[:-1], amount.x(value)))
         assert amount.value(float(begun[-1])) == pytest.approx(value, rel=1e-9)
         assert np.allclose(begun[:-1], p.start[:-1])
+
+
+def test_a_point_that_was_just_asked_is_not_run_again(
+    three: tuple[Evidence, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    p = problem(three)
+    x = p.start.copy()
+    first = p.misfits(x)
+    ran: list[str] = []
+    run = Simulator.run
+
+    def counted(self: Simulator, recording: Evidence, *args: Any) -> object:
+        ran.append(recording.name)
+        return run(self, recording, *args)
+
+    monkeypatch.setattr(Simulator, "run", counted)
+    p.zeros(x), p.left(x), p.aside(x), p.followed(x)
+    heavier = p.with_weighing(replace(p.weighing, sigma={ANGLE: 3.0 * SIGMA}))
+    assert heavier.misfits(x) is first  # weights are none of its business
+    assert not ran
+    fewer = p.with_evidence(three[:2])
+    fewer.misfits(x)
+    assert ran == ["0", "1"]
+    x[0] += STEP  # another point, if in the same array
+    moved = p.misfits(x)[ANGLE]
+    assert ran == ["0", "1", "0", "1", "2"]
+    assert not any(np.array_equal(a, b) for a, b in zip(moved, first[ANGLE], strict=True))
+    with pytest.raises(ValueError, match="read-only"):
+        moved[0] += 1.0  # whoever asks next gets the same

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeGuard
 
 import numpy as np
@@ -45,6 +46,11 @@ class Model:
     def name(self) -> str:
         """Names of what was added, joined."""
         return " + ".join(t.name for t in self.terms) or "calibrated drive"
+
+    @cached_property
+    def carried(self) -> Fit:
+        """Its fit about recordings with what its own drive carries over of unknown histories."""
+        return with_own_carryover(self.fit)
 
     @property
     def added(self) -> frozenset[str]:
@@ -161,7 +167,7 @@ def _moved(fit: Fit) -> dict[str, frozenset[str]]:
 
 def reweighed(model: Model, weighing: Weighing, groups: Groups) -> Model:
     """The model refitted with other weights, and with what its own drive carries over of unknown histories."""
-    fit = refit(with_own_carryover(model.fit), weighing, LIMITS.settled)
+    fit = refit(model.carried, weighing, LIMITS.settled)
     return replace(model, fit=fit, left_out=left_out(fit, groups))
 
 
