@@ -1,5 +1,5 @@
-"""Independent fits side by side in threads: the compiled kernels let go of the interpreter. Linear algebra has none of
-its own meanwhile."""
+"""Independent fits side by side: in threads, as the compiled kernels let go of the interpreter, or in processes, whose
+interpreters do not wait for each other. Linear algebra has no threads of its own meanwhile."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_limits
+
+from cablecomp.estimation.forked import forkable, forked
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -22,6 +26,8 @@ MOST = 4
 
 _HERE = threading.local()
 """`aside`: whether this thread is one of those that do the work."""
+_FORKS: ContextVar[bool] = ContextVar("forks", default=False)
+"""Whether this process lets itself be forked."""
 
 
 def side_by_side(work: Callable[[A], B], items: Sequence[A]) -> Iterator[B]:
@@ -33,6 +39,33 @@ def side_by_side(work: Callable[[A], B], items: Sequence[A]) -> Iterator[B]:
         return
     with ThreadPoolExecutor(threads, initializer=_aside) as pool:
         yield from pool.map(work, items)
+
+
+def in_processes(
+    work: Callable[[A], B], items: Sequence[A], dear: Callable[[A], float] = lambda _: 0.0
+) -> list[B]:
+    """As `side_by_side`, of work that takes a tenth of a second and more: in forks of this process, where it lets
+    itself be forked (`forks_allowed`). What `work` changes is not seen here then, only what it returns. `dear`: which
+    items take longest, and are begun with."""
+    several = 1 if getattr(_HERE, "aside", False) else min(MOST, _threads(), len(items))
+    if several < 2 or not (_FORKS.get() and forkable()):
+        return list(side_by_side(work, items))
+    _HERE.aside = True
+    try:
+        return forked(work, items, several, dear)
+    finally:
+        _HERE.aside = False
+
+
+@contextmanager
+def forks_allowed() -> Iterator[None]:
+    """Meanwhile work may go to forks of this process. For who owns it: a program that drives a joint, or has a library
+    in it that cannot be forked, had better not."""
+    token = _FORKS.set(True)
+    try:
+        yield
+    finally:
+        _FORKS.reset(token)
 
 
 def _aside() -> None:
