@@ -30,6 +30,7 @@ from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json, write_diagnosis
 from cablecomp.errors import InputError
+from cablecomp.estimation.parallel import forks_allowed
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
@@ -86,7 +87,7 @@ def diagnose_recordings(
     data = read_moving(recordings, reading(joint))
     announce_compilation()
     doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
-    with share_bar() as progress:
+    with share_bar() as progress, forks_allowed():
         found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
     found = replace(found, warnings=(*doubted, *found.warnings))
     with atomic_directory(out) as folder:

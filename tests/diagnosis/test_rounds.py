@@ -11,6 +11,7 @@ from joints import SMALL, closed
 
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.explain import rounds
+from cablecomp.diagnosis.explain.beginning import _far as far_off
 from cablecomp.diagnosis.explain.dependence import Dependence, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.scores import ScoreDifference
@@ -39,7 +40,7 @@ def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_
 
     monkeypatch.setattr(rounds, "rough", rough)
     monkeypatch.setattr(rounds, "ask_dependences", lambda *_: [])
-    monkeypatch.setattr(rounds, "_further", lambda h, at: [])
+    monkeypatch.setattr(rounds, "further", lambda h, at: [])
     plain = [f"event {k}" for k in range(LIMITS.tried_later + 2)]
     trading = [f"friction {k}" for k in range(LIMITS.tried_trading + 1)]
     answers: Any = [
@@ -93,7 +94,7 @@ def test_a_share_with_a_bound_is_begun_with_most_of_it_as_well(effect: str, shar
     h = Hypothesis(law, effect, amount, (Start({p.name: p.neutral for p in law.parameters}),), False)
     fit: Any = SimpleNamespace(values={"EA_N": 2e4}, problem=SimpleNamespace(config=config))
     at: Any = SimpleNamespace(model=SimpleNamespace(fit=fit))
-    found = rounds._far(h, at)
+    found = far_off(h, at)
     if share is None:
         assert found == []
     else:

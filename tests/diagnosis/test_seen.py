@@ -77,3 +77,26 @@ def test_what_promises_most_is_known_before_it_is_asked_again(
     assert likeliest(anchor(fit, seen=Seen()), others, 3, lambda h: False) == others
     events = [h for h in pool if h.has_instant]
     assert likeliest(anchor(fit, seen=seen), events, 0, lambda h: False) == events
+
+
+def test_what_is_seen_apart_is_not_seen_here_until_it_is_learnt(
+    asked: tuple[list[Hypothesis], Seen, Fit],
+) -> None:
+    pool, seen, fit = asked
+    h = next(h for h in pool if h.effect.id == "pretension_relaxation")
+    other = next(h for h in pool if h.effect.id == "series_compliance")
+    known = seen.starts_of(h)
+    assert known
+    assert seen.starts_of(other)
+    own, aside = seen.only(h), seen.apart()
+    assert own.starts_of(h) == known
+    assert not own.starts_of(other)
+    start = (h.starts[0],)
+    for one in (own, aside):
+        one.keep(h, start, fit, [])  # as if nothing could be followed from there
+        assert one.recall(h, start, fit) == []
+    assert seen.recall(h, start, fit)
+    here = seen.apart()
+    here.learn(own)
+    assert here.recall(h, start, fit) == []
+    assert here.starts_of(other) == seen.starts_of(other)

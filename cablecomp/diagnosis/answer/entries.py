@@ -31,7 +31,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, load_channel
 from cablecomp.estimation.least_squares import Fit, rms_left
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.profile import profile_interval
 from cablecomp.observer import Observer
 
@@ -51,7 +51,7 @@ def named_of(w: Weighed, final: Model) -> Named:
     mine = f"effect.{effect.id}."
     values = list(as_trials_say([v for v in effect_values(final.fit) if v.name.startswith(mine)]))
     if w.confidence >= LIMITS.name:
-        found = side_by_side(lambda v: profile_interval(final.fit, v.name, LIMITS.wider), values)
+        found = in_processes(lambda v: profile_interval(final.fit, v.name, LIMITS.wider), values)
         values = [replace(v, interval_95=i) for v, i in zip(values, found, strict=True)]
     values, recording = _in_its_recording(values, w.term, final.fit)
     parameters: dict[str, Value | str] = {v.name.removeprefix(mine): v for v in values}

@@ -16,7 +16,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import INPUT, JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, fitted_to_part, rms_left
 from cablecomp.estimation.limits import CARRYOVER_SD
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.signal.smoothing import BoolArray, FloatArray
 
 
@@ -30,7 +30,7 @@ def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empir
         again = fitted_to_part(fit, part.rest, 5)
         return _left(again, part.out, _again(again, laws))
 
-    parts = [p for found in side_by_side(left_out, left_out_in_turn(fit.problem.evidence, by)) for p in found]
+    parts = [p for found in in_processes(left_out, left_out_in_turn(fit.problem.evidence, by)) for p in found]
     own_zero = [p - np.mean(p) for p in parts]
     return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)), _rms(own_zero))
 

@@ -34,7 +34,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit, solve
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.signal.smoothing import FloatArray
 
 ALONE: Final = ScoreDifference(1.0, 99.0, 10.0)
@@ -83,10 +83,10 @@ def rivals(
     before = 0.5 * float(base.fit.residual @ base.fit.residual)
     others = [h for h in pool if h.effect.id not in ids and not h.same_as(term)]
     others = likeliest(here, others, LIMITS.asked_later, lambda h: False)
-    asked = side_by_side(lambda h: ask_all([here], h), others)
+    asked = in_processes(lambda h: ask_all([here], h), others)
     answers = [a for a in asked if a and a[0].cost < LIMITS.promise * before]
     answers = sorted(answers, key=lambda a: a[0].cost)[: LIMITS.promising - 2]
-    fitted = [next(iter(f), None) for f in side_by_side(lambda a: rough(a, LIMITS.rough), answers)]
+    fitted = [next(iter(f), None) for f in in_processes(lambda a: rough(a, LIMITS.rough), answers)]
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )
@@ -98,7 +98,7 @@ def rivals(
     freely: list[ScoreDifference] = []
     models: dict[str, Model] = {}
     chosen = roughs[: LIMITS.promising // 2]
-    fits = side_by_side(lambda p: _tried(p[0]), chosen)
+    fits = in_processes(lambda p: _tried(p[0]), chosen)
     for fit, (_, a) in zip(fits, chosen, strict=True):
         # what only its most extreme shape fits is another effect's to explain
         if fit is None or better_word(fit, a.hypothesis):

@@ -6,11 +6,12 @@ Besides effects, a round tries dependences: a parameter that is each session's o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from cablecomp.diagnosis.explain.beginning import Beginning, Begun, further
 from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor, likeliest
@@ -39,61 +40,11 @@ from cablecomp.diagnosis.explain.scores import (
 )
 from cablecomp.diagnosis.explain.screening import Answer, ask_all, rough
 from cablecomp.diagnosis.explain.seen import Seen
-from cablecomp.diagnosis.folds import Groups
-from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import MOTOR
 from cablecomp.estimation.least_squares import Fit, solve
-from cablecomp.estimation.parallel import side_by_side
-from cablecomp.estimation.parameter import by_condition, vague_drive
-from cablecomp.estimation.problem import Problem
-from cablecomp.signal.smoothing import FloatArray
-
-
-@dataclass(frozen=True)
-class Beginning:
-    """What a round begins from.
-
-    `nominal`: a further point to ask from. `number`: 0 for the first round. `cold`: values to begin from where the
-    drive is known by order of magnitude only; `known`: models of earlier rounds, to begin from as well; `seen`: what
-    was asked beside these does. Once the time is up nothing further is begun but the most promising fit.
-    """
-
-    model: Model
-    nominal: Fit | None
-    pool: Sequence[Hypothesis]
-    groups: Groups
-    pace: Pace
-    number: int
-    cold: Mapping[str, float] | None
-    known: Sequence[Model]
-    seen: Seen
-
-    @property
-    def cost(self) -> float:
-        """Cost of the model that hypotheses are put beside."""
-        return self.model.fit.cost
-
-    def tell(self, what: str) -> None:
-        """Say what is being done, and how far the search is."""
-        self.pace.tell(what, self.number / (LIMITS.rounds + LIMITS.later_rounds))
-
-    def trades(self, h: Hypothesis) -> bool:
-        """Whether a hypothesis is tried whatever it promises: beside another effect it may trade places."""
-        return self.cold is not None and self.number > 0 and h.trades
-
-
-@dataclass(frozen=True)
-class Begun:
-    """A fit that has been begun: its cost so far, what it adds, where it stands, and what is roughly known of
-    its derivative."""
-
-    cost: float
-    terms: tuple[Term, ...]
-    problem: Problem
-    x: FloatArray
-    J: FloatArray | None = None
+from cablecomp.estimation.parallel import in_processes
+from cablecomp.estimation.parameter import by_condition
 
 
 def one_round(at: Beginning, rng: np.random.Generator) -> Round:
@@ -128,7 +79,7 @@ def _tried(
         at.tell(f"fitting {c.terms[0].name}")
         return None if at.pace.over and c is not chosen[0] else _finished(c, at, fine)
 
-    models = ranked_models([m for m in side_by_side(finish, chosen) if m is not None], at.groups)
+    models = ranked_models([m for m in in_processes(finish, chosen) if m is not None], at.groups)
     return _compared(models, at, fine, rng)
 
 
@@ -148,7 +99,7 @@ def _pairs(begun: Sequence[Begun], at: Beginning) -> list[Begun]:
         dependence, fit = found
         return [Begun(fit.cost, (pair[1], dependence), fit.problem, fit.x, fit.J)]
 
-    found = [b for part in side_by_side(begin, near[: LIMITS.pairs]) for b in part]
+    found = [b for part in in_processes(begin, near[: LIMITS.pairs]) for b in part]
     return [b for b in found if b.cost < at.cost]
 
 
@@ -156,17 +107,26 @@ def _asked(at: Beginning) -> list[list[Answer]]:
     """What each hypothesis that the model has not promises, by a linear step from each anchor. In a later round those
     that promise most by what was seen of them before are asked."""
     here = anchor(at.model.fit, seen=at.seen)
-    anchors = [here, *([] if at.nominal is None else [anchor(at.nominal)])]
+    nominal = [] if at.nominal is None else [anchor(at.nominal)]
     ids = {t.effect.id for t in at.model.terms if isinstance(t, Hypothesis)}
     left = [h for h in at.pool if h.effect.id not in ids]  # a second of the same would share its parameters
     if at.number > 0:
         left = likeliest(here, left, LIMITS.asked_later, at.trades)
 
-    def answer(h: Hypothesis) -> list[Answer]:
+    def answer(h: Hypothesis) -> tuple[list[Answer], Seen]:
         at.tell(f"asking {h.name}")
-        return [] if at.pace.over else ask_all(anchors, h)
+        own = at.seen.only(h)
+        return [] if at.pace.over else ask_all([replace(here, seen=own), *nominal], h), own
 
-    return [a for a in side_by_side(answer, left) if a]
+    answers = in_processes(answer, left, _dear)
+    for _, seen in answers:
+        at.seen.learn(seen)
+    return [a for a, _ in answers if a]
+
+
+def _dear(h: Hypothesis) -> float:
+    """Which hypotheses take long: those that are run on every sample, then those that come at any instant."""
+    return 2.0 * h.effect.rates + h.has_instant
 
 
 def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun], list[Begun]]:
@@ -178,23 +138,24 @@ def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun],
         dear = 2 if model.fit.problem.fine else 1
         worth = sorted(worth, key=lambda a: a[0].cost)
         most = LIMITS.tried_later // dear
-        further = LIMITS.tried_trading // dear if len(model.fit.problem.repeated) > 1 else 0
-        worth = worth[:most] + [a for a in worth[most:] if at.trades(a[0].hypothesis)][:further]
+        trading = LIMITS.tried_trading // dear if len(model.fit.problem.repeated) > 1 else 0
+        worth = worth[:most] + [a for a in worth[most:] if at.trades(a[0].hypothesis)][:trading]
 
     def begin(a: list[Answer]) -> list[Fit]:
         h = a[0].hypothesis
         at.tell(f"trying {h.name}")
-        found = [] if at.pace.over else rough(a, LIMITS.rough, _further(h, at) if h.trades else [])
+        found = [] if at.pace.over else rough(a, LIMITS.rough, further(h, at) if h.trades else [])
         return [f for f in found if not in_no_recording(f, h)]
 
     first: list[Begun] = []
     second: list[Begun] = []
-    for fits, a in zip(side_by_side(begin, worth), worth, strict=True):
+    for fits, a in zip(in_processes(begin, worth, lambda a: _dear(a[0].hypothesis)), worth, strict=True):
         h = a[0].hypothesis
         for k, f in enumerate(fits[: 2 if at.trades(h) else 1]):
             (second if k else first).append(Begun(f.cost, (h,), f.problem, f.x, f.J))
-    for found in side_by_side(_by_conditions, list(first)):
-        first += found
+    if first and first[0].problem.evidence[0].condition:
+        for found in in_processes(_by_conditions, list(first)):
+            first += found
     if at.number > 0 or model.fit.problem.parameters:
         for d, cost, problem in ask_dependences(model.fit, model.terms, at.groups.by):
             first.append(Begun(cost, (d,), problem, placed(model.fit, problem)))
@@ -269,52 +230,6 @@ def _compared(
     added = len(at.model.terms)
     tried = [Tried(m.terms[added], m, differences[m.name], shares[m.name]) for m in models]
     return sorted(tried, key=lambda t: -t.difference.gain)
-
-
-def _further(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
-    """Values to begin from beside where calibration stands: effects that trade places sit in a valley of their
-    own, and an earlier model that has this one may have found it; what that model lacks begins at a part of its
-    amount."""
-    model, cold = at.model, at.cold
-    having = [m for m in at.known if h.name in m.added and len(m.terms) <= len(model.terms)]
-    if not having:
-        return [cold, *_far(h, at)] if cold is not None and model.terms else []
-    best = max(having, key=lambda m: len(model.added & m.added))
-    values = dict(best.fit.values)
-    amounts = {t.key(t.amount.name) for t in model.terms if isinstance(t, Hypothesis)}
-    for name, value in model.fit.values.items():
-        values.setdefault(name, LIMITS.part * value if name in amounts else value)
-    return [values]
-
-
-def _far(h: Hypothesis, at: Beginning) -> list[Mapping[str, float]]:
-    """The drive as it stands with most of a share that has a bound: a little of it sits in another valley."""
-    amount, values = h.amount, at.model.fit.values
-    if amount.log or not 0.0 < amount.maximum <= 1.0:
-        return []
-    starts = {h.key(k): v for k, v in h.starts[0].values.items() if not isinstance(v, str)}
-    far = LIMITS.far * amount.bounds(at.model.fit.problem.config)[1]
-    return [{**starts, **values, h.key(amount.name): far}]
-
-
-def cold_starts(pool: Sequence[Hypothesis], baseline: Fit) -> dict[str, float] | None:
-    """Where every effect would begin beside the nominal drive; None where the drive is known better than by
-    order of magnitude (calibration then stays in its valley)."""
-    if not vague_drive(baseline.problem.parameters):
-        return None
-    evidence = baseline.problem.evidence
-    torque = [
-        float(np.std(e.columns[c])) for e in evidence for c in (MOTOR, "joint_torque_Nm") if c in e.columns
-    ]
-    found: dict[str, float] = {}
-    for h in pool:
-        values = dict(h.starts[0].values if h.effect.posture else h.starts[len(h.starts) // 2].values)
-        if (
-            h.amount.unit == "N m" and torque
-        ):  # a share of the torques that go round: moments are not known beforehand
-            values[h.amount.name] = 0.25 * float(np.median(torque))
-        found |= {h.key(k): v for k, v in values.items() if not isinstance(v, str)}
-    return found
 
 
 def _wants_rates(a: Answer, at: Beginning) -> bool:

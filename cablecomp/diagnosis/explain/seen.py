@@ -7,7 +7,7 @@ What an effect does hardly hangs on what else the model has; what is left for it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,28 @@ class _Kept(NamedTuple):
     sizes: tuple[float, ...]
 
 
-class Seen:
-    """What each hypothesis did, by where it was asked from. Threads may share one, each with hypotheses of its own."""
+OfOne: TypeAlias = Mapping[object, _Kept]
+"""What one hypothesis did, by where it was asked from."""
 
-    def __init__(self) -> None:
-        self._of: dict[str, dict[object, _Kept]] = {}
+
+class Seen:
+    """What each hypothesis did, by where it was asked from. Work that goes side by side shares none: what is told of a
+    hypothesis would hang on which came first."""
+
+    def __init__(self, of: Mapping[str, OfOne] | None = None) -> None:
+        self._of: dict[str, dict[object, _Kept]] = {h: dict(kept) for h, kept in (of or {}).items()}
+
+    def apart(self) -> Seen:
+        """The same, to go on by itself."""
+        return Seen(self._of)
+
+    def only(self, h: Hypothesis) -> Seen:
+        """What was seen of one hypothesis, to go on by itself."""
+        return Seen({h.name: self._of[h.name]} if h.name in self._of else {})
+
+    def learn(self, other: Seen) -> None:
+        """Take over what another one has seen of its hypotheses."""
+        self._of |= other._of
 
     def keep(self, h: Hypothesis, starts: Starts, fit: Fit, found: Sequence[Added]) -> None:
         """Remember what was found beside a fit."""

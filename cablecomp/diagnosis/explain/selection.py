@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from cablecomp.diagnosis.explain.asked_again import with_better_forms
+from cablecomp.diagnosis.explain.beginning import Beginning, cold_starts
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
@@ -25,7 +26,7 @@ from cablecomp.diagnosis.explain.model import (
     searching,
     without,
 )
-from cablecomp.diagnosis.explain.rounds import Beginning, cold_starts, one_round
+from cablecomp.diagnosis.explain.rounds import one_round
 from cablecomp.diagnosis.explain.scores import demanded, left_out, score_difference
 from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.explain.ties import (
@@ -44,7 +45,7 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.problem import Weighing
 
 
@@ -152,7 +153,7 @@ def _carried(
         if others and not any(others[0] is m for m in kept) and not outdoes(fresh[0], others[0], groups):
             kept.append(others[0])
     sharper = searching(fresh[0].fit)
-    again = list(side_by_side(lambda m: with_better_forms(reweighed(m, sharper, groups), groups), kept))
+    again = list(in_processes(lambda m: with_better_forms(reweighed(m, sharper, groups), groups), kept))
     carried = ranked([m for m in again if all(amount_resolved(m.fit, t) for t in m.terms)], groups)
     if not carried:
         return None
@@ -217,7 +218,7 @@ def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
             for term in model.terms[:-1]
             if not any(t.belongs_to(term) for t in bound) and not alone_by_far(rounds, term)
         ]
-        fewer = side_by_side(partial(without, model, groups=groups, known=fitted_in(rounds)), asked)
+        fewer = in_processes(partial(without, model, groups=groups, known=fitted_in(rounds)), asked)
         for term, smaller in zip(asked, fewer, strict=True):
             if smaller is None or implausible(smaller) > implausible(model):
                 continue

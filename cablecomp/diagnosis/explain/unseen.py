@@ -14,7 +14,7 @@ from cablecomp.diagnosis.explain.linear import Anchor, anchor, contribution
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.signal.smoothing import FloatArray
 
 
@@ -48,7 +48,7 @@ def could_be_unseen(
     found, hidden = [], []
     held = {entry.id for entry in fit.problem.config.effect}
     asked = [h for h in pool if h.name not in named and (h.effect.id not in held or h.channel)]
-    for h, made in zip(asked, side_by_side(lambda h: _made(here, h), asked), strict=True):
+    for h, made in zip(asked, in_processes(lambda h: _made(here, h), asked), strict=True):
         sizes = _bounds(here, h, made)
         seen = [s for s in sizes if s is not None]
         most = max(abs(b) for b in h.amount.bounds(fit.problem.config))

@@ -40,7 +40,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.signal.smoothing import FloatArray
 
 NO_SIZE: Final = ("length", "instant", "duration")
@@ -84,7 +84,7 @@ def weigh(
     pool = [h for h in found.pool if h.name in able]
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
     drawn = zip(terms, rng.spawn(len(terms)), strict=True)
-    weighed = side_by_side(lambda t: _weighed(found, t[0], pool, left, locate, share_left, t[1]), [*drawn])
+    weighed = in_processes(lambda t: _weighed(found, t[0], pool, left, locate, share_left, t[1]), [*drawn])
     return sorted(one_in_series(list(weighed)), key=lambda w: -w.confidence)
 
 
@@ -122,7 +122,7 @@ def _weighed(
         others = [t for t in bare.terms if isinstance(t, Hypothesis)]
         having, lacking = (left_out_with_discrepancy(m, others, groups) for m in (final, bare))
         own = score_difference(having, lacking, groups)
-        instead = rivals(final, term, bare, pool, groups, selection.seen, selection.known, rng)
+        instead = rivals(final, term, bare, pool, groups, selection.seen.apart(), selection.known, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
     nearest = min(against.values(), key=lambda v: v.z, default=NO_RIVAL)
     # an event of any course predicts nothing of a part left out: it is weighed as it goes
