@@ -128,8 +128,9 @@ def _help(
     global _HELPING
     try:
         _HELPING = True
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for each in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(each) != signal.SIG_IGN:
+                signal.signal(each, signal.SIG_DFL)
         gc.freeze()  # what was there before is not looked through again, whose pages would be copied for it
         found: dict[int, B] | BaseException = {}
         try:
