@@ -21,7 +21,7 @@ B = TypeVar("B")
 P = ParamSpec("P")
 
 MOST = 4
-"""Threads; beyond, the interpreter between kernel calls is what they wait for."""
+"""Threads or processes: with more, threads wait for the interpreter, and forks for what goes one after another."""
 
 
 _HERE = threading.local()

@@ -50,15 +50,16 @@ def forking(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @needs_linux
-def test_results_are_in_order_and_hold_the_starters_own_objects() -> None:
+@pytest.mark.parametrize("processes", [2, 4])
+def test_results_are_in_order_and_hold_the_starters_own_objects(processes: int) -> None:
     rows = [np.full(1000, float(k)) for k in range(8)]
 
     def work(k: int) -> Found:
         _at_once(k)
         return Found(rows[k], 2.0 * rows[k], os.getpid())
 
-    found = forked(work, range(8), 2)
-    assert len({f.where for f in found}) == 2
+    found = forked(work, range(8), processes)
+    assert len({f.where for f in found}) == processes
     for f, row in zip(found, rows, strict=True):
         assert f.before is row  # not a copy of it, whichever process looked at it
         np.testing.assert_array_equal(f.doubled, 2.0 * row)
