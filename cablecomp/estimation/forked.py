@@ -10,9 +10,11 @@ from __future__ import annotations
 import gc
 import os
 import pickle
+import select
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -28,6 +30,9 @@ NUMBER: Final = 4
 """Bytes of an item's number in the pipe that hands them out."""
 LEFT_OUT: Final = (type, ModuleType, BuiltinFunctionType)
 """What lives outside of the work: it is found by its name."""
+PATIENCE_S: Final = 60.0
+"""How long a fork may go on when all else is done, beside ten times what that took: then it hangs, in a lock that a
+library held when the process was forked."""
 
 _HELPING = False
 """Whether this process is a fork that works for another."""
@@ -38,16 +43,18 @@ def helping() -> bool:
     return _HELPING
 
 
-def forkable() -> bool:
-    """Whether this process can be forked: on Linux, while no other thread of it could hold a lock meanwhile."""
-    return sys.platform == "linux" and threading.active_count() == 1
+def forkable(items: int) -> bool:
+    """Whether this process can be forked for so many items: on Linux, while no other thread of it could hold a lock
+    meanwhile, and where their numbers fit into a pipe."""
+    return sys.platform == "linux" and threading.active_count() == 1 and NUMBER * items <= select.PIPE_BUF
 
 
 def forked(
     work: Callable[[A], B], items: Sequence[A], processes: int, dear: Callable[[A], float] = lambda _: 0.0
 ) -> list[B]:
     """Results in the order of the items, done by this process and by forks of it, `dear` ones first; what one of them
-    raises is raised here, and what a killed one has not done is done here."""
+    raises is raised here, and what one that was killed, or hangs, has not done is done here."""
+    began = time.monotonic()
     known = reachable([work, *items])
     take, put = os.pipe()
     order = sorted(range(len(items)), key=lambda k: -dear(items[k]))
@@ -56,11 +63,15 @@ def forked(
     helpers: list[tuple[int, BinaryIO]] = []
     done: dict[int, B] = {}
     try:
-        for _ in range(processes - 1):
-            helpers.append(_helper(work, items, take, known))
+        with suppress(OSError):  # no room for a further process: with those there are
+            for _ in range(processes - 1):
+                helpers.append(_helper(work, items, take, known))
         for k in iter(lambda: _next(take), None):
             done[k] = work(items[k])
+        patience = PATIENCE_S + 10.0 * (time.monotonic() - began)
         for _, told in helpers:
+            if not select.select([told], [], [], patience)[0]:
+                continue
             with suppress(EOFError, pickle.UnpicklingError):
                 found = _Told(told, known).load()
                 if isinstance(found, BaseException):
@@ -103,11 +114,15 @@ def _helper(
     """A fork that takes items until there is none: its id, and where it tells what it found."""
     read, write = os.pipe()
     starter = os.getpid()
-    with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", DeprecationWarning
-        )  # threads of linear algebra see to forks themselves
-        helper = os.fork()
+    try:
+        with warnings.catch_warnings():
+            # threads of linear algebra, which are what it warns of, see to forks themselves
+            warnings.simplefilter("ignore", DeprecationWarning)
+            helper = os.fork()
+    except OSError:
+        os.close(read)
+        os.close(write)
+        raise
     if helper == 0:
         os.close(read)
         _help(work, items, take, write, known, starter)

@@ -48,7 +48,7 @@ def in_processes(
     itself be forked (`forks_allowed`). What `work` changes is not seen here then, only what it returns. `dear`: which
     items take longest, and are begun with."""
     several = 1 if getattr(_HERE, "aside", False) else min(MOST, _threads(), len(items))
-    if several < 2 or not (_FORKS.get() and forkable()):
+    if several < 2 or not (_FORKS.get() and forkable(len(items))):
         return list(side_by_side(work, items))
     _HERE.aside = True
     try:

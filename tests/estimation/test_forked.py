@@ -46,7 +46,7 @@ def _at_once(k: int) -> None:
 def forking(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two cores, and nothing that keeps this process from being forked (a test's own process may have threads)."""
     monkeypatch.setattr(parallel, "_threads", lambda: 2)
-    monkeypatch.setattr(parallel, "forkable", lambda: True)
+    monkeypatch.setattr(parallel, "forkable", lambda items: True)
 
 
 @needs_linux
@@ -99,6 +99,30 @@ def test_what_a_killed_fork_has_not_done_is_done_here() -> None:
         return k * k
 
     assert forked(work, range(6), 2) == [k * k for k in range(6)]
+
+
+@needs_linux
+def test_what_a_fork_that_hangs_has_not_done_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cablecomp.estimation.forked.PATIENCE_S", 0.1)
+
+    def work(k: int) -> int:
+        _at_once(k)
+        if helping():
+            time.sleep(1000.0)
+        return k * k
+
+    assert forked(work, range(6), 2) == [k * k for k in range(6)]
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@needs_linux
+def test_where_no_process_can_be_started_the_work_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fork() -> int:
+        raise OSError("no room")
+
+    monkeypatch.setattr(os, "fork", fork)
+    assert forked(lambda k: k * k, range(6), 2) == [k * k for k in range(6)]
 
 
 @needs_linux
@@ -164,7 +188,7 @@ def test_a_process_with_further_threads_is_not_forked() -> None:
     other = threading.Thread(target=done.wait)
     other.start()
     try:
-        assert not forkable()
+        assert not forkable(2)
     finally:
         done.set()
         other.join()
