@@ -35,7 +35,7 @@ PATIENCE_S: Final = 60.0
 library held when the process was forked."""
 
 _HELPING = False
-"""Whether this process is a fork that works for another."""
+"""Set where a fork begins."""
 
 
 def helping() -> bool:

@@ -115,9 +115,10 @@ class Problem:
         return replace(self, parameters=(*self.parameters[:place], *own, *self.parameters[place + 1 :]))
 
     def with_weighing(self, weighing: Weighing) -> Problem:
-        """The same with other weights, which misfits do not hang on."""
+        """The same with other weights; misfits hang on which channels have some, and on no weight."""
         changed = replace(self, weighing=weighing, bases={})
-        object.__setattr__(changed, "_last", self._last)
+        if changed.channels == self.channels:
+            object.__setattr__(changed, "_last", self._last)
         return changed
 
     # --- misfits ------------------------------------------------------------------------------------------------------

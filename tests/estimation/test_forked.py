@@ -42,6 +42,15 @@ def _at_once(k: int) -> None:
     time.sleep(0.05)
 
 
+def _met(folder: Path, processes: int) -> int:
+    """This process, once so many have begun an item."""
+    (folder / str(os.getpid())).touch()
+    until = time.monotonic() + 60.0
+    while len(list(folder.iterdir())) < processes and time.monotonic() < until:
+        time.sleep(0.01)
+    return os.getpid()
+
+
 @pytest.fixture
 def forking(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two cores, and nothing that keeps this process from being forked (a test's own process may have threads)."""
@@ -51,12 +60,11 @@ def forking(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @needs_linux
 @pytest.mark.parametrize("processes", [2, 4])
-def test_results_are_in_order_and_hold_the_starters_own_objects(processes: int) -> None:
+def test_results_are_in_order_and_hold_the_starters_own_objects(processes: int, tmp_path: Path) -> None:
     rows = [np.full(1000, float(k)) for k in range(8)]
 
     def work(k: int) -> Found:
-        _at_once(k)
-        return Found(rows[k], 2.0 * rows[k], os.getpid())
+        return Found(rows[k], 2.0 * rows[k], _met(tmp_path, processes))
 
     found = forked(work, range(8), processes)
     assert len({f.where for f in found}) == processes
@@ -169,17 +177,21 @@ def _runs(process: int) -> bool:
 
 @needs_linux
 @pytest.mark.usefixtures("forking")
-def test_nobody_is_forked_who_has_not_said_so() -> None:
+def test_nobody_is_forked_who_has_not_said_so(tmp_path: Path) -> None:
     def where(k: int) -> int:
         _at_once(k)
         return os.getpid()
 
+    def within(k: int) -> tuple[bool, set[int], int]:
+        own = _met(tmp_path, 2)
+        return helping(), set(in_processes(where, range(2))), own
+
     assert set(in_processes(where, range(4))) == {os.getpid()}
     with forks_allowed():
-        assert len(set(in_processes(where, range(4)))) == 2
-        inner = in_processes(lambda k: (helping(), set(in_processes(where, range(2))), os.getpid()), range(4))
-    assert any(h for h, _, _ in inner)
-    assert all(within == {own} for _, within, own in inner)  # work within work forks no further
+        found = in_processes(within, range(4))
+    assert {h: own for h, _, own in found}[False] == os.getpid()
+    assert len({own for _, _, own in found}) == 2
+    assert all(inner == {own} for _, inner, own in found)  # work within work forks no further
     assert set(in_processes(where, range(4))) == {os.getpid()}
 
 

@@ -271,3 +271,19 @@ def test_a_point_that_was_just_asked_is_not_run_again(
     assert not any(np.array_equal(a, b) for a, b in zip(moved, first[ANGLE], strict=True))
     with pytest.raises(ValueError, match="read-only"):
         moved[0] += 1.0  # whoever asks next gets the same
+
+
+def test_weights_of_another_channel_have_it_asked(three: tuple[Evidence, ...]) -> None:
+    torque = "motor_torque_Nm"
+    felt = tuple(
+        replace(
+            e,
+            columns={**e.columns, torque: np.zeros_like(e.columns[ANGLE])},
+            counted={**e.counted, torque: e.counted[ANGLE]},
+        )
+        for e in three
+    )
+    p = problem(felt)
+    assert set(p.misfits(p.start)) == {ANGLE}
+    both = p.with_weighing(Weighing({ANGLE: SIGMA, torque: 1e-3}, {}))
+    assert set(both.misfits(p.start)) == {ANGLE, torque}
