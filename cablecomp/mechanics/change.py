@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NoReturn
 
 import numpy as np
 
@@ -55,6 +56,9 @@ class Term:
     parameters: tuple[float, ...]
     state_size: int
     ring_size: int = 0
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a term's machine code lies in its own process: send the joint, and extend it there")
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ diagnosis as in one process."""
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -17,8 +18,10 @@ import pytest
 from numpy.typing import NDArray
 from small_drive import TOLERANT, recorded
 
+from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import report_json
+from cablecomp.effects import extend
 from cablecomp.errors import InputError
 from cablecomp.estimation import parallel
 from cablecomp.estimation.forked import forkable, forked, helping
@@ -136,6 +139,19 @@ def test_where_no_process_can_be_started_the_work_is_done_here(monkeypatch: pyte
 @needs_linux
 def test_what_cannot_be_sent_back_is_done_here() -> None:
     assert [f() for f in forked(lambda k: lambda: k, range(4), 2)] == [0, 1, 2, 3]
+
+
+@needs_linux
+def test_machine_code_does_not_leave_its_process() -> None:
+    """Another process has something else at its address."""
+    entry = EffectEntry(id="termination_backlash", gap_rad=2e-3)
+    joint = TOLERANT.model_copy(update={"effect": (entry,)})
+    found = forked(lambda k: extend(joint), range(4), 2)  # cannot be sent, so it is made here
+    assert [t.address for change in found for t in change.terms] == [
+        t.address for t in extend(joint).terms
+    ] * 4
+    with pytest.raises(TypeError, match="in its own process"):
+        pickle.dumps(extend(joint))
 
 
 @needs_linux
