@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,6 +56,25 @@ def _met(folder: Path, processes: int) -> int:
 
 
 @pytest.fixture
+def none_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Every process that a test forks is gone when it has ended, and was taken notice of (others may have been started
+    by this one before)."""
+    forks: list[int] = []
+    fork = os.fork
+
+    def kept() -> int:
+        forks.append(fork())
+        return forks[-1]
+
+    monkeypatch.setattr(os, "fork", kept)
+    yield
+    assert forks
+    for each in forks:
+        with pytest.raises(ChildProcessError):
+            os.waitpid(each, os.WNOHANG)
+
+
+@pytest.fixture
 def forking(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two cores, and nothing that keeps this process from being forked (a test's own process may have threads)."""
     monkeypatch.setattr(parallel, "_threads", lambda: 2)
@@ -62,6 +82,7 @@ def forking(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @needs_linux
+@pytest.mark.usefixtures("none_left")
 @pytest.mark.parametrize("processes", [2, 4])
 def test_results_are_in_order_and_hold_the_starters_own_objects(processes: int, tmp_path: Path) -> None:
     rows = [np.full(1000, float(k)) for k in range(8)]
@@ -74,8 +95,6 @@ def test_results_are_in_order_and_hold_the_starters_own_objects(processes: int, 
     for f, row in zip(found, rows, strict=True):
         assert f.before is row  # not a copy of it, whichever process looked at it
         np.testing.assert_array_equal(f.doubled, 2.0 * row)
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)  # nothing is left over
 
 
 @needs_linux
@@ -85,6 +104,7 @@ def test_dear_items_are_begun_with() -> None:
 
 
 @needs_linux
+@pytest.mark.usefixtures("none_left")
 @pytest.mark.parametrize("refused", range(4))
 def test_what_is_raised_is_raised_to_whom_asked(refused: int) -> None:
     def refuse(k: int) -> int:
@@ -95,11 +115,10 @@ def test_what_is_raised_is_raised_to_whom_asked(refused: int) -> None:
 
     with pytest.raises(InputError, match="no such item"):
         forked(refuse, range(4), 2)
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
 
 
 @needs_linux
+@pytest.mark.usefixtures("none_left")
 def test_what_a_killed_fork_has_not_done_is_done_here() -> None:
     here = os.getpid()
 
@@ -113,6 +132,7 @@ def test_what_a_killed_fork_has_not_done_is_done_here() -> None:
 
 
 @needs_linux
+@pytest.mark.usefixtures("none_left")
 def test_what_a_fork_that_hangs_has_not_done_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cablecomp.estimation.forked.PATIENCE_S", 0.1)
 
@@ -123,8 +143,6 @@ def test_what_a_fork_that_hangs_has_not_done_is_done_here(monkeypatch: pytest.Mo
         return k * k
 
     assert forked(work, range(6), 2) == [k * k for k in range(6)]
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
 
 
 @needs_linux
@@ -137,6 +155,7 @@ def test_where_no_process_can_be_started_the_work_is_done_here(monkeypatch: pyte
 
 
 @needs_linux
+@pytest.mark.usefixtures("none_left")
 def test_what_cannot_be_sent_back_is_done_here() -> None:
     assert [f() for f in forked(lambda k: lambda: k, range(4), 2)] == [0, 1, 2, 3]
 
