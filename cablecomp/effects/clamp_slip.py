@@ -71,9 +71,19 @@ def _arc_per_pull(config: JointConfig) -> float:
     return _loop_arc(config) / (10.0 * pretension(config))
 
 
+LEAST_TURN = 0.01
+"""Turn of the output drum by which a clamp or a drum plausibly slips, however slack its cables are [rad]: half a
+degree, and nothing to do with how far friction on the wraps lets a cable stretch."""
+
+
 def _loop_arc(config: JointConfig) -> float:
     """Arc on the output drum that its unit of deflection makes [m]."""
     return drum_radius(config) * wrap_deflection(config)
+
+
+def _slipped_arc(config: JointConfig) -> float:
+    """That arc, or that of the least turn by which a drum plausibly slips [m]."""
+    return drum_radius(config) * max(wrap_deflection(config), LEAST_TURN)
 
 
 def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
@@ -129,7 +139,7 @@ EFFECT = Effect(
             -1.0,
             1.0,
             "s, length let go: by cable h, below 0 by cable l",
-            scale=_loop_arc,
+            scale=_slipped_arc,
             minimum=-0.1,
             maximum=0.1,
             omitted=0.0,

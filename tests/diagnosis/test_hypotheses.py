@@ -260,6 +260,28 @@ def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
         assert all((reach_of(h.amount, config)[0] < 0.0) is sides for h in events)
 
 
+def test_an_event_of_cable_l_may_be_as_large_as_one_of_cable_h() -> None:
+    """Which of two like cables is called h says nothing of how far it may slip or how many of its wires may break."""
+    pool = hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)
+    for h in (h for h in pool if h.has_instant):
+        low, high = reach_of(h.amount, JOINT)
+        assert low == -high < 0.0, h.name
+
+
+@pytest.mark.parametrize(("pretension_N", "turn_rad"), [(1.0, 0.01), (1000.0, None)])
+def test_a_slack_drive_may_slip_by_half_a_degree(pretension_N: float, turn_rad: float | None) -> None:
+    """By how far friction on the wraps lets its cables stretch a tight drive slips, by T0/(EA mu) on either drum; a
+    slack one's clamps hold no better."""
+    (stage,) = JOINT.drive.stage
+    slack = stage.model_copy(update={"pretension_N": pretension_N})
+    config = JOINT.model_copy(update={"drive": JOINT.drive.model_copy(update={"stage": (slack,)})})
+    ratio = slack.input_radius_m / slack.output_radius_m
+    stretched = pretension_N / slack.EA_N * (1.0 / slack.mu_output + ratio / slack.mu_input)
+    assert (stretched < 0.01) is (turn_rad is not None)
+    (amount,) = {h.amount for h in hypotheses(config, gathered()) if h.name == "clamp_slip"}
+    assert amount.bounds(config)[1] == pytest.approx(slack.output_radius_m * (turn_rad or stretched))
+
+
 @pytest.mark.parametrize("warm", [True, False])
 def test_that_warmth_quickens_creep_is_asked_where_a_temperature_moves(warm: bool) -> None:
     (creep,) = [h for h in hypotheses(JOINT, gathered(warm=warm)) if h.effect.id == "pretension_relaxation"]
