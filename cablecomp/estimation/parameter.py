@@ -166,8 +166,8 @@ def reach_of(amount: EffectParameter, config: JointConfig) -> tuple[float, float
     low, high = amount.bounds(config)
     one_sided = amount.log or low >= 0.0
     # a share needs no room for a scale that is known roughly
-    room = 1.0 if amount.unit == "-" else 10.0
-    return max(0.0 if one_sided else low * room, amount.minimum), min(high * room, amount.maximum)
+    most = high * (1.0 if amount.unit == "-" else 10.0)
+    return max(0.0 if one_sided else low * 3.0, amount.minimum), min(most, amount.maximum)
 
 
 def _of_effect(name: str, p: EffectParameter, value: float, config: JointConfig) -> Parameter:

@@ -260,14 +260,6 @@ def test_in_an_open_circuit_no_event_happens_to_the_other_cable() -> None:
         assert all((reach_of(h.amount, config)[0] < 0.0) is sides for h in events)
 
 
-def test_an_event_of_cable_l_may_be_as_large_as_one_of_cable_h() -> None:
-    """Which of two like cables is called h says nothing of how far it may slip or how many of its wires may break."""
-    pool = hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)
-    for h in (h for h in pool if h.has_instant):
-        low, high = reach_of(h.amount, JOINT)
-        assert low == -high < 0.0, h.name
-
-
 @pytest.mark.parametrize(("pretension_N", "turn_rad"), [(1.0, 0.01), (1000.0, None)])
 def test_a_slack_drive_may_slip_by_half_a_degree(pretension_N: float, turn_rad: float | None) -> None:
     """By how far friction on the wraps lets its cables stretch a tight drive slips, by T0/(EA mu) on either drum; a
