@@ -14,6 +14,10 @@ from cablecomp.effects.course import COURSE, CURVE, DURATION, LENGTHS, STEPS, co
 from cablecomp.errors import InputError
 from cablecomp.mechanics.change import Term
 
+LEAST_TURN = 0.01
+"""Turn of the output drum by which a clamp or a drum plausibly slips, however slack its cables are [rad]: half a
+degree, and nothing to do with how far friction on the wraps lets a cable stretch."""
+
 
 @term(parameters=("slip", "instant", "duration", "curve", "taken_up", *LENGTHS))
 def _slip(c: Any, p: Any, s: Any) -> None:
@@ -71,11 +75,6 @@ def _arc_per_pull(config: JointConfig) -> float:
     return _loop_arc(config) / (10.0 * pretension(config))
 
 
-LEAST_TURN = 0.01
-"""Turn of the output drum by which a clamp or a drum plausibly slips, however slack its cables are [rad]: half a
-degree, and nothing to do with how far friction on the wraps lets a cable stretch."""
-
-
 def _loop_arc(config: JointConfig) -> float:
     """Arc on the output drum that its unit of deflection makes [m]."""
     return drum_radius(config) * wrap_deflection(config)
@@ -83,7 +82,7 @@ def _loop_arc(config: JointConfig) -> float:
 
 def _slipped_arc(config: JointConfig) -> float:
     """That arc, or that of the least turn by which a drum plausibly slips [m]."""
-    return drum_radius(config) * max(wrap_deflection(config), LEAST_TURN)
+    return max(_loop_arc(config), LEAST_TURN * drum_radius(config))
 
 
 def _creeping(key: str, cable: str) -> tuple[Parameter, Parameter]:
