@@ -15,6 +15,7 @@ from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import MOTOR, Evidence, gather, load_channel, rows_for
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.standing import apart_of, stated_of
 from cablecomp.signal.smoothing import FloatArray
 
@@ -93,11 +94,15 @@ def gather_body(
     samples = [len(recordings[n]["time_s"]) for n in names]
     wanted = LIMITS.rows if rows is None else rows
     fine, judged = rows_for(samples, max(wanted, LIMITS.rows_each * len(names)))
+
+    def gathered(k: int) -> Evidence:
+        name = names[k]
+        e = gather(config, name, recordings[name], sessions[name], fine_rows=fine[k], judged_rows=judged[k])
+        return replace(e, condition=_conditions(config, e))
+
     found = []
     after = -np.inf
-    for name, f, j in zip(names, fine, judged, strict=True):
-        e = gather(config, name, recordings[name], sessions[name], fine_rows=f, judged_rows=j)
-        e = replace(e, condition=_conditions(config, e))
+    for name, e in zip(names, in_processes(gathered, range(len(names))), strict=True):
         begin, end = float(e.columns["time_s"][0]), float(e.columns["time_s"][-1])
         if begin < after:  # every recording starts its own clock: one goes on after the other
             shift = after + 1.0 - begin

@@ -30,7 +30,7 @@ from cablecomp.estimation.limits import (
     HISTORY_LEG,
     HISTORY_PARTS,
 )
-from cablecomp.estimation.parallel import side_by_side
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import Unrecorded, load_of, simulator
 from cablecomp.signal.smoothing import FloatArray
@@ -197,7 +197,7 @@ def with_own_carryover(fit: Fit) -> Fit:
     problem = fit.problem
     if problem.fine:
         return fit
-    evidence = tuple(side_by_side(lambda e: _carried_over_anew(problem, fit.x, e), problem.evidence))
+    evidence = tuple(in_processes(lambda e: _carried_over_anew(problem, fit.x, e), problem.evidence))
     return replace(fit, problem=problem.with_evidence(evidence))
 
 

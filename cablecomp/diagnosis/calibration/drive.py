@@ -14,10 +14,11 @@ from cablecomp.diagnosis.folds import kind_of_parts, shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
-from cablecomp.estimation.history import forgotten, full_swing, with_own_carryover
+from cablecomp.estimation.history import Forgotten, forgotten, full_swing, with_own_carryover
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
 from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of, vague_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.estimation.standing import PRETENSION, in_its_place
@@ -166,10 +167,13 @@ def without_history(fit: Fit, evidence: Sequence[Evidence]) -> tuple[list[Eviden
     """The recordings, rows counting from where their histories are forgotten, with their carry-over; and by how much
     that moves a recording's zero [rad]."""
     size = {c: rms_left(fit, c) for c in fit.problem.channels}
-    cut, constant = [], []
-    for e in evidence:
+
+    def forgets(e: Evidence) -> Forgotten:
         swing = full_swing(fit.problem, e, LIMITS.history_most)
-        found = forgotten(fit.problem, fit.x, e, size, LIMITS.history, swing)
+        return forgotten(fit.problem, fit.x, e, size, LIMITS.history, swing)
+
+    cut, constant = [], []
+    for e, found in zip(evidence, in_processes(forgets, evidence), strict=True):
         read = np.flatnonzero(e.counted[JOINT])
         most = int(read[len(read) // 2]) if len(read) else 0  # of an encoder that was read at first only
         counting = e.counting_from(min(found.first, most))

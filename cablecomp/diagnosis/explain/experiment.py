@@ -21,6 +21,7 @@ from cablecomp.control.protocol import (
 )
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.errors import InputError
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
@@ -186,8 +187,9 @@ def best_experiment(
     protocol can be followed.
     """
     found: list[Experiment] = []
-    for protocol in candidates(models[0], seen):
-        readings = _readings(models, protocol, temperature_degC)
+    protocols = candidates(models[0], seen)
+    made = in_processes(lambda p: _readings(models, p, temperature_degC), protocols)
+    for protocol, readings in zip(protocols, made, strict=True):
         if readings is None:
             continue
         worst = (

@@ -19,6 +19,7 @@ from cablecomp.diagnosis.locate.views import Response, Responses
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import INPUT, JOINT
 from cablecomp.estimation.least_squares import Fit
+from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import Simulator, simulator
 from cablecomp.estimation.steadying import on_every_row
@@ -75,10 +76,17 @@ def responses(fit: Fit) -> Responses:
     if plain is None:
         return Responses((), ())
     reach = _reach(problem, fit.x, plain)
+    here = _counted(problem, plain)
+
+    def column(change: Change) -> FloatArray | None:
+        there = _run(problem, fit.x, change)
+        return None if there is None else _counted(problem, there) - here
+
+    places = list(_places(problem.joint(fit.x, problem.evidence[0]), reach))
+    made = iter(in_processes(column, [change for place in places for change in place.changes]))
     found = []
-    for place in _places(problem.joint(fit.x, problem.evidence[0]), reach):
-        runs = [_run(problem, fit.x, change) for change in place.changes]
-        columns = [_counted(problem, run) - _counted(problem, plain) for run in runs if run is not None]
+    for place in places:
+        columns = [c for c in (next(made) for _ in place.changes) if c is not None]
         if columns:
             found.append(Response(place.covariate, place.how, np.column_stack(columns)))
     return Responses(tuple(found), _slow(fit))
