@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -62,19 +63,25 @@ PART = 0.3
 """Of what a linear answer promises, gone at first where the whole of it leads astray."""
 
 
-def ask(here: Anchor, h: Hypothesis) -> Answer | None:
-    """The best linear answer over the hypothesis's starts; None if it cannot be simulated or shows nothing."""
+def ask(here: Anchor, h: Hypothesis, worth: float = inf) -> Answer | None:
+    """The best linear answer over the hypothesis's starts; None if it cannot be simulated or shows nothing. It is asked
+    for no shape where it leaves more than `worth` without one."""
     found = _plainly(here, h)
     if found is None:
         return None
     plain, best = found
+    if plain.cost > worth:
+        return plain
     other = _shaped(here, h, best) if h.further or h.has_instant or h.cycle_start else None
     return plain if other is None else replace(other, plain=plain)
 
 
 def ask_all(anchors: Sequence[Anchor], h: Hypothesis) -> list[Answer]:
-    """What a hypothesis promises at each anchor, best first."""
-    asked = [ask(here, h) for here in anchors]
+    """What a hypothesis promises at each anchor, best first. Only where it leaves less than the first anchor without it
+    are shapes asked for at the others, and at the first of a law that is run on every sample at size after size."""
+    worth = LIMITS.promise * anchors[0].fit.cost
+    dear = h.effect.rates and h.effect.saturates
+    asked = [ask(here, h, worth if k or dear else inf) for k, here in enumerate(anchors)]
     return sorted((a for a in asked if a is not None), key=lambda a: a.cost)
 
 
