@@ -15,8 +15,8 @@ from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, hypotheses
 from cablecomp.diagnosis.explain.linear import anchor, contribution
 from cablecomp.diagnosis.explain.plausible import drags
-from cablecomp.diagnosis.explain.screening import ask, rough
-from cablecomp.estimation.least_squares import solve
+from cablecomp.diagnosis.explain.screening import ask, ask_all, rough
+from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parameter import reach_of
 from firmware_sim.plant import EffectSpec, PlantConfig, simulate
 
@@ -88,6 +88,24 @@ def test_a_weight_on_a_linkage_is_promised_with_a_lever_that_grows() -> None:
             assert answer.cost < 0.5 * answer.plain.cost
 
 
+def test_shapes_are_asked_for_at_a_further_anchor_only_where_it_comes_below_the_first() -> None:
+    """Here the further one is the drive with other friction, once far off and once next to none."""
+    law = {"moment_Nm": 0.15, "phase_rad": 0.4, "second": 0.8, "second_phase_rad": 1.5}
+    body, drive = calibrated(recorded([EffectSpec("gravity_load:linkage", law)], 30.0))
+    weight = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "gravity_load")
+    problem, here = drive.fit.problem, anchor(drive.fit)
+    rubs = [p.base.startswith("mu_") for p in problem.parameters]
+    for further, shaped in ((1.5, False), (0.01, True)):
+        x = drive.fit.x + further * np.array(rubs)
+        there = anchor(Fit(problem, x, problem.residual(x), problem.jacobian(x)))
+        alone = ask(there, weight)
+        assert alone is not None
+        assert alone.plain is not None
+        assert (alone.plain.cost < drive.fit.cost) == shaped
+        answers = ask_all([here, there], weight)
+        assert [a.plain is not None for a in answers] == [True, shaped]
+
+
 def test_an_event_of_a_law_that_knows_no_duration_is_asked_at_once_alone() -> None:
     """A user's own event may have an instant and nothing of a course."""
     body, drive = calibrated(recorded([EffectSpec("clamp_slip", {"slip_m": 1e-4, "time_s": EVENT_S})], 20.0))
@@ -125,9 +143,7 @@ def test_an_amount_that_saturates_is_asked_for_far_beyond_what_shows(true: float
     slip = [EffectSpec("viscous_slip:one_drum", {"coefficient_Ns_per_m_rad": true, "on_input": on_input})]
     body, drive = calibrated(recorded(slip, 20.0))
     (viscous,) = (h for h in hypotheses(TOLERANT, body.used) if h.effect.id == "viscous_slip")
-    answer = ask(anchor(drive.fit), viscous)
-    assert answer is not None
-    (fit, *_) = rough([answer], 8)
+    (fit, *_) = rough(ask_all([anchor(drive.fit)], viscous), 8)
     assert fit.cost < 0.05 * drive.fit.cost
     assert fit.values["effect.viscous_slip.drum"] == pytest.approx(1.0 - 2.0 * on_input, abs=0.05)
 
