@@ -44,9 +44,9 @@ def side_by_side(work: Callable[[A], B], items: Sequence[A]) -> Iterator[B]:
 def in_processes(
     work: Callable[[A], B], items: Sequence[A], dear: Callable[[A], float] = lambda _: 0.0
 ) -> list[B]:
-    """As `side_by_side`, of work that takes a tenth of a second and more: in forks of this process, where it lets
-    itself be forked (`forks_allowed`). What `work` changes is not seen here then, only what it returns. `dear`: which
-    items take longest, and are begun with."""
+    """As `side_by_side`, of work that takes a tenth of a second and more in all: in forks of this process, where it
+    lets itself be forked (`forks_allowed`). What `work` changes is not seen here then, only what it returns. `dear`:
+    which items take longest, and are begun with."""
     several = 1 if getattr(_HERE, "aside", False) else min(MOST, _threads(), len(items))
     if several < 2 or not (_FORKS.get() and forkable(len(items))):
         return list(side_by_side(work, items))
