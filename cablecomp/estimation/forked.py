@@ -52,8 +52,9 @@ def forkable(items: int) -> bool:
 def forked(
     work: Callable[[A], B], items: Sequence[A], processes: int, dear: Callable[[A], float] = lambda _: 0.0
 ) -> list[B]:
-    """Results in the order of the items, done by this process and by forks of it, `dear` ones first; what one of them
-    raises is raised here, and what one that was killed, or hangs, has not done is done here."""
+    """Results in the order of the items, done by this process and by forks of it, `dear` ones first. What a fork
+    that was killed, or hangs, has not done is done here, in order, and what raised something once more: so that is
+    raised here, and of several the first in order, whoever met it first."""
     began = time.monotonic()
     known = reachable([work, *items])
     take, put = os.pipe()
@@ -61,22 +62,17 @@ def forked(
     os.write(put, b"".join(k.to_bytes(NUMBER, "little") for k in order))
     os.close(put)
     helpers: list[tuple[int, BinaryIO]] = []
-    done: dict[int, B] = {}
     try:
         with suppress(OSError):  # no room for a further process: with those there are
             for _ in range(processes - 1):
                 helpers.append(_helper(work, items, take, known))
-        for k in iter(lambda: _next(take), None):
-            done[k] = work(items[k])
+        done = _taken(work, items, take)
         patience = PATIENCE_S + 10.0 * (time.monotonic() - began)
         for _, told in helpers:
             if not select.select([told], [], [], patience)[0]:
                 continue
             with suppress(EOFError, pickle.UnpicklingError):
-                found = _Told(told, known).load()
-                if isinstance(found, BaseException):
-                    raise found
-                done |= found
+                done |= _Told(told, known).load()
     finally:
         os.close(take)
         for helper, told in helpers:
@@ -101,6 +97,21 @@ def reachable(roots: Sequence[object]) -> dict[int, object]:
             own = getattr(here, "__globals__", None)
             left += [r for r in gc.get_referents(here) if r is not own]
     return found
+
+
+def _taken(work: Callable[[A], B], items: Sequence[A], take: int, starter: int | None = None) -> dict[int, B]:
+    """What was done of the items while there were any to take, by their numbers; where one raises, nobody takes a
+    further one. A fork ends where its `starter` has."""
+    done: dict[int, B] = {}
+    for k in iter(lambda: _next(take), None):
+        try:
+            done[k] = work(items[k])
+        except Exception:  # whatever it is, it is raised where the item is done again
+            while _next(take) is not None:
+                pass
+        if starter is not None and os.getppid() != starter:
+            os._exit(1)
+    return done
 
 
 def _next(take: int) -> int | None:
@@ -147,16 +158,7 @@ def _help(
             if signal.getsignal(each) != signal.SIG_IGN:
                 signal.signal(each, signal.SIG_DFL)
         gc.freeze()  # what was there before is not looked through again, whose pages would be copied for it
-        found: dict[int, B] | BaseException = {}
-        try:
-            done: dict[int, B] = {}
-            for k in iter(lambda: _next(take), None):
-                done[k] = work(items[k])
-                if os.getppid() != starter:
-                    os._exit(1)
-            found = done
-        except Exception as error:  # whatever it is, it is raised where the work was asked for
-            found = error
+        found = _taken(work, items, take, starter)
         with os.fdopen(write, "wb") as told:
             _Tell(told, known).dump(found)
         os._exit(0)

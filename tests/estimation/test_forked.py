@@ -119,6 +119,23 @@ def test_what_is_raised_is_raised_to_whom_asked(refused: int) -> None:
 
 @needs_linux
 @pytest.mark.usefixtures("none_left")
+@pytest.mark.parametrize("dearest", [1, -1])
+def test_of_several_refusals_the_first_in_order_is_raised(dearest: int) -> None:
+    begun = []
+
+    def refuse(k: int) -> int:
+        if not helping():
+            begun.append(k)
+        _at_once(k)
+        raise InputError(f"no item {k}")
+
+    with pytest.raises(InputError, match="no item 0"):
+        forked(refuse, range(40), 2, dear=lambda k: dearest * k)
+    assert len(begun) == 2  # once one has raised nobody takes a further one
+
+
+@needs_linux
+@pytest.mark.usefixtures("none_left")
 def test_what_a_killed_fork_has_not_done_is_done_here() -> None:
     here = os.getpid()
 
