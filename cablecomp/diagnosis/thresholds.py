@@ -95,7 +95,8 @@ class Thresholds:
     """How far a recording's zero may depart from its session's while hypotheses are fitted, in what a row
     counts for."""
     promise: float = 0.98
-    """Cost after a linear step over the cost before, above which a hypothesis is not tried at all."""
+    """Cost after a linear step over the cost before, above which a hypothesis is not tried at all, nor asked for shapes
+    at the nominal drive, or where size after size is run on every sample (no name of 34 trials hung on those)."""
     reach: float = 0.01
     """Share of the cost that a linear step by one in a parameter (e times as much, or as much again) costs where
     hypotheses are asked: of a sloppy model steps by e to the fifth promised a quarter of the cost, on the jaw, that no

@@ -83,10 +83,11 @@ def responses(fit: Fit) -> Responses:
         return None if there is None else _counted(problem, there) - here
 
     places = list(_places(problem.joint(fit.x, problem.evidence[0]), reach))
-    made = iter(in_processes(column, [change for place in places for change in place.changes]))
+    asked = [(place, change) for place in places for change in place.changes]
+    made = in_processes(lambda a: column(a[1]), asked)
     found = []
     for place in places:
-        columns = [c for c in (next(made) for _ in place.changes) if c is not None]
+        columns = [c for (at, _), c in zip(asked, made, strict=True) if at is place and c is not None]
         if columns:
             found.append(Response(place.covariate, place.how, np.column_stack(columns)))
     return Responses(tuple(found), _slow(fit))
