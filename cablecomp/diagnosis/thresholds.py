@@ -407,7 +407,8 @@ class Thresholds:
     """What goes with speed of a joint's friction over what does not, at the usual speed, between which it is no name:
     whatever yields late seems to drag in part (trials seeds 738 to 744: five of five such names were wrong, at 0.66 to
     1.8, of greased guides, strands, a frame that flexes, jitter; right ones had 0.18 and less, drags 4.9 and more).
-    Greased bearings of the plant (LuGre) drag by up to 0.6."""
+    Greased bearings of the plant (LuGre) drag by up to 0.6; one of them (805/18) seemed to by more, and alone took off
+    0.999 where the next effect took off 0.7: that is its own word (`by_far`, `z_unbeaten`)."""
     by_far: float = 0.25
     """Share of what the best other effect leaves alone, below which an effect with a shape on the bound beyond which
     another would be the better word is that word itself (`649/66`, a key on springs: 0.15)."""

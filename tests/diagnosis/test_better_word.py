@@ -12,8 +12,9 @@ from turning import JOINT, gathered, hypothesis, recorded
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain.held_down import greased, in_part_a_drag
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
-from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.model import Model, Round
 from cablecomp.diagnosis.explain.plausible import better_word
+from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.estimation.least_squares import Fit
 
 
@@ -80,8 +81,20 @@ def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
     assert greased(alone, bearing) == ""
     assert bool(greased(beside, bearing)) == (word == "")
     assert greased(beside, path) == ""
-    assert bool(in_part_a_drag(alone, bearing)) == mixed
-    assert in_part_a_drag(beside, path) == ""
+    assert bool(in_part_a_drag(alone, bearing, (), 5.0)) == mixed
+    assert in_part_a_drag(beside, path, (), 5.0) == ""
+    for other, lead, held in ((0.7, 5.0, False), (0.97, 5.0, mixed), (0.7, 1.9, mixed)):
+        taken_off = ((bearing, 0.99), (path, other))
+        tried = [
+            SimpleNamespace(
+                term=h,
+                model=SimpleNamespace(terms=(h,)),
+                difference=ScoreDifference(gain, 9.0, 9.0),
+            )
+            for h, gain in taken_off
+        ]
+        rounds = cast("list[Round]", [SimpleNamespace(tried=tried)])
+        assert bool(in_part_a_drag(alone, bearing, rounds, lead)) == held
 
 
 def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:

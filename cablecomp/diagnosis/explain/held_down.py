@@ -69,11 +69,14 @@ def greased(final: Model, term: Hypothesis) -> str:
     return "a drag in proportion to speed: grease in the cable's path, whose friction is there, drags alike"
 
 
-def in_part_a_drag(final: Model, term: Hypothesis) -> str:
+def in_part_a_drag(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float) -> str:
     """What is to be said of a friction of which a part goes with speed and a part does not, as whatever yields late
-    seems to (a greased guide, strands, a frame that flexes); "" of any other."""
+    seems to (a greased guide, strands, a frame that flexes); "" of any other, and of one that alone is by far the best
+    and `lead` standard errors ahead of its rivals."""
     low, high = LIMITS.mixed_drag
     if not low < drag_at_speed(final.fit, term) < high:
+        return ""
+    if lead >= LIMITS.z_unbeaten and alone_by_far(rounds, term):
         return ""
     return "in part it goes with speed and in part it does not: whatever yields late does alike"
 

@@ -169,7 +169,7 @@ def _weighed(
         hardly_ahead(term, lead)
         or seen_once(final, term, lead)
         or greased(final, term)
-        or in_part_a_drag(final, term)
+        or in_part_a_drag(final, term, selection.rounds, lead)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), open_to
     better = None
