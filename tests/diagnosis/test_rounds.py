@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -65,6 +66,21 @@ def test_an_effect_that_is_asked_for_by_several_amounts_takes_one_place() -> Non
     begun: list[Any] = [SimpleNamespace(terms=(t,)) for t in (*amounts, *others)]
     assert [c.terms[0].name for c in rounds._of_so_many(begun, 2)] == ["a", "b", others[0].name]
     assert len(rounds._of_so_many(begun, 3)) == 4
+
+
+def test_a_drive_mounted_anew_takes_no_effects_place() -> None:
+    """What differs between sessions is fitted to the end whatever promises more, if it lies lower than without."""
+    law = catalogue()["nonlinear_cable"]
+    effects = [Hypothesis(replace(law, id=f"e{k}"), f"e{k}", law.parameters[0], (), True) for k in range(12)]
+    anew, by_posture = Dependence("pretension_N", "session"), Dependence("pretension_N", "bend_rad")
+
+    def chosen(cost: float) -> list[str]:
+        begun: list[Any] = [SimpleNamespace(terms=(h,), cost=10.0 + k) for k, h in enumerate(effects)]
+        begun += [SimpleNamespace(terms=(d,), cost=cost) for d in (anew, by_posture)]
+        return [c.terms[0].name for c in rounds._chosen(begun, [], beginning(1))]
+
+    assert len(chosen(101.0)) == max(LIMITS.promising - 4, LIMITS.promising // 2)
+    assert chosen(99.0) == [*chosen(101.0), anew.name]
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,11 @@ from grouped import GROUPS, NOISE, WAVE
 from cablecomp.diagnosis.explain import model as model_module
 from cablecomp.diagnosis.explain import selection, ties
 from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.seen import Seen
+from cablecomp.effects import catalogue
 from cablecomp.signal.smoothing import FloatArray
 
 
@@ -137,6 +139,27 @@ def test_what_alone_explains_by_far_the_most_is_not_left_out(
     monkeypatch.setattr(selection, "implausible", lambda m: 0)
     monkeypatch.setattr(selection, "alone_by_far", lambda rounds, term: term.name == by_far)
     assert selection._pruned(model(1.0, "a", "b", "c"), [], GROUPS).name == left
+
+
+@pytest.mark.parametrize(
+    ("term", "event", "known"),
+    [
+        (Dependence("pretension_N", "session"), True, False),
+        (Dependence("pretension_N", "session"), False, True),
+        (Dependence("effect.routing_friction.mu_angle", "session"), True, True),
+        (None, True, True),
+    ],
+)
+def test_an_event_elsewhere_does_not_stand_in_for_mounting_anew(
+    monkeypatch: pytest.MonkeyPatch, term: Dependence | None, event: bool, known: bool
+) -> None:
+    """A slip found between two sessions is another one than that which the model has beside their own pretensions."""
+    law = catalogue()["clamp_slip" if event else "nonlinear_cable"]
+    other = Hypothesis(law, law.id, law.parameters[0], (), True)
+    monkeypatch.setattr(selection, "without", lambda m, term, groups, known: known)
+    with_it = replace(model(1.0), terms=(other, term or other))
+    found: Any = selection._without(with_it, term or other, GROUPS, [model(1.0)])
+    assert bool(found) is known
 
 
 def fitted(left: Any, *names: str, fine: bool = False, weighing: str = "its own") -> Model:

@@ -163,12 +163,15 @@ def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun],
 
 
 def _chosen(first: Sequence[Begun], second: Sequence[Begun], at: Beginning) -> list[Begun]:
-    """What is fitted to the end. What lies lower need not predict better: of two valleys both are."""
+    """What is fitted to the end. What lies lower need not predict better: of two valleys both are. A drive mounted anew
+    takes no effect's place: sessions differ whatever is missing, and an event between two of them does nearly as well.
+    """
     promising = max(LIMITS.promising - 2 * at.number, LIMITS.promising // 2)
     most = LIMITS.hopeless * (first[0].cost if first else 0.0)
     nearest = _of_so_many(first, promising)
     chosen = [c for k, c in enumerate(nearest) if c.cost < at.cost and (k < 2 or c.cost < most)]
     taken = [c.terms[0].name for c in chosen]
+    chosen += [c for c in first if _mounts_anew(c) and c.terms[0].name not in taken and c.cost < at.cost]
     return chosen + [c for c in second if c.terms[0].name in taken and c.cost < most]
 
 
@@ -181,6 +184,11 @@ def _of_so_many(begun: Sequence[Begun], most: int) -> list[Begun]:
             break
         found.append(c)
     return found
+
+
+def _mounts_anew(c: Begun) -> bool:
+    """Whether it is only how the drive stands in each session."""
+    return isinstance(c.terms[0], Dependence) and c.terms[0].mounted_anew
 
 
 def _place(c: Begun) -> str:

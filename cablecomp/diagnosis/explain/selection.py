@@ -15,6 +15,7 @@ from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
     Selection,
+    Term,
     Tried,
     amount_resolved,
     bears,
@@ -218,7 +219,7 @@ def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
             for term in model.terms[:-1]
             if not any(t.belongs_to(term) for t in bound) and not alone_by_far(rounds, term)
         ]
-        fewer = in_processes(partial(without, model, groups=groups, known=fitted_in(rounds)), asked)
+        fewer = in_processes(partial(_without, model, groups=groups, known=fitted_in(rounds)), asked)
         for term, smaller in zip(asked, fewer, strict=True):
             if smaller is None or implausible(smaller) > implausible(model):
                 continue
@@ -230,3 +231,11 @@ def _pruned(model: Model, rounds: Sequence[Round], groups: Groups) -> Model:
             return model
         model = weakest[1]
     return model
+
+
+def _without(model: Model, term: Term, groups: Groups, known: Sequence[Model]) -> Model | None:
+    """The model without one of its terms; of a drive mounted anew beside events, with these where they are: elsewhere,
+    between two sessions, an event does nearly what mounting did, and is another event."""
+    events = any(isinstance(t, Hypothesis) and t.has_instant for t in model.terms)
+    mounting = isinstance(term, Dependence) and term.mounted_anew
+    return without(model, term, groups, () if mounting and events else known)
