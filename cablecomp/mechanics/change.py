@@ -77,6 +77,8 @@ class Change:
     """Share of the cable's compliance at T0 that does not stiffen."""
     knee: float = 0.0
     """T/T0 around which it stiffens, at once; 0: with the tension."""
+    again: float = 0.0
+    """T/T0 around which it does once more, soft from the knee on to there; 0: nowhere."""
     guide_angle: float = 0.0
     guide_length_m: float = 0.0
     guide_skew: float = 0.0
@@ -110,6 +112,7 @@ def together(changes: Sequence[Change]) -> Change:
         stiffening=sum(c.stiffening for c in changes),
         steady=max((c.steady for c in changes), default=0.0),
         knee=max((c.knee for c in changes), default=0.0),
+        again=max((c.again for c in changes), default=0.0),
         guide_angle=sum(c.guide_angle for c in changes),
         guide_length_m=sum(c.guide_length_m for c in changes),
         guide_skew=sum(c.guide_skew for c in changes),
@@ -146,12 +149,12 @@ def law_tables(change: Change, config: JointConfig) -> Floats | None:
     )
     if by_tension is None and by_joint is None and by_motor is None:
         if change.stiffening != 0.0:
-            return stiffening_law(change.stiffening, change.steady, change.knee)[None]
+            return stiffening_law(change.stiffening, change.steady, change.knee, change.again)[None]
         inside = change.play_share or change.guide_angle or change.viscous_Ns_per_m_rad
         return plain_law()[None] if inside or change.moves_pretension else None
     out, wound = config.drive.stage[-1].wrap_output_rad, config.drive.stage[0].wrap_input_rad
     widest = 2.0 * max(s.wrap_output_rad + s.wrap_input_rad for s in config.drive.stage) + 20.0
-    stiffness = change.stiffening, change.steady, change.knee
+    stiffness = change.stiffening, change.steady, change.knee, change.again
     return _law_tables(by_tension, by_joint, by_motor, out, wound, widest, stiffness)
 
 
@@ -163,7 +166,7 @@ def _law_tables(
     out: float,
     wound: float,
     widest: float,
-    stiffness: tuple[float, float, float],
+    stiffness: tuple[float, float, float, float],
 ) -> Floats:
     """By `ELSEWHERE`, `ON_H`, `ON_L`, `IN_H`, `IN_L`; wraps on the joint's and the motor's drum, the widest of all."""
     grooves: list[Factor | None] = [None]

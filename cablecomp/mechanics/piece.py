@@ -11,16 +11,17 @@ import numpy as np
 
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
+    AGAIN,
     AREA_OF_V,
+    BENDS,
     E_OF_V,
+    FIRST_BEND,
     GROOVED,
     HEAD,
     KNEE,
     KNEE_AREA,
     KNEE_HALF,
     KNEE_RISE,
-    KNEE_V_HIGH,
-    KNEE_V_LOW,
     LEAST_STIFFNESS,
     MODE,
     PLAIN,
@@ -178,17 +179,14 @@ def _strain_sums(
 def _piece_bent(
     laws: Floats, law: int, y1: float, v1: float, tau1: float, y2: float, v2: float, tau2: float
 ) -> tuple[float, float]:
-    """`piece` for a cable with a knee: in parts below it, in it, and above it."""
+    """`piece` for a cable with a knee: in parts between the bends of its compliance."""
     tabled = laws[law, HEAD, MODE] == TABLED
-    v_in, v_out = laws[law, HEAD, KNEE_V_LOW], laws[law, HEAD, KNEE_V_HIGH]
-    if v2 < v1:
-        v_in, v_out = v_out, v_in
     total = slope = 0.0
     y, v, tau = y1, v1, tau1
-    for k in range(3):
+    for k in range(BENDS + 1):
         y_to, v_to, tau_to = y2, v2, tau2
-        if k < 2:
-            bend = v_in if k == 0 else v_out
+        if k < BENDS:
+            bend = laws[law, HEAD, FIRST_BEND + (k if v2 > v1 else BENDS - 1 - k)]
             share = (bend - v1) / (v2 - v1) if v2 != v1 else 2.0
             if not 0.0 < share < 1.0:
                 continue
@@ -215,22 +213,30 @@ def _piece_of_line(
     if abs(d) < 0.05:
         return _strain_sums(MIDDLE_X, MIDDLE_W, laws, law, v1, dy, d)
     head = laws[law, HEAD]
-    knee, steady = head[KNEE], head[STEADY]
+    steady = head[STEADY]
     at_1 = 1.0 - head[STIFFENING] * head[KNEE_RISE]
-    middle = 0.5 * (tau1 + tau2)
-    low, width = (1.0 - KNEE_HALF) * knee, 2.0 * KNEE_HALF * knee
-    grown, rise = tau2 - tau1, 0.0  # of tau, and of the integral of S
-    area = 0.0  # integral over v of the integral of S
-    if middle > low + width:
-        rise, area = grown, grown - knee * d
-    elif middle > low:
-        rise = grown * (middle - low) / width
-        area = (grown * (middle - 2.0 * low) + low * low * d) / (2.0 * width)
+    middle, grown = 0.5 * (tau1 + tau2), tau2 - tau1
+    rise, area = _rise_of_line(head[KNEE], middle, grown, d)
+    if head[AGAIN] > 0.0:
+        rise_again, area_again = _rise_of_line(head[AGAIN], middle, grown, d)
+        rise, area = grown - rise + rise_again, grown - area + area_again
     share = (1.0 - steady) / at_1
     bent = grown - d - head[STIFFENING] * (area - head[KNEE_AREA] * d)
     total = steady * (grown - d) + share * bent
     slope = steady * grown + share * (grown - head[STIFFENING] * rise)
     return total * dy / d, slope * dy / d
+
+
+@inner_kernel
+def _rise_of_line(knee: float, middle: float, grown: float, d: float) -> tuple[float, float]:
+    """By how much the integral of what rises about one knee grows over a piece beside it or in it, about `middle`, over
+    which tau has grown by `grown`; and the integral of it over v."""
+    low, width = (1.0 - KNEE_HALF) * knee, 2.0 * KNEE_HALF * knee
+    if middle > low + width:
+        return grown, grown - knee * d
+    if middle > low:
+        return grown * (middle - low) / width, (grown * (middle - 2.0 * low) + low * low * d) / (2.0 * width)
+    return 0.0, 0.0
 
 
 @inner_kernel

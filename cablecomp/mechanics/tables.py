@@ -45,34 +45,38 @@ ROWS = 6
     STIFFENING, STEADY,  # b and w in EA(T) = EA/(w + (1 - w)/(1 + b (tau - 1)))
     GROOVED,  # 0 = g(y) is y itself
     BY_TENSION,  # 0 = v is ln tau itself
-    KNEE, KNEE_AREA, KNEE_RISE,  # u (0: none), integral of S from there to T0, S at T0
-    KNEE_V_LOW, KNEE_V_HIGH,  # v where S begins to rise, and where it is 1
+    KNEE, AGAIN,  # u and u2 (0: none)
+    KNEE_AREA, KNEE_RISE,  # integral of S up to T0, S at T0
+    FIRST_BEND,  # v of the bends of S, ascending, infinite where there are none
 ) = range(16)  # fmt: skip
+BENDS = constant(4)
+HEAD_SIZE = FIRST_BEND + 4
 
 
 def plain_law() -> Floats:
     """The law of the thesis (constant mu, constant EA) in the form of a table."""
-    return np.zeros((ROWS, 16))
+    return np.zeros((ROWS, HEAD_SIZE))
 
 
-def stiffening_law(stiffening: float, steady: float = 0.0, knee: float = 0.0) -> Floats:
+def stiffening_law(stiffening: float, steady: float = 0.0, knee: float = 0.0, again: float = 0.0) -> Floats:
     """Constant mu with the tangent stiffness EA/(steady + (1 - steady) f(tau)), in the form of a table.
 
     f = 1/(1 + stiffening (tau - 1)); with a knee (1 - stiffening S(tau))/(1 - stiffening S(1)), where S rises from 0 to
-    1 straight from 0.75 knee to 1.25 knee."""
-    table = np.zeros((ROWS, 16))
+    1 straight from 0.75 knee to 1.25 knee; with `again` above it S falls there, and rises so about `again`."""
+    table = np.zeros((ROWS, HEAD_SIZE))
     table[HEAD, MODE] = STIFF
-    _set_stiffness(table, stiffening, steady, knee)
+    _set_stiffness(table, stiffening, steady, knee, again)
     return table
 
 
-def _set_stiffness(table: Floats, stiffening: float, steady: float, knee: float) -> None:
+def _set_stiffness(table: Floats, stiffening: float, steady: float, knee: float, again: float) -> None:
     head = table[HEAD]
-    head[STIFFENING], head[STEADY], head[KNEE] = stiffening, steady, knee
+    head[STIFFENING], head[STEADY], head[KNEE], head[AGAIN] = stiffening, steady, knee, again
     if knee > 0.0:
-        head[KNEE_AREA], head[KNEE_RISE] = knee_area(knee, 1.0)
-        low, high = (v_of_tau(table[None], 0, (1.0 + way * KNEE_HALF) * knee) for way in (-1.0, 1.0))
-        head[KNEE_V_LOW], head[KNEE_V_HIGH] = low, high
+        head[KNEE_AREA], head[KNEE_RISE] = knee_area(knee, again, 1.0)
+        places = sorted((1.0 + way * KNEE_HALF) * u for u in (knee, again) if u > 0.0 for way in (-1.0, 1.0))
+        bends = [v_of_tau(table[None], 0, tau) for tau in places]
+        head[FIRST_BEND:HEAD_SIZE] = [*bends, *[math.inf] * (BENDS - len(bends))]
 
 
 def law_table(
@@ -82,6 +86,7 @@ def law_table(
     stiffening: float = 0.0,
     steady: float = 0.0,
     knee: float = 0.0,
+    again: float = 0.0,
 ) -> Floats:
     """Tabulate mu(tension)/mu0 (argument tau = T/T0), mu(groove place)/mu0 (argument y [rad] from the
     termination; None: the same everywhere) and the tangent stiffness as `stiffening_law`; both factors are vectorised
@@ -108,7 +113,7 @@ def law_table(
         head[MODE] = TABLED
     else:
         head[MODE] = STIFF if stiffening != 0.0 else PLAIN
-    _set_stiffness(table, stiffening, steady, knee)
+    _set_stiffness(table, stiffening, steady, knee, again)
     if head[BY_TENSION] and knee == 0.0:
         _fill_strains(table[None], 0)
         table[AREA_OF_V] = _integral(1.0 / head[V_PER], table[E_OF_V])
@@ -273,8 +278,18 @@ def _strain_in_part(laws: Floats, law: int, tau: float) -> tuple[float, float]:
 
 
 @leaf_kernel
-def knee_area(knee: float, tau: float) -> tuple[float, float]:
-    """Integral over tau of S, which rises straight from 0 at 0.75 u to 1 at 1.25 u for a knee at u; and S."""
+def knee_area(knee: float, again: float, tau: float) -> tuple[float, float]:
+    """Integral over tau, up to it, of S (`stiffening_law`) for a knee at u; and S."""
+    area, rise = risen(knee, tau)
+    if again == 0.0:
+        return area, rise
+    once_more, twice = risen(again, tau)
+    return tau - area + once_more, 1.0 - rise + twice
+
+
+@leaf_kernel
+def risen(knee: float, tau: float) -> tuple[float, float]:
+    """Integral over tau of what rises straight from 0 at 0.75 u to 1 at 1.25 u; and that."""
     beyond = tau - (1.0 - KNEE_HALF) * knee
     if beyond <= 0.0:
         return 0.0, 0.0
@@ -286,9 +301,9 @@ def knee_area(knee: float, tau: float) -> tuple[float, float]:
 
 @inner_kernel
 def _knee_strain(laws: Floats, law: int, tau: float) -> tuple[float, float]:
-    """The same of a cable that gives by the share b less beyond its knee."""
+    """The same of a cable that gives by the share b less where S is 1."""
     b = laws[law, HEAD, STIFFENING]
-    area, rise = knee_area(laws[law, HEAD, KNEE], tau)
+    area, rise = knee_area(laws[law, HEAD, KNEE], laws[law, HEAD, AGAIN], tau)
     at_1 = 1.0 - b * laws[law, HEAD, KNEE_RISE]
     return (tau - 1.0 - b * (area - laws[law, HEAD, KNEE_AREA])) / at_1, (1.0 - b * rise) / at_1
 

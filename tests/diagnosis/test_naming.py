@@ -163,6 +163,11 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             ("steady", 0.5, 0.9),
         ),
         (
+            "nonlinear_cable",
+            Case({"dip": 0.7, "place": 1.0, "width": 0.3}, loads=1.7, form=":s_shaped"),
+            ("again", 1.3, 2.3),
+        ),
+        (
             "crosstalk",
             Case({"load_coefficient": 0.1, "bend_per_unit": 0.6}, ("other_1",), form=":quadratic"),
             ("bend_per_unit", 0.5, 0.7),
@@ -220,6 +225,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "patch",
         "unequal steps",
         "saturates",
+        "an S",
         "more one way",
         "rubs",
         "drags along",

@@ -241,32 +241,41 @@ def wrap_stretch(strain: Callable[[float], float], tau: float, mu: float) -> flo
 
 
 @pytest.mark.parametrize(
-    ("b", "steady", "knee"),
-    [(-0.4, 0.0, 0.0), (0.3, 0.0, 0.0), (0.9, 0.0, 0.0), (0.9, 0.5, 0.0), (0.8, 0.0, 0.8), (-0.4, 0.3, 0.7)],
+    ("b", "steady", "knee", "again"),
+    [
+        (-0.4, 0.0, 0.0, 0.0),
+        (0.3, 0.0, 0.0, 0.0),
+        (0.9, 0.0, 0.0, 0.0),
+        (0.9, 0.5, 0.0, 0.0),
+        (0.8, 0.0, 0.8, 0.0),
+        (-0.4, 0.3, 0.7, 0.0),
+        (0.8, 0.2, 0.6, 1.5),
+    ],
 )
-def test_a_stiffening_cable_against_quadrature(b: float, steady: float, knee: float) -> None:
+def test_a_stiffening_cable_against_quadrature(b: float, steady: float, knee: float, again: float) -> None:
     """Free span and both wraps of an open circuit, unloaded from T0: stretched by int dT/EA(T)."""
     config = joint("snow-open-rig")
     stage = config.drive.stage[0]
+    knees = (knee, knee * again or 1e9)
 
     def strain(tau: float) -> float:
         def gives(x: float) -> float:
             if knee:
-                return 1.0 - b * float(np.interp(x, [0.75 * knee, 1.25 * knee], [0.0, 1.0]))
+                once, twice = (float(np.interp(x, [0.75 * u, 1.25 * u], [0.0, 1.0])) for u in knees)
+                return 1.0 - b * (1.0 - once + twice if again else once)
             return 1.0 / (1.0 + b * (x - 1.0))
 
         def compliance(x: float) -> float:
             return steady + (1.0 - steady) * gives(x) / gives(1.0)
 
-        bends = [x for x in (0.75 * knee, 1.25 * knee) if tau < x < 1.0]
+        bends = sorted(w * u for u in knees for w in (0.75, 1.25) if tau < w * u < 1.0)
         return float(quad(compliance, 1.0, tau, epsabs=0.0, epsrel=1e-12, points=bends or None)[0])
 
     time = np.linspace(0.0, 1.0, 60)
     unit = stage.output_radius_m * stage.pretension_N
     load = -0.5 * unit * time
-    found = run(
-        config, still(time, load), ("nonlinear_cable", {"stiffening": b, "steady": steady, "knee": knee})
-    )["deflection_rad"]
+    law = {"stiffening": b, "steady": steady, "knee": knee, "again": again}
+    found = run(config, still(time, load), ("nonlinear_cable", law))["deflection_rad"]
     for k in (15, 35, 59):
         tau = 1.0 + load[k] / unit
         stretch = stage.free_length_m * strain(tau)

@@ -41,6 +41,9 @@ def test_what_a_law_needs_beside_its_amount_is_named() -> None:
     weight = {"moment_Nm": 0.1, "phase_rad": 0.0, "tilt_rad_per_unit": 0.5}
     assert "lacks key `channel`, what turns the joint's base" in refusal(("gravity_load", weight))
     assert "lacks key `holds_l_N`, the tension" in refusal(("clamp_slip", {"creep_l_m_per_Ns": 1e-6}))
+    stiff_again = {"stiffening": 0.5, "again": 2.0}
+    assert "has `again` and no `knee`" in refusal(("nonlinear_cable", stiff_again))
+    extend(with_effects(joint(), [("nonlinear_cable", {**stiff_again, "knee": 0.8})]))
 
 
 @pytest.mark.parametrize(

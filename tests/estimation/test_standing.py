@@ -20,10 +20,10 @@ from cablecomp.estimation.standing import apart_of, as_it_stood, at_pretension, 
 from cablecomp.signal.smoothing import FloatArray
 
 
-def both(steady: float = 0.0, knee: float = 0.0, **coat: float) -> JointConfig:
+def both(steady: float = 0.0, knee: float = 0.0, again: float = 0.0, **coat: float) -> JointConfig:
     """The joint with a cable that stiffens and a coat."""
     by_pressure = {"exponent": 0.25, **coat}
-    by_pull = {"stiffening": 0.3, "steady": steady, "knee": knee}
+    by_pull = {"stiffening": 0.3, "steady": steady, "knee": knee, "again": again}
     return with_effects(JOINT, [("nonlinear_cable", by_pull), ("pressure_dependent_friction", by_pressure)])
 
 
@@ -39,6 +39,9 @@ def stiffness(config: JointConfig) -> np.ndarray:
     gives = 1.0 / (1.0 + b * (tau - 1.0))
     if u:
         rise, at_1 = (np.interp(t, [0.75 * u, 1.25 * u], [0.0, 1.0]) for t in (tau, 1.0))
+        if r := float(cable.get("again", 0.0)):
+            more, at_1_more = (np.interp(t, [0.75 * r * u, 1.25 * r * u], [0.0, 1.0]) for t in (tau, 1.0))
+            rise, at_1 = 1.0 - rise + more, 1.0 - at_1 + at_1_more
         gives = (1.0 - b * rise) / (1.0 - b * at_1)
     return np.asarray(stage.EA_N / (w + (1.0 - w) * gives))
 
@@ -63,6 +66,7 @@ def friction(config: JointConfig, key: str) -> np.ndarray:
         {"adhesion": 0.3, "adhesion_power": 2.0, "lost": 0.4, "place": 0.8},
         {"knee": 1.2},
         {"steady": 0.4, "knee": 0.8},
+        {"knee": 0.6, "again": 2.0},
         {"lost": 0.6, "place": 1.3},
         {"lost": -0.4},
     ],

@@ -40,22 +40,37 @@ def test_a_stiffening_piece_is_the_integral_of_its_strain(
 
 
 @pytest.mark.parametrize("steady", [0.0, 0.4])
-@pytest.mark.parametrize(("share", "knee"), [(-0.5, 0.7), (0.75, 1.0), (0.9, 1.5), (0.95, 0.3)])
+@pytest.mark.parametrize(
+    ("share", "knee", "again"),
+    [
+        (-0.5, 0.7, 0.0),
+        (0.75, 1.0, 0.0),
+        (0.9, 1.5, 0.0),
+        (0.95, 0.3, 0.0),
+        (0.75, 0.6, 1.4),
+        (0.9, 0.9, 1.2),  # stiff again before it is at its softest
+        (-0.5, 0.4, 0.9),
+    ],
+)
 @pytest.mark.parametrize("rise", [0.01, 0.049, 0.051, 0.2, 0.5, 2.0])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
-    share: float, knee: float, rise: float, way: float, steady: float
+    share: float, knee: float, again: float, rise: float, way: float, steady: float
 ) -> None:
-    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0."""
-    law = np.stack([stiffening_law(share, steady, knee)])
-    bends = np.array([0.75 * knee, 1.25 * knee])
+    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0; where
+    the cable is stiff again 1 less that, and the same about where it is."""
+    law = np.stack([stiffening_law(share, steady, knee, again)])
+    knees = [knee, *([again] if again else [])]
+    bends = np.sort([w * u for u in knees for w in (0.75, 1.25)])
+    at_bends = [_stiff_share(b, knee, again) for b in bends]
 
-    def area(tau: float) -> float:
-        inside = min(max(tau, bends[0]), bends[1]) - bends[0]
-        return float(inside**2 / (2.0 * np.ptp(bends)) + max(tau - bends[1], 0.0))
+    def area(tau: float) -> float:  # S is straight between bends
+        inside = [0.0, *(b for b in bends if b < tau), tau]
+        levels = [at_bends[0], *at_bends[: len(inside) - 2], _stiff_share(tau, knee, again)]
+        return float(np.trapezoid(levels, inside))
 
     def strain(v: float) -> float:
-        at_1 = 1.0 - share * np.interp(1.0, bends, [0.0, 1.0])
+        at_1 = 1.0 - share * _stiff_share(1.0, knee, again)
         bent = (np.expm1(v) - share * (area(np.exp(v)) - area(1.0))) / at_1
         return float(steady * np.expm1(v) + (1.0 - steady) * bent)
 
@@ -67,6 +82,12 @@ def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
         found = sum(quad(strain, a, b, epsabs=1e-14, epsrel=1e-13)[0] for a, b in pairwise(parts))
         assert total == pytest.approx(WIDTH_RAD * found / (high - low), abs=2e-13)
         assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), abs=2e-12)
+
+
+def _stiff_share(tau: float, knee: float, again: float) -> float:
+    """S at this tension."""
+    once, twice = (float(np.interp(tau, [0.75 * u, 1.25 * u], [0.0, 1.0])) for u in (knee, again or 1e9))
+    return 1.0 - once + twice if again else once
 
 
 @pytest.mark.parametrize("stiffening", [0.0, 0.5])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -59,25 +61,40 @@ def test_strain_is_the_integral_of_the_stiffness_named(stiffening: float, steady
 
 
 @pytest.mark.parametrize("steady", [0.0, 0.7])
-@pytest.mark.parametrize(("share", "knee"), [(-0.5, 0.7), (0.75, 1.0), (0.75, 1.3), (0.95, 0.3)])
+@pytest.mark.parametrize(
+    ("share", "knee", "again"),
+    [
+        (-0.5, 0.7, 0.0),
+        (0.75, 1.0, 0.0),
+        (0.75, 1.3, 0.0),
+        (0.95, 0.3, 0.0),
+        (0.8, 0.7, 1.3),
+        (-0.4, 0.9, 1.1),
+    ],
+)
 def test_strain_with_a_knee_is_the_integral_of_its_compliance(
-    share: float, knee: float, steady: float
+    share: float, knee: float, again: float, steady: float
 ) -> None:
-    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0; in a
-    table too."""
-    law = np.stack([stiffening_law(share, steady, knee)])
-    table = np.stack([law_table(hardly, hardly, WRAP, share, steady, knee)])
+    """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0, or from
+    1 to 0 and back about another tension; in a table too."""
+    law = np.stack([stiffening_law(share, steady, knee, again)])
+    table = np.stack([law_table(hardly, hardly, WRAP, share, steady, knee, again)])
 
     def yields(tau: float) -> float:
-        return 1.0 - share * float(np.interp(tau, [0.75 * knee, 1.25 * knee], [0.0, 1.0]))
+        rise = float(np.interp(tau, [0.75 * knee, 1.25 * knee], [0.0, 1.0]))
+        if again:
+            rise = 1.0 - rise + float(np.interp(tau, [0.75 * again, 1.25 * again], [0.0, 1.0]))
+        return 1.0 - share * rise
 
     def compliance(tau: float) -> float:
         return float(steady + (1.0 - steady) * yields(tau) / yields(1.0))
 
+    bends = np.sort([w * u for u in (knee, again or knee) for w in (0.75, 1.25)])
     for tau in (0.02, 0.5, 0.9, 1.0, 1.3, 2.4, 8.0):
-        strain = quad(compliance, 1.0, tau, epsrel=1e-12, epsabs=1e-14, limit=200, points=sorted((1.0, tau)))[
-            0
-        ]
+        low, high = sorted((1.0, tau))
+        parts = [low, *np.unique(bends[(low < bends) & (bends < high)]), high]
+        found = sum(quad(compliance, a, b, epsrel=1e-12, epsabs=1e-14)[0] for a, b in pairwise(parts))
+        strain = found if tau >= 1.0 else -found
         assert strain_of_tau(law, 0, tau)[0] == pytest.approx(strain, rel=1e-10, abs=1e-13)
         assert strain_of_tau(law, 0, tau)[1] == pytest.approx(compliance(tau), rel=1e-12)
         assert strain_of_tau(table, 0, tau) == pytest.approx(strain_of_tau(law, 0, tau), rel=1e-12)

@@ -24,6 +24,7 @@ EFFECTS = (
     (("viscous_slip", {"coefficient_Ns_per_m_rad": 50.0}),),
     (("nonlinear_cable", {"stiffening": 0.9, "steady": 0.5}),),
     (("nonlinear_cable", {"stiffening": 0.8, "knee": 1.1}),),
+    (("nonlinear_cable", {"stiffening": 0.8, "knee": 0.7, "again": 1.8}),),
     (("routing_friction", {"mu_angle": 0.05, "arc_length_m": 0.0, "place": 0.02, "spread": 0.9}),),
     (("viscous_slip", {"coefficient_Ns_per_m_rad": 50.0, "drum": -1.0}),),
     (("strand_friction", {"fraction": 0.2, "yield_N": 2.0, "spread": 1.0}),),
