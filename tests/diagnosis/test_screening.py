@@ -12,8 +12,9 @@ from small_drive import TOLERANT, calibrated, course, recorded
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
+from cablecomp.diagnosis.explain import screening
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, hypotheses
-from cablecomp.diagnosis.explain.linear import anchor, contribution
+from cablecomp.diagnosis.explain.linear import anchor, best_start, contribution
 from cablecomp.diagnosis.explain.plausible import drags
 from cablecomp.diagnosis.explain.screening import ask, ask_all, rough
 from cablecomp.estimation.least_squares import Fit, solve
@@ -146,6 +147,22 @@ def test_an_amount_that_saturates_is_asked_for_far_beyond_what_shows(true: float
     (fit, *_) = rough(ask_all([anchor(drive.fit)], viscous), 8)
     assert fit.cost < 0.05 * drive.fit.cost
     assert fit.values["effect.viscous_slip.drum"] == pytest.approx(1.0 - 2.0 * on_input, abs=0.05)
+
+
+@pytest.mark.parametrize("times", [10.0, 300.0])
+def test_an_amount_that_saturates_is_begun_at_less_than_a_straight_line_promises(times: float) -> None:
+    """Of what hardly slides any more less shows as much, and no step leads from there to where it is."""
+    true, amount = 1e6, "coefficient_Ns_per_m_rad"
+    body, drive = calibrated(recorded([EffectSpec("viscous_slip", {amount: true})], 20.0))
+    (viscous,) = (h for h in hypotheses(TOLERANT, body.used) if h.effect.id == "viscous_slip")
+    fit = solve(drive.fit.problem.finely(), drive.fit.x, 4)
+    here = anchor(fit)
+    best = best_start(here, viscous)
+    assert best is not None
+    far = screening._answer(here, viscous, best._replace(values={**best.values, amount: times * true}))
+    (found, *_) = rough([far], 5)
+    assert found.cost < 0.01 * fit.cost
+    assert found.values[f"effect.viscous_slip.{amount}"] == pytest.approx(true, rel=0.2)
 
 
 @pytest.mark.parametrize("fine", [False, True])
