@@ -11,25 +11,29 @@ from cablecomp.mechanics.tables import LEAST_STIFFNESS, knee_area
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
-    knee, again = values["knee"], values["again"]
-    if again and not knee:
+    if values["again"] and not values["knee"]:
         raise InputError(
             f"{config.name}: effect `nonlinear_cable` has `again` and no `knee`; what is stiff again has to give way "
             "before: give `knee` as well, or leave out `again`"
         )
-    # what is stiff again before it gives way never does
-    again_at = max(again, 1.0) * knee if again else 0.0
-    return Change(stiffening=values["stiffening"], steady=values["steady"], knee=knee, again=again_at)
+    knee, again = _knees(values)
+    return Change(stiffening=values["stiffening"], steady=values["steady"], knee=knee, again=again)
+
+
+def _knees(values: Mapping[str, float]) -> tuple[float, float]:
+    """T/T0 of the knee and of where it is stiff again, 0 where there is none: what is so before it gives way never
+    gives way."""
+    knee, again = values.get("knee", 0.0), values.get("again", 0.0)
+    return knee, max(again, 1.0) * knee if again else 0.0
 
 
 def _at_pretension(values: Mapping[str, float], factor: float) -> Restated:
     """1/EA(T) keeps its values: b -> b t/g, g = 1 + b (t - 1), w -> w/c, EA -> EA/c, c = w + (1 - w)/g, t = T0'/T0;
     with a knee g = (1 - b S(1))/(1 - b S(t)), b stays and u -> u/t, r stays."""
     b, steady = values["stiffening"], values.get("steady", 0.0)
-    knee, again = values.get("knee", 0.0), values.get("again", 0.0)
+    knee, again = _knees(values)
     if knee:
-        again_at = max(again, 1.0) * knee if again else 0.0
-        here, there = (knee_area(knee, again_at, tau)[1] for tau in (1.0, factor))
+        here, there = (knee_area(knee, again, tau)[1] for tau in (1.0, factor))
         gain = (1.0 - b * here) / (1.0 - b * there)
         law = {"stiffening": b, "knee": knee / factor}
     else:
