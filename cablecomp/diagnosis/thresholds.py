@@ -186,6 +186,9 @@ class Thresholds:
     """Times the amount that shows at which an amount whose effect saturates is asked for, too (viscous slip delays what
     slides by ever less as it grows: what a hundredth of it explains was not seen, `701/120`, nor what thirty times as
     much on one drum does, `718/0`)."""
+    saturating: tuple[float, ...] = (0.1, 0.03, 0.01, 0.003)
+    """Shares of what a straight line promises of such an amount at which it is begun, too: it promises far too much
+    (viscous slip by Eyring's law began at eight times what fits, `806/30`, 39 times the noise, and was not found)."""
     shaped: float = 0.9
     """Cost with a shape that an effect may do without (an event that takes its time, a mount that yields more one way)
     over that of the best without it, after a linear step (not of an event) and after a rough fit, above which it does

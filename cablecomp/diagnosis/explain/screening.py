@@ -61,9 +61,6 @@ def with_entry(problem: Problem, h: Hypothesis, entry: EffectEntry) -> Problem:
 
 PART = 0.3
 """Of what a linear answer promises, gone at first where the whole of it leads astray."""
-PARTS = (0.1, 0.03, 0.01, 0.003)
-"""The same of a law that saturates, of which a straight line promises far too much: viscous slip by Eyring's law began
-at eight times what fits (806/30, 39 times the noise), and was not found at all."""
 
 
 def ask(here: Anchor, h: Hypothesis, worth: float = inf) -> Answer | None:
@@ -178,8 +175,8 @@ def _answer(here: Anchor, h: Hypothesis, best: Best) -> Answer:
     J[:data, :count] = here.fit.J[:data]
     J[data : data + count, :count] = here.fit.J[data:]
     J[:data, count + amount] = -d[:data] / size * new[amount].slope(x[count + amount])
-    shares = PARTS if h.effect.saturates else ()
-    parts = (begun(share) + share * along for share in (PART, *shares))
+    shares = (PART, *LIMITS.saturating) if h.effect.saturates else (PART,)
+    parts = (begun(share) + share * along for share in shares)
     starts = (x, x + along, *parts, begun(PART))
     begin = tuple(inside(problem, s) for s in starts)
     return Answer(h, best.cost, best.by_channel, problem, begin, J)
