@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from effect_cases import Floats, excitation, joint, run, still
+from knees import bends, stiff_share
 from scipy.integrate import quad
 
 from cablecomp.config import JointConfig
@@ -256,20 +257,19 @@ def test_a_stiffening_cable_against_quadrature(b: float, steady: float, knee: fl
     """Free span and both wraps of an open circuit, unloaded from T0: stretched by int dT/EA(T)."""
     config = joint("snow-open-rig")
     stage = config.drive.stage[0]
-    knees = (knee, knee * again or 1e9)
+    again_at = again * knee
 
     def strain(tau: float) -> float:
         def gives(x: float) -> float:
             if knee:
-                once, twice = (float(np.interp(x, [0.75 * u, 1.25 * u], [0.0, 1.0])) for u in knees)
-                return 1.0 - b * (1.0 - once + twice if again else once)
+                return 1.0 - b * float(stiff_share(x, knee, again_at))
             return 1.0 / (1.0 + b * (x - 1.0))
 
         def compliance(x: float) -> float:
             return steady + (1.0 - steady) * gives(x) / gives(1.0)
 
-        bends = sorted(w * u for u in knees for w in (0.75, 1.25) if tau < w * u < 1.0)
-        return float(quad(compliance, 1.0, tau, epsabs=0.0, epsrel=1e-12, points=bends or None)[0])
+        inside = [x for x in bends(knee, again_at) if tau < x < 1.0]
+        return float(quad(compliance, 1.0, tau, epsabs=0.0, epsrel=1e-12, points=inside or None)[0])
 
     time = np.linspace(0.0, 1.0, 60)
     unit = stage.output_radius_m * stage.pretension_N

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from knees import stiff_share
 from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig, in_session, parse_joint
@@ -38,10 +39,8 @@ def stiffness(config: JointConfig) -> np.ndarray:
     tau, u = TENSIONS / stage.pretension_N, float(cable.get("knee", 0.0))
     gives = 1.0 / (1.0 + b * (tau - 1.0))
     if u:
-        rise, at_1 = (np.interp(t, [0.75 * u, 1.25 * u], [0.0, 1.0]) for t in (tau, 1.0))
-        if r := float(cable.get("again", 0.0)):
-            more, at_1_more = (np.interp(t, [0.75 * r * u, 1.25 * r * u], [0.0, 1.0]) for t in (tau, 1.0))
-            rise, at_1 = 1.0 - rise + more, 1.0 - at_1 + at_1_more
+        again = u * float(cable.get("again", 0.0))
+        rise, at_1 = (stiff_share(t, u, again) for t in (tau, 1.0))
         gives = (1.0 - b * rise) / (1.0 - b * at_1)
     return np.asarray(stage.EA_N / (w + (1.0 - w) * gives))
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from knees import bends, stiff_share
 from scipy.integrate import quad
 
 from cablecomp.mechanics.piece import piece
@@ -60,17 +61,14 @@ def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
     """de/dtau = w + (1 - w) (1 - b S(tau))/(1 - b S(1)), S from 0 at 0.75 u straight to 1 at 1.25 u, e(1) = 0; where
     the cable is stiff again 1 less that, and the same about where it is."""
     law = np.stack([stiffening_law(share, steady, knee, again)])
-    knees = [knee, *([again] if again else [])]
-    bends = np.sort([w * u for u in knees for w in (0.75, 1.25)])
-    at_bends = [_stiff_share(b, knee, again) for b in bends]
+    bent_at = bends(knee, again)
 
     def area(tau: float) -> float:  # S is straight between bends
-        inside = [0.0, *(b for b in bends if b < tau), tau]
-        levels = [at_bends[0], *at_bends[: len(inside) - 2], _stiff_share(tau, knee, again)]
-        return float(np.trapezoid(levels, inside))
+        inside = [0.0, *bent_at[bent_at < tau], tau]
+        return float(np.trapezoid(stiff_share(inside, knee, again), inside))
 
     def strain(v: float) -> float:
-        at_1 = 1.0 - share * _stiff_share(1.0, knee, again)
+        at_1 = 1.0 - share * stiff_share(1.0, knee, again)
         bent = (np.expm1(v) - share * (area(np.exp(v)) - area(1.0))) / at_1
         return float(steady * np.expm1(v) + (1.0 - steady) * bent)
 
@@ -78,16 +76,10 @@ def test_a_piece_across_a_knee_is_the_integral_of_its_strain(
         end = begin + way * rise
         total, slope = piece(law, 0, 1.0, begin, np.exp(begin), 1.0 + WIDTH_RAD, end, np.exp(end))
         low, high = sorted((begin, end))
-        parts = [low, *(v for v in np.log(bends) if low < v < high), high]
+        parts = [low, *(v for v in np.log(bent_at) if low < v < high), high]
         found = sum(quad(strain, a, b, epsabs=1e-14, epsrel=1e-13)[0] for a, b in pairwise(parts))
         assert total == pytest.approx(WIDTH_RAD * found / (high - low), abs=2e-13)
         assert slope == pytest.approx(WIDTH_RAD * (strain(end) - strain(begin)) / (end - begin), abs=2e-12)
-
-
-def _stiff_share(tau: float, knee: float, again: float) -> float:
-    """S at this tension."""
-    once, twice = (float(np.interp(tau, [0.75 * u, 1.25 * u], [0.0, 1.0])) for u in (knee, again or 1e9))
-    return 1.0 - once + twice if again else once
 
 
 @pytest.mark.parametrize("stiffening", [0.0, 0.5])
@@ -122,24 +114,24 @@ def test_a_piece_across_a_knee_under_friction_by_pressure_is_the_integral_of_its
     """Both: v = (tau^n - 1)/n, and compliance that falls by b as S rises from 0.75 u to 1.25 u."""
     share, knee = 0.75, 1.1
     law = np.stack([law_table(lambda tau: tau**-exponent, None, 1.0, share, 0.0, knee)])
-    bends = np.array([0.75 * knee, 1.25 * knee])
+    bent_at = bends(knee, 0.0)
 
     def tau_of(v: float) -> float:
         return float((1.0 + exponent * v) ** (1.0 / exponent))
 
     def compliance(tau: float) -> float:
-        low, at_1 = (float(np.interp(t, bends, [0.0, 1.0])) for t in (tau, 1.0))
-        return (1.0 - share * low) / (1.0 - share * at_1)
+        here, at_1 = stiff_share([tau, 1.0], knee, 0.0)
+        return float((1.0 - share * here) / (1.0 - share * at_1))
 
     def strain(v: float) -> float:
         tau = tau_of(v)
-        inside = [b for b in bends if min(1.0, tau) < b < max(1.0, tau)]
+        inside = [b for b in bent_at if min(1.0, tau) < b < max(1.0, tau)]
         return float(quad(compliance, 1.0, tau, epsabs=1e-12, points=inside or None)[0])
 
     for begin in (-0.25, 0.0, 0.1):
         end = begin + rise
         total, _ = piece(law, 0, 1.0, begin, tau_of(begin), 1.0 + WIDTH_RAD, end, tau_of(end))
-        inside = [v for v in (bends**exponent - 1.0) / exponent if min(begin, end) < v < max(begin, end)]
+        inside = [v for v in (bent_at**exponent - 1.0) / exponent if min(begin, end) < v < max(begin, end)]
         found = quad(strain, begin, end, epsabs=1e-11, points=inside or None)[0] / rise
         assert total == pytest.approx(WIDTH_RAD * found, abs=3e-8)
 

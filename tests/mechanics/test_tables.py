@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from knees import bends, stiff_share
 from scipy.integrate import quad
 
 from cablecomp.mechanics.tables import (
@@ -81,18 +82,15 @@ def test_strain_with_a_knee_is_the_integral_of_its_compliance(
     table = np.stack([law_table(hardly, hardly, WRAP, share, steady, knee, again)])
 
     def yields(tau: float) -> float:
-        rise = float(np.interp(tau, [0.75 * knee, 1.25 * knee], [0.0, 1.0]))
-        if again:
-            rise = 1.0 - rise + float(np.interp(tau, [0.75 * again, 1.25 * again], [0.0, 1.0]))
-        return 1.0 - share * rise
+        return 1.0 - share * float(stiff_share(tau, knee, again))
 
     def compliance(tau: float) -> float:
         return float(steady + (1.0 - steady) * yields(tau) / yields(1.0))
 
-    bends = np.sort([w * u for u in (knee, again or knee) for w in (0.75, 1.25)])
+    bent_at = bends(knee, again)
     for tau in (0.02, 0.5, 0.9, 1.0, 1.3, 2.4, 8.0):
         low, high = sorted((1.0, tau))
-        parts = [low, *np.unique(bends[(low < bends) & (bends < high)]), high]
+        parts = [low, *bent_at[(low < bent_at) & (bent_at < high)], high]
         found = sum(quad(compliance, a, b, epsrel=1e-12, epsabs=1e-14)[0] for a, b in pairwise(parts))
         strain = found if tau >= 1.0 else -found
         assert strain_of_tau(law, 0, tau)[0] == pytest.approx(strain, rel=1e-10, abs=1e-13)
