@@ -76,7 +76,7 @@ EFFECT = Effect(
             omitted=0.5,
             minimum=0.0,
             maximum=0.98,
-            tries=(0.15, 0.85),
+            tries=(0.15, 0.35, 0.65, 0.85),
             of_known_drive=True,  # of the jaw two of them took the place of what another posture needs
         ),
         Parameter(

@@ -60,3 +60,17 @@ def test_a_law_takes_the_shape_that_it_has_once_it_is_fitted() -> None:
     assert better.fit.cost < 0.2 * plain.cost
     assert better.fit.values["effect.series_compliance.skew"] == pytest.approx(-0.6, abs=0.05)
     assert with_better_forms(better, groups) is better
+
+
+def test_a_path_is_looked_for_between_the_middle_and_the_end_of_the_cable() -> None:
+    """Of the plant's two guides one lies at 0.7 of the free cable; at 0.85 of it a step promised nothing yet."""
+    bent = {"mu_angle": 0.2, "arc_length_m": 0.005, "count": 2.0, "first": 0.7}
+    body, drive = calibrated(recorded([EffectSpec("routing_friction:several_guides", bent)], 30.0))
+    path = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "routing_friction")
+    begun = with_entry(drive.fit.problem, path, path.entry({"mu_angle": 0.2, "arc_length_m": 0.005}))
+    plain = solve(begun, begun.start, 15)
+    groups = make_groups(drive.fit)
+    better = with_better_forms(Model((path,), plain, left_out(plain, groups)), groups)
+    assert better.fit.cost < 0.2 * plain.cost
+    assert better.fit.values["effect.routing_friction.place"] > 0.6
+    assert better.fit.values["effect.routing_friction.mu_angle"] == pytest.approx(0.2, rel=0.05)
