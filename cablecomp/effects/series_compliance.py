@@ -93,8 +93,9 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 
 def _stiffens(values: Mapping[str, float], on_high: bool) -> bool:
-    """Ever more at once it is play; what softens over all of its load is a coupling."""
-    return on_high and values.get("power", HERTZ) < 1.0
+    """Ever more at once by a contact's power it is play, whose own is near none (`_at_once`); what yields by another
+    power over all of its load is a coupling: it softens, or is bent at first and then stretched, as a diaphragm."""
+    return on_high and values.get("power", HERTZ) == HERTZ
 
 
 def _at_once(values: Mapping[str, float], _on_high: bool) -> bool:

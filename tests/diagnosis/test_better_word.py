@@ -97,21 +97,23 @@ def test_a_bearing_that_gives_way_for_long_is_another_but_where_it_mostly_drags(
         assert bool(in_part_a_drag(alone, bearing, rounds, lead)) == held
 
 
-def test_a_coupling_at_its_bound_is_better_called_play_where_it_stiffens_alone() -> None:
+def test_a_coupling_at_its_bound_is_better_called_play_where_it_has_no_power_of_its_own() -> None:
     coupling = hypothesis("series_compliance", "series_compliance")
     shapes = ("stiffening_per_Nm", "power")
     free = {p.base.rpartition(".")[2]: p for p in coupling.free(dict.fromkeys(shapes, 0.5), JOINT)}
     ends = [free[name] for name in shapes]
     at = np.array([p.x(p.high) for p in ends])
 
-    def word(power: float) -> str:
+    def word(**power: float) -> str:
         problem = SimpleNamespace(parameters=ends, config=JOINT)
-        values = {coupling.key("power"): power}
+        values = {coupling.key(name): v for name, v in {"stiffening_per_Nm": ends[0].high, **power}.items()}
         fit = SimpleNamespace(problem=problem, x=at, values=values)
         return better_word(cast("Fit", fit), coupling)
 
-    assert word(0.4) == "stiffening_per_Nm"
-    assert word(1.8) == ""
+    assert word() == "stiffening_per_Nm"
+    assert word(power=1e-4) == "power"
+    assert word(power=0.4) == ""  # a diaphragm, bent at first and stretched the more it turns
+    assert word(power=1.8) == ""
 
 
 @pytest.mark.parametrize(
