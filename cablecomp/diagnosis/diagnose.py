@@ -19,7 +19,8 @@ from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.search import Search, done_without, exchanged, search, without_effects
 from cablecomp.diagnosis.explain.usual import usual_of
-from cablecomp.diagnosis.explain.weighing import Weighed, weigh
+from cablecomp.diagnosis.explain.weighed import Weighed
+from cablecomp.diagnosis.explain.weighing import weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
 from cablecomp.diagnosis.locate.responses import left_on_every_row

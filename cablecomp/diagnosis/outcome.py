@@ -12,7 +12,7 @@ from cablecomp.diagnosis.body import Body
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.describe.empirical import Found
 from cablecomp.diagnosis.explain.model import Model
-from cablecomp.diagnosis.explain.weighing import Weighed
+from cablecomp.diagnosis.explain.weighed import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.diagnosis.locate.location import Location, locate
 from cablecomp.diagnosis.locate.remainders import sensitivities, series_of

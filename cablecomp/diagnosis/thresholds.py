@@ -392,6 +392,11 @@ class Thresholds:
     were wrong (trials seeds 685 to 710: 11 of 19; 712 to 716: 8 of 12), of all others below it, delays apart, 35 of
     165. So has a payload of which no recording shows a whole cycle: three of four such names (738 to 744) were a torque
     sensor's drift."""
+    z_beside: float = 4.5
+    """Standard errors by which a curve of the load or the pressure, or a slow drift, has to be ahead of none and of its
+    nearest rival, either in any form, beside an effect that takes off more, whose own form leaves such curves: of 13
+    such names below it ten were wrong, and two came nearest to physics that is in no catalogue; of 190 other further
+    names 26 were wrong (trials seeds 749, 750, 805, 806 and 970 to 973)."""
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""

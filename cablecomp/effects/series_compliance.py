@@ -259,6 +259,7 @@ EFFECT = Effect(
     acts_through=("load", "load_rate"),
     bounded=True,
     pliant=True,
+    fills_in=True,
     in_series=True,
     change=_change,
     tries=(

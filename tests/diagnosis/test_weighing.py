@@ -13,14 +13,9 @@ from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.confidence import learnt
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.weighing import (
-    Weighed,
-    _against,
-    _at_bound,
-    _follows,
-    _unfollowed,
-    one_in_series,
-)
+from cablecomp.diagnosis.explain.weighed import Weighed, clear_of_forms, one_in_series
+from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, _unfollowed
+from cablecomp.diagnosis.thresholds import LIMITS
 
 
 @pytest.mark.parametrize(
@@ -68,6 +63,11 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
     assert ";" not in reason
 
 
+def _weighed(name: str, removes: float, confidence: float, lead: float = 9.0) -> Weighed:
+    even, effect = ScoreDifference(0.5, 9.0, 9.0), hypothesis(name.partition(":")[0], name)
+    return Weighed(effect, None, {"lead": lead}, confidence, (), even, "", removes)
+
+
 @pytest.mark.parametrize(
     ("sizes", "named"),
     [
@@ -89,17 +89,37 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
 def test_of_a_coupling_and_a_clearance_one_has_the_name(
     sizes: dict[str, tuple[float, float]], named: set[str]
 ) -> None:
-    def weighed(name: str, removes: float, confidence: float) -> Weighed:
-        even = ScoreDifference(0.5, 9.0, 9.0)
-        return Weighed(hypothesis(name.partition(":")[0], name), None, {}, confidence, (), even, "", removes)
-
-    found = one_in_series([weighed(name, *size) for name, size in sizes.items()])
+    found = one_in_series([_weighed(name, *size) for name, size in sizes.items()])
     assert [w.term.name for w in found] == list(sizes)
     assert {w.term.name for w in found if w.confidence >= 0.5} == named
     for w in found:
         was = sizes[w.term.name][1]
         assert (w.confidence == was) is (w.term.name in named or was < 0.5)
         assert ("one curve of the load" in w.why_not) is (w.confidence != was)
+
+
+@pytest.mark.parametrize(
+    ("curve", "removes", "lead", "beside", "keeps"),
+    [
+        ("pressure_dependent_friction", 0.01, 3.2, 0.9, False),
+        ("pretension_relaxation", 0.06, 2.5, 0.9, False),
+        ("series_compliance", 0.2, 3.1, 0.9, False),
+        ("series_compliance", 0.2, 7.6, 0.9, True),  # far ahead
+        ("series_compliance", 0.8, 3.1, 0.9, True),  # takes off more than the other
+        ("series_compliance", 0.2, 3.1, 0.4, True),  # the other has no name
+        ("viscous_slip", 0.2, 3.1, 0.9, True),  # no such curve
+    ],
+)
+def test_a_curve_that_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_more(
+    curve: str, removes: float, lead: float, beside: float, keeps: bool
+) -> None:
+    first, further = clear_of_forms(
+        [_weighed("routing_friction", 0.7, beside), _weighed(curve, removes, 0.8, lead)]
+    )
+    assert first.confidence == beside
+    assert (further.confidence == 0.8) is keeps
+    assert (further.confidence < LIMITS.name) is not keeps
+    assert (f"{lead} standard errors" in further.why_not) is not keeps
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:

@@ -22,7 +22,7 @@ from cablecomp.diagnosis.explain.model import Model, Selection
 from cablecomp.diagnosis.explain.neighbours import not_told_apart
 from cablecomp.diagnosis.explain.unseen import Hidden
 from cablecomp.diagnosis.explain.usual import usual_of
-from cablecomp.diagnosis.explain.weighing import Weighed
+from cablecomp.diagnosis.explain.weighed import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates, join
 from cablecomp.diagnosis.locate.remainders import sensitivities
 from cablecomp.diagnosis.outcome import Case, Outcome

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -34,6 +33,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.ties import surest_alone
 from cablecomp.diagnosis.explain.usual import lost_in_usual
+from cablecomp.diagnosis.explain.weighed import Weighed, clear_of_forms, one_in_series
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -45,28 +45,6 @@ from cablecomp.signal.smoothing import FloatArray
 
 NO_SIZE: Final = ("length", "instant", "duration")
 """Roles of parameters whose bounds are no sign against an effect."""
-
-
-@dataclass(frozen=True)
-class Weighed:
-    """One effect of the final model: its evidence, confidence, rivals that stand in for it, its score against
-    the nearest one.
-
-    `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the
-    last to come, whichever is more: effects that trade places take off little as the last, what others hide
-    takes off little alone. `better`: the model with the rival in its place that predicts data left out better, by more
-    than a tie; None where there is none.
-    """
-
-    term: Hypothesis
-    depends: Dependence | None
-    evidence: Mapping[str, float]
-    confidence: float
-    rivals: tuple[str, ...]
-    difference: ScoreDifference
-    why_not: str
-    removes: float
-    better: Model | None = None
 
 
 Locate = Callable[[Fit], Location]
@@ -85,23 +63,7 @@ def weigh(
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
     drawn = zip(terms, rng.spawn(len(terms)), strict=True)
     weighed = in_processes(lambda t: _weighed(found, t[0], pool, left, locate, share_left, t[1]), [*drawn])
-    return sorted(one_in_series(list(weighed)), key=lambda w: -w.confidence)
-
-
-def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
-    """The same, where of those named that give way in series with the joint the one that takes off most keeps its name:
-    what one law's form lacks there the other has, and data show the one curve that they make together."""
-    among = [w for w in weighed if w.term.effect.in_series and w.confidence >= LIMITS.name]
-    if not among:
-        return list(weighed)
-    most = max(among, key=lambda w: w.removes).term.effect.id
-    why_not = f"what gives way in series is one curve of the load, and `{most}` takes off more of it"
-    return [
-        replace(w, confidence=LIMITS.little_told, why_not=why_not)
-        if any(w is other for other in among) and w.term.effect.id != most
-        else w
-        for w in weighed
-    ]
+    return sorted(clear_of_forms(one_in_series(list(weighed))), key=lambda w: -w.confidence)
 
 
 def _weighed(

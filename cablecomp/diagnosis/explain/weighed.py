@@ -1,0 +1,73 @@
+"""An effect as weighed, and what may not be named beside another: a second of what gives way in series, a curve that
+another law's form leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cablecomp.diagnosis.explain.dependence import Dependence
+from cablecomp.diagnosis.explain.hypotheses import Hypothesis
+from cablecomp.diagnosis.explain.model import Model
+from cablecomp.diagnosis.explain.scores import ScoreDifference
+from cablecomp.diagnosis.thresholds import LIMITS
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """One effect of the final model: its evidence, confidence, rivals that stand in for it, its score against
+    the nearest one.
+
+    `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the
+    last to come, whichever is more: effects that trade places take off little as the last, what others hide
+    takes off little alone. `better`: the model with the rival in its place that predicts data left out better, by more
+    than a tie; None where there is none.
+    """
+
+    term: Hypothesis
+    depends: Dependence | None
+    evidence: Mapping[str, float]
+    confidence: float
+    rivals: tuple[str, ...]
+    difference: ScoreDifference
+    why_not: str
+    removes: float
+    better: Model | None = None
+
+
+def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """The same, where of those named that give way in series with the joint the one that takes off most keeps its name:
+    what one law's form lacks there the other has, and data show the one curve that they make together."""
+    among = [w for w in weighed if w.term.effect.in_series and w.confidence >= LIMITS.name]
+    if not among:
+        return list(weighed)
+    most = max(among, key=lambda w: w.removes).term.effect.id
+    why_not = f"what gives way in series is one curve of the load, and `{most}` takes off more of it"
+    return [
+        replace(w, confidence=LIMITS.little_told, why_not=why_not)
+        if any(w is other for other in among) and w.term.effect.id != most
+        else w
+        for w in weighed
+    ]
+
+
+def clear_of_forms(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """The same, where a curve or a drift that another law's form may leave keeps its name beside a named effect that
+    takes off more only if it is far ahead."""
+    most = max((w.removes for w in weighed if w.confidence >= LIMITS.name), default=0.0)
+
+    def doubtful(w: Weighed) -> bool:
+        further = w.term.effect.fills_in and LIMITS.name <= w.confidence and w.removes < most
+        return further and w.evidence["lead"] < LIMITS.z_beside
+
+    return [
+        replace(
+            w,
+            confidence=LIMITS.little_told,
+            why_not=f"the form of what takes off more may leave this beside it, which is ahead of its nearest rival or "
+            f"of none by {w.evidence['lead']:.1f} standard errors; {LIMITS.z_beside:g} are asked for",
+        )
+        if doubtful(w)
+        else w
+        for w in weighed
+    ]
