@@ -63,9 +63,12 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
     assert ";" not in reason
 
 
-def _weighed(name: str, removes: float, confidence: float, lead: float = 9.0) -> Weighed:
+def _weighed(
+    name: str, removes: float, confidence: float, lead: float = 9.0, last: float | None = None
+) -> Weighed:
     even, effect = ScoreDifference(0.5, 9.0, 9.0), hypothesis(name.partition(":")[0], name)
-    return Weighed(effect, None, {"lead": lead}, confidence, (), even, "", removes)
+    evidence = {"lead": lead, "share_total": removes if last is None else last}
+    return Weighed(effect, None, evidence, confidence, (), even, "", removes)
 
 
 @pytest.mark.parametrize(
@@ -99,22 +102,26 @@ def test_of_a_coupling_and_a_clearance_one_has_the_name(
 
 
 @pytest.mark.parametrize(
-    ("curve", "removes", "lead", "beside", "keeps"),
+    ("name", "removes", "last", "lead", "beside", "keeps"),
     [
-        ("pressure_dependent_friction", 0.01, 3.2, 0.9, False),
-        ("pretension_relaxation", 0.06, 2.5, 0.9, False),
-        ("series_compliance", 0.2, 3.1, 0.9, False),
-        ("series_compliance", 0.2, 7.6, 0.9, True),  # far ahead
-        ("series_compliance", 0.8, 3.1, 0.9, True),  # takes off more than the other
-        ("series_compliance", 0.2, 3.1, 0.4, True),  # the other has no name
-        ("viscous_slip", 0.2, 3.1, 0.9, True),  # no such curve
+        ("pressure_dependent_friction", 0.1, 0.1, 3.2, 0.9, False),
+        ("pretension_relaxation", 0.1, 0.1, 2.5, 0.9, False),
+        ("series_compliance", 0.1, 0.1, 3.1, 0.9, False),
+        ("series_compliance", 0.1, 0.1, 7.6, 0.9, True),  # far ahead
+        ("series_compliance", 0.3, 0.3, 3.1, 0.9, True),  # so large
+        ("series_compliance", 0.8, 0.8, 3.1, 0.9, True),  # takes off more than the other
+        ("series_compliance", 0.1, 0.1, 3.1, 0.4, True),  # the other has no name
+        ("viscous_slip", 0.2, 0.2, 3.1, 0.9, True),  # no such curve
+        ("viscous_slip", 0.2, 0.001, 3.1, 0.9, False),  # hardly missed
+        ("viscous_slip", 0.2, 0.001, 7.6, 0.9, True),
+        ("clock_skew", 0.001, 0.001, 3.1, 0.9, True),  # no form is late
     ],
 )
-def test_a_curve_that_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_more(
-    curve: str, removes: float, lead: float, beside: float, keeps: bool
+def test_what_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_more(
+    name: str, removes: float, last: float, lead: float, beside: float, keeps: bool
 ) -> None:
     first, further = clear_of_forms(
-        [_weighed("routing_friction", 0.7, beside), _weighed(curve, removes, 0.8, lead)]
+        [_weighed("routing_friction", 0.7, beside), _weighed(name, removes, 0.8, lead, last)]
     )
     assert first.confidence == beside
     assert (further.confidence == 0.8) is keeps

@@ -52,22 +52,21 @@ def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
 
 
 def clear_of_forms(weighed: Sequence[Weighed]) -> list[Weighed]:
-    """The same, where a curve or a drift that another law's form may leave keeps its name beside a named effect that
-    takes off more only if it is far ahead."""
+    """The same, where what another law's form may leave keeps its name beside a named effect that takes off more only
+    if it is far ahead."""
     most = max((w.removes for w in weighed if w.confidence >= LIMITS.name), default=0.0)
+    return [_left_by_a_form(w) if w.confidence >= LIMITS.name and w.removes < most else w for w in weighed]
 
-    def doubtful(w: Weighed) -> bool:
-        further = w.term.effect.fills_in and LIMITS.name <= w.confidence and w.removes < most
-        return further and w.evidence["lead"] < LIMITS.z_beside
 
-    return [
-        replace(
-            w,
-            confidence=LIMITS.little_told,
-            why_not=f"the form of what takes off more may leave this beside it, which is ahead of its nearest rival or "
-            f"of none by {w.evidence['lead']:.1f} standard errors; {LIMITS.z_beside:g} are asked for",
-        )
-        if doubtful(w)
-        else w
-        for w in weighed
-    ]
+def _left_by_a_form(w: Weighed) -> Weighed:
+    """The same without its name, if it is so small a curve or drift as other laws' forms leave, or takes off little of
+    whatever kind, and is not far ahead."""
+    delay, lead = w.term.amount.unit == "s", w.evidence["lead"]
+    most = LIMITS.curve_beside if w.term.effect.fills_in else 0.0 if delay else LIMITS.little_beside
+    if lead >= LIMITS.z_beside or w.evidence["share_total"] >= most:
+        return w
+    why_not = (
+        f"the form of what takes off more may leave this beside it; it is ahead of its nearest rival or of none by "
+        f"{lead:.1f} standard errors, {LIMITS.z_beside:g} are asked for"
+    )
+    return replace(w, confidence=LIMITS.little_told, why_not=why_not)
