@@ -120,9 +120,9 @@ def test_of_a_coupling_and_a_clearance_one_has_the_name(
 def test_what_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_more(
     name: str, removes: float, last: float, lead: float, beside: float, keeps: bool
 ) -> None:
-    first, further = clear_of_forms(
-        [_weighed("routing_friction", 0.7, beside), _weighed(name, removes, 0.8, lead, last)]
-    )
+    two = [_weighed("routing_friction", 0.7, beside), _weighed(name, removes, 0.8, lead, last)]
+    assert clear_of_forms(two, known=False) == two
+    first, further = clear_of_forms(two, known=True)
     assert first.confidence == beside
     assert (further.confidence == 0.8) is keeps
     assert (further.confidence < LIMITS.name) is not keeps

@@ -51,9 +51,12 @@ def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
     ]
 
 
-def clear_of_forms(weighed: Sequence[Weighed]) -> list[Weighed]:
+def clear_of_forms(weighed: Sequence[Weighed], *, known: bool) -> list[Weighed]:
     """The same, where what another law's form may leave keeps its name beside a named effect that takes off more only
-    if it is far ahead."""
+    if it is far ahead. Of a drive that is not `known`, but by order of magnitude, a share of the mismatch says nothing.
+    """
+    if not known:
+        return list(weighed)
     most = max((w.removes for w in weighed if w.confidence >= LIMITS.name), default=0.0)
     return [_left_by_a_form(w) if w.confidence >= LIMITS.name and w.removes < most else w for w in weighed]
 

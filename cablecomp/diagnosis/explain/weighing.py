@@ -41,6 +41,7 @@ from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.parallel import in_processes
+from cablecomp.estimation.parameter import vague_drive
 from cablecomp.signal.smoothing import FloatArray
 
 NO_SIZE: Final = ("length", "instant", "duration")
@@ -63,7 +64,8 @@ def weigh(
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
     drawn = zip(terms, rng.spawn(len(terms)), strict=True)
     weighed = in_processes(lambda t: _weighed(found, t[0], pool, left, locate, share_left, t[1]), [*drawn])
-    return sorted(clear_of_forms(one_in_series(list(weighed))), key=lambda w: -w.confidence)
+    known = not vague_drive(final.fit.problem.parameters)
+    return sorted(clear_of_forms(one_in_series(weighed), known=known), key=lambda w: -w.confidence)
 
 
 def _weighed(
