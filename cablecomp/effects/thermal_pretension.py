@@ -19,10 +19,13 @@ from cablecomp.effects.base import (
 from cablecomp.effects.compiled_term import term
 
 
-@term(parameters=("coefficient", "bend", "reference", "lag", "hanging"), state=("time", "warm"))
+@term(
+    parameters=("coefficient", "bend", "reference", "lag", "stick", "hanging"), state=("time", "warm", "slid")
+)
 def _expand(c: Any, p: Any, s: Any) -> None:
-    """p: coefficient [1/K], its growth [1/K], reference [degC], lag [s], moment R T0 that hangs [N m] (closed circuit:
-    0); s: time [s] and temperature [degC] of what expands.
+    """p: coefficient [1/K], its growth [1/K], reference [degC], lag [s], by how much what expands sticks [K], moment
+    R T0 that hangs [N m] (closed circuit: 0); s: time [s], temperature of what expands, and that which it has slid to
+    [degC].
 
     Without a temperature nothing is changed.
     """
@@ -30,9 +33,12 @@ def _expand(c: Any, p: Any, s: Any) -> None:
     if not math.isnan(warm):
         if p.lag > 0.0 and not c.first:
             warm += (s.warm - warm) * math.exp(-(c.time - s.time) / p.lag)
+        slid = warm
+        if p.stick > 0.0 and not c.first:
+            slid = min(max(s.slid, warm - p.stick), warm + p.stick)
         if c.commit:
-            s.time, s.warm = c.time, warm
-        over = warm - p.reference
+            s.time, s.warm, s.slid = c.time, warm, slid
+        over = slid - p.reference
         factor = max(1.0 + p.coefficient * over * (1.0 + p.bend * over), LEAST_PRETENSION)
         if p.hanging > 0.0:
             c.moment += p.hanging * (1.0 - factor)
@@ -49,6 +55,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         bend=values["bend_per_K"],
         reference=values["reference_degC"],
         lag=values["lag_s"],
+        stick=values["stick_K"],
         hanging=hanging,
     )
     return Change(terms=terms, moves_pretension=closed)
@@ -73,11 +80,13 @@ EFFECT = Effect(
     id="thermal_pretension",
     statement="Cable and frame expand differently with temperature, and the pretension rises or falls with "
     "it.",
-    equation="T0(ϑ) = T0 (1 + k D (1 + b D)), D = ϑ - ϑ_ref, with k = (α_frame - α_cable) EA/T0 for a stiff frame, ϑ "
-    "the temperature of what expands: t_l dϑ/dt = ϑ_measured - ϑ; in an open circuit T = T0(ϑ) + M/R",
+    equation="T0(ϑ) = T0 (1 + k D (1 + b D)), D = y - ϑ_ref, with k = (α_frame - α_cable) EA/T0 for a stiff frame, ϑ "
+    "the temperature of what expands: t_l dϑ/dt = ϑ_measured - ϑ; y drawn along by ϑ, |y - ϑ| <= s; in an open circuit "
+    "T = T0(ϑ) + M/R",
     source="thermal strain of a member held at constant length: S. Timoshenko, Strength of Materials, part "
     "I, 1930; coefficients of expansion themselves rise with temperature: R. K. Kirby, T. A. Hahn and B. D. "
-    "Rothrock, in American Institute of Physics Handbook, 1972",
+    "Rothrock, in American Institute of Physics Handbook, 1972; bolted joints stick before they slide: L. Gaul and "
+    "R. Nitsche, Appl. Mech. Rev. 54, 2001",
     parameters=(
         Parameter(
             "coefficient_per_K",
@@ -126,6 +135,19 @@ EFFECT = Effect(
             minimum=-2.0,
             maximum=2.0,
             tries=(-0.5, 0.5),
+        ),
+        Parameter(
+            "stick_K",
+            "K",
+            0.0,
+            0.0,
+            20.0,
+            "s, up to which bolted joints of the frame stick before they slide, either way; 0: they do not stick",
+            role="slack",
+            omitted=0.0,
+            minimum=0.0,
+            tries=(0.2, 0.5),
+            of_known_drive=True,
         ),
     ),
     acts_through=("temperature", "time"),

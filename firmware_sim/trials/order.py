@@ -46,7 +46,8 @@ ALIKE = frozenset({
     "strand_break:unequal_steps", "strand_friction:graded", "strand_friction:masing", "strand_friction:proportional",
     "strand_friction:rate_dependent", "termination_backlash:dragging_link", "termination_backlash:greased",
     "termination_backlash:sprung", "termination_backlash:two_clearances", "termination_backlash:wedged",
-    "thermal_pretension:lagged", "thermal_pretension:quadratic", "viscous_slip:one_drum",
+    "thermal_pretension:lagged", "thermal_pretension:quadratic", "thermal_pretension:sticking",
+    "viscous_slip:one_drum",
 })  # fmt: skip
 """Forms that the catalogue has by now, as shapes of its own laws: they count as the catalogue's."""
 FORMS = (*FRICTION, *CABLE, *JOINT, *LOADS)
@@ -69,7 +70,6 @@ LATEST = frozenset({
     "strand_break:bent_over_drums",
     "strand_friction:bouc_wen",
     "termination_backlash:loosening",
-    "thermal_pretension:sticking",
     "viscous_slip:eyring",
 })  # fmt: skip
 """Forms that joined last: nothing was tuned on them before they were judged."""

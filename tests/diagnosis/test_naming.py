@@ -212,6 +212,15 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
             Case({"gap_rad": 3e-3, "share": 0.8, "place_rad": 0.2, "width_rad": 0.3}, form=":worn"),
             ("swing", 0.4, 1.0),
         ),
+        (
+            "thermal_pretension",
+            Case(
+                {"coefficient_per_K": 0.03, "reference_degC": 20.0, "stick_K": 1.5},
+                ("temperature_degC",),
+                form=":sticking",
+            ),
+            ("stick_K", 1.3, 1.7),
+        ),
     ],
     ids=[
         "stiffens",
@@ -235,6 +244,7 @@ def test_an_effect_that_the_plant_has_is_named(effect: str) -> None:
         "tilts its bearing",
         "softer across",
         "worn",
+        "sticks",
     ],
 )
 def test_what_goes_by_another_law_is_named_for_what_it_is(

@@ -87,6 +87,18 @@ def test_what_expands_late_follows_a_step_of_temperature_exponentially() -> None
     assert found == pytest.approx(stage.pretension_N * (1.0 + 0.01 * warm), rel=3e-3)
 
 
+def test_a_frame_that_sticks_follows_the_temperature_once_that_has_turned_by_enough() -> None:
+    """From 20 to 26 degC and back, 2 K of it taken up by joints that stick, from their middle on."""
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 12.0, 481)
+    warm = 26.0 - np.abs(time - 6.0)
+    values = {"coefficient_per_K": 0.01, "reference_degC": 21.0, "stick_K": 2.0}
+    found = run(config, resting(time) | {"temperature_degC": warm}, ("thermal_pretension", values))
+    slid = np.where(time < 6.0, np.maximum(warm - 2.0, 20.0), np.minimum(warm + 2.0, 24.0))
+    expected = config.drive.stage[0].pretension_N * (1.0 + 0.01 * (slid - 21.0))
+    assert found["tension_h_N"] == pytest.approx(late_by_one(expected), rel=1e-9)
+
+
 def test_relaxation_stops_before_the_cable_is_slack() -> None:
     time = np.linspace(0.0, 1e6, 50)
     found = run(joint(), resting(time), ("pretension_relaxation", {"fraction": 0.3, "time_constant_s": 1e-3}))

@@ -23,7 +23,7 @@ def absolute(
     if p.role == "bend":
         return tried / (width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
     if p.role == "slack":
-        return tried * width(evidence, channel)
+        return tried * (width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
     if p.role == "tilt":
         return tried / width(evidence, channel)
     if p.role == "begin":
