@@ -20,24 +20,29 @@ from cablecomp.effects.compiled_term import term
 
 
 @term(
-    parameters=("coefficient", "bend", "reference", "lag", "stick", "hanging"), state=("time", "warm", "slid")
+    parameters=("coefficient", "bend", "reference", "lag", "stick", "hanging"),
+    state=("known", "time", "warm", "slid"),
 )
 def _expand(c: Any, p: Any, s: Any) -> None:
     """p: coefficient [1/K], its growth [1/K], reference [degC], lag [s], by how much what expands sticks [K], moment
-    R T0 that hangs [N m] (closed circuit: 0); s: time [s], temperature of what expands, and that which it has slid to
-    [degC].
+    R T0 that hangs [N m] (closed circuit: 0); s: whether a reading came before, its time [s], temperature of what
+    expands then, and that which it had slid to [degC].
 
     Without a temperature nothing is changed.
     """
     warm = c.temperature
-    if not math.isnan(warm):
-        if p.lag > 0.0 and not c.first:
+    if math.isnan(warm):
+        if c.first and c.commit:
+            s.known = 0.0
+    else:
+        goes_on = s.known != 0.0 and not c.first
+        if p.lag > 0.0 and goes_on:
             warm += (s.warm - warm) * math.exp(-(c.time - s.time) / p.lag)
         slid = warm
-        if p.stick > 0.0 and not c.first:
+        if p.stick > 0.0 and goes_on:
             slid = min(max(s.slid, warm - p.stick), warm + p.stick)
         if c.commit:
-            s.time, s.warm, s.slid = c.time, warm, slid
+            s.known, s.time, s.warm, s.slid = 1.0, c.time, warm, slid
         over = slid - p.reference
         factor = max(1.0 + p.coefficient * over * (1.0 + p.bend * over), LEAST_PRETENSION)
         if p.hanging > 0.0:

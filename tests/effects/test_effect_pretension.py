@@ -99,6 +99,21 @@ def test_a_frame_that_sticks_follows_the_temperature_once_that_has_turned_by_eno
     assert found["tension_h_N"] == pytest.approx(late_by_one(expected), rel=1e-9)
 
 
+@pytest.mark.parametrize("law", [{"lag_s": 1.5}, {"stick_K": 2.0}])
+def test_what_expands_begins_with_the_first_reading_of_the_temperature(law: dict[str, float]) -> None:
+    config = joint(free_length_m=LONG)
+    time = np.linspace(0.0, 10.0, 401)
+    warm = 24.0 + 3.0 * np.sin(time)
+    values = {"coefficient_per_K": 0.01, "reference_degC": 24.0, **law}
+
+    def tension(begin: int) -> Floats:
+        columns = resting(time[begin:]) | {"temperature_degC": warm[begin:].copy()}
+        columns["temperature_degC"][: 40 - begin] = np.nan
+        return run(config, columns, ("thermal_pretension", values))["tension_h_N"]
+
+    assert tension(0)[41:] == pytest.approx(tension(40)[1:], rel=1e-9)
+
+
 def test_relaxation_stops_before_the_cable_is_slack() -> None:
     time = np.linspace(0.0, 1e6, 50)
     found = run(joint(), resting(time), ("pretension_relaxation", {"fraction": 0.3, "time_constant_s": 1e-3}))
