@@ -395,13 +395,13 @@ class Thresholds:
     a torque sensor's drift."""
     z_beside: float = 5.0
     """Standard errors by which what another law's form may leave has to be ahead of none and of its nearest rival,
-    either in any form, beside an effect that takes off more: 15 of 18 such names below it were wrong, of 199 other
+    either in any form, beside an effect that takes off more: 15 of 17 such names below it were wrong, of 200 other
     further names 25 (trials seeds 749, 750, 805, 806 and 970 to 974)."""
     curve_beside: float = 0.15
     """Share of the mismatch, as the last to come, up to which a form may leave a curve of the load or the pressure, or
     a slow drift (eight of eight such names were wrong; of five that took off more two were)."""
     little_beside: float = 0.012
-    """The same of whatever is no delay (seven of ten; no form is late)."""
+    """The same of whatever is no delay (seven of nine; no form is late)."""
     beaten_told: float = 0.2
     """Confidence at most in an effect in whose place another one predicts data left out better (trials seeds 635, 636,
     801 and 802, and a piece of the jaw: 15 of 18 such names were wrong)."""

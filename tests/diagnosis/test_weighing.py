@@ -127,6 +127,8 @@ def test_what_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_m
     assert (further.confidence == 0.8) is keeps
     assert (further.confidence < LIMITS.name) is not keeps
     assert (f"{lead} standard errors" in further.why_not) is not keeps
+    after_a_delay = [_weighed("clock_skew", 0.7, beside), two[1]]
+    assert clear_of_forms(after_a_delay, known=True) == after_a_delay
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:

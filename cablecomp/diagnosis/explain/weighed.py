@@ -53,19 +53,21 @@ def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
 
 def clear_of_forms(weighed: Sequence[Weighed], *, known: bool) -> list[Weighed]:
     """The same, where what another law's form may leave keeps its name beside a named effect that takes off more only
-    if it is far ahead. Of a drive that is not `known`, but by order of magnitude, a share of the mismatch says nothing.
+    if it is far ahead: no delay, which has one form. Of a drive that is not `known`, but by order of magnitude, a share
+    of the mismatch says nothing.
     """
     if not known:
         return list(weighed)
-    most = max((w.removes for w in weighed if w.confidence >= LIMITS.name), default=0.0)
+    laws = (w for w in weighed if w.confidence >= LIMITS.name and not _is_delay(w))
+    most = max((w.removes for w in laws), default=0.0)
     return [_left_by_a_form(w) if w.confidence >= LIMITS.name and w.removes < most else w for w in weighed]
 
 
 def _left_by_a_form(w: Weighed) -> Weighed:
     """The same without its name, if it is so small a curve or drift as other laws' forms leave, or takes off little of
     whatever kind, and is not far ahead."""
-    delay, lead = w.term.amount.unit == "s", w.evidence["lead"]
-    most = LIMITS.curve_beside if w.term.effect.fills_in else 0.0 if delay else LIMITS.little_beside
+    lead = w.evidence["lead"]
+    most = LIMITS.curve_beside if w.term.effect.fills_in else 0.0 if _is_delay(w) else LIMITS.little_beside
     if lead >= LIMITS.z_beside or w.evidence["share_total"] >= most:
         return w
     why_not = (
@@ -73,3 +75,8 @@ def _left_by_a_form(w: Weighed) -> Weighed:
         f"{lead:.1f} standard errors, {LIMITS.z_beside:g} are asked for"
     )
     return replace(w, confidence=LIMITS.little_told, why_not=why_not)
+
+
+def _is_delay(w: Weighed) -> bool:
+    """Whether it is how late a channel is."""
+    return w.term.amount.unit == "s"
