@@ -391,8 +391,10 @@ class Thresholds:
     ahead of none and of its nearest rival, either in any form: below 2 19 of 31 such names, said with 0.5 to 0.95,
     were wrong (trials seeds 685 to 710: 11 of 19; 712 to 716: 8 of 12), of all others below it, delays apart, 35 of
     165; of those held down since, 14 of 20 below 1.5 were wrong, of five from there to 2 none (749, 750, 805, 806 and
-    970 to 974). So has a payload of which no recording shows a whole cycle: three of four such names (738 to 744) were
-    a torque sensor's drift."""
+    970 to 974)."""
+    z_seen_once: float = 2.0
+    """The same of a payload of which no recording shows a whole cycle: three of four such names below it were a torque
+    sensor's drift (trials seeds 738 to 744)."""
     z_beside: float = 5.0
     """Standard errors by which what another law's form may leave has to be ahead of none and of its nearest rival,
     either in any form, beside an effect that takes off more: 15 of 17 such names below it were wrong, of 200 other

@@ -106,7 +106,7 @@ def test_what_bends_to_the_form_of_others_has_to_be_clearly_ahead_of_them(
 
 @pytest.mark.parametrize(
     ("period_s", "lead", "hardly"),
-    [(0.0, 0.5, False), (5.0, 0.5, False), (60.0, 0.5, True), (60.0, 2.5, False)],
+    [(0.0, 0.5, False), (5.0, 0.5, False), (60.0, 0.5, True), (60.0, 1.9, True), (60.0, 2.0, False)],
 )
 def test_a_payload_of_which_no_recording_shows_a_cycle_has_to_be_ahead_of_a_load_read_with_a_drift(
     period_s: float, lead: float, hardly: bool

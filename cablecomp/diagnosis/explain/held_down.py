@@ -94,7 +94,7 @@ def hardly_ahead(term: Hypothesis, lead: float) -> str:
 
 def seen_once(final: Model, term: Hypothesis, lead: float) -> str:
     """The same of a payload of which no recording shows a whole cycle: a torque sensor that drifts reads alike."""
-    if not term.cycle_start or lead >= LIMITS.z_pliant:
+    if not term.cycle_start or lead >= LIMITS.z_seen_once:
         return ""
     period = final.fit.values.get(term.key(term.of_cycle[0]), 0.0)
     time = [e.columns["time_s"] for e in final.fit.problem.evidence]
@@ -102,5 +102,5 @@ def seen_once(final: Model, term: Hypothesis, lead: float) -> str:
         return ""
     return (
         f"no recording shows a whole cycle, as of a load that is read with a drift, and it is ahead by "
-        f"{lead:.1f} standard errors; {LIMITS.z_pliant:g} are asked for"
+        f"{lead:.1f} standard errors; {LIMITS.z_seen_once:g} are asked for"
     )
