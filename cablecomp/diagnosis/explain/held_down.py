@@ -53,7 +53,7 @@ def slight(
     if own.gain < LIMITS.tie and not surest_alone(rounds, term):
         return "without it the others predict data left out as well"
     slightly = removes < LIMITS.slight and own.gain < LIMITS.slight_gain and own.z < LIMITS.z
-    if slightly and term.amount.unit != "s":
+    if slightly and not term.is_delay:
         return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
     if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
         return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"

@@ -58,7 +58,7 @@ def clear_of_forms(weighed: Sequence[Weighed], *, known: bool) -> list[Weighed]:
     """
     if not known:
         return list(weighed)
-    laws = (w for w in weighed if w.confidence >= LIMITS.name and not _is_delay(w))
+    laws = (w for w in weighed if w.confidence >= LIMITS.name and not w.term.is_delay)
     most = max((w.removes for w in laws), default=0.0)
     return [_left_by_a_form(w) if w.confidence >= LIMITS.name and w.removes < most else w for w in weighed]
 
@@ -67,16 +67,11 @@ def _left_by_a_form(w: Weighed) -> Weighed:
     """The same without its name, if it is so small a curve or drift as other laws' forms leave, or takes off little of
     whatever kind, and is not far ahead."""
     lead = w.evidence["lead"]
-    most = LIMITS.curve_beside if w.term.effect.fills_in else 0.0 if _is_delay(w) else LIMITS.little_beside
-    if lead >= LIMITS.z_beside or w.evidence["share_total"] >= most:
+    most = LIMITS.curve_beside if w.term.effect.fills_in else LIMITS.little_beside
+    if w.term.is_delay or lead >= LIMITS.z_beside or w.evidence["share_total"] >= most:
         return w
     why_not = (
         f"the form of what takes off more may leave this beside it; it is ahead of its nearest rival or of none by "
         f"{lead:.1f} standard errors, {LIMITS.z_beside:g} are asked for"
     )
     return replace(w, confidence=LIMITS.little_told, why_not=why_not)
-
-
-def _is_delay(w: Weighed) -> bool:
-    """Whether it is how late a channel is."""
-    return w.term.amount.unit == "s"
