@@ -13,12 +13,13 @@ from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.instants import instants
-from cablecomp.diagnosis.explain.plausible import in_no_recording, over_plausible
+from cablecomp.diagnosis.explain.model import no_answer
+from cablecomp.diagnosis.explain.plausible import falls_between, over_plausible
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import gather
 from cablecomp.estimation.least_squares import Fit
-from cablecomp.estimation.parameter import of_drive, reach_of
+from cablecomp.estimation.parameter import of_drive, of_effect, reach_of
 from cablecomp.estimation.problem import Problem, Weighing
 
 
@@ -52,7 +53,7 @@ def test_beside_a_drive_known_by_order_of_magnitude_an_event_lies_in_a_recording
     def lost(config: JointConfig, instant_s: float, lasts_s: float = 0.0) -> bool:
         values = {slip.key("time_s"): instant_s, slip.key("duration_s"): lasts_s}
         problem = SimpleNamespace(parameters=of_drive(config), evidence=body.used)
-        return in_no_recording(cast("Fit", SimpleNamespace(problem=problem, values=values)), slip)
+        return falls_between(cast("Fit", SimpleNamespace(problem=problem, values=values)), slip)
 
     first_ends_s, second_begins_s = spans[0][1], spans[1][0]
     assert not lost(VAGUE, 0.5 * first_ends_s)
@@ -60,6 +61,27 @@ def test_beside_a_drive_known_by_order_of_magnitude_an_event_lies_in_a_recording
     assert lost(VAGUE, second_begins_s + 0.01)  # nothing of the recording lies before it
     assert lost(VAGUE, 0.5 * first_ends_s, lasts_s=1.05 * first_ends_s)  # nor after its middle
     assert not lost(JOINT, 0.5 * (first_ends_s + second_begins_s))
+
+
+def test_of_a_known_drive_an_event_lies_in_a_session() -> None:
+    """Between recordings of one mounting it may happen, between two mountings they differ as much without it."""
+    body = gather_body(JOINT, {"a/1": recorded(seed=1), "a/2": recorded(seed=2), "b/1": recorded(seed=3)})
+    ends = [(float(e.columns["time_s"][0]), float(e.columns["time_s"][-1])) for e in body.used]
+    slip = next(h for h in hypotheses(JOINT, body.used) if h.effect.id == "clamp_slip")
+
+    def why_none(instant_s: float, lasts_s: float = 0.0) -> str:
+        values = {slip.key("time_s"): instant_s, slip.key("duration_s"): lasts_s}
+        free = of_effect(slip.effect, {slip.amount.name: 1e-3}, JOINT)
+        problem = SimpleNamespace(parameters=free, evidence=body.used, config=JOINT)
+        fit = SimpleNamespace(problem=problem, values=values, x=np.array([p.x(1e-3) for p in free]))
+        return no_answer(cast("Fit", fit), slip)
+
+    within_a, within_ab = 0.5 * (ends[0][1] + ends[1][0]), 0.5 * (ends[1][1] + ends[2][0])
+    assert why_none(0.5 * ends[0][1]) == ""
+    assert why_none(within_a) == ""
+    assert "falls between" in why_none(within_ab)
+    assert "falls between" in why_none(0.5 * ends[1][1], lasts_s=within_ab)
+    assert why_none(ends[2][1] + 1.0) == ""  # goes on beyond the last sample
 
 
 def test_an_effect_that_reads_a_channel_is_asked_once_for_each_channel_that_varies() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.plausible import amount_of
+from cablecomp.diagnosis.explain.plausible import amount_of, falls_between
 from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.folds import Groups
@@ -181,6 +181,14 @@ def best_resolved(fit: Fit, term: Hypothesis, pool: Sequence[Hypothesis]) -> Hyp
         return abs(value - h.amount.neutral) / max(abs(b) for b in h.amount.bounds(fit.problem.config))
 
     return max(same, key=share) if len(same) > 1 else term
+
+
+def no_answer(fit: Fit, term: Term) -> str:
+    """Why a term, as fitted, is none, in words: an effect's amount is none, an event is where no recording shows it; ""
+    where it is one."""
+    if isinstance(term, Hypothesis) and falls_between(fit, term):
+        return "it falls between recordings, which differ in more than that"
+    return "" if amount_resolved(fit, term) else "its amount is not told from none"
 
 
 def amount_resolved(fit: Fit, term: Term) -> bool:

@@ -94,15 +94,24 @@ def _widest_presliding(fit: Fit, h: Hypothesis) -> float:
     return LIMITS.presliding * max(seen, default=np.inf)
 
 
-def in_no_recording(fit: Fit, h: Hypothesis) -> bool:
-    """Whether an event has moved to where none of several recordings shows it, beside a drive known by order of
-    magnitude: recordings differ in load and order, and such a drive may differ from one to the next in many ways."""
-    several = len(fit.problem.evidence) > 1
-    if not (h.has_instant and several and vague_drive(fit.problem.parameters)):
+def falls_between(fit: Fit, h: Hypothesis) -> bool:
+    """Whether an event has moved to where nothing shows it: between two sessions, where mounting does as much; between
+    recordings, beside a drive known by order of magnitude: they differ in load and order, and such a drive may differ
+    from one to the next in many ways."""
+    evidence = fit.problem.evidence
+    if not h.has_instant or len(evidence) == 1:
         return False
     instant = fit.values[h.key(h.instant)]
     middle = instant + 0.5 * fit.values.get(h.key(h.duration), 0.0)
-    return not any(a <= middle <= b for a, b in map(inside_of, fit.problem.evidence))
+    spans = list(map(inside_of, evidence))
+    if vague_drive(fit.problem.parameters):
+        return not any(a <= middle <= b for a, b in spans)
+    of_session: dict[str, list[float]] = {}
+    for e, span in zip(evidence, spans, strict=True):
+        of_session.setdefault(e.session, []).extend(span)
+    stood = [(min(ends), max(ends)) for ends in of_session.values()]
+    begun, over = (any(a <= middle for a, _ in stood), any(middle <= b for _, b in stood))
+    return begun and over and not any(a <= middle <= b for a, b in stood)
 
 
 def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:

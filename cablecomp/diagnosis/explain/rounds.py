@@ -29,7 +29,7 @@ from cablecomp.diagnosis.explain.model import (
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
-from cablecomp.diagnosis.explain.plausible import in_no_recording, runs_away
+from cablecomp.diagnosis.explain.plausible import falls_between, runs_away
 from cablecomp.diagnosis.explain.scores import (
     block_losses,
     demanded,
@@ -145,7 +145,7 @@ def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun],
         h = a[0].hypothesis
         at.tell(f"trying {h.name}")
         found = [] if at.pace.over else rough(a, LIMITS.rough, further(h, at) if h.trades else [])
-        return [f for f in found if not in_no_recording(f, h)]
+        return [f for f in found if not falls_between(f, h)]
 
     first: list[Begun] = []
     second: list[Begun] = []
@@ -215,7 +215,7 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
 
 def _lost(fit: Fit, term: Term) -> bool:
     """Whether an effect has left what is plausible of it, or all recordings."""
-    return isinstance(term, Hypothesis) and (runs_away(fit, term) or in_no_recording(fit, term))
+    return isinstance(term, Hypothesis) and (runs_away(fit, term) or falls_between(fit, term))
 
 
 def _compared(

@@ -15,16 +15,16 @@ from cablecomp.diagnosis.explain.model import (
     Model,
     Selection,
     Term,
-    amount_resolved,
     bears,
     common,
     left_off,
     loss,
+    no_answer,
     placed,
     stripped,
     without,
 )
-from cablecomp.diagnosis.explain.plausible import in_no_recording, runs_away
+from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.explain.ties import implausible
@@ -95,8 +95,8 @@ def exchanged(found: Search, model: Model, drive: Calibrated) -> Search | None:
     before, groups = found.selection.final, found.selection.groups
     size = common([before], groups)
     effects = [t for t in model.terms if isinstance(t, Hypothesis)]
-    lost = any(runs_away(model.fit, h) or in_no_recording(model.fit, h) for h in effects)
-    answers = bears(model.fit) and all(amount_resolved(model.fit, h) for h in effects) and not lost
+    lost = any(runs_away(model.fit, h) or no_answer(model.fit, h) != "" for h in effects)
+    answers = bears(model.fit) and not lost
     plausible = implausible(model) <= implausible(before)
     if not (answers and plausible and loss(model, size, groups) < loss(before, size, groups)):
         return None

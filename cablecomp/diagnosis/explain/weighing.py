@@ -24,8 +24,8 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import (
     Model,
     Selection,
-    amount_resolved,
     moves_rad,
+    no_answer,
     without,
 )
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
@@ -109,8 +109,8 @@ def _weighed(
         terms=sum(isinstance(t, Hypothesis) for t in final.terms),
     )
     depends = next((d for d in final.terms if isinstance(d, Dependence) and d.belongs_to(term)), None)
-    confidence, why_not = 0.0, "its amount is not told from none"
-    if amount_resolved(final.fit, term):
+    confidence, why_not = 0.0, no_answer(final.fit, term)
+    if not why_not:
         confidence = learnt().probability(evidence)
         why_not = _against((*instead.effects, *instead.plain), own, evidence)
     lead = min(ahead.z, of_rival.z)
