@@ -193,11 +193,13 @@ def likeliest(
     here: Anchor, pool: Sequence[Hypothesis], most: int, besides: Callable[[Hypothesis], bool]
 ) -> list[Hypothesis]:
     """Of the hypotheses so many that promise most by what was seen of them (half where every run is dear), those of
-    which nothing was, and `besides` whatever they promise."""
+    which nothing was, or not enough (of what saturates other sizes do other things), and `besides` whatever they
+    promise."""
     most //= 2 if here.fit.problem.fine else 1
     costs: dict[str, float] = {}
     for h in pool:
-        known = (promised(here, h, s) for s in here.seen.starts_of(h))
+        starts = [] if h.effect.saturates else here.seen.starts_of(h)
+        known = (promised(here, h, s) for s in starts)
         costs[h.name] = min((c for c in known if c is not None), default=-inf)
     told = sorted(c for c in costs.values() if c > -inf)
     worst = told[most - 1] if len(told) > most else inf
