@@ -20,10 +20,9 @@ def absolute(
 ) -> float:
     """A value to try in the parameter's unit."""
     p = effect.parameter(name)
-    if p.role == "bend":
-        return tried / (width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
-    if p.role == "slack":
-        return tried * (width(evidence, channel) if channel else _reach(evidence, effect.needs[0]))
+    if p.role in ("bend", "slack"):
+        reach = width(evidence, channel) if channel else _reach(evidence, effect.needs[0])
+        return tried / reach if p.role == "bend" else tried * reach
     if p.role == "tilt":
         return tried / width(evidence, channel)
     if p.role == "begin":
