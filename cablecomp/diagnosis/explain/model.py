@@ -13,7 +13,7 @@ import numpy as np
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
-from cablecomp.diagnosis.explain.plausible import amount_of, falls_between
+from cablecomp.diagnosis.explain.plausible import amount_of, falls_between, runs_away
 from cablecomp.diagnosis.explain.scores import ScoreDifference, block_losses, left_out, scales
 from cablecomp.diagnosis.explain.seen import Seen
 from cablecomp.diagnosis.folds import Groups
@@ -187,8 +187,13 @@ def no_answer(fit: Fit, term: Term) -> str:
     """Why a term, as fitted, is none, in words: an effect's amount is none, an event is where no recording shows it; ""
     where it is one."""
     if isinstance(term, Hypothesis) and falls_between(fit, term):
-        return "it falls between recordings, which differ in more than that"
+        return "it falls between recordings or at an end of one; they differ in more than that"
     return "" if amount_resolved(fit, term) else "its amount is not told from none"
+
+
+def lost(fit: Fit, term: Term) -> bool:
+    """Whether a term, as fitted, is no answer, or an effect that has left what is plausible of it."""
+    return no_answer(fit, term) != "" or (isinstance(term, Hypothesis) and runs_away(fit, term))
 
 
 def amount_resolved(fit: Fit, term: Term) -> bool:

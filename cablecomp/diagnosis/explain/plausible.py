@@ -95,23 +95,22 @@ def _widest_presliding(fit: Fit, h: Hypothesis) -> float:
 
 
 def falls_between(fit: Fit, h: Hypothesis) -> bool:
-    """Whether an event has moved to where nothing shows it: between two sessions, where mounting does as much; between
-    recordings, beside a drive known by order of magnitude: they differ in load and order, and such a drive may differ
-    from one to the next in many ways."""
+    """Whether an event has moved to where nothing shows it: between two sessions, where mounting does as much; beside a
+    drive known by order of magnitude, to where none of several recordings does: they differ in load and order, and such
+    a drive may differ from one to the next in many ways."""
     evidence = fit.problem.evidence
     if not h.has_instant or len(evidence) == 1:
         return False
-    instant = fit.values[h.key(h.instant)]
-    middle = instant + 0.5 * fit.values.get(h.key(h.duration), 0.0)
-    spans = list(map(inside_of, evidence))
-    if vague_drive(fit.problem.parameters):
-        return not any(a <= middle <= b for a, b in spans)
-    of_session: dict[str, list[float]] = {}
-    for e, span in zip(evidence, spans, strict=True):
-        of_session.setdefault(e.session, []).extend(span)
-    stood = [(min(ends), max(ends)) for ends in of_session.values()]
-    begun, over = (any(a <= middle for a, _ in stood), any(middle <= b for _, b in stood))
-    return begun and over and not any(a <= middle <= b for a, b in stood)
+    middle = fit.values[h.key(h.instant)] + 0.5 * fit.values.get(h.key(h.duration), 0.0)
+    vague = vague_drive(fit.problem.parameters)
+    within: dict[str, list[float]] = {}
+    for e in evidence:
+        within.setdefault(e.name if vague else e.session, []).extend(inside_of(e))
+    stretches = [(min(ends), max(ends)) for ends in within.values()]
+    if any(a <= middle <= b for a, b in stretches):
+        return False
+    # of a known drive it may go on before the first session and beyond the last
+    return vague or min(a for a, _ in stretches) <= middle <= max(b for _, b in stretches)
 
 
 def _most(h: Hypothesis, joint: JointConfig, fit: Fit) -> float:

@@ -18,18 +18,17 @@ from cablecomp.diagnosis.explain.linear import anchor, likeliest
 from cablecomp.diagnosis.explain.model import (
     Model,
     Round,
-    Term,
     Tried,
-    amount_resolved,
     best_resolved,
     common,
     finely,
     loss,
+    lost,
     placed,
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
-from cablecomp.diagnosis.explain.plausible import falls_between, runs_away
+from cablecomp.diagnosis.explain.plausible import falls_between
 from cablecomp.diagnosis.explain.scores import (
     block_losses,
     demanded,
@@ -204,18 +203,13 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
     except InputError:
         return None
     terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    if _lost(fit, terms[0]) or not amount_resolved(fit, terms[0]):
+    if lost(fit, terms[0]):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:
         size = scales(at.model.left_out, at.groups)
         ratio = loss(at.model, size, at.groups) / max(loss(fine, size, at.groups), 1e-300)
     return Model((*at.model.terms, *terms), fit, left_out(fit, at.groups), ratio)
-
-
-def _lost(fit: Fit, term: Term) -> bool:
-    """Whether an effect has left what is plausible of it, or all recordings."""
-    return isinstance(term, Hypothesis) and (runs_away(fit, term) or falls_between(fit, term))
 
 
 def _compared(

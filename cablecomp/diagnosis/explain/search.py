@@ -19,12 +19,11 @@ from cablecomp.diagnosis.explain.model import (
     common,
     left_off,
     loss,
-    no_answer,
+    lost,
     placed,
     stripped,
     without,
 )
-from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.explain.ties import implausible
@@ -95,8 +94,7 @@ def exchanged(found: Search, model: Model, drive: Calibrated) -> Search | None:
     before, groups = found.selection.final, found.selection.groups
     size = common([before], groups)
     effects = [t for t in model.terms if isinstance(t, Hypothesis)]
-    lost = any(runs_away(model.fit, h) or no_answer(model.fit, h) != "" for h in effects)
-    answers = bears(model.fit) and not lost
+    answers = bears(model.fit) and not any(lost(model.fit, h) for h in effects)
     plausible = implausible(model) <= implausible(before)
     if not (answers and plausible and loss(model, size, groups) < loss(before, size, groups)):
         return None
