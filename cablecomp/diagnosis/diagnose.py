@@ -19,7 +19,7 @@ from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.search import Search, done_without, exchanged, search, without_effects
 from cablecomp.diagnosis.explain.usual import usual_of
-from cablecomp.diagnosis.explain.weighed import Weighed
+from cablecomp.diagnosis.explain.weighed import Weighed, in_order
 from cablecomp.diagnosis.explain.weighing import weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
@@ -126,12 +126,6 @@ def _weighed(
         found = fewer
 
 
-def _moved(w: Weighed) -> tuple[float, float]:
-    """What stands first among names: what moves the joint's angle most (all of it where the drive cannot follow without
-    it); of what shows in the motor's torque alone, what is missed most there."""
-    return w.evidence.get("moves_rad", inf), w.evidence["gain"]
-
-
 def _judged(
     case: Case,
     before: Remainder,
@@ -147,7 +141,7 @@ def _judged(
     augmented = errors_of(final.fit, case.body.final, by) if final.terms else baseline
     if not predicts(drive.fit, final, baseline, augmented, drive.floor_rad):
         weighed = [replace(w, confidence=0.0, why_not=NO_BETTER) for w in weighed]
-    named = sorted((w for w in weighed if w.confidence >= LIMITS.name), key=_moved, reverse=True)
+    named = in_order(w for w in weighed if w.confidence >= LIMITS.name)
     kept, remainder = final, after
     if not named:
         kept = without_effects(final, drive, found.groups)

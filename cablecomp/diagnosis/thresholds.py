@@ -352,6 +352,8 @@ class Thresholds:
     off 95 % together, and none of them was missed."""
     name: float = 0.5
     """Confidence from which an effect is named; weaker ones are candidates."""
+    least_doubt: float = 0.01
+    """Doubt with which a name's odds count at the least where names are put in order: none is known to be surer."""
     event_size: float = 4.5
     """Stated deviations by which an event's size has to stand out of none: it is the best of many instants (trials
     seeds 615 to 628, 64 events named: below it 16 of 20 were wrong names, above it 11 of 44)."""

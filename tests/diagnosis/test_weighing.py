@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -13,7 +14,7 @@ from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.confidence import learnt
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.weighed import Weighed, clear_of_forms, one_in_series
+from cablecomp.diagnosis.explain.weighed import Weighed, clear_of_forms, in_order, one_in_series
 from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, _unfollowed
 from cablecomp.diagnosis.thresholds import LIMITS
 
@@ -69,6 +70,29 @@ def _weighed(
     even, effect = ScoreDifference(0.5, 9.0, 9.0), hypothesis(name.partition(":")[0], name)
     evidence = {"lead": lead, "share_total": removes if last is None else last}
     return Weighed(effect, None, evidence, confidence, (), even, "", removes)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        # RMS that it moves the joint by [rad], None: as much as the drive cannot follow; its confidence
+        ((3e-4, 0.9), (2e-4, 0.9)),
+        ((2e-4, 0.94), (3.6e-4, 0.62)),  # sure, and hardly less
+        ((4e-4, 0.62), (1e-4, 0.94)),  # less sure, and far more
+        ((3e-4, 0.9), (8e-5, 1.0)),  # no name is beyond doubt
+        ((None, 0.6), (3e-4, 0.99)),
+    ],
+)
+def test_what_moves_the_joint_most_for_how_sure_it_is_stands_first(
+    first: tuple[float | None, float], second: tuple[float, float]
+) -> None:
+    def moving(name: str, moves_rad: float | None, confidence: float) -> Weighed:
+        w = _weighed(name, 0.5, confidence)
+        moves = {} if moves_rad is None else {"moves_rad": moves_rad}
+        return replace(w, evidence={**w.evidence, "gain": 0.5, **moves})
+
+    found = in_order([moving("clamp_slip", *second), moving("gravity_load", *first)])
+    assert [w.term.name for w in found] == ["gravity_load", "clamp_slip"]
 
 
 @pytest.mark.parametrize(
