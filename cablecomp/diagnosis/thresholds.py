@@ -250,6 +250,10 @@ class Thresholds:
     (in 109 recordings of neighbours, trials seed 738, at most 0.56; of two tensions of a sheath's own cables 0.97 to
     0.99: crosstalk of these came in beside friction of the path in four of six runs by other last digits, and with
     0.78 in one of them)."""
+    least_turn_rad: float = 0.05
+    """Turn of either pulley [rad] below which what goes with its angle is not asked for (trials seeds 749 to 808, input
+    locked, turned by 0.01 at the most: six names of a weight, a run-out or a groove, all wrong; of the others turned by
+    1 and more)."""
     own_plays: tuple[float, ...] = (0.02, 0.1, 0.25)
     """Half widths of the plays that this motion is taken through, in its range."""
     of_each: int = 2

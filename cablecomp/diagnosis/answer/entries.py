@@ -20,6 +20,7 @@ from cablecomp.diagnosis.explain.experiment import APART, best_experiment
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Selection
 from cablecomp.diagnosis.explain.neighbours import not_told_apart
+from cablecomp.diagnosis.explain.turned import stands_still
 from cablecomp.diagnosis.explain.unseen import Hidden
 from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.explain.weighed import Weighed
@@ -279,6 +280,11 @@ def notes(case: Case) -> tuple[str, ...]:
         found.append(
             f"{channel} goes with the joint's own motion ({100 * share:.0f} % of it): whether a neighbour "
             "loads the joint by it cannot be told from the joint's own drive, and is not asked"
+        )
+    if stands_still(case.config, body.used):
+        found.append(
+            f"neither pulley is turned by {LIMITS.least_turn_rad:g} rad: a weight, a run-out or a groove cannot be "
+            "told from what goes with the load then, and is not asked for unless another joint turns it"
         )
     if body.clock_s:
         begun = [f"{short(name)} from {s:.4g} s" for name, s in body.clock_s.items()]

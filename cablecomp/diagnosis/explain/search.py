@@ -27,6 +27,7 @@ from cablecomp.diagnosis.explain.model import (
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.selection import select
 from cablecomp.diagnosis.explain.ties import implausible
+from cablecomp.diagnosis.explain.turned import told
 from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -40,9 +41,9 @@ from cablecomp.estimation.least_squares import Fit, covariance, derivative_of_pa
 class Search:
     """What a search came to.
 
-    `pool`: every hypothesis asked. `selection`: its rounds and its model, about the recordings searched. `final`: that
-    model about all recordings; `groups`: what of these is left out in turn. `cut_short`: the time was up. `put_in`:
-    names of terms that no round chose, put in the place of others afterwards.
+    `pool`: every hypothesis, also what these recordings cannot tell. `selection`: its rounds and its model, about the
+    recordings searched. `final`: that model about all recordings; `groups`: what of these is left out in turn.
+    `cut_short`: the time was up. `put_in`: names of terms that no round chose, put in the place of others afterwards.
     """
 
     pool: Sequence[Hypothesis]
@@ -61,7 +62,8 @@ def search(drive: Calibrated, pool: Sequence[Hypothesis], rng: np.random.Generat
     calibrated = drive.fit if whole else _about(drive.fit, some)
     nominal = drive.nominal if whole else _nominal(calibrated)
     groups = make_groups(calibrated)
-    selection = select(calibrated, nominal, pool, groups, rng, pace)
+    asked = told(pool, drive.fit.problem.config, evidence)
+    selection = select(calibrated, nominal, asked, groups, rng, pace)
     cut_short = pace.over
     pace.tell("last fit", 0.9)
     final = _without_idle_growth(
