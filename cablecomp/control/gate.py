@@ -20,6 +20,8 @@ RATE_LIMITED: Final = 16
 STALE: Final = 32
 FAR_FROM_MOTOR: Final = 64
 MUST_STOP: Final = NOT_FINITE | STALE
+BRAKE_S: Final = 0.05
+"""Within which a motor whose drive is not told a position has to come to rest before a limit of it."""
 
 _NAMES: Final = (
     "not finite",
@@ -44,6 +46,7 @@ class GateLimits:
 
     Position target rate in rad/s, torque feed-forward rate in Nm/s; `age_s` is that of the motor position.
     `wire`: what the message can carry, so that the limits hold for what is read off the wire.
+    `tells_position`: the drive is told a position; else its limits hold by where the motor is.
     """
 
     position_min_rad: float = -inf
@@ -55,6 +58,7 @@ class GateLimits:
     lead_max_rad: float = 0.5
     age_s: float = 0.1
     wire: Wire = ANY_WIRE
+    tells_position: bool = True
 
     def __post_init__(self) -> None:
         for name in ("velocity_max_rad_s", "torque_max_Nm", "position_rate_rad_s", "torque_rate_Nm_s"):
@@ -75,7 +79,9 @@ class GateLimits:
             )
 
     @classmethod
-    def of(cls, limits: Limits, wire: Wire = ANY_WIRE, **more: float) -> GateLimits:
+    def of(
+        cls, limits: Limits, wire: Wire = ANY_WIRE, *, tells_position: bool = True, **more: float
+    ) -> GateLimits:
         """The joint's own limits and what the wire can carry, narrowed or completed by `more`."""
         own = {
             "position_min_rad": limits.motor_position_min_rad,
@@ -89,6 +95,7 @@ class GateLimits:
         return replace(
             made,
             wire=wire,
+            tells_position=tells_position,
             position_min_rad=max(made.position_min_rad, wire.position.low),
             position_max_rad=min(made.position_max_rad, wire.position.high),
             velocity_max_rad_s=min(made.velocity_max_rad_s, -wire.velocity.low, wire.velocity.high),
@@ -142,12 +149,14 @@ def gate(
     Not finite or stale: the command before is repeated with no velocity and no torque, and the flags
     hold a bit of `MUST_STOP`. Otherwise position is cut by distance from where the motor is, by magnitude,
     and last, so that nothing overrules it, by rate: `|q - q_before| <= rate period`, whatever the motor is
-    said to be at; velocity and torque by magnitude, torque by rate. What comes out is what the wire
-    carries, so all of it holds there. `before`: the last command that was sent; `age_s`: age of
-    `motor_position_rad`.
+    said to be at; velocity and torque by magnitude, torque by rate. At a limit of position no velocity leads
+    on: a drive follows it beyond, by its damping over its stiffness. A drive that is told no position gets
+    no more velocity than brings it to the limit within `BRAKE_S`, and at it no torque that leads on. What
+    comes out is what the wire carries, so all of it holds there. `before`: the last command that was sent;
+    `age_s`: age of `motor_position_rad`.
     """
     q, v, tau = command.motor_position_rad, command.motor_velocity_rad_s, command.motor_torque_Nm
-    if not isfinite(q + v + tau + motor_position_rad):
+    if not isfinite(q + v + tau + motor_position_rad + before[0] + before[2]):
         return before._replace(motor_velocity_rad_s=0.0, motor_torque_Nm=0.0, flags=NOT_FINITE)
     if not age_s <= limits.age_s:
         return before._replace(motor_velocity_rad_s=0.0, motor_torque_Nm=0.0, flags=STALE)
@@ -165,11 +174,21 @@ def gate(
     )
     if cut:
         flags |= RATE_LIMITED
-    slow = _within(v, 0.0, limits.velocity_max_rad_s)
+    fast, most = limits.velocity_max_rad_s, limits.torque_max_Nm
+    slow, weak = _within(v, 0.0, fast), _within(tau, 0.0, most)
+    if limits.tells_position:
+        edge = wire.position.step
+        up = 0.0 if position >= high - edge or motor_position_rad >= high else fast
+        down = 0.0 if position <= low + edge or motor_position_rad <= low else -fast
+    else:
+        room = high - motor_position_rad, motor_position_rad - low
+        up, down = max(room[0], 0.0) / BRAKE_S, -max(room[1], 0.0) / BRAKE_S
+        if (room[0] <= 0.0 < weak) or (room[1] <= 0.0 and weak < 0.0):
+            weak, flags = 0.0, flags | POSITION_LIMITED
+    if not down <= slow <= up:
+        slow, flags = up if slow > up else down, flags | POSITION_LIMITED
     if slow != v:
         flags |= VELOCITY_LIMITED
-    most = limits.torque_max_Nm
-    weak = _within(tau, 0.0, most)
     if weak != tau:
         flags |= TORQUE_LIMITED
     torque, spare_Nm, cut = _follow(
@@ -177,8 +196,7 @@ def gate(
     )
     if cut:
         flags |= RATE_LIMITED
-    fast = limits.velocity_max_rad_s
-    slow = _carried(slow, -fast, fast, wire.velocity) or 0.0
+    slow = _carried(slow, max(down, -fast), min(up, fast), wire.velocity) or 0.0
     return SafeCommand(position, slow, torque, flags, spare_rad, spare_Nm)
 
 

@@ -19,6 +19,7 @@ from cablecomp.errors import InputError
 from cablecomp.links.link import Link
 from cablecomp.links.protocols import tells
 from cablecomp.links.readings import JointReadings
+from cablecomp.links.records import Mode
 from cablecomp.links.schema import JointEnds, LinkConfig
 from cablecomp.observer import Observer
 from cablecomp.runtime.health import Health
@@ -151,7 +152,11 @@ def joint_setup(
         preload_Nm=compensator.preload_Nm,
         motor_step_rad=bus.joints[c.place].motor_step_rad,
     )
-    limits = GateLimits.of(c.config.limits, bus.wire(c.place), age_s=times.motor_stop_s)
+    motor = link.joint[c.place].motor
+    tells_position = motor is None or motor.mode in (Mode.POSITION, Mode.IMPEDANCE)
+    limits = GateLimits.of(
+        c.config.limits, bus.wire(c.place), tells_position=tells_position, age_s=times.motor_stop_s
+    )
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
 
 

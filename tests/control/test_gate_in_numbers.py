@@ -121,17 +121,77 @@ def test_what_passes_is_the_nearest_that_the_message_can_carry(
     for value, grid in zip(start[:3], limits.wire, strict=True):
         assert abs(value) == pytest.approx(min(map(abs, values(grid, -100.0, 100.0))), abs=1e-9)
     safe = gate(Command(q, v, tau), start, 0.0, 0.0, T, limits)
-    wanted = (min(max(q, -3.0), 3.0), min(max(v, -2.2), 2.2), min(max(tau, -1.7), 1.7))
-    for value, asked, grid, most in zip(safe[:3], wanted, limits.wire, (3.0, 2.2, 1.7), strict=True):
-        nearest = min(abs(x - asked) for x in values(grid, -most, most))
-        assert abs(value - asked) == pytest.approx(nearest, abs=1e-5)
+    # at a limit of position, within the message's step, no velocity leads on
+    low = 0.0 if safe.motor_position_rad <= -3.0 + position.step else -2.2
+    high = 0.0 if safe.motor_position_rad >= 3.0 - position.step else 2.2
+    most = ((-3.0, 3.0), (low, high), (-1.7, 1.7))
+    for value, asked, grid, (least, largest) in zip(safe[:3], (q, v, tau), limits.wire, most, strict=True):
+        wanted = min(max(asked, least), largest)
+        nearest = min((abs(x - wanted) for x in values(grid, least, largest)), default=abs(wanted))
+        assert abs(value - wanted) == pytest.approx(nearest, abs=1e-5)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("asked", "before", "motor", "passed", "flags"),
+    [
+        ((3.0, 5.0, 0.5), 3.0, 2.9, (3.0, 0.0, 0.5), POSITION_LIMITED | VELOCITY_LIMITED),
+        ((3.0, -5.0, 0.5), 3.0, 2.9, (3.0, -5.0, 0.5), 0),  # away from it
+        ((2.99, 5.0, 0.0), 2.99, 3.01, (2.99, 0.0, 0.0), POSITION_LIMITED | VELOCITY_LIMITED),
+        ((2.99, 5.0, 0.0), 2.99, 2.99, (2.99, 5.0, 0.0), 0),
+    ],
+)
+def test_at_a_limit_of_position_no_velocity_leads_on(
+    asked: tuple[float, float, float],
+    before: float,
+    motor: float,
+    passed: tuple[float, ...],
+    flags: int,
+    sign: float,
+) -> None:
+    last = SafeCommand(sign * before, 0.0, 0.0, 0)
+    safe = gate(Command(*(sign * x for x in asked)), last, sign * motor, 0.0, T, FREE)
+    assert safe[:3] == pytest.approx([sign * x for x in passed])
+    assert safe.flags == flags
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("asked", "motor", "passed", "flags"),
+    [
+        ((8.0, 0.5), 2.0, (8.0, 0.5), 0),
+        ((8.0, 0.5), 2.9, (2.0, 0.5), POSITION_LIMITED | VELOCITY_LIMITED),  # 0.1 rad within 0.05 s
+        ((8.0, 0.5), 3.0, (0.0, 0.0), POSITION_LIMITED | VELOCITY_LIMITED | TORQUE_LIMITED),
+        ((-8.0, -0.5), 3.2, (-8.0, -0.5), 0),  # back
+    ],
+)
+def test_a_drive_that_is_told_no_position_is_held_by_where_the_motor_is(
+    asked: tuple[float, float], motor: float, passed: tuple[float, float], flags: int, sign: float
+) -> None:
+    limits = replace(FREE, tells_position=False)
+    at = sign * min(motor, 3.0)
+    safe = gate(
+        Command(at, sign * asked[0], sign * asked[1]),
+        SafeCommand(at, 0.0, 0.0, 0),
+        sign * motor,
+        0.0,
+        T,
+        limits,
+    )
+    assert safe[1:3] == pytest.approx([sign * x for x in passed])
+    assert safe.flags == flags
+
+
+def test_after_a_command_that_never_went_out_there_is_none() -> None:
+    safe = gate(Command(0.1, 0.0, 0.0), SafeCommand(nan, 0.0, 0.0, 0), 0.1, 0.0, T, LIMITS)
+    assert safe.flags == NOT_FINITE
 
 
 def test_what_is_finite_is_cut_however_large_it_is() -> None:
     huge = 1e200
     last = SafeCommand(0.0, 0.0, 0.0, 0)
     safe = gate(Command(huge, huge, huge), last, huge, 0.0, T, LIMITS)
-    assert safe[:3] == (0.025, 20.0, 0.4)
+    assert safe[:3] == (0.025, 0.0, 0.4), "a motor beyond its limit is not led on"
     assert safe.flags == POSITION_LIMITED | RATE_LIMITED | VELOCITY_LIMITED | TORQUE_LIMITED
 
 
