@@ -16,7 +16,6 @@ from cablecomp.links import serial_frames, slcan_frames
 from cablecomp.links.ports import PortBase, Sink
 from cablecomp.links.records import BusState
 
-_MAX_PENDING = 65_536
 _CHUNK = 65_536
 _PIECE = 2048
 """A terminal gives at most 4096 bytes at once; after less than this nothing is left. To read on all the same
@@ -45,7 +44,8 @@ class LinePort(PortBase):
     pyserial.
 
     `attach` opens and returns the pyserial port and what closes it; `pack` makes a frame's bytes, `reader`
-    cuts what comes. What a full line does not take at once is kept and sent first the next time.
+    cuts what comes. Of a frame that a full line takes in part the rest is kept and sent first the next time; until
+    that is gone no other frame is taken: commands that waited would come late, and a stop behind them.
     """
 
     def __init__(
@@ -91,7 +91,8 @@ class LinePort(PortBase):
         self.counters.overflows = self._reader.overflows
         if found:
             self.heard()
-        question = self._reader.question()
+        self._flush()
+        question = b"" if self._pending else self._reader.question()
         if question:
             self._pending += question
             self._flush()
@@ -128,15 +129,26 @@ class LinePort(PortBase):
         if self.state in _GONE:
             self.counters.send_failures += 1
             return False
-        packed = self._pack(identifier, data)
-        if len(self._pending) + len(packed) > _MAX_PENDING:
-            self.counters.send_failures += 1
-            self._flush()
+        if not self._flush():
             return False
+        if self._pending:
+            self.counters.send_failures += 1
+            return False
+        packed = self._pack(identifier, data)
         self._pending += packed
-        return self._flush()
+        if not self._flush():
+            return False
+        if len(self._pending) == len(packed):  # none of it: it shall not go out later than it was meant to
+            self._pending.clear()
+            self.counters.send_failures += 1
+            return False
+        return True
 
     def _flush(self) -> bool:
+        """Hand over what waits, as far as the line takes it; False = the line is gone."""
+        if self.state in _GONE:
+            self._pending.clear()
+            return False
         try:
             while self._pending:
                 if self._fd >= 0:
