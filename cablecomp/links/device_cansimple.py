@@ -11,13 +11,14 @@ from cablecomp.links.cansimple import AxisState, Cmd, Cmd06, ControlMode
 from cablecomp.links.cansimple_firmware import FIRMWARES, Datum, error_of, error_words, state_of
 from cablecomp.links.devices import Claim, Gear, Outgoing, Receiver, Take, calibration, chain, grid
 from cablecomp.links.readings import JointReadings, MessageStats
-from cablecomp.links.records import JOINT_POSITION, Frame, Mode, MotorCommand, Request
+from cablecomp.links.records import JOINT_POSITION, DriveState, Frame, Mode, MotorCommand, Request
 from cablecomp.links.schema import MotorEnd, SensorEnd
 from cablecomp.links.schema_devices import CanSimpleDevice
 from cablecomp.links.units import Linear
 from cablecomp.signals import Wire
 
 _TURN: Final = 2.0 * pi
+_MISSED_HEARTBEATS: Final = 5
 _EXTRAS: Final[dict[Datum, tuple[str, ...]]] = {
     "temperature": ("other_motor_temperature_degC",),
     "bus": ("other_bus_voltage_V",),
@@ -59,6 +60,8 @@ class CanSimpleDrive:
         self._device = device
         self._readings = readings
         self._firmware = FIRMWARES[device.firmware]
+        self._patience_s = _MISSED_HEARTBEATS * device.heartbeat_s
+        self._silent = False
         self._polled = tuple(cansimple.request(end.node, self._firmware.data[d]) for d in device.polled)
         self._joint = joint
         if joint is not None:
@@ -106,10 +109,11 @@ class CanSimpleDrive:
             "bus": [(0, _EXTRAS["bus"][0], Linear(1.0))],
             "powers": [(k, channel, Linear(1.0)) for k, channel in enumerate(_EXTRAS["powers"])],
         }
-        out = [Receiver(cansimple.identifier(self._node, Cmd.HEARTBEAT), self._heartbeat())]
+        heard = self._stats("heartbeat")
+        out = [Receiver(cansimple.identifier(self._node, Cmd.HEARTBEAT), self._heartbeat(heard))]
         for name in sorted(wanted):
             identifier = cansimple.identifier(self._node, self._firmware.data[name])
-            out.append(Receiver(identifier, self._pair(name, maps[name])))
+            out.append(Receiver(identifier, self._pair(name, maps[name], heard)))
         if self._joint is not None:
             reply = cansimple.identifier(self._node, Cmd06.TX_SDO)
             out.append(Receiver(reply, self._joint_encoder(self._joint)))
@@ -120,8 +124,8 @@ class CanSimpleDrive:
         self._readings.messages.append(stats)
         return stats
 
-    def _heartbeat(self) -> Take:
-        stats, readings, firmware = self._stats("heartbeat"), self._readings, self._firmware
+    def _heartbeat(self, stats: MessageStats) -> Take:
+        readings, firmware = self._readings, self._firmware
 
         def take(data: bytes, now_s: float) -> int:
             if len(data) != 8:
@@ -130,14 +134,15 @@ class CanSimpleDrive:
             heartbeat = cansimple.parse_heartbeat(data)
             readings.state = state_of(firmware, heartbeat)
             readings.error = error_of(firmware, heartbeat)
+            self._silent = False
             stats.received += 1
             stats.last_s = now_s
             return 0
 
         return take
 
-    def _pair(self, name: Datum, channels: list[tuple[int, str, Linear]]) -> Take:
-        stats, readings = self._stats(name), self._readings
+    def _pair(self, name: Datum, channels: list[tuple[int, str, Linear]], heard: MessageStats) -> Take:
+        stats, readings, patience_s = self._stats(name), self._readings, self._patience_s
         places = [(which, readings.index(channel), *line) for which, channel, line in channels]
         values, arrived, updates = readings.values, readings.arrived_s, readings.updates
         is_reply = name == "encoder"
@@ -158,6 +163,8 @@ class CanSimpleDrive:
             if is_reply:
                 readings.replies += 1
                 readings.unanswered = 0
+                if now_s - heard.last_s > patience_s:  # what it told last may not be so any more
+                    readings.state, self._silent = DriveState.UNKNOWN, True
             stats.received += 1
             stats.last_s = now_s
             return len(places)
@@ -253,4 +260,5 @@ class CanSimpleDrive:
 
     def error_text(self, error: int) -> str:
         """See `Drive.error_text`."""
-        return error_words(self._firmware, error)
+        silent = (f"{_MISSED_HEARTBEATS} of its heartbeats stayed out",) if self._silent else ()
+        return ", ".join(filter(None, (error_words(self._firmware, error), *silent)))

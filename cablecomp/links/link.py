@@ -73,9 +73,8 @@ class Link(Protocol):
         """Let a drive act with `share` (0…1) of its stiffness from now on; False = its gains cannot be
         changed from here."""
 
-    def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool:
-        """Ask a drive to change state; False = the protocol has no such request, or the bus did not take
-        it."""
+    def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool | None:
+        """Ask a drive to change state; False = the bus did not take it, None = the protocol has no such request."""
 
     def stop(self) -> bool:
         """Ask every drive to let go, by the quickest way that it has; never raises; False = a frame was not
@@ -181,13 +180,13 @@ class BusLink:
             self._sent += self._port.send(identifier, data)
         return frames is not None
 
-    def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool:
+    def request(self, joint: int, request: Request, mode: Mode | None = None) -> bool | None:
         """See `Link.request`."""
         drive = self._drives[joint]
         frames = () if drive is None else drive.request(request, mode)
         taken = [self._port.send(identifier, data) for identifier, data in frames]
         self._sent += sum(taken)
-        return bool(taken) and all(taken)
+        return all(taken) if taken else None
 
     def stop(self) -> bool:
         """See `Link.stop`; both the stop and the disable request go out, for drives that know only one."""
@@ -196,7 +195,7 @@ class BusLink:
             if drive is not None:
                 stopped = self.request(joint, Request.STOP)
                 disabled = self.request(joint, Request.DISABLE)
-                done = done and (stopped or disabled)
+                done = done and bool(stopped or disabled)
         return done
 
     def sync(self, step: int) -> bool:

@@ -128,7 +128,8 @@ class CanSimpleDevice(Frozen):
     (firmware 0.6: all).
 
     `joint_endpoint`: number of `spi_encoder0.raw` (or of another float in turns) in the `flat_endpoints.json` of the
-    drive's very firmware (618 in 0.6.10): the encoder at the joint, if the joint's sensor is this drive.
+    drive's very firmware (618 in 0.6.10): the encoder at the joint, if the joint's sensor is this drive. `heartbeat_s`:
+    how often it tells its state, as set in it (`heartbeat_rate_ms`, `heartbeat_msg_rate_ms`).
     """
 
     protocol: Literal["cansimple"]
@@ -139,6 +140,7 @@ class CanSimpleDevice(Frozen):
     torque_constant_Nm_per_A: Positive | None = None
     velocity_limit_turns_s: Positive | None = None
     current_limit_A: Positive | None = None
+    heartbeat_s: Annotated[float, Field(ge=0.01, le=10.0)] = 0.1
     joint_endpoint: Annotated[int, Field(ge=1, le=0xFFFF)] | None = None
 
     @model_validator(mode="after")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from time import perf_counter
 
@@ -32,7 +32,6 @@ ROWS_EVERY_S = 0.1
 """Of the loop's own time, between two times that rows are handed over: what a process that is killed loses of them."""
 _NOTHING_NEW = Feed(0.0, True)
 _ENABLED = DriveState.ENABLED  # looked up in its class anew it would take ten times as long
-_NOT_RUNNING = (DriveState.FAULT, DriveState.DISABLED)
 _NONE_YET = Command(nan, nan, nan)
 
 
@@ -75,6 +74,7 @@ class JointLoop:
         self._flags = 0
         self._gate_flags = 0
         self._refused = False
+        self._untaken_s = nan
         self._rows_due_s = -inf
         self._period_s = setup.compensator.period_s
         self._fresh_s = setup.times.fresh_s
@@ -114,10 +114,10 @@ class JointLoop:
         self.checked = self.setup.health.check(self.readings, now_s)
         self.taking_up.listen(self.readings, self.checked, now_s)
 
-    def first(self) -> None:
+    def first(self, now_s: float) -> None:
         """The first command: where the motor is, without force."""
         assert self.checked is not None
-        self._send(self.taking_up.first(self.checked.sample.motor_position_rad))
+        self._send(self.taking_up.first(self.checked.sample.motor_position_rad), now_s)
 
     def enable(self, now_s: float, mode: Mode) -> None:
         """While the drive is taken up: observe and record, and let it take hold where it is, against the
@@ -125,7 +125,9 @@ class JointLoop:
         checked = self._check(now_s, nan)
         self._observe(checked, now_s, None)
         self._judge(checked, now_s, drive=False)
-        if not self.stop_reason:
+        if not self.stop_reason and not isfinite(self._sent.motor_position_rad):
+            self.first(now_s)  # the bus has not taken it yet: nothing else goes out before
+        elif not self.stop_reason:
             motor = checked.sample.motor_position_rad
             wish = self.taking_up.step(self._sent, motor, self.enabled, mode, now_s)
             self._send_gated(wish, checked, now_s)
@@ -198,11 +200,16 @@ class JointLoop:
 
     # ---- inside ----------------------------------------------------------------------------------
 
-    def _send(self, safe: SafeCommand) -> None:
-        """Send it; what the bus does not take has not been sent."""
+    def _send(self, safe: SafeCommand, now_s: float) -> None:
+        """Send it; what the bus does not take has not been sent, and a bus that takes none for as long as a motor's
+        reading may be old ends the run."""
         command = MotorCommand(safe.motor_position_rad, safe.motor_velocity_rad_s, safe.motor_torque_Nm)
         if not self._link.send(self.setup.place, command) & NOT_TAKEN:
-            self._sent = safe
+            self._sent, self._untaken_s = safe, nan
+        elif self._untaken_s != self._untaken_s:
+            self._untaken_s = now_s
+        elif now_s - self._untaken_s > self.setup.limits.age_s:
+            self.stop_reason = self.stop_reason or "the bus takes no commands"
 
     def _check(self, now_s: float, target_rad: float) -> Checked:
         predicted = self._predicted + self._offset
@@ -272,7 +279,7 @@ class JointLoop:
             self.stop_reason = self.stop_reason or words
         elif checked.fatal:
             self.stop_reason = self.stop_reason or ", ".join(health_names(checked.flags))
-        elif drive and self.readings.state in _NOT_RUNNING:
+        elif drive and self.readings.state is not _ENABLED:
             self.stop_reason = self.stop_reason or f"drive reports {self.drive_words}"
 
     def _send_gated(self, command: Command, checked: Checked, now_s: float) -> None:
@@ -288,7 +295,7 @@ class JointLoop:
         if flags & MUST_STOP:
             self.stop_reason = self.stop_reason or f"gate: {', '.join(gate_names(flags & MUST_STOP))}"
         else:
-            self._send(safe)
+            self._send(safe, now_s)
 
     def _note(self, flags: int, now_s: float) -> None:
         fresh, gone = flags & ~self._flags, self._flags & ~flags

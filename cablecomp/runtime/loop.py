@@ -25,6 +25,7 @@ from cablecomp.runtime.timing import TimingReport
 TIME_IS_OVER = "time is over"
 COLLECT_EVERY = 500  # ticks between two collections of young garbage, in idle time
 LOOK_EVERY = 128  # ticks between two looks at the link's counters
+STOPS = 3  # times that a run which ends by an error has its stop taken by the bus
 DISABLE_GRACE = 20  # ticks after enabling in which an old "disabled" may still be on its way
 
 
@@ -95,6 +96,7 @@ class Loop:
         self._stage_s = options.begin_s
         self._armed_s = 0.0
         self._asked_to_stop = ""
+        self._watched = False  # to the end of the time after a stop
         self._unread = ((0, 0), (0, 0))
 
     @property
@@ -158,6 +160,7 @@ class Loop:
             for joint in self.joints:
                 joint.keep(tick.now_s)
             if done:
+                self._watched = True
                 return
 
     def _tick(self, tick: Tick) -> bool:
@@ -184,7 +187,7 @@ class Loop:
         elif all(j.taking_up.known_s(now) >= self.options.settle_s for j in self.joints):
             self._go(RunStage.ENABLING, now)
             for joint in self.joints:
-                joint.first()
+                joint.first(now)
         elif now - self._stage_s > self.options.listen_s:
             raise DeviceError(f"link `{self.link.config.name}`: {self._what_is_missing(now)}")
 
@@ -297,11 +300,23 @@ class Loop:
         if tick.number % COLLECT_EVERY == 0 and not gc.isenabled() and end - begin < 0.5 * self.period_s:
             gc.collect(0)
 
+    def _stop_for_sure(self) -> None:
+        """The stop once more and again, until the bus has taken it often enough for one to get through; no longer than
+        is watched after a stop."""
+        tries = max(STOPS, round(self.options.after_s / self.period_s))
+        taken = 0
+        for _ in range(tries):
+            taken += self.link.stop()
+            if taken == STOPS:
+                return
+            self._clock.wait_until(self._clock.now() + self.period_s)
+
     def _close(self) -> None:
         """Stop command, whatever happened; then the link and every log, each one tried."""
         try:
+            if self.stage is not RunStage.STOPPING or not self._watched:
+                self._stop_for_sure()
             if self.stage is not RunStage.STOPPING:
-                self.link.stop()
                 self.stop_reason = self.stop_reason or "ended by an error"
                 self.events.add(self.accounts.last_s, "", f"stop: {self.stop_reason}")
         finally:

@@ -72,8 +72,10 @@ class TakingUp:
         link, place = self._link, self._place
         again = self._can_disable and readings.state is DriveState.ENABLED
         if self._asked_s != self._asked_s or (again and now_s - self._asked_s >= ASK_AGAIN_S):
-            self._can_disable = link.request(place, Request.DISABLE)
-            self._asked_s = now_s
+            taken = link.request(place, Request.DISABLE)
+            self._can_disable = taken is not None
+            if taken is not False:  # what the bus did not take is asked again at once
+                self._asked_s = now_s
         if checked.motor_age_s > 0.0:
             link.request(place, Request.REPORT)
         unknown = self._unknown(readings, checked)
@@ -89,6 +91,8 @@ class TakingUp:
             return ", ".join(health_names(checked.flags)) or "data are old"
         if readings.saturated & CLIP_POSITION:
             return "motor position stands at the end of what its reply can carry; check its zero and range"
+        if self._asked_s != self._asked_s:
+            return "the bus did not take that the drive be let go"
         if self._can_disable and readings.state is DriveState.ENABLED:
             return "the drive stays enabled though it was asked to let go"
         try:
@@ -111,13 +115,13 @@ class TakingUp:
             torque = min(torque + self._period_s / TORQUE_S, 1.0)
         elif not self.pulls:
             self._link.request(self._place, Request.CLEAR_FAULTS, mode)
-            self._link.request(self._place, Request.ENABLE, mode)
-            self._enable_s = now_s
+            if self._link.request(self._place, Request.ENABLE, mode) is not False:  # else it is asked again
+                self._enable_s = now_s
         elif enabled and stiffness < 1.0:
             stiffness = min(stiffness + self._period_s / EASE_S, 1.0) if self._eases else 1.0
             if self._eases:
                 self._link.ease(self._place, stiffness)
         self._shares = _Shares(torque, stiffness)
-        free = stiffness == 0.0 and self._eases
+        free = stiffness == 0.0 if self._eases else not enabled
         target = motor_position_rad if free else sent.motor_position_rad
         return Command(target, 0.0, -self._preload_Nm * torque)
