@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joints import SMALL, SMALL_TOLERANCE, closed
@@ -14,8 +16,11 @@ from cablecomp.estimation.evidence import gather
 CONFIG = parse_joint({**closed(SMALL, "small"), "tolerance": SMALL_TOLERANCE}, "small")
 
 
-def repeated(amplitudes: np.ndarray, compliance: float, sigma: float) -> float | None:
-    """Of a joint that yields to its load and has no memory: one cycle per amplitude of the load."""
+def repeated(
+    amplitudes: np.ndarray, compliance: float, sigma: float, unread: float = 0.0, later: float = 0.0
+) -> float | None:
+    """Of a joint that yields to its load and has no memory: one cycle per amplitude of the load. Its angle is not read
+    in a last share of the time, `unread`, and reads something else in a last share that does not count, `later`."""
     rng = np.random.default_rng(11)
     time = np.arange(0.0, 8.0 * len(amplitudes), 0.02)
     size = np.interp(time, 8.0 * (np.arange(len(amplitudes)) + 0.5), amplitudes)
@@ -26,9 +31,14 @@ def repeated(amplitudes: np.ndarray, compliance: float, sigma: float) -> float |
         "time_s": time,
         "motor_position_rad": motor,
         "joint_torque_Nm": load,
-        "joint_position_rad": joint,
+        "joint_position_rad": np.where(time < (1.0 - unread) * time[-1], joint, np.nan),
     }
+    columns["joint_position_rad"] += np.where(
+        time < (1.0 - later) * time[-1], 0.0, 1e-2 * rng.standard_normal(len(time))
+    )
     evidence = gather(CONFIG, "one", columns, "all", fine_rows=6_000, judged_rows=2_000)
+    counts = evidence.at_rows("time_s") < (1.0 - later) * time[-1]
+    evidence = replace(evidence, counted={c: k & counts for c, k in evidence.counted.items()})
     return repeatability([evidence], [covariates_of(CONFIG, evidence).at(evidence.rows)])
 
 
@@ -38,6 +48,13 @@ def test_the_scatter_of_a_joint_is_found_whatever_its_load_differs_by(compliance
     amplitudes = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 1.0])
     found = repeated(amplitudes, compliance, sigma)
     assert found == pytest.approx(sigma, rel=0.25)
+
+
+@pytest.mark.parametrize("apart", [{"unread": 0.2}, {"later": 0.2}])
+def test_rows_that_do_not_count_say_nothing_of_it(apart: dict[str, float]) -> None:
+    """The angle not read in the last fifth of the time, or that fifth kept for the end."""
+    amplitudes = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 1.0])
+    assert repeated(amplitudes, 0.01, 1e-5, **apart) == pytest.approx(1e-5, rel=0.25)
 
 
 def test_nothing_is_said_where_nothing_repeats() -> None:

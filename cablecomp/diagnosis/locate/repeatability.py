@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from cablecomp.diagnosis.locate.covariates import Covariates
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 
 def repeatability(
@@ -21,12 +21,13 @@ def repeatability(
 ) -> float | None:
     """RMS difference [rad] between repeats of the same state in one recording, over sqrt 2: of the joint's angle, or of
     what a model with named effects leaves of it on the judged rows (`told`, by recording), whichever is less; None
-    where nothing repeats."""
+    where nothing repeats. Rows that do not count (the angle was not read there, or they are kept for the end) say
+    nothing of it."""
     joint = [e.at_rows(JOINT) for e in evidence]
     views = (joint,) if told is None else (joint, told)
     squares: list[list[FloatArray]] = [[] for _ in views]
-    for k, c in enumerate(covariates):
-        pairs, apart_by = _repeats(c)
+    for k, (e, c) in enumerate(zip(evidence, covariates, strict=True)):
+        pairs, apart_by = _repeats(c, e.counted[JOINT])
         if len(pairs):
             a, b = pairs[:, 0], pairs[:, 1]
             for found, seen in zip(squares, views, strict=True):
@@ -36,8 +37,8 @@ def repeatability(
     return min(float(np.sqrt(0.5 * np.median(np.concatenate(s)) / 0.455)) for s in squares)
 
 
-def _repeats(c: Covariates) -> tuple[IntArray, FloatArray]:
-    """Pairs of judged rows of a recording, far apart in time, in the same state, and by what their states and times
+def _repeats(c: Covariates, counted: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Pairs of counted rows of a recording, far apart in time, in the same state, and by what their states and times
     still lie apart; none where too few repeat."""
     v = c.values
     loaded = np.ptp(v["load"]) > 0.0
@@ -50,6 +51,7 @@ def _repeats(c: Covariates) -> tuple[IntArray, FloatArray]:
     apart = 0.1 * float(time[-1] - time[0])
     near = cKDTree(points).query_pairs(LIMITS.repeats * np.sqrt(points.shape[1]), output_type="ndarray")
     near = near[np.abs(time[near[:, 0]] - time[near[:, 1]]) > apart]
+    near = near[counted[near].all(axis=1)]
     if len(near) < LIMITS.repeats_fewest:
         return np.empty((0, 2), dtype=np.int64), np.empty((0, 0))
     a, b = near[:, 0], near[:, 1]
