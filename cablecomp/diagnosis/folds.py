@@ -18,7 +18,7 @@ import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
@@ -43,7 +43,8 @@ class KeptForTheEnd(NamedTuple):
 
 
 def kept_for_the_end(found: Sequence[Evidence]) -> KeptForTheEnd:
-    """Whole recordings where there are enough of them and their sessions have others, else the end of each."""
+    """Whole recordings where there are enough of them and their sessions have others, else the end of each, by the rows
+    on which its joint's angle counts."""
     if len(found) >= LIMITS.final_from:
         final = [e for k, e in enumerate(found) if k % LIMITS.final_every == LIMITS.final_every // 2]
         used = [e for e in found if e not in final]
@@ -54,7 +55,8 @@ def kept_for_the_end(found: Sequence[Evidence]) -> KeptForTheEnd:
             return KeptForTheEnd(tuple(used), tuple(final), "recording")
     used, final = [], []
     for e in found:
-        early = np.arange(len(e.rows)) < int((1.0 - LIMITS.final_share) * len(e.rows))
+        counts = e.counted[JOINT].astype(np.int64)
+        early = np.cumsum(counts) - counts < int((1.0 - LIMITS.final_share) * counts.sum())
         used.append(_counting(e, early))
         final.append(_counting(e, ~early))
     return KeptForTheEnd(tuple(used), tuple(final), "block")

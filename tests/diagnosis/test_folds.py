@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cablecomp.diagnosis.folds import kind_of_parts, left_out_in_turn
+from cablecomp.diagnosis.folds import kept_for_the_end, kind_of_parts, left_out_in_turn
 from cablecomp.estimation.evidence import JOINT, Evidence
 
 
@@ -35,6 +36,17 @@ def test_recordings_are_left_out_once_and_never_all_that_tell_a_sessions_drive(s
         assert part.rest
         if len(several) > 1:
             assert {e.session for e in part.out} <= {e.session for e in part.rest}
+
+
+@pytest.mark.parametrize("read", [60, 33])
+def test_the_end_is_kept_of_what_was_read(read: int) -> None:
+    """A recording whose joint's angle is missing from some row on: the last rows that have one are kept."""
+    whole = recording("0", "one")
+    kept = kept_for_the_end([replace(whole, counted={JOINT: np.arange(60) < read})])
+    used, final = (e[0].counted[JOINT] for e in (kept.used, kept.final))
+    assert np.flatnonzero(final).tolist() == list(range(int(0.85 * read), read))
+    assert np.array_equal(used | final, np.arange(60) < read)
+    assert not np.any(used & final)
 
 
 def test_blocks_are_left_out_once() -> None:
