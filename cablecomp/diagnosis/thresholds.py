@@ -356,6 +356,10 @@ class Thresholds:
     off 95 % together, and none of them was missed."""
     name: float = 0.5
     """Confidence from which an effect is named; weaker ones are candidates."""
+    not_followed: float = 0.7
+    """Share of what another channel than the joint's angle does, left by the model, from which it is said that it is
+    not followed (a motor's torque in another unit, or stuck: all of it and more; in 240 trials of 751 to 808 up to
+    0.31)."""
     least_doubt: float = 0.01
     """Doubt with which a name's odds count at the least where names are put in order: none is known to be surer."""
     event_size: float = 4.5

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from cablecomp.diagnosis.answer import verdict
-from cablecomp.diagnosis.answer.verdict import is_structured, not_carried, predicts, share_left, verdict_of
+from cablecomp.diagnosis.answer.verdict import (
+    _not_followed,
+    is_structured,
+    not_carried,
+    predicts,
+    share_left,
+    verdict_of,
+)
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -180,3 +187,20 @@ def test_a_model_that_does_not_carry_to_what_was_kept_for_the_end_is_warned_of(
     assert bool(lines) is said
     assert not said or "4.0 times worse" in lines[0]
     assert not list(not_carried(Errors(9e-6, 1e-5, 5e-5, 1e-5), 2e-5))  # within what sensors leave of either
+
+
+@pytest.mark.parametrize(("left", "said"), [(0.03, False), (0.6, False), (0.8, True), (283.0, True)])
+def test_a_channel_that_is_not_followed_is_said(left: float, said: bool) -> None:
+    """A torque of the motor that swings by 1 Nm RMS about 5 Nm, in some of the recordings."""
+    swing = 5.0 + np.sqrt(2.0) * np.sin(np.linspace(0.0, 20.0 * np.pi, 2000))
+
+    def at_rows(channel: str) -> Any:
+        return swing
+
+    counted = {"motor_torque_Nm": np.ones(2000, dtype=np.bool_)}
+    evidence = [SimpleNamespace(at_rows=at_rows, counted=c) for c in (counted, {})]
+    fit: Any = leaving(1e-5, left)
+    problem = SimpleNamespace(channels=fit.problem.channels, evidence=evidence)
+    lines = list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms))))
+    assert bool(lines) is said
+    assert all(line.startswith("motor_torque_Nm is not followed") for line in lines)

@@ -182,18 +182,29 @@ def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple
 
 
 def tested(selection: Selection, named: Sequence[str]) -> tuple[Tested, ...]:
-    rows = []
+    """Every comparison of the search; what the final model has is no more "not needed" in the rounds that led to it,
+    those beside a part of that model (in all, where it was put in afterwards)."""
     taken = {t.name for t in selection.final.terms}
-    for r in selection.rounds:
-        for t in r.tried:
-            accepted = r.accepted is not None and r.accepted.term.name == t.term.name and t.term.name in taken
-            outcome = (
-                "named" if t.term.name in named and accepted else "candidate" if accepted else "not needed"
-            )
-            rows.append(
-                Tested(t.term.name, r.base.name, t.difference.gain, t.difference.z, t.selected_in, outcome)
-            )
-    return tuple(rows)
+    rows = [(r, t) for r in selection.rounds for t in r.tried]
+    steps = {(r.base.name, t.term.name) for r, t in rows if {b.name for b in r.base.terms} <= taken}
+    led = {name for _, name in steps}
+
+    def outcome(base: str, name: str) -> str:
+        if name not in taken or (name in led and (base, name) not in steps):
+            return "not needed"
+        return "named" if name in named else "candidate"
+
+    return tuple(
+        Tested(
+            t.term.name,
+            r.base.name,
+            t.difference.gain,
+            t.difference.z,
+            t.selected_in,
+            outcome(r.base.name, t.term.name),
+        )
+        for r, t in rows
+    )
 
 
 def next_experiment(

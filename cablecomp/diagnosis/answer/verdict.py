@@ -85,7 +85,7 @@ def warnings_of(model: Model) -> tuple[str, ...]:
         )
     if any(isinstance(t, Hypothesis) and t.effect.id == "clock_skew" for t in model.terms):
         lines += filter(None, [drag_alike(model.fit)])
-    return (*lines, *_set_anew(model.fit), *_hidden(model.fit.problem.evidence))
+    return (*lines, *_not_followed(model.fit), *_set_anew(model.fit), *_hidden(model.fit.problem.evidence))
 
 
 def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
@@ -98,6 +98,19 @@ def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
             "changed there, the load goes further there than before, or the model does not carry that far; look at the "
             "recordings' last stretches"
         )
+
+
+def _not_followed(fit: Fit) -> Iterator[str]:
+    """Channels beside the joint's angle that the model follows hardly or not at all."""
+    for c in (c for c in fit.problem.channels if c != JOINT):
+        read = [e.at_rows(c)[e.counted[c]] for e in fit.problem.evidence if c in e.counted]
+        own = float(np.sqrt(np.mean(np.concatenate([x - np.mean(x) for x in read if len(x)]) ** 2)))
+        left = rms_left(fit, c)
+        if left > LIMITS.not_followed * own:
+            yield (
+                f"{c} is not followed: the model leaves {left:.3g} of it RMS, and it changes by {own:.3g}; its unit, sign "
+                "or zero is another than stated, or it is stuck, or another joint's; leave it out or mend it"
+            )
 
 
 def _set_anew(fit: Fit) -> Iterator[str]:
