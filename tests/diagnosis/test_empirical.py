@@ -106,3 +106,14 @@ def test_sixteen_teeth_a_turn_are_found_beside_noise_and_none_in_noise(
         law = held.found.law
         assert np.pi / law.half_width == pytest.approx(16.0, abs=0.05)
         assert np.hypot(*law.coefficients_rad[1:]) == pytest.approx(amplitude_rad, rel=0.15)
+
+
+def test_a_wave_fitted_to_other_data_has_the_frequency_that_these_have() -> None:
+    """As the errors on data left out ask: a frequency from the data that judge it would be told them."""
+    here = evidence()
+    x = here.at_rows(WAVE.of)[here.counted[JOINT]]
+    elsewhere = 1.09 * np.pi / WAVE.half_width
+    there = 1e-3 * np.sin(elsewhere * x + 0.4)
+    (again,) = refitted([WAVE], [here], [there])
+    assert np.pi / again.half_width == pytest.approx(elsewhere, rel=5e-3)
+    assert np.std(value_of(again, here)[here.counted[JOINT]] - there) < 0.05 * np.std(there)

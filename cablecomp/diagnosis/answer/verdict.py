@@ -108,8 +108,8 @@ def _not_followed(fit: Fit) -> Iterator[str]:
         left = rms_left(fit, c)
         if left > LIMITS.not_followed * own:
             yield (
-                f"{c} is not followed: the model leaves {left:.3g} of it RMS, and it changes by {own:.3g}; its unit, sign "
-                "or zero is another than stated, or it is stuck, or another joint's; leave it out or mend it"
+                f"{c} is not followed: the model leaves {left:.3g} of it RMS, and it changes by {own:.3g}; its unit, "
+                "sign or zero is another than stated, or it is stuck, or another joint's; leave it out or mend it"
             )
 
 

@@ -16,7 +16,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
+from cablecomp.signal.smoothing import FloatArray, IntArray
 
 TERMS = 10
 """Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a
@@ -115,12 +115,13 @@ def _wave(rows: _Rows) -> _Held | None:
     predicted = np.zeros(len(x))
     for k in np.unique(rows.groups.fold):
         out = rows.groups.fold == k
-        T = _waves(x, _best(grid, every, x, rows, ~out)) * rows.weight[:, None]
+        here = [T[~out] for T in every]
+        T = _waves(x, _best(grid, here, x[~out], rows.weight[~out], rows.left[~out])) * rows.weight[:, None]
         predicted[out] = T[out] @ _ridge(T[~out], rows.left[~out])
     step = score_difference(rows.left - predicted, rows.left, rows.groups)
     if not _holds(step):
         return None
-    frequency = _best(grid, every, x, rows, np.ones(len(x), dtype=np.bool_))
+    frequency = _best(grid, every, x, rows.weight, rows.left)
     law = Empirical(
         id="wave_by_motor_angle", law="fourier", of=WAVE_OVER, half_width=np.pi / frequency,
         coefficients_rad=(0.0, *(float(c) for c in _ridge(_waves(x, frequency) * rows.weight[:, None], rows.left))),
@@ -129,12 +130,13 @@ def _wave(rows: _Rows) -> _Held | None:
 
 
 def _best(
-    grid: FloatArray, every: Sequence[FloatArray], x: FloatArray, rows: _Rows, seen: BoolArray
+    grid: FloatArray, every: Sequence[FloatArray], x: FloatArray, weight: FloatArray, left: FloatArray
 ) -> float:
-    """The frequency whose wave takes most off the rows seen, to a sixteenth of the grid's step."""
-    top = int(np.argmax([_taken_off(T[seen], rows.left[seen]) for T in every]))
+    """The frequency whose wave takes most off what is left (weighted), to a sixteenth of the grid's step; `every`: the
+    waves of the grid, weighted."""
+    top = int(np.argmax([_taken_off(T, left) for T in every]))
     near = grid[top] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, 33) if len(grid) > 1 else grid
-    fine = [_taken_off((_waves(x, k) * rows.weight[:, None])[seen], rows.left[seen]) for k in near]
+    fine = [_taken_off(_waves(x, k) * weight[:, None], left) for k in near]
     return float(near[int(np.argmax(fine))])
 
 
@@ -202,13 +204,18 @@ def value_of(law: Empirical, recording: Evidence) -> FloatArray:
 def refitted(
     laws: Sequence[Empirical], recordings: Sequence[Evidence], left: Sequence[FloatArray]
 ) -> list[Empirical]:
-    """The same series fitted to other data: `left`, each recording's misfit [rad] on counted rows, one law
-    after the other."""
+    """The same series fitted to other data, a wave's frequency chosen anew: `left`, each recording's misfit [rad] on
+    counted rows, one law after the other."""
     weight = np.concatenate([e.weight[e.counted[JOINT]] for e in recordings])
     rest = np.concatenate(left)
     found = []
     for law in laws:
-        x = np.concatenate([e.at_rows(law.of)[e.counted[JOINT]] for e in recordings])
+        parts = [e.at_rows(law.of)[e.counted[JOINT]] for e in recordings]
+        x = np.concatenate(parts)
+        if law.law == "fourier" and len(grid := _frequencies(parts)):
+            every = [_waves(x, k) * weight[:, None] for k in grid]
+            frequency = _best(grid, every, x, weight, rest * weight)
+            law = law.model_copy(update={"half_width": np.pi / frequency})
         T = _of(law, x)
         c = _ridge(T * weight[:, None], rest * weight)
         rest = rest - T @ c
