@@ -15,7 +15,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.estimation.evidence import FEWEST, INPUT, JOINT, MOTOR, OVERFLOWN
 from cablecomp.estimation.evidence import load_channel as channel_of_load
-from cablecomp.estimation.lateness import accounted_for, delays, rather_late
+from cablecomp.estimation.lateness import accounted_for, borne_out, delays, rather_late
 from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
 from cablecomp.signal.smoothing import FloatArray
 
@@ -178,7 +178,7 @@ def _torques(view: View) -> list[Suspicion]:
             f"{mrad(view.left(ratio=ratio))} as it is, {mrad(scaled)} scaled so"
         )
         found.append(Suspicion("scale", view.channel, words, {"compliance_over_nominal": factor}))
-    return found
+    return [f for f in found if borne_out(view, f)]
 
 
 def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[Suspicion]:

@@ -101,6 +101,21 @@ def accounted_for(config: JointConfig, columns: Mapping[str, FloatArray], said: 
         return False
 
 
+def borne_out(view: View, said: Suspicion) -> bool:
+    """Whether the nominal drive, which knows its own hysteresis, follows the joint better with the load as a suspicion
+    of its sign or scale has it: to a straight line small loads within the hysteresis look stiff, or turned. So it is
+    where it bears neither load."""
+    some = _some(view)
+    line = np.column_stack((np.ones_like(view.q[some]), view.q[some]))
+
+    def left(factor: float) -> float:
+        bent = _bent(view, factor)
+        return inf if bent is None else rms(_beyond(line, view.y[some] - bent))
+
+    as_it_is, otherwise = left(1.0), left(_factor(view, [said]))
+    return otherwise < as_it_is or as_it_is == inf
+
+
 def _delay(view: View, name: str, late: float, before: float, after: float) -> Suspicion:
     """The words for a channel that is so late [s], and what is left at best [rad] as it is and shifted."""
     of_speed = _of_speed(view, name, late)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 from turning import JOINT, course, recorded
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, load_joint
 from cablecomp.effects import with_effects
 from cablecomp.estimation.belief import suspicions
 from cablecomp.estimation.view import Suspicion
@@ -193,6 +194,23 @@ def test_a_joint_held_by_a_spring_is_no_load_of_the_opposite_sign() -> None:
         lost[k] = np.clip(lost[k - 1] + 0.1 * (q[k] - q[k - 1]), -0.01, 0.01)
     angle = 0.5 * (JOINT.drive.ratio * q - lost)
     assert kinds(joint_position_rad=angle, joint_torque_Nm=-3.0 * angle) == []
+
+
+@pytest.mark.parametrize("seed", [2, 5, 7, 11])
+def test_loads_within_the_hysteresis_are_in_no_other_unit(seed: int) -> None:
+    """To a straight line the drive is stiff there, far beyond what it is by its greatest load."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 8.0, 0.01)
+    slow, quick = rng.uniform(0.2, 0.6), rng.uniform(0.3, 1.2)
+    soft = 1.0 - np.exp(-time)
+    arm = Path(__file__).parents[2] / "configs/joints/capstan-arm.toml"
+    joint = load_joint(arm)
+    most = rng.choice([0.03, 0.1, 0.3]) * joint.drive.stage[-1].pretension_moment_Nm
+    motor = 0.8 * soft * np.sin(2.0 * np.pi * slow * time)
+    load = most * soft * np.sin(2.0 * np.pi * quick * time + rng.uniform(0.0, 6.0))
+    columns = dict(simulate(PlantConfig.from_toml(arm), time, motor, load).channels())
+    columns["joint_position_rad"] = columns["joint_position_rad"] + 2e-5 * rng.standard_normal(len(time))
+    assert suspicions(joint, columns) == ()
 
 
 def test_a_load_that_lets_an_open_circuit_slacken_is_one_of_the_other_sign() -> None:
