@@ -20,6 +20,8 @@ from cablecomp.mechanics.together import solve_together
 UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
 """Share of the moments by which a row may miss its balance after all iterations, and how far its angle may still turn;
 farther off it is refused."""
+MOST_STRAIN = 1.0
+"""Strain under the pretension alone above which no cable is one any more: what no effect may make of it."""
 AFRESH = constant(False)
 """Nothing was solved just now that the next solution is near to (for a plain False circuits are compiled twice)."""
 
@@ -169,11 +171,17 @@ def _follow_pretension(d: Drive, laws: Floats) -> None:
 
 @inner_kernel
 def terms_sane(d: Drive, laws: Floats) -> bool:
-    """True if the terms' answers are finite and all factors positive; a pretension that moves needs law tables."""
+    """True if the terms' answers are finite and all factors positive, and no pretension strains its cable by more than
+    `MOST_STRAIN`; a pretension that moves needs law tables."""
     x = d.context
     if laws is None:
         if x.pretension_h != 1.0 or x.pretension_l != 1.0:
             return False
+    elif x.pretension_h > 1.0 or x.pretension_l > 1.0:
+        for c in range(d.size.cables):
+            cable = d.cables[c]
+            if not cable.T0 * max(x.pretension_h, x.pretension_l) <= MOST_STRAIN * cable.EA:
+                return False
     sums = x.moment + x.length_h + x.length_l + x.reading + x.motor_moment
     factors = x.pretension_h + x.pretension_l + x.stiffness_h + x.stiffness_l
     positive = x.pretension_h > 0.0 and x.pretension_l > 0.0 and x.stiffness_h > 0.0 and x.stiffness_l > 0.0
@@ -198,11 +206,17 @@ def joint_ready(d: Drive) -> int:
 
 @inner_kernel
 def strength_used(d: Drive) -> float:
-    """Greatest share of its breaking force that any cable bears in the pending solution; 0 where none is stated."""
+    """Greatest share of its breaking force that any cable bears in the pending solution, or will once its pretension
+    follows the terms' factor, which a commit leaves to the next sample; 0 where none is stated."""
+    x = d.context
     worst = 0.0
     for c in range(d.size.cables):
-        state = d.states[c]
-        worst = max(worst, d.cables[c].per_breaking * max(state.tension, state.tension_in))
+        cable, state = d.cables[c], d.states[c]
+        tension = max(state.tension, state.tension_in)
+        if d.size.terms > 0:
+            factor = x.pretension_h if cable.sign > 0.0 else x.pretension_l
+            tension += max(cable.T0 * (factor - state.pretension), 0.0)
+        worst = max(worst, cable.per_breaking * tension)
     return worst
 
 

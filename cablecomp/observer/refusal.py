@@ -33,7 +33,7 @@ REASONS = {
     Refusal.BACKWARD: "comes after a later one; time must not run backwards",
     Refusal.BREAKS: "loads a cable beyond its breaking force; lower the load or check breaking_force_N",
     Refusal.EFFECT: "makes an effect of the configuration give no finite answer, or move a pretension "
-    "without `moves_pretension`; check its parameters and the channels it reads",
+    "without `moves_pretension` or beyond what any cable bears; check its parameters and the channels it reads",
     Refusal.UNREACHABLE: "no load that the joint can take brings it to this joint angle; "
     "check the encoders' zeros and the pretension",
     Refusal.UNKNOWN: "comes before any other: nothing is known of the joint yet; step a first sample",

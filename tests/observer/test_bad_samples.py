@@ -81,3 +81,45 @@ def test_friction_that_slackens_an_open_circuit_says_so(share: float) -> None:
     assert Observer(plain).run(columns(load, motor))["deflection_rad"].shape == (200,)
     with pytest.raises(InputError, match="slacken"):
         Observer(config).run(columns(load, motor))
+
+
+@pytest.mark.parametrize(
+    ("breaking_force_N", "absurd_degC"),
+    [(1500.0, 1e3), (1500.0, 1e18), (None, 1e6), (None, 1e18), (None, 1e300)],
+)
+def test_a_temperature_that_no_cable_bears_is_refused_with_the_sample_that_says_it(
+    breaking_force_N: float | None, absurd_degC: float
+) -> None:
+    """A pretension acts a sample later: what is let in would have every later sample refused, and roll back each one
+    that would mend it."""
+    config = joint("closed", {} if breaking_force_N is None else {"breaking_force_N": breaking_force_N})
+    thermal = {"id": "thermal_pretension", "coefficient_per_K": 0.05, "reference_degC": 20.0}
+    config = config.model_copy(update={"effect": (EffectEntry.model_validate(thermal),)})
+    load = 0.1 * pull_unit(config) * np.sin(0.05 * np.arange(60.0))
+    observer, unspoilt = Observer(config), Observer(config)
+    refused = []
+    for k, torque in enumerate(load.tolist()):
+        sample = Sample(1e-3 * k, 0.0, torque, temperature_degC=absurd_degC if k == 20 else 25.0)
+        if k != 20:
+            unspoilt.step(sample)
+        try:
+            observer.step(sample)
+        except InputError:
+            refused.append(k)
+    assert refused == [20]
+    assert observer.snapshot() == unspoilt.snapshot()
+
+
+def test_a_temperature_that_creeps_up_to_what_breaks_a_cable_leaves_the_way_back() -> None:
+    config = joint("closed", {"breaking_force_N": 1500.0})
+    thermal = {"id": "thermal_pretension", "coefficient_per_K": 0.05, "reference_degC": 20.0}
+    config = config.model_copy(update={"effect": (EffectEntry.model_validate(thermal),)})
+    observer, refused = Observer(config), []
+    rises = 20.0 + np.concatenate([np.linspace(0.0, 1000.0, 2000), np.zeros(10)])
+    for k, warm in enumerate(rises.tolist()):
+        try:
+            observer.step(Sample(1e-3 * k, 0.0, 0.0, temperature_degC=warm))
+        except InputError:
+            refused.append(k)
+    assert refused
+    assert refused == list(range(refused[0], 2000))
