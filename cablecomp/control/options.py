@@ -104,13 +104,15 @@ class HealthOptions(_Frozen):
     against motor torque over the drive's ratio; `lead_rad`: motor target against motor position; each
     must last `confirm_s`. `stuck_rad`: how far the motor target may move while the motor encoder shows
     no change. `shake_Nm`: RMS of the load's quick part (above 10 Hz), for a fifth of `confirm_s`:
-    feed-forward that has come to shake the link is let go of. None = not watched.
+    feed-forward that has come to shake the link is let go of. None = not watched. Temperatures, those of
+    further channels too, are plausible from -60 to 200 degC and change by at most `temperature_rate_K_s`.
     """
 
     motor_rate_rad_s: Positive = 60.0
     joint_rate_rad_s: Positive = 40.0
     torque_rate_Nm_s: Positive = 2000.0
     torque_max_Nm: Positive | None = None
+    temperature_rate_K_s: Positive = 50.0
     joint_residual_rad: Positive | None = None
     torque_mismatch_Nm: Positive | None = None
     lead_rad: Positive | None = 0.3

@@ -8,14 +8,15 @@ from math import expm1, inf, isfinite, isnan, nan, pi
 class Channel:
     """The last plausible value of a channel, when it came, and whether newer ones had to be turned down.
 
-    A value is plausible if it is finite, within `most`, and moved no faster than `rate` since the value
-    before. After one that is not, values are turned down until they agree with the last plausible one
-    again. `changed_s`: when it last changed.
+    A value is plausible if it is finite, within `least` (given none: `-most`) and `most`, and moved no faster than
+    `rate` since the value before. After one that is not, values are turned down until they agree with the last
+    plausible one again. `changed_s`: when it last changed.
     """
 
     __slots__ = (
         "_floor",
         "_hold_s",
+        "_least",
         "_most",
         "_rate",
         "_raw",
@@ -28,11 +29,14 @@ class Channel:
         "value",
     )
 
-    def __init__(self, rate: float, floor: float, hold_s: float, most: float = inf) -> None:
+    def __init__(
+        self, rate: float, floor: float, hold_s: float, most: float = inf, least: float | None = None
+    ) -> None:
         self._rate = rate
         self._floor = floor
         self._hold_s = hold_s
         self._most = most
+        self._least = -most if least is None else least
         self._raw = self._raw_s = nan
         self.value = nan
         self.arrived_s = -inf
@@ -45,7 +49,7 @@ class Channel:
         """Judge one new value that came at `arrived_s`; False = turned down."""
         raw, dt = self._raw, arrived_s - self._raw_s
         self._raw, self._raw_s = value, arrived_s
-        if not -self._most < value < self._most:
+        if not self._least < value < self._most:
             self.refused += 1
             self.suspect = self.suspect or not isfinite(value)
             return False
@@ -61,6 +65,38 @@ class Channel:
             self.changed_s = arrived_s
         self.value, self.arrived_s = value, arrived_s
         return True
+
+
+class Seldom(Channel):
+    """A channel that may come seldom: `held` while what came last was turned down (`hold`), which counts as old
+    (`age_s`) from `confirm_s` on, or from when the next two readings should have come, at the pace of the last two.
+    """
+
+    __slots__ = ("_confirm_s", "_old_from_s", "held")
+
+    def __init__(
+        self,
+        rate: float,
+        floor: float,
+        hold_s: float,
+        confirm_s: float,
+        most: float = inf,
+        least: float | None = None,
+    ) -> None:
+        super().__init__(rate, floor, hold_s, most, least)
+        self._confirm_s = confirm_s
+        self._old_from_s = inf
+        self.held = False
+
+    def hold(self, arrived_s: float) -> None:
+        """Note that the value that came at `arrived_s` was turned down."""
+        if not self.held:
+            self._old_from_s = arrived_s + max(self._confirm_s, 2.5 * (arrived_s - self.arrived_s))
+            self.held = True
+
+    def age_s(self, now_s: float) -> float:
+        """For how long it has counted as old that readings were turned down (0 = it does not)."""
+        return max(now_s - self._old_from_s, 0.0) if self.held else 0.0
 
 
 class Sustained:

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from cablecomp.control.options import HealthOptions
 from cablecomp.links.readings import JointReadings
 from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE, TEMPERATURE
-from cablecomp.runtime.channel import Channel, Latency, Shaking, Sustained
+from cablecomp.runtime.channel import Channel, Latency, Seldom, Shaking, Sustained
 from cablecomp.signals import Sample
 
 (
@@ -30,8 +30,11 @@ from cablecomp.signals import Sample
     MOTOR_STUCK,
     JOINT_STUCK,
     ENCODERS_DISAGREE,
-) = (1 << bit for bit in range(16))
+    TEMPERATURE_UNTRUE,
+    OTHER_UNTRUE,
+) = (1 << bit for bit in range(18))
 FATAL: Final = MOTOR_LAGS | MOTOR_STUCK | ENCODERS_DISAGREE
+_UNTRUE: Final = TEMPERATURE_UNTRUE | OTHER_UNTRUE
 
 _WORDS: Final = (
     "motor position is stale",
@@ -50,6 +53,8 @@ _WORDS: Final = (
     "motor encoder is stuck",
     "joint encoder is stuck",
     "encoders disagree",
+    "temperature cannot be true",
+    "a further channel cannot be true",
 )
 _FAR = 5.0  # times the joint residual's limit: no joint moves there in a few samples
 _FAR_S = 0.003
@@ -57,6 +62,11 @@ _FAR_PERIODS = 2.5  # at least: of a slow loop two samples would be enough
 _SAME = 3  # readings that repeat the one before: fewer come from a drive that stood still itself
 _STILL_S = 0.008
 _STILL_PERIODS = 7.5
+_COLDEST_DEGC, _HOTTEST_DEGC = -60.0, 200.0
+"""What a thermometer at a joint can read: a little more than the widest grade of electronics (-55 degC) and the hottest
+class of winding insulation in use (H, 180 degC) bear."""
+_TEMPERATURE_FLOOR_K, _ANGLE_FLOOR_RAD, _TORQUE_FLOOR_Nm = 5.0, 0.05, 0.5
+"""Steps that pass however soon a reading comes after the one before: resolution and noise of a coarse sensor."""
 
 
 def health_names(flags: int) -> tuple[str, ...]:
@@ -87,8 +97,10 @@ class Health:
     open circuit's pretension pulls at the motor; `motor_step_rad`: what the drive rounds its position to, so that a
     motor that moves by less shows no change.
 
-    Motor position, joint torque, joint position are held at their last plausible value; all else passes
-    as it came.
+    Motor position, joint torque, joint position are held at their last plausible value. So are temperature and
+    `others`: what is turned down of them is put back in the readings too, so that what is recorded is what the observer
+    saw. Further channels are judged by the unit in their name; of one without, only that it is finite.
+    `needs_temperature`: an effect reads it. All else passes as it came.
     """
 
     def __init__(
@@ -100,6 +112,7 @@ class Health:
         *,
         needs_torque: bool = True,
         needs_joint: bool = False,
+        needs_temperature: bool = False,
         others: tuple[int, ...] = (),
         preload_Nm: float = 0.0,
         motor_step_rad: float = 0.0,
@@ -124,6 +137,8 @@ class Health:
         self._needs_torque = needs_torque
         self._needs_joint = needs_joint
         self._others = others
+        self._needs_temperature = needs_temperature
+        self._further: list[tuple[Seldom, int, int]] = []
         self._unanswered = o.unanswered
         self._lead_rad = inf if o.lead_rad is None else o.lead_rad
         self._stuck_rad = inf if o.stuck_rad is None else o.stuck_rad + 2.0 * motor_step_rad
@@ -150,7 +165,7 @@ class Health:
         target sent last.
         """
         values = readings.values
-        flags = self._take(values, readings.arrived_s, readings.updates)
+        flags = self._take(readings)
         motor, torque, joint, fresh = self.motor, self.torque, self.joint, self._fresh_s
         stamp = readings.device_s[JOINT_TORQUE]
         late = self.latency.take(readings.arrived_s[JOINT_TORQUE], stamp) if not isnan(stamp) else 0.0
@@ -177,6 +192,8 @@ class Health:
                 load_age = self._mismatch.age_s
         if self._needs_joint:
             load_age = max(load_age, joint_age, self._residual.age_s)
+        if flags & _UNTRUE:
+            load_age = max(load_age, self._untrue_s(now_s))
         ready = (
             not isnan(motor.value)
             and (has_torque or not self._needs_torque)
@@ -195,7 +212,8 @@ class Health:
         joint_ok = has_joint and joint_age <= fresh and not flags & (JOINT_RESIDUAL | JOINT_STUCK)
         return Checked(sample, motor_age, load_age, flags, ready, joint_ok, bool(flags & FATAL))
 
-    def _take(self, values: list[float], arrived: list[float], updates: list[int]) -> int:
+    def _take(self, readings: JointReadings) -> int:
+        values, arrived, updates = readings.values, readings.arrived_s, readings.updates
         flags = 0
         for channel, place, jump in self._channels:
             n = updates[place]
@@ -206,7 +224,45 @@ class Health:
                 flags |= jump
         if abs(values[JOINT_TORQUE]) >= self._most_Nm:
             flags |= TORQUE_SATURATED
+        for further, place, untrue in self._further or self._name_further(readings):
+            n = updates[place]
+            if n != further.seen:
+                further.seen = n
+                if further.take(values[place], arrived[place]):
+                    further.held = False
+                else:
+                    further.hold(arrived[place])
+                    values[place] = further.value
+            if further.held:
+                flags |= untrue
         return flags
+
+    def _name_further(self, readings: JointReadings) -> list[tuple[Seldom, int, int]]:
+        """Temperature and the further channels, whose names the readings know: where they lie, and their flags."""
+        names = readings.channels
+        self._further += [(self._of_name(names[TEMPERATURE]), TEMPERATURE, TEMPERATURE_UNTRUE)]
+        self._further += [(self._of_name(names[place]), place, OTHER_UNTRUE) for place in self._others]
+        return self._further
+
+    def _untrue_s(self, now_s: float) -> float:
+        """For how long what effects read beside the common channels has counted as old."""
+        needed = OTHER_UNTRUE | (TEMPERATURE_UNTRUE if self._needs_temperature else 0)
+        return max(
+            (further.age_s(now_s) for further, _, untrue in self._further if untrue & needed), default=0.0
+        )
+
+    def _of_name(self, channel: str) -> Seldom:
+        """What is plausible of a further channel, by the unit that its name ends in."""
+        o, hold_s = self._o, self._fresh_s
+        if channel.endswith("_degC"):
+            limits = _HOTTEST_DEGC, _COLDEST_DEGC
+            return Seldom(o.temperature_rate_K_s, _TEMPERATURE_FLOOR_K, hold_s, o.confirm_s, *limits)
+        rates = {
+            "_rad": (o.joint_rate_rad_s, _ANGLE_FLOOR_RAD),
+            "_Nm": (o.torque_rate_Nm_s, _TORQUE_FLOOR_Nm),
+        }
+        found = next((limit for unit, limit in rates.items() if channel.endswith(unit)), (inf, 0.0))
+        return Seldom(*found, hold_s, o.confirm_s)
 
     def _encoders(self, now_s: float, predicted_rad: float, target_rad: float) -> int:
         flags, limit, motor = 0, self._o.joint_residual_rad, self.motor

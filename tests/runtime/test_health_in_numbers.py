@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, expm1
+from math import exp, expm1, inf, nan
 
 import pytest
 from fed_health import ALL, Fed, N, T, options
@@ -17,10 +17,11 @@ def test_every_flag_has_its_bit_and_its_words() -> None:
         *(h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE, h.MOTOR_JUMP, h.TORQUE_JUMP, h.JOINT_JUMP),
         *(h.TORQUE_SATURATED, h.JOINT_RESIDUAL, h.TORQUE_MISMATCH, h.MOTOR_LAGS, h.UNANSWERED, h.LATE),
         *(h.SHAKES, h.MOTOR_STUCK, h.JOINT_STUCK, h.ENCODERS_DISAGREE),
+        *(h.TEMPERATURE_UNTRUE, h.OTHER_UNTRUE),
     )
-    assert flags == tuple(1 << k for k in range(16))
+    assert flags == tuple(1 << k for k in range(18))
     words = [word for flag in flags for word in h.health_names(flag)]
-    assert len(words) == len(set(words)) == 16
+    assert len(words) == len(set(words)) == 18
     assert h.health_names(sum(flags)) == tuple(words)
     symptoms = {
         "stale": (h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE),
@@ -93,6 +94,65 @@ def test_a_sample_holds_what_came_and_the_other_channels_in_the_observer_s_order
     fed.readings.values[TEMPERATURE] = 31.0
     s = fed.cycle(motor=0.5, torque=1.5, joint=0.25, motor_torque=0.75).sample
     assert s == (T, 0.5, 1.5, 0.25, 0.75, 31.0, (9.0, 7.0))
+
+
+@pytest.mark.parametrize("absurd", [327.67, -60.5, 200.5, 31.5 + 5.2, 31.5 - 5.2, 1e300])
+@pytest.mark.parametrize("needed", [True, False])
+def test_a_temperature_that_cannot_be_true_is_held_out_and_makes_old_what_lives_on_it(
+    absurd: float, needed: bool
+) -> None:
+    fed = Fed(needs_temperature=needed)
+    fed.cycle(**ALL, temperature=31.0)
+    assert fed.cycle(**ALL, temperature=31.5).sample.temperature_degC == 31.5
+    for k in range(20):  # every reading from now on: old once it has lasted
+        checked = fed.cycle(**ALL, temperature=absurd)
+        assert checked.flags == h.TEMPERATURE_UNTRUE
+        assert checked.sample.temperature_degC == fed.readings.values[TEMPERATURE] == 31.5
+        assert checked.load_age_s == (max(k - 8, 0) * T if needed else 0.0)
+    fed.cycle(**ALL, temperature=32.0)
+    over = fed.cycle(**ALL, temperature=32.0)
+    assert (over.flags, over.load_age_s, over.sample.temperature_degC) == (0, 0.0, 32.0)
+
+
+def test_one_reading_of_a_slow_thermometer_that_cannot_be_true_makes_nothing_old() -> None:
+    """It comes every 100 periods, and none is missed before the next two."""
+    fed = Fed(needs_temperature=True)
+    for k in range(600):
+        came = {"temperature": 327.67 if k == 300 else 20.0} if k % 100 == 0 else {}
+        checked = fed.cycle(**ALL, **came)
+        assert checked.load_age_s == 0.0
+        assert checked.sample.temperature_degC == 20.0
+        assert checked.flags == (h.TEMPERATURE_UNTRUE if 300 <= k < 500 else 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad"),
+    [
+        *[("other_1", 7.0, absurd) for absurd in (nan, inf, -inf)],
+        *[("other_motor_degC", 40.0, absurd) for absurd in (-61.0, 201.0, 45.2, inf)],
+        *[("other_wrist_rad", 1.0, absurd) for absurd in (1.25, nan)],
+        *[("other_wrist_Nm", 1.0, absurd) for absurd in (-9.6, inf)],
+    ],
+)
+def test_a_further_channel_is_judged_by_its_unit_and_held(name: str, good: float, bad: float) -> None:
+    fed = Fed(others=(len_of_channels(),))
+    fed.readings.others = (name,)
+    fed.readings.values.append(nan), fed.readings.arrived_s.append(nan), fed.readings.updates.append(0)
+    assert fed.cycle(**ALL).flags == 0  # it has never come, and is no number
+    assert fed.cycle(**ALL, other_0=good).sample.other == (good,)
+    for k in range(20):
+        checked = fed.cycle(**ALL, other_0=bad)
+        assert (checked.flags, checked.sample.other) == (h.OTHER_UNTRUE, (good,))
+        assert checked.load_age_s == max(k - 8, 0) * T
+    fed.cycle(**ALL, other_0=good)
+    assert fed.cycle(**ALL, other_0=good).flags == 0
+
+
+def test_a_further_channel_without_a_unit_may_be_anything_finite() -> None:
+    fed = Fed(count=1, others=(len_of_channels(),))
+    for value in (0.0, 1e300, -1e300, 5.0):
+        checked = fed.cycle(**ALL, other_0=value)
+        assert (checked.flags, checked.sample.other) == (0, (value,))
 
 
 def len_of_channels() -> int:

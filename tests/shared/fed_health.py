@@ -6,9 +6,23 @@ from math import nan
 
 from cablecomp.control.options import HealthOptions
 from cablecomp.links.readings import JointReadings
-from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE
+from cablecomp.links.records import (
+    CHANNELS,
+    JOINT_POSITION,
+    JOINT_TORQUE,
+    MOTOR_POSITION,
+    MOTOR_TORQUE,
+    TEMPERATURE,
+)
 from cablecomp.runtime import health as h
 
+PLACES = (
+    ("motor", MOTOR_POSITION),
+    ("torque", JOINT_TORQUE),
+    ("joint", JOINT_POSITION),
+    ("temperature", TEMPERATURE),
+    ("other_0", len(CHANNELS)),
+)
 T = 1.0 / 1024.0
 N = 0.25
 
@@ -46,7 +60,7 @@ class Fed:
     def cycle(self, predicted: float = nan, target: float = nan, **came: float) -> h.Checked:
         self.k += 1
         now, r = self.k * self.period_s, self.readings
-        for name, place in (("motor", MOTOR_POSITION), ("torque", JOINT_TORQUE), ("joint", JOINT_POSITION)):
+        for name, place in PLACES:
             if name in came:
                 r.values[place], r.arrived_s[place] = came[name], now
                 r.updates[place] += 1
