@@ -69,6 +69,12 @@ def given_gains(options: CompensatorOptions) -> Gains | None:
     return None if any(value is None for value in found) else Gains(*found)
 
 
+def _force_limit_Nm(config: JointConfig, options: CompensatorOptions) -> float:
+    """By how much torque feedback may change what is wanted: without contact it finds no torque however far it goes."""
+    stated = options.force_feedback_limit_Nm or config.limits.joint_torque_max_Nm
+    return stated or config.drive.stage[-1].pretension_moment_Nm
+
+
 class Compensator:
     """Controls one joint; the state is in the open attributes, time comes with the sample.
 
@@ -117,6 +123,7 @@ class Compensator:
         self._velocity = 0.0
         self._motor_share = self.gains.motor_integral_per_s * period_s
         self._motor_limit = options.motor_integral_limit_rad
+        self._force_limit = _force_limit_Nm(config, options)
         self._linear = options.linear_stiffness_Nm_per_rad
         self._from_sensor = options.load != "reference"
         self._goes_to_position = options.mode is ControlMode.POSITION
@@ -241,7 +248,8 @@ class Compensator:
         joint_velocity = self.follow.rate
         wanted_Nm = self._wanted_torque(reference, joint, joint_velocity)
         if not feed.held:
-            self._force_feedback(wanted_Nm - estimate.joint_torque_Nm)
+            if self.active:  # else nothing of it would reach the motor
+                self._force_feedback(wanted_Nm - estimate.joint_torque_Nm)
             asked = wanted_Nm + self.force_trim_Nm
             self.deflection_used_rad = self._deflection(sample, reference, asked)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
@@ -260,7 +268,9 @@ class Compensator:
 
     def _force_feedback(self, error_Nm: float) -> None:
         if error_Nm == error_Nm:
-            self.force_trim_Nm += self.gains.force_feedback_per_s * self.period_s * error_Nm
+            limit = self._force_limit
+            trim = self.force_trim_Nm + self.gains.force_feedback_per_s * self.period_s * error_Nm
+            self.force_trim_Nm = min(max(trim, -limit), limit)
 
     # ---- common ----------------------------------------------------------------------------------
 

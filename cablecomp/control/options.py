@@ -64,8 +64,9 @@ class CompensatorOptions(_Frozen):
     `load_filter_Hz`, `load_lead_s`: expected load = `(1 + s lead) / (1 + s / (2 pi f))^2` of the reading.
     `follow_*`: the same filter on the joint position that force and impedance mode follow.
     `joint_feedback_per_s`: integral gain on the joint encoder's error, 0 = no feedback.
-    `force_feedback_per_s`: the same on the torque error. `motor_integral_per_s`: the same on the motor
-    encoder's own error (all contestants alike). `torque_from`: where force and impedance mode know the joint
+    `force_feedback_per_s`: the same on the torque error, within `force_feedback_limit_Nm` (None = the joint's
+    greatest torque as its limits state it, else R T0 of the output stage). `motor_integral_per_s`: the same on the
+    motor encoder's own error (all contestants alike). `torque_from`: where force and impedance mode know the joint
     torque from.
     """
 
@@ -80,6 +81,7 @@ class CompensatorOptions(_Frozen):
     joint_feedback_per_s: NonNegative | None = 0.0
     joint_feedback_limit_rad: Positive = 0.05
     force_feedback_per_s: NonNegative | None = None
+    force_feedback_limit_Nm: Positive | None = None
     motor_integral_per_s: NonNegative | None = None
     motor_integral_limit_rad: Positive = 0.1
     linear_stiffness_Nm_per_rad: Positive | None = None

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cablecomp.config import load_joint
+from cablecomp.config import JointConfig, Limits, load_joint
 from cablecomp.control.command import FULL, Feed, Reference
 from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
@@ -156,6 +156,42 @@ def test_force_mode_makes_the_torque_that_is_wanted_against_a_held_output() -> N
     for k in range(3000):
         motor = c.step(sample(k, motor, nan, 0.2), Reference(joint_torque_Nm=-0.9)).motor_position_rad
     assert K * (0.2 - N * motor) == pytest.approx(-0.9, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("joint", "given", "limit"),
+    [
+        (JOINT, {}, 2.0),  # joint_torque_max_Nm of the joint
+        (JOINT, {"force_feedback_limit_Nm": 0.75}, 0.75),
+        (JOINT.model_copy(update={"limits": Limits()}), {}, JOINT.drive.stage[-1].pretension_moment_Nm),
+    ],
+)
+def test_force_mode_without_contact_does_not_wind_up(
+    joint: JointConfig, given: dict[str, float], limit: float
+) -> None:
+    """Nothing is touched for 10 s; then twice what is wanted: the trim is gone at 5 per s of the 0.5 Nm too much."""
+    options = CompensatorOptions.model_validate({"mode": "force", "torque_from": "sensor", **given})
+    c = Compensator(joint, options, T, Spring(), gains=GAINS, motor=MotorModel())
+    for k in range(10_000):
+        c.step(sample(k, 0.0, 0.0, 0.0), Reference(joint_torque_Nm=0.5))
+        assert c.force_trim_Nm == pytest.approx(min(5.0 * 0.5 * (k + 1) * T, limit))
+    assert c.force_trim_Nm == limit
+    back = round(limit / (5.0 * 0.5) / T)
+    for k in range(back):
+        c.step(sample(10_000 + k, 0.0, 1.0, 0.0), Reference(joint_torque_Nm=0.5))
+    assert c.force_trim_Nm == pytest.approx(0.0, abs=5.0 * 0.5 * T)
+
+
+def test_torque_feedback_rests_while_nothing_of_it_reaches_the_motor() -> None:
+    c = controller(mode="force", torque_from="sensor")
+    c.step(sample(0, 0.0, 0.0, 0.0), Reference(joint_torque_Nm=0.5))
+    found = c.force_trim_Nm
+    for k in range(1, 100):
+        c.step(sample(k, 0.0, 0.0, 0.0), Reference(joint_torque_Nm=0.5), Feed(1.0, held=True))
+    c.disable()
+    for k in range(100, 200):
+        c.step(sample(k, 0.0, 0.0, 0.0), Reference(joint_torque_Nm=0.5))
+    assert c.force_trim_Nm == found
 
 
 def test_impedance_wants_a_load_in_proportion_to_the_position_error() -> None:
