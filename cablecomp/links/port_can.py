@@ -236,8 +236,11 @@ class GenericPort(PortBase):
     def close(self) -> None:
         """See `Port.close`."""
         if self._bus is not None:
-            self._bus.shutdown()
-            self._bus = None
+            bus, self._bus = self._bus, None
+            try:
+                bus.shutdown()
+            except (can.CanError, OSError) as error:
+                self.fault = self.fault or f"closing failed ({error})"
         self.state = BusState.CLOSED
 
 

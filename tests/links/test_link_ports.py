@@ -60,6 +60,41 @@ def test_virtual_both_ways_with_a_stock_client(channel: str, kind: str) -> None:
     assert not port.send(1, b"")
 
 
+class Unplugged:
+    """A bus whose adapter is gone, once it is."""
+
+    def __init__(self, channel: str) -> None:
+        self._bus = bus(channel)
+        self.gone = False
+
+    def _there(self) -> None:
+        if self.gone:
+            raise can.CanOperationError("unplugged")
+
+    def recv(self, timeout: float | None) -> can.Message | None:
+        self._there()
+        return self._bus.recv(timeout)
+
+    def shutdown(self) -> None:
+        self._bus.shutdown()
+        self._there()
+
+
+@pytest.mark.parametrize("noticed", [True, False])
+def test_closing_an_adapter_that_is_gone_says_so_and_closes(channel: str, noticed: bool) -> None:
+    made = Unplugged(channel)
+    port = GenericPort(lambda: made)
+    port.open()
+    made.gone = True
+    if noticed:
+        port.drain(Catch(), 1)
+        assert port.state == BusState.LOST
+    port.close()
+    assert port.fault == ("receiving failed (unplugged)" if noticed else "closing failed (unplugged)")
+    assert port.state == BusState.CLOSED
+    port.close()
+
+
 def test_a_receiver_does_not_share_the_senders_bytes(channel: str) -> None:
     port, one, two = can_port("virtual", channel, None, {}), bus(channel), bus(channel)
     port.open()

@@ -4,8 +4,10 @@ recorded is lost. With `-s` every fault tells its line.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import can
 import numpy as np
 import polars as pl
 import pytest
@@ -14,6 +16,8 @@ from fault_runs import JOINT, REACH, Outcome, nothing_is_lost, run_with, simulat
 from cablecomp.config import load_joint
 from cablecomp.errors import DeviceError
 from cablecomp.links.load import load_link
+from cablecomp.links.port_can import GenericPort
+from cablecomp.links.ports import Port
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import times_of
 
@@ -172,6 +176,51 @@ def test_a_line_that_is_gone_stops_the_joint(link: str, fault: str, words: str, 
     assert not outcome.finished
     assert outcome.moved_rad(outcome.stopped_after_s) <= 0.06
     nothing_is_lost(outcome)
+
+
+def test_an_adapter_that_is_gone_leaves_the_report_and_everything_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pulled out in mid-run; python-can cannot even close it, and lets an error out."""
+    simulation, link, control = simulated("wrist-virtual")
+    gone: list[bool] = []
+
+    class Adapter:
+        def __init__(self, channel: str | int | None) -> None:
+            self._bus = can.Bus(interface="virtual", channel=channel, ignore_config=True)
+
+        def recv(self, timeout: float) -> can.Message | None:
+            self._there()
+            return self._bus.recv(timeout)
+
+        def send(self, message: can.Message, timeout: float) -> None:
+            self._there()
+            self._bus.send(message, timeout)
+
+        def shutdown(self) -> None:
+            self._bus.shutdown()
+            self._there()
+
+        def _there(self) -> None:
+            if gone:
+                raise can.CanOperationError("unplugged")
+
+    def opened(interface: str, channel: str | int | None, *options: object) -> Port:
+        return GenericPort(lambda: Adapter(channel))
+
+    def watch(loop, tick) -> None:
+        if loop.since_s > 0.4:
+            gone[:] = [True]
+
+    monkeypatch.setattr("cablecomp.links.link.can_port", opened)
+    options = RunOptions(1.2, True, tmp_path)
+    try:
+        report = run_joint(load_joint(JOINT), link, control, REACH, options, simulation, watch)
+    finally:
+        simulation.close()
+    assert "bus is lost" in report.stop_reason
+    assert json.loads((tmp_path / "run.json").read_text())["stop_reason"] == report.stop_reason
+    nothing_is_lost(Outcome(tmp_path, report, ticks=report.timing.ticks))
 
 
 def test_no_answer_at_all_is_a_device_error_in_one_line(tmp_path: Path) -> None:
