@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from math import isfinite
 from pathlib import Path
 
 from cablecomp.config import JointConfig
@@ -173,6 +174,11 @@ def _wanted(
     begin = 0.0
     if options.resume is not None:
         begin = max(resumed_at_s(s) for s in setups) + 1.0 / link.rate_Hz
+        if not isfinite(begin):
+            raise InputError(
+                f"{options.resume}: its observer has taken no sample, there is nothing to go on from; "
+                "leave out --resume"
+            )
     return LoopOptions(duration, mode=_drive_mode(link, place), policy=policy, begin_s=begin)
 
 

@@ -18,6 +18,7 @@ from cablecomp.config import load_joint
 from cablecomp.control.options import ControlMode, FeedForward, load_control
 from cablecomp.control.protocol import parse_protocol
 from cablecomp.control.standard import force_protocol
+from cablecomp.errors import InputError
 from cablecomp.links.load import load_link
 from cablecomp.observer import Observer
 from cablecomp.recording.reader import open_recording
@@ -276,3 +277,25 @@ def test_a_run_goes_on_from_a_snapshot_and_can_be_replayed_from_there(
     again = np.concatenate([observer.run(block.columns)["deflection_rad"] for block in blocks])
     live = pl.read_csv(tmp_path / "prediction.csv", infer_schema_length=None)["deflection_rad"].to_numpy()
     assert live.tobytes() == again.tobytes()
+
+
+def test_a_snapshot_of_an_observer_that_has_taken_nothing_is_nothing_to_go_on_from(tmp_path: Path) -> None:
+    """Its time is minus infinity, from which no clock gets anywhere."""
+    snapshot = tmp_path / "empty.snapshot"
+    Observer(load_joint(JOINT)).save(snapshot)
+    joint, control = load_joint(JOINT), load_control(CONTROL)
+    control = control.model_copy(update={"compensator": control.compensator.model_copy(update=WRIST_GAINS)})
+    link, control = matched(load_link(LINK), control, own_link=False)
+    simulation = start_simulation(JOINT, SimulationWish(link, control, off_nominal=False, seed=3))
+
+    def watch(loop: Loop, tick: Tick) -> None:
+        assert tick.number < 1000, "it would never end"
+
+    options = RunOptions(0.3, True, tmp_path / "run", resume=snapshot)
+    try:
+        with pytest.raises(InputError, match=r"empty\.snapshot: its observer has taken no sample") as caught:
+            run_joint(joint, link, control, REACH, options, simulation, watch)
+    finally:
+        simulation.close()
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "run").exists()
