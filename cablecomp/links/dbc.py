@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import isfinite
+from math import ceil, floor, isfinite
 from pathlib import Path
 from struct import pack
 from typing import Any, NamedTuple
@@ -18,6 +18,9 @@ import cantools
 
 from cablecomp.errors import InputError
 from cablecomp.links.records import EXTENDED
+
+_DECIMALS = 1e-9
+"""Share by which a limit over a scale, both written in decimals, may miss a whole count."""
 
 
 class Field(NamedTuple):
@@ -101,8 +104,9 @@ def _field(signal: Any, length: int) -> Field:
     low, high = (-(1 << n - 1), (1 << n - 1) - 1) if signal.is_signed else (0, (1 << n) - 1)
     scale, offset = float(signal.scale), float(signal.offset)
     if signal.minimum is not None and signal.maximum is not None and signal.maximum > signal.minimum:
-        ends = sorted(round((float(x) - offset) / scale) for x in (signal.minimum, signal.maximum))
-        low, high = max(low, ends[0]), min(high, ends[1])
+        ends = sorted((float(x) - offset) / scale for x in (signal.minimum, signal.maximum))
+        least, most = _inward(*ends)
+        low, high = max(low, least), min(high, most)
     return Field(
         signal.name,
         big,
@@ -118,6 +122,13 @@ def _field(signal: Any, length: int) -> Field:
         {int(k): str(v) for k, v in (signal.choices or {}).items()},
         tuple(signal.multiplexer_ids or ()),
     )
+
+
+def _inward(least: float, most: float) -> tuple[int, int]:
+    """The outermost counts that lie between the ends of a range, themselves in counts but for the rounding of the
+    table's decimals; the nearest one where none does."""
+    low, high = ceil(least - _DECIMALS * abs(least)), floor(most + _DECIMALS * abs(most))
+    return (low, high) if low <= high else (round(0.5 * (least + most)),) * 2
 
 
 def counts_in(field: Field, little: int, big: int) -> int:

@@ -116,6 +116,28 @@ def test_saturation_nan_and_limits_of_the_table(tmp_path: Path) -> None:
         dbc.field_of(layout, "z", "here")
 
 
+@pytest.mark.parametrize(
+    ("scale", "offset", "low", "high", "counts"),
+    [
+        (0.3, 0.0, -3.2, 3.2, (-10, 10)),
+        (0.3, 0.0, -3.1, 3.1, (-10, 10)),
+        (-0.3, 0.0, -3.2, 3.2, (-10, 10)),
+        (0.1, 0.0, -0.3, 0.7, (-3, 7)),  # 0.7 / 0.1 is less than 7 by a digit
+        (0.1, 0.0, 0.3, 0.6, (3, 6)),
+        (0.001, -20.0, -19.9995, 19.9995, (1, 32767)),
+        (0.00038147, 0.0, -12.5, 12.5, (-32767, 32767)),
+        (1.0, 0.0, 0.1, 0.8, (0, 0)),  # none lies between
+        (1.0, 0.0, 0.0, 0.0, (-32768, 32767)),  # the table states none
+    ],
+)
+def test_the_limits_of_a_table_are_not_exceeded_by_what_lies_between_counts(
+    tmp_path: Path, scale: float, offset: float, low: float, high: float, counts: tuple[int, int]
+) -> None:
+    path = table_of(tmp_path, f'BO_ 291 C: 8 A\n SG_ x : 0|16@1- ({scale},{offset}) [{low}|{high}] "" B\n')
+    field = dbc.layout(path, "C").fields["x"]
+    assert (field.low, field.high) == counts
+
+
 def test_bad_tables_end_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         dbc.layout(tmp_path / "none.dbc", "M")
