@@ -18,20 +18,23 @@ from cablecomp.signals import Wire
 
 OTHER_RANGES: Final = 0x100
 """Error code of ours: the drive's PMAX, VMAX or TMAX is not the link's."""
+UNTOLD_RANGES: Final = 0x101
+"""Error code of ours: the drive was to be enabled before it had told what they are."""
 _NAMES: Final = {registers.PMAX: "PMAX", registers.VMAX: "VMAX", registers.TMAX: "TMAX"}
 _POSITION: Final = Struct("<ff")
 _VELOCITY: Final = Struct("<f4x")
 
 
 class DamiaoDrive(MitDrive):
-    """Asks the drive for its ranges before it is enabled, and does not enable one whose ranges are others:
-    every number would be read and sent in a wrong scale."""
+    """Asks the drive for its ranges before it is enabled, and does not enable one whose ranges are others, or that does
+    not tell them: every number would be read and sent in a wrong scale."""
 
     def __init__(self, device: MitDevice, end: MotorEnd, readings: JointReadings) -> None:
         super().__init__(device, end, readings)
         p, v, t, _, _ = self._scale
         self._ranges = {registers.PMAX: p, registers.VMAX: v, registers.TMAX: t}
         self._told: dict[int, float] = {}
+        self._refused = False
         self._native, self._velocity_limit = device.native, device.velocity_limit_rad_s
 
     def take(self, data: bytes, now_s: float) -> int:
@@ -45,7 +48,13 @@ class DamiaoDrive(MitDrive):
         taken = super().take(data, now_s)
         if taken and self._wrong:
             self._readings.state, self._readings.error = DriveState.FAULT, OTHER_RANGES
+        elif taken and self._refused and self._untold:
+            self._readings.state, self._readings.error = DriveState.FAULT, UNTOLD_RANGES
         return taken
+
+    @property
+    def _untold(self) -> list[int]:
+        return [n for n in self._ranges if n not in self._told]
 
     @property
     def _wrong(self) -> list[int]:
@@ -81,13 +90,15 @@ class DamiaoDrive(MitDrive):
     def request(self, request: Request, mode: Mode | None) -> tuple[Frame, ...]:
         """See `Drive.request`."""
         if request == Request.REPORT:
-            unknown = [n for n in self._ranges if n not in self._told]
-            return (*(registers.read(self._node, n) for n in unknown), registers.report(self._node))
+            return (*(registers.read(self._node, n) for n in self._untold), registers.report(self._node))
         frames = super().request(request, mode)
         if request != Request.ENABLE:
             return frames
         if self._wrong:
             return ()
+        self._refused = bool(self._untold)
+        if self._refused:
+            return self.request(Request.REPORT, mode)
         wanted = registers.MIT
         if self._own_loop:
             wanted = registers.POSITION if self._mode is Mode.POSITION else registers.VELOCITY
@@ -95,6 +106,9 @@ class DamiaoDrive(MitDrive):
 
     def error_text(self, error: int) -> str:
         """See `Drive.error_text`."""
+        if error == UNTOLD_RANGES:
+            names = ", ".join(_NAMES[n] for n in self._untold)
+            return f"the drive has not told its {names} (registers); it is not enabled before it has"
         if error != OTHER_RANGES:
             return super().error_text(error)
         found = ", ".join(f"{_NAMES[n]} {self._told[n]:g} (link: {self._ranges[n]:g})" for n in self._wrong)

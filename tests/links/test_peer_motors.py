@@ -102,9 +102,51 @@ def test_damiao_registers_are_asked_for_and_written_as_damiao_motor_does(rigs: A
     ours = rig.heard()
     assert [(i, d[:4]) for i, d in ours] == [(i, d[:4]) for i, d in bus.sent]
     bus.sent.clear()
+    tell_ranges(rig)
     motor.write_register(10, 1)
     rig.link.request(0, Request.ENABLE)
     assert rig.heard() == [*bus.sent, (1, motor.encode_enable_msg())]
+
+
+def tell_ranges(rig: Rig, *numbers: int) -> None:
+    """A DM4310 as delivered tells its PMAX, VMAX and TMAX, or these registers alone."""
+    for number, value in ((21, 12.5), (22, 30.0), (23, 10.0)):
+        if not numbers or number in numbers:
+            rig.tell(0x11, struct.pack("<HBBf", 1, 0x33, number, value))
+    rig.link.poll(0.5)
+
+
+@pytest.mark.parametrize("told", [(), (21, 22)])
+def test_a_damiao_drive_that_does_not_tell_its_ranges_is_not_enabled(
+    rigs: Any, told: tuple[int, ...]
+) -> None:
+    rig: Rig = rigs("damiao-socketcan.toml")
+    joint, state = rig.link.joints[0], bytes.fromhex("01 80 00 7F F7 FF 24 25")
+    if told:
+        tell_ranges(rig, *told)
+    rig.tell(0x11, state)
+    rig.link.poll(1.0)
+    assert joint.state is DriveState.DISABLED  # nothing is wrong before it is to be enabled
+    rig.heard()
+    for _ in range(2):
+        rig.link.request(0, Request.ENABLE)
+        heard = rig.heard()  # it is asked again, and not enabled
+        assert [d[2:4].hex() for i, d in heard] == [f"33{n:02x}" for n in (21, 22, 23) if n not in told] + [
+            "cc00"
+        ]
+        assert {i for i, _ in heard} == {0x7FF}
+    rig.tell(0x11, state)
+    rig.link.poll(2.0)
+    assert joint.state is DriveState.FAULT
+    assert ("the drive has not told its " + ("TMAX" if told else "PMAX, VMAX, TMAX")) in rig.link.error_text(
+        0
+    )
+    tell_ranges(rig)
+    rig.tell(0x11, state)
+    rig.link.poll(3.0)
+    assert (joint.state, rig.link.error_text(0)) == (DriveState.DISABLED, "")
+    rig.link.request(0, Request.ENABLE)
+    assert rig.heard()[-1] == (1, bytes.fromhex("FF FF FF FF FF FF FF FC"))
 
 
 def test_a_damiao_drive_of_other_ranges_is_not_enabled(rigs: Any) -> None:
@@ -135,6 +177,7 @@ def test_damiaos_own_loops_are_commanded_as_damiao_motor_does(rigs: Any) -> None
     rig: Rig = rigs("damiao-socketcan.toml", native)
     bus = Listener()
     motor = core.DaMiaoMotor(1, 0x11, bus, motor_type="4310")
+    tell_ranges(rig)
     for mode, number, send in (
         (Mode.POSITION, 2, lambda: motor.send_cmd_pos_vel(0.3, 5.0)),
         (Mode.VELOCITY, 3, lambda: motor.send_cmd_vel(1.25)),

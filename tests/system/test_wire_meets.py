@@ -59,6 +59,9 @@ def test_both_ends_say_the_same(meet: Any, protocol: str, wire: str) -> None:
     if protocol == "cia402":
         meeting.climb()
     else:
+        if protocol == "damiao":  # it has to tell its ranges before
+            assert link.request(0, Request.REPORT)
+            meeting.until(lambda: joint.updates[MOTOR_POSITION])
         assert link.request(0, Request.CLEAR_FAULTS)
         assert link.request(0, Request.ENABLE, mode)
     meeting.until(lambda: device.drive.state.name == "ENABLED")
