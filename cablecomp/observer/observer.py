@@ -168,11 +168,13 @@ class Observer:
 
         Raises InputError, and changes nothing, if it cannot be such a state.
         """
-        if not self._joint.take_up(vector[:-1]):
+        last = float(vector[-1])
+        unknown = last == -math.inf and not np.any(vector[-1 - len(self._joint.heights) : -1])
+        if not (math.isfinite(last) or unknown) or not self._joint.take_up(vector[:-1]):
             raise InputError(
                 f"{self.config.name}: this vector is no state of the joint; give one from Observer.vector"
             )
-        self._last_time = float(vector[-1])
+        self._last_time = last
         if self.pieces() == 0:
             self._forget()
 

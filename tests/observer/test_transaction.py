@@ -247,6 +247,21 @@ def test_a_vector_is_checked_and_zeros_mean_that_nothing_is_known() -> None:
     assert same(other.step(samples[0]), Observer(config).step(samples[0]))
 
 
+@pytest.mark.parametrize("time_s", [nan, inf, -inf])
+def test_a_vector_of_no_time_is_no_state(time_s: float) -> None:
+    config = joint("closed")
+    observer, other = Observer(config), Observer(config)
+    observer.step(Sample(0.25, 0.0, 0.1))
+    other.step(Sample(0.5, 0.0, 0.2))
+    before, vector = other.snapshot(), observer.vector()
+    vector[-1] = time_s
+    with pytest.raises(InputError, match="no state of the joint"):
+        other.set_vector(vector)
+    assert other.snapshot() == before
+    other.set_vector(Observer(config).vector())  # of one that knows nothing: before any time
+    assert other.snapshot() == Observer(config).snapshot()
+
+
 def test_an_impossible_state_is_told_and_no_snapshot_of_it_is_taken_up() -> None:
     config = joint("closed")
     poisoned, sound = Observer(config), Observer(config)
