@@ -68,7 +68,7 @@ def unpack(
         )
     try:
         return _fill(body, model, states, numbers)
-    except ValueError:
+    except (ValueError, struct.error):
         raise InputError(
             "snapshot: holds more or less than its joint's state; start from a known state instead"
         ) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,15 @@ def test_a_spoiled_snapshot_is_one_line(spoil, words: str) -> None:  # type: ign
         Observer(joint("closed")).restore(spoil(observer.snapshot()))
     with pytest.raises(InputError, match="another joint"):
         Observer(joint("closed", {"mu_output": 0.2})).restore(observer.snapshot())
+
+
+@pytest.mark.parametrize("length", [28, 33, 36, 40, 100, -1])
+def test_a_snapshot_cut_short_and_sealed_anew_is_one_line(length: int) -> None:
+    observer = Observer(joint("closed"))
+    observer.step(Sample(0.0, 0.0, 0.1))
+    body = observer.snapshot()[:-32][:length]
+    with pytest.raises(InputError, match="more or less than its joint's state"):
+        Observer(joint("closed")).restore(body + sha256(body).digest())
 
 
 def test_the_planned_swing_erases_and_a_smaller_one_does_not() -> None:
