@@ -14,6 +14,7 @@ from cablecomp.links.records import EXTENDED, FD, FD_LENGTHS, REMOTE, SWITCH
 
 Sink = Callable[[int, bytes], None]
 MAX_LINE = 144
+_DIGITS = b"0123456789ABCDEFabcdef"
 _FD_CODES = {length: f"{code:X}" for code, length in enumerate(FD_LENGTHS)}
 
 
@@ -43,6 +44,8 @@ def parse_line(line: bytes) -> tuple[int, bytes] | None:
     elif kind in (b"T", b"R", b"D", b"B"):
         split, flags = 9, EXTENDED
     else:
+        return None
+    if line[1:].strip(_DIGITS):  # what `int` would pass as well: a sign, blanks, underscores
         return None
     try:
         identifier = int(line[1:split], 16)
@@ -96,7 +99,7 @@ class LineReader:
 
     def _take_answer(self, line: bytes) -> None:
         try:
-            if line[:1] == b"F" and len(line) == 3:
+            if line[:1] == b"F" and len(line) == 3 and not line[1:].strip(_DIGITS):
                 self.flags = int(line[1:], 16)
                 return
         except ValueError:

@@ -31,7 +31,22 @@ def test_time_stamp_and_remote() -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["t1002113", "t10021", "t1009112233445566778899", "tXYZ0", "q", "t100311334"]
+    "line",
+    [
+        *("t1002113", "t10021", "t1009112233445566778899", "tXYZ0", "q", "t100311334"),
+        # no hexadecimal digits, though `int` reads numbers in them
+        *(
+            "t-12100",
+            "t+12100",
+            "t 12100",
+            "t12 100",
+            "t1_2100",
+            "T-1234560",
+            "r-120",
+            "t0x1100",
+            "t1000 1D6",
+        ),
+    ],
 )
 def test_damaged_lines(line: str) -> None:
     assert parse_line(line.encode()) is None
@@ -62,5 +77,6 @@ def test_a_refusal_leads_to_one_question_and_its_answer() -> None:
     assert (reader.question(), reader.question()) == (b"F\r", b"")
     reader.feed(b"F80\r", lambda identifier, data: None)
     assert (reader.flags, reader.invalid) == (0x80, 0)
-    reader.feed(b"F8x\r", lambda identifier, data: None)
-    assert (reader.flags, reader.invalid) == (0x80, 1)
+    for k, noise in enumerate((b"F8x\r", b"F-1\r", b"F 1\r")):
+        reader.feed(noise, lambda identifier, data: None)
+        assert (reader.flags, reader.invalid) == (0x80, 1 + k)
