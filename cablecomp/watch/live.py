@@ -91,6 +91,7 @@ class LiveWatch:
         self._rows: list[tuple[float, ...]] = []
         self._block = max(1, round(self.options.block_s / period_s))
         self._news: deque[str] = deque()
+        self._off = False
         self._jobs: deque[Future[None]] = deque()
         self._worker = None if inline else ThreadPoolExecutor(1, thread_name_prefix="live")
         if self._worker is not None:
@@ -138,11 +139,21 @@ class LiveWatch:
 
     def _run(self, work: Callable[[], None]) -> None:
         if self._worker is None:
-            work()
+            self._do(work)
             return
         while self._jobs and self._jobs[0].done():
-            self._jobs.popleft().result()
-        self._jobs.append(self._worker.submit(work))
+            self._jobs.popleft()
+        self._jobs.append(self._worker.submit(self._do, work))
+
+    def _do(self, work: Callable[[], None]) -> None:
+        """Do it, unless the watch is off; what goes wrong turns it off and is news: the joint runs on."""
+        if self._off:
+            return
+        try:
+            work()
+        except Exception as error:  # whatever it is, no watch ends a run
+            self._off = True
+            self._news.append(f"the watch is off: {type(error).__name__}: {error}")
 
     def _digest(self, rows: list[tuple[float, ...]]) -> None:
         block = np.array(rows)

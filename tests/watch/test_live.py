@@ -33,3 +33,24 @@ def test_what_the_joint_is_known_to_leave_is_no_mismatch_from_the_start(
         said = watch.take(sample, Estimate(t, 0.0, 0.0, 0.0, 0.0, 0.0, 60.0, 60.0), True)
         news += [said] if said else []
     assert any("since the start" in said for said in news) is raised
+
+
+@pytest.mark.parametrize("inline", [True, False])
+def test_whatever_goes_wrong_in_the_watch_is_news_and_ends_it_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inline: bool
+) -> None:
+    watch = LiveWatch(load_joint(JOINT), 1e-3, tmp_path, LiveOptions(block_s=0.01), inline=inline)
+    asked = []
+
+    def breaks(state: object, time_s: float, residual_rad: float) -> None:
+        asked.append(time_s)
+        raise FloatingPointError("out of nowhere")
+
+    monkeypatch.setattr("cablecomp.watch.live.step", breaks)
+    estimate = Estimate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 60.0, 60.0)
+    samples = [Sample(1e-3 * k, 0.0, 0.0, 0.0, temperature_degC=20.0) for k in range(500)]
+    said = [watch.take(sample, estimate, True) for sample in samples]
+    news = [words for words in said if words] + watch.finish()
+    assert news == ["the watch is off: FloatingPointError: out of nowhere"]
+    assert len(asked) == 1
+    assert watch.kept == []
