@@ -15,6 +15,7 @@ from cablecomp.control.gate import GateLimits
 from cablecomp.control.motors import DriveGains
 from cablecomp.control.options import CompensatorOptions, ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol
+from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.links.link import Link
 from cablecomp.links.protocols import tells
@@ -148,6 +149,7 @@ def joint_setup(
         period,
         needs_torque=sensor,
         needs_joint=both,
+        needs_temperature=_reads_temperature(config),
         others=_places(bus.joints[c.place], observer.channels),
         preload_Nm=compensator.preload_Nm,
         motor_step_rad=bus.joints[c.place].motor_step_rad,
@@ -177,6 +179,19 @@ def resumed_at_s(setup: JointSetup) -> float:
     observer = setup.compensator.observer
     assert isinstance(observer, Observer)
     return float(observer.vector()[-1])
+
+
+def _reads_temperature(config: JointConfig) -> bool:
+    """Whether an effect of the joint goes with its temperature."""
+    known = ((catalogue()[e.id], e.parameters) for e in config.effect)
+    return any(
+        "temperature_degC" in effect.needs
+        or any(
+            p.needs == "temperature_degC" and given.get(p.name, p.neutral) != p.neutral
+            for p in effect.parameters
+        )
+        for effect, given in known
+    )
 
 
 def _places(readings: JointReadings, channels: Sequence[str]) -> tuple[int, ...]:

@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 from cablecomp.cli.simulation import _timing
+from cablecomp.config import load_joint
+from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
 from cablecomp.links.load import load_link
 from cablecomp.links.protocols import tells
-from cablecomp.runtime.setup import _check_measured
+from cablecomp.runtime.setup import _check_measured, _reads_temperature
 
 LINKS = Path(__file__).parents[2] / "configs/links"
 TORQUE, POSITION = "joint_torque_Nm", "joint_position_rad"
@@ -44,3 +46,22 @@ def test_a_simulated_joint_goes_at_the_link_s_rate(rate_Hz: float) -> None:
     timing = _timing(rate_Hz)
     assert timing.sample_s == pytest.approx(1.0 / rate_Hz, rel=1e-12)
     assert timing.step_s <= 5e-4 * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("effect", "reads"),
+    [
+        ((), False),
+        (("thermal_pretension", {"coefficient_per_K": 0.01, "reference_degC": 20.0}), True),
+        (("pretension_relaxation", {"fraction": 0.05, "time_constant_s": 20.0}), False),
+        (
+            ("pretension_relaxation", {"fraction": 0.05, "time_constant_s": 20.0, "quickening_per_K": 0.07}),
+            True,
+        ),
+    ],
+)
+def test_a_temperature_is_needed_where_an_effect_goes_with_it(
+    effect: tuple[str, dict[str, float]] | tuple[()], reads: bool
+) -> None:
+    joint = with_effects(load_joint("wrist-capstan"), [effect] if effect else [])
+    assert _reads_temperature(joint) is reads
