@@ -21,6 +21,16 @@ DECADE = log(10.0)
 """Prior sd, in the logarithm, of what is known by order of magnitude."""
 
 
+def parts_of(name: str) -> tuple[str, str, str]:
+    """A parameter's name without session or condition, then the one or the other, or "": `@` and `~` may stand in a
+    session's own name, which is a folder's."""
+    base, _, session = name.partition("@")
+    if "~" not in base:
+        return base, session, ""
+    base, _, condition = name.partition("~")
+    return base, "", condition
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One free parameter, fitted as x: value = exp(x) if `log`, else `scale` x.
@@ -58,12 +68,12 @@ class Parameter:
     @property
     def base(self) -> str:
         """The name without session or condition."""
-        return self.name.partition("@")[0].partition("~")[0]
+        return parts_of(self.name)[0]
 
     @property
     def session(self) -> str | None:
         """The session whose own value this is, or None."""
-        return self.name.partition("@")[2] or None
+        return parts_of(self.name)[1] or None
 
     @property
     def vague(self) -> bool:
@@ -78,7 +88,7 @@ class Parameter:
     @property
     def condition(self) -> str | None:
         """The condition that this is a gain by, or None."""
-        return self.name.partition("~")[2] or None
+        return parts_of(self.name)[2] or None
 
 
 def vague_drive(parameters: Sequence[Parameter]) -> bool:

@@ -11,6 +11,7 @@ from cablecomp.config import JointConfig, claiming, in_session, session_of, with
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Apart, Evidence
+from cablecomp.estimation.parameter import parts_of
 from cablecomp.signal.smoothing import FloatArray
 
 PRETENSION = "pretension_N"
@@ -40,8 +41,8 @@ def stood(common: JointConfig, values: Mapping[str, float], recording: Evidence)
     joint = in_its_place(common, recording)
     own: dict[str, float] = {}
     for name, value in values.items():
-        base, at, session = name.partition("@")
-        if at and session == recording.session:
+        base, session, _ = parts_of(name)
+        if session and session == recording.session:
             own[base] = value
     if PRETENSION in own:
         joint = at_pretension(joint, own.pop(PRETENSION))
@@ -49,8 +50,8 @@ def stood(common: JointConfig, values: Mapping[str, float], recording: Evidence)
         joint = with_values(joint, _checked(joint, own))
     gained: dict[str, float] = {}
     for name, value in values.items():
-        base, tilde, condition = name.partition("~")
-        if tilde:
+        base, _, condition = parts_of(name)
+        if condition:
             gained[base] = gained.get(base, value_of(joint, base)) + value * recording.condition[condition]
     return with_values(joint, _checked(joint, gained)) if gained else joint
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
+from cablecomp.estimation.parameter import parts_of
+
 ANSWERS: Final[Mapping[str, str]] = {
     "consistent": "The drive's own physics account for these data; nothing is left beyond noise.",
     "recalibrate": "Nominal values were off; no physics is missing.",
@@ -90,11 +92,10 @@ def dependences(result: Mapping[str, Any]) -> list[dict[str, Any]]:
         if (d := m["depends_on"]) is not None
     }
     for name, entry in result["calibration"].items():
-        base, tilde, condition = name.partition("~")
-        if tilde:
+        base, session, condition = parts_of(name)
+        if condition:
             found[base, condition] = {"parameter": base, "on": condition, "per_unit": entry["value"]}
-        base, at, session = name.partition("@")
-        if at and not base.endswith(("_offset_rad", "_offset_Nm")):
+        if session and not base.endswith(("_offset_rad", "_offset_Nm")):
             law = found.setdefault((base, "session"), {"parameter": base, "on": "session", "values": {}})
             law["values"][session] = entry["value"]
     return list(found.values())

@@ -9,6 +9,7 @@ from typing import Any
 from cablecomp.config import EffectEntry
 from cablecomp.diagnosis.explain.conformal import deficits
 from cablecomp.effects.catalogue import acts_through, catalogue
+from cablecomp.estimation.parameter import parts_of
 from cablecomp.trials.reference import Yardstick
 from cablecomp.trials.row import Bound, Estimate, Named, Row
 from cablecomp.trials.sealed import TrueEffect, Truth
@@ -146,11 +147,10 @@ def _dependences(verdict: Mapping[str, Any]) -> set[tuple[str, str]]:
         if (d := m.get("depends_on")) is not None
     }
     for name in verdict["calibration"]:
-        base, tilde, condition = name.partition("~")
-        if tilde:
+        base, session, condition = parts_of(name)
+        if condition:
             found.add((base.removeprefix("effect."), condition))
-        base, at, _ = name.partition("@")
-        if at and not base.endswith(("_offset_rad", "_offset_Nm")):
+        if session and not base.endswith(("_offset_rad", "_offset_Nm")):
             found.add((base, "session"))
     return found
 

@@ -117,6 +117,18 @@ def test_own_values_apply_to_their_session_alone(three: tuple[Evidence, ...]) ->
     assert np.abs(common[2] - moved[2]).max() > SIGMA
 
 
+@pytest.mark.parametrize("session", ["run~1", "run@1~2", "~"])
+def test_a_sessions_name_may_hold_what_stands_before_a_condition(session: str) -> None:
+    """It is a folder's, and a folder may be called anything."""
+    e = evidence(recorded(), "one", session)
+    mu = next(q for q in problem((e,)).parameters if q.name == "mu_output")
+    (own,) = own_of(mu, [session])
+    assert (own.base, own.session, own.condition) == ("mu_output", session, None)
+    free = replace(problem((e,)), parameters=(own,))
+    assert np.isfinite(free.misfits(free.start)[ANGLE]).all()
+    assert free.joint(np.log([0.3]), e).drive.stage[0].mu_output == pytest.approx(0.3)
+
+
 def test_a_gain_by_condition_adds_rate_times_condition(three: tuple[Evidence, ...]) -> None:
     bent = tuple(replace(e, condition={"bend": c}) for e, c in zip(three, (0.0, 1.0, 2.0), strict=True))
     p = problem(bent)

@@ -287,6 +287,16 @@ def test_the_law_that_ties_sessions_is_drawn_at_their_values(found: Diagnosis) -
     assert (line.y[1] - line.y[0]) / (line.x[1] - line.x[0]) == pytest.approx(0.2)
 
 
+def test_a_sessions_own_value_is_said_to_differ_between_sessions_whatever_their_names(
+    found: Diagnosis,
+) -> None:
+    own = tuple(Value(f"mu_output@run~{k}", 0.1 * k, 0.01, session=f"run~{k}") for k in (1, 2))
+    d = replace(found, calibration=(*found.calibration, *own))
+    text = text_of(diagnosis_page(d))
+    assert "mu_output differs between sessions: run~1 0.1, run~2 0.2" in text
+    assert "per unit of" not in text
+
+
 def test_a_profile_interval_stands_in_place_of_two_standard_deviations(found: Diagnosis) -> None:
     (named,) = found.named
     (name, value) = next((k, v) for k, v in named.parameters.items() if isinstance(v, Value))

@@ -86,8 +86,8 @@ def test_dependences_count_but_for_those_that_were_declared() -> None:
     said = verdict("routing_friction")
     said["missing_physics"][0]["depends_on"] = on
     said["calibration"] = {
-        "pretension_N@1": {"value": 1.0, "sd": 0.1},
-        "joint_position_offset_rad@1": {"value": 0.0, "sd": 0.1},
+        "pretension_N@run~1": {"value": 1.0, "sd": 0.1},
+        "joint_position_offset_rad@run~1": {"value": 0.0, "sd": 0.1},
     }
     found = row(tied, said)
     assert (found.depends, found.depends_wrongly) == ((1, 1), 1)
