@@ -24,9 +24,9 @@ class Session(Frozen):
 
     `own`: names of the parameters that may differ from session to session. `recordings`: patterns of paths
     (`*` and `?` as in a shell; a folder stands for all that is in it), matched from the right; one that is a
-    recording's own path goes before all others. `values`: what this session's own parameters are, by name.
-    `mounting`: the session that this is a part of, where the drive stood differently in its recordings (before and
-    after an event; bent more or less): zeros, and what is `own`, are the mounting's.
+    recording's own path goes before all others, of several the longest. `values`: what this session's own parameters
+    are, by name. `mounting`: the session that this is a part of, where the drive stood differently in its recordings
+    (before and after an event; bent more or less): zeros, and what is `own`, are the mounting's.
     """
 
     name: str = ""
@@ -46,9 +46,10 @@ class Session(Frozen):
         places = (recording, *recording.parents)
         return any(place.match(pattern) for pattern in self.recordings for place in places if place.name)
 
-    def names(self, recording: Path) -> bool:
-        """Whether one of the patterns is this recording's own path, from the right."""
-        return any(recording.parts[-len(p.parts) :] == p.parts for p in map(Path, self.recordings))
+    def names(self, recording: Path) -> int:
+        """How many parts of this recording's own path one of the patterns is, from the right; 0 if none is."""
+        own = (p.parts for p in map(Path, self.recordings) if recording.parts[-len(p.parts) :] == p.parts)
+        return max(map(len, own), default=0)
 
 
 class Depends(Frozen):

@@ -82,9 +82,20 @@ def effect_name(name: str) -> tuple[str, str]:
 
 
 def claiming(config: JointConfig, recording: Path | None) -> list[Session]:
-    """The sessions that claim a recording: those that name it, else all whose patterns match."""
+    """The sessions that claim a recording: those that name most of its path, else all whose patterns match."""
     matching = [s for s in config.sessions if recording is not None and s.matches(recording)]
-    return [s for s in matching if recording is not None and s.names(recording)] or matching
+    named = [0 if recording is None else s.names(recording) for s in matching]
+    return [s for s, parts in zip(matching, named, strict=True) if parts == max(named)]
+
+
+def claimed_by(config: JointConfig, recording: Path, instead: str) -> Session | None:
+    """The session that claims a recording; None if there is none. Raises InputError, which says what to do `instead`,
+    if several do."""
+    matching = claiming(config, recording)
+    if len(matching) > 1:
+        names = ", ".join(s.name for s in matching)
+        raise InputError(f"{recording}: several sessions claim it ({names}); {instead}")
+    return matching[0] if matching else None
 
 
 def session_of(config: JointConfig, recording: Path | None, name: str | None) -> Session | None:
@@ -98,11 +109,7 @@ def session_of(config: JointConfig, recording: Path | None, name: str | None) ->
         if not found:
             raise InputError(f"--session {name}: {config.name} has no session of that name; it has {known}")
         return found[0]
-    matching = claiming(config, recording)
-    if len(matching) > 1:
-        names = ", ".join(s.name for s in matching)
-        raise InputError(f"{recording}: several sessions claim it ({names}); choose one with --session")
-    return matching[0] if matching else None
+    return None if recording is None else claimed_by(config, recording, "choose one with --session")
 
 
 def in_session(config: JointConfig, session: Session | None) -> JointConfig:

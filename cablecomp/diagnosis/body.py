@@ -10,13 +10,13 @@ from typing import Literal
 
 import numpy as np
 
-from cablecomp.config import JointConfig, claiming
+from cablecomp.config import JointConfig, claimed_by
 from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import MOTOR, Evidence, gather, load_channel, rows_for
 from cablecomp.estimation.parallel import in_processes
-from cablecomp.estimation.standing import apart_of, stated_of
+from cablecomp.estimation.standing import ONE_CLAIM, apart_of, stated_of
 from cablecomp.signal.smoothing import FloatArray
 
 Sessions = Literal["folder", "each", "one"]
@@ -53,14 +53,14 @@ class Body:
 
 def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | None = None) -> dict[str, str]:
     """The session of each recording: as `[[session]]` claims it (one that is a part of a mounting: that), else its
-    folder (`each`: its own, `one`: all together)."""
+    folder (`each`: its own, `one`: all together). Raises InputError for one that several claim."""
     found = {}
     paths = {name: PurePath(name) for name in names}
     files, folders = _told_apart(set(paths.values())), _told_apart({p.parent for p in paths.values()})
     for name, path in paths.items():
-        claimed = [s.mounting or s.name for s in claiming(config, Path(name))] if mode is None else []
+        claimed = claimed_by(config, Path(name), ONE_CLAIM) if mode is None else None
         if claimed:
-            found[name] = claimed[0]
+            found[name] = claimed.mounting or claimed.name
         elif mode == "each":
             found[name] = files[path]
         else:
@@ -71,6 +71,17 @@ def session_names(config: JointConfig, names: Sequence[str], mode: Sessions | No
 def short(recording: str) -> str:
     """A recording's name with the folder that it is in."""
     return "/".join(recording.replace("\\", "/").split("/")[-2:])
+
+
+def paths_apart(recordings: Sequence[str]) -> dict[str, str]:
+    """Each recording's name with the folder that it is in, and with as many above as tell it from the others."""
+    parts = {name: name.replace("\\", "/").split("/") for name in recordings}
+    found = {}
+    for name, mine in parts.items():
+        ends = (mine[-k:] for k in range(2, len(mine)))
+        alone = (end for end in ends if sum(p[-len(end) :] == end for p in parts.values()) == 1)
+        found[name] = "/".join(next(alone, mine))
+    return found
 
 
 def _told_apart(paths: Set[PurePath]) -> dict[PurePath, str]:

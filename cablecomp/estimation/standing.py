@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cablecomp.config import JointConfig, claiming, in_session, session_of, with_values
+from cablecomp.config import JointConfig, claimed_by, in_session, session_of, with_values
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Apart, Evidence
@@ -16,6 +16,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 PRETENSION = "pretension_N"
 JOINT_ZERO, MOTOR_ZERO = "joint_position_offset_rad", "motor_torque_offset_Nm"
+ONE_CLAIM = "let the `recordings` of one of them alone match it"
+"""What is to be done about a recording that several sessions claim, where none can be chosen."""
 ON_THE_CLOCK = ("instant", "begin", "cycle start")
 """Roles of effects' parameters that are read on the recordings' clock."""
 
@@ -66,8 +68,8 @@ def in_its_place(joint: JointConfig, recording: Evidence) -> JointConfig:
 def stated_of(config: JointConfig, recording: Path, columns: Mapping[str, FloatArray]) -> dict[str, float]:
     """The values that the configuration states of a recording alone: those of the session that claims it, else what
     its conditions make."""
-    claimed = claiming(config, recording)
-    return dict(claimed[0].values) if claimed else _gained(config, columns)[0]
+    claimed = claimed_by(config, recording, ONE_CLAIM)
+    return dict(claimed.values) if claimed else _gained(config, columns)[0]
 
 
 def apart_of(

@@ -95,6 +95,20 @@ recordings = ["monday/a.csv"]
         assert (found and found.name) == expected, path
 
 
+def test_of_two_that_name_a_recording_the_one_that_names_more_of_its_path_claims_it() -> None:
+    text = """
+[[session]]
+name = "here"
+recordings = ["s/rec.csv"]
+[[session]]
+name = "there"
+recordings = ["mon/s/rec.csv"]
+"""
+    for path, expected in {"s/rec.csv": "here", "mon/s/rec.csv": "there", "tue/s/rec.csv": "here"}.items():
+        found = session_of(config(text), Path(path), None)
+        assert (found and found.name) == expected, path
+
+
 def test_a_sessions_values_take_the_place_of_the_joints_own() -> None:
     joint = config(SESSIONS)
     monday = in_session(joint, joint.sessions[0])

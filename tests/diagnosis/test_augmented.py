@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from math import log
@@ -14,6 +15,7 @@ from small_drive import TOLERANT, course, recorded
 
 from cablecomp.config import JointConfig, parse_joint
 from cablecomp.config.sessions import Session
+from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.answer.augmented import augmented_joint
 from cablecomp.diagnosis.body import Columns, gather_body
 from cablecomp.diagnosis.calibration.drive import first_weights
@@ -164,3 +166,32 @@ def test_a_session_before_an_event_knows_none_and_one_after_it_does(
         found = slip.parameters["time_s"] if slip.parameters["slip_m"] else None
         assert found == (None if instant_s is None else pytest.approx(instant_s)), name
     assert joint.effect[0].parameters["time_s"] == 0.0  # as it stands now
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("mon/s/1.csv", "tue/s/1.csv"),
+        ("/data/mon/s/1.csv", "s/1.csv"),
+        ("s/1.csv", "s/t/1.csv"),
+        ("1.csv", "s/1.csv"),
+    ],
+)
+def test_sessions_claim_their_recordings_and_no_others(names: tuple[str, ...]) -> None:
+    """Folders of one name, and one inside of another; of each a recording is kept for the end; an event in the first
+    of the second."""
+    zeros = {name.replace("1", k): 0.05 * i for i, name in enumerate(names) for k in "012"}
+    columns = recorded([], 16.0)
+    angle = columns["joint_position_rad"]
+    moved = {name: {**columns, "joint_position_rad": angle + zero} for name, zero in zeros.items()}
+    evidence = gather_body(TOLERANT, moved).used
+    used, kept = [e for k, e in enumerate(evidence) if k % 3 < 2], evidence[2::3]
+    joint = augmented_joint(TOLERANT, with_a_slip(used, 8.0 + evidence[3].shift_s), (), kept)
+    again = parse_joint(tomllib.loads(joint_text(joint)), "again")
+    came = []
+    for name, zero in zeros.items():
+        stood, _, _ = as_it_stood(again, Path(name), dict)
+        assert stood.sensors.joint_position_offset_rad == pytest.approx(zero, abs=0.01), name
+        (slip,) = stood.effect
+        came.append(slip.parameters["time_s"] if slip.parameters["slip_m"] else None)
+    assert came == [None, None, None, pytest.approx(8.0), 0.0, 0.0]

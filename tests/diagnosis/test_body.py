@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -30,6 +31,17 @@ def test_a_session_of_the_configuration_claims_its_recordings_unless_told_otherw
     names = ["data/monday/1.csv", "data/tuesday/1.csv"]
     assert list(session_names(claimed, names).values()) == ["monday", "warm"]
     assert list(session_names(claimed, names, "folder").values()) == ["monday", "tuesday"]
+
+
+@pytest.mark.parametrize("mode", [None, "each"])
+def test_a_recording_that_several_sessions_claim_is_refused(mode: Literal["each"] | None) -> None:
+    """Its values are those of one of them, and which is not known."""
+    sessions = [
+        {"name": n, "recordings": ["s/rec.csv"], "values": {"mu_output": 0.1}} for n in ("mon", "tue")
+    ]
+    joint = parse_joint({**PLAIN, "session": sessions}, "x")
+    with pytest.raises(InputError, match=r"mon/s/rec.csv: several sessions claim it \(mon, tue\); let"):
+        gather_body(joint, {"mon/s/rec.csv": recorded()}, mode)
 
 
 def test_parts_of_a_mounting_are_one_session_with_what_else_is_in_its_folder() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from cablecomp.config import Depends, Empirical, JointConfig, ObserverOptions, Session, claiming, with_values
 from cablecomp.config.sessions import ZEROS
-from cablecomp.diagnosis.body import short
+from cablecomp.diagnosis.body import paths_apart
 from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
@@ -47,6 +47,8 @@ def augmented_joint(
     sessions = fit.problem.sessions
     if len(sessions) == 1:
         joint = _with_zeros(joint, _zeros_of(zeros, sessions[0]))
+    known = [*fit.problem.evidence, *kept]
+    paths = paths_apart([e.name for e in known])
     entries = []
     for label, members in _ways(model):
         recordings = [*members, *(e for e in kept if _alike(e, members[0], model))]
@@ -54,22 +56,24 @@ def augmented_joint(
         session = members[0].session
         own_zeros = _zeros_of(zeros, session)
         after = _afterwards(_stood(config, fit, last), model, last)
-        if len(sessions) > 1 or _tied(model) or after != common:
-            values = {**own_zeros, **_own(after, common, fit)}
-            part = "" if label == session else session
-            entries.append(
-                Session(name=label, mounting=part, recordings=_patterns(members, model), values=values)
-            )
+        alone = []
         for e in recordings:
             now = _meanwhile(_stood(config, fit, e), model, e)
             moved = _stands_apart(fit, zeros[JOINT], e)
             if now != after or moved:
                 values = {**(_zeros_of(zeros, e.name) if moved else own_zeros), **_own(now, common, fit)}
-                name = f"{label} {short(e.name)}"
-                entries.append(
-                    Session(name=name, mounting=session, recordings=(short(e.name),), values=values)
+                path = paths[e.name]
+                alone.append(
+                    Session(name=f"{label} {path}", mounting=session, recordings=(path,), values=values)
                 )
-    known = [*fit.problem.evidence, *kept]
+        if len(sessions) > 1 or _tied(model) or after != common:
+            values = {**own_zeros, **_own(after, common, fit)}
+            part = "" if label == session else session
+            whole = () if _tied(model) else _folder(session, recordings, known)
+            claims = whole or tuple(paths[e.name] for e in recordings)
+            claims = tuple(c for c in claims if (c,) not in {s.recordings for s in alone})
+            entries.append(Session(name=label, mounting=part, recordings=claims, values=values))
+        entries += alone
     entries += [s for s in _others(config, model, common, known) if s.name not in {e.name for e in entries}]
     if not entries:
         return joint
@@ -260,11 +264,13 @@ def _depends(model: Model, first: Evidence) -> tuple[Depends, ...]:
     return tuple(found)
 
 
-def _patterns(members: Sequence[Evidence], model: Model) -> tuple[str, ...]:
-    session = members[0].session
-    if not _tied(model) and all(session in e.name.split("/") for e in members):
-        return (session,)
-    return tuple(short(e.name) for e in members)
+def _folder(session: str, mine: Sequence[Evidence], known: Sequence[Evidence]) -> tuple[str, ...]:
+    """The folder that a session is called after, where its recordings lie in it, no others do, and no
+    other's whole path is the end of one of theirs."""
+    names = {e.name for e in mine}
+    others = {e.name for e in known} - names
+    taken = any(session in o.split("/") or n.endswith(f"/{o}") for o in others for n in names)
+    return (session,) if not taken and all(session in n.split("/") for n in names) else ()
 
 
 def _zeros_of(zeros: Mapping[str, Mapping[str, FloatArray]], session: str) -> dict[str, float]:
