@@ -7,6 +7,7 @@ session's own: the zeros of the sensors always, the pretension where the cables 
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
@@ -18,12 +19,15 @@ from cablecomp.config.base import Finite, Frozen, Listed, Positive, Text
 ZEROS: Final = ("joint_position_offset_rad", "motor_torque_offset_Nm")
 """What may differ from session to session unless the configuration says otherwise: the zeros."""
 
+_ESCAPED: Final = re.compile(r"\[([*?[])\]")
+"""A character of a path that a pattern does not mean as its own: `glob.escape` writes it so."""
+
 
 class Session(Frozen):
     """One `[[session]]`; without a name (`[session]`) it says what holds for all sessions.
 
     `own`: names of the parameters that may differ from session to session. `recordings`: patterns of paths
-    (`*` and `?` as in a shell; a folder stands for all that is in it), matched from the right; one that is a
+    (`*`, `?`, `[..]` as in a shell; a folder stands for all that is in it), matched from the right; one that is a
     recording's own path goes before all others, of several the longest. `values`: what this session's own parameters
     are, by name. `mounting`: the session that this is a part of, where the drive stood differently in its recordings
     (before and after an event; bent more or less): zeros, and what is `own`, are the mounting's.
@@ -43,13 +47,15 @@ class Session(Frozen):
 
     def matches(self, recording: Path) -> bool:
         """Whether one of the patterns names this recording or a folder that it is in."""
-        places = (recording, *recording.parents)
-        return any(place.match(pattern) for pattern in self.recordings for place in places if place.name)
+        places = [place for place in (recording, *recording.parents) if place.name]
+        return any(self.names(p) or any(map(p.match, self.recordings)) for p in places)
 
     def names(self, recording: Path) -> int:
         """How many parts of this recording's own path one of the patterns is, from the right; 0 if none is."""
-        own = (p.parts for p in map(Path, self.recordings) if recording.parts[-len(p.parts) :] == p.parts)
-        return max(map(len, own), default=0)
+        paths = (
+            Path(p).parts for pattern in self.recordings for p in (pattern, _ESCAPED.sub(r"\1", pattern))
+        )
+        return max((len(parts) for parts in paths if recording.parts[-len(parts) :] == parts), default=0)
 
 
 class Depends(Frozen):

@@ -95,6 +95,35 @@ recordings = ["monday/a.csv"]
         assert (found and found.name) == expected, path
 
 
+def test_brackets_in_a_path_are_its_own_where_they_are_escaped_or_the_path_is_just_that() -> None:
+    text = """
+[[session]]
+name = "escaped"
+recordings = ["run [[]1]", "run [[]?]/[*].csv"]
+[[session]]
+name = "pattern"
+recordings = ["run [23]"]
+"""
+    for path, expected in {
+        "run [1]/r.csv": "escaped",
+        "run 1/r.csv": None,
+        "run [4]/*.csv": "escaped",
+        "run [4]/r.csv": None,
+        "run 3/r.csv": "pattern",
+        "run [23]/r.csv": "pattern",
+    }.items():
+        found = session_of(config(text), Path(path), None)
+        assert (found and found.name) == expected, path
+
+
+def test_a_bracketed_path_that_is_named_goes_before_its_folder() -> None:
+    named = '[[session]]\nname = "named"\nrecordings = ["run [[]1]/r.csv"]\n'
+    folder = '[[session]]\nname = "folder"\nrecordings = ["run [[]1]"]\n'
+    found = session_of(config(folder + named), Path("x/run [1]/r.csv"), None)
+    assert found is not None
+    assert found.name == "named"
+
+
 def test_of_two_that_name_a_recording_the_one_that_names_more_of_its_path_claims_it() -> None:
     text = """
 [[session]]

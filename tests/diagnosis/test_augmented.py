@@ -175,6 +175,8 @@ def test_a_session_before_an_event_knows_none_and_one_after_it_does(
         ("/data/mon/s/1.csv", "s/1.csv"),
         ("s/1.csv", "s/t/1.csv"),
         ("1.csv", "s/1.csv"),
+        ("run [3]/1.csv", "run 3/1.csv"),
+        ("a [1].csv", "b/a*1.csv"),
     ],
 )
 def test_sessions_claim_their_recordings_and_no_others(names: tuple[str, ...]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from glob import escape
 from math import hypot, inf
 from pathlib import Path
 
@@ -62,17 +63,15 @@ def augmented_joint(
             moved = _stands_apart(fit, zeros[JOINT], e)
             if now != after or moved:
                 values = {**(_zeros_of(zeros, e.name) if moved else own_zeros), **_own(now, common, fit)}
-                path = paths[e.name]
-                alone.append(
-                    Session(name=f"{label} {path}", mounting=session, recordings=(path,), values=values)
-                )
+                name, claims = f"{label} {paths[e.name]}", (escape(paths[e.name]),)
+                alone.append(Session(name=name, mounting=session, recordings=claims, values=values))
         if len(sessions) > 1 or _tied(model) or after != common:
             values = {**own_zeros, **_own(after, common, fit)}
             part = "" if label == session else session
             whole = () if _tied(model) else _folder(session, recordings, known)
-            claims = whole or tuple(paths[e.name] for e in recordings)
-            claims = tuple(c for c in claims if (c,) not in {s.recordings for s in alone})
-            entries.append(Session(name=label, mounting=part, recordings=claims, values=values))
+            every = [escape(path) for path in whole or [paths[e.name] for e in recordings]]
+            rest = tuple(path for path in every if (path,) not in {s.recordings for s in alone})
+            entries.append(Session(name=label, mounting=part, recordings=rest, values=values))
         entries += alone
     entries += [s for s in _others(config, model, common, known) if s.name not in {e.name for e in entries}]
     if not entries:
