@@ -6,7 +6,7 @@ suspicion with its numbers; nothing is changed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import log, pi
 from typing import Final
 
@@ -69,19 +69,23 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     ):  # it would spoil all that follows
         return (*found, *fits)
     fits += _torques(view)
-    if found:
-        return (*found, *fits)
-    late = delays(view)
-    if not fits or (late and not _linear(view.shifted(late[0]))):
-        found += late
-    else:
-        found += rather_late(view, fits, _linear)
-    if config.effect:
-        found = [s for s in found if s.kind != "delay" or not accounted_for(config, columns, s)]
+    found += fits if found else _delays(view, fits, columns)  # over a gap no delay can be told
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
         rows = _rows(columns, (INPUT, MOTOR, "joint_torque_Nm"))
         found += _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
     return tuple(found)
+
+
+def _delays(view: View, fits: Sequence[Suspicion], columns: Mapping[str, FloatArray]) -> list[Suspicion]:
+    """What comes late, and what straight lines tell (`fits`) unless that is of it."""
+    late = delays(view)
+    found = (
+        late
+        if not fits or (late and not _linear(view.shifted(late[0])))
+        else rather_late(view, fits, _linear)
+    )
+    known = view.config.effect
+    return [s for s in found if s.kind != "delay" or not known or not accounted_for(view.config, columns, s)]
 
 
 def _linear(view: View) -> list[Suspicion]:

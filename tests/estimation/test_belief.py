@@ -90,6 +90,16 @@ def test_a_gap_over_which_the_joint_moved() -> None:
     assert said.numbers["gap_s"] == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.parametrize("gap", [False, True])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_motor_torque_of_the_other_sign_is_said_across_a_gap_too(gap: bool, sign: float) -> None:
+    kept = (COLUMNS["time_s"] < 8.0) | (COLUMNS["time_s"] > (10.0 if gap else 8.0))
+    torque = -sign * JOINT.drive.ratio * COLUMNS["joint_torque_Nm"]
+    said = suspicions(JOINT, {n: v[kept] for n, v in {**COLUMNS, "motor_torque_Nm": torque}.items()})
+    turned = [("sign", "motor_torque_Nm")] if sign < 0.0 else []
+    assert [(s.kind, s.channel) for s in said if s.kind != "gap"] == turned
+
+
 def plant(motor_rad: FloatArray, load_Nm: FloatArray, *effects: EffectSpec) -> dict[str, FloatArray]:
     """The joint as the independent plant has it, with its encoder's noise."""
     stage = StageConfig(**{f.name: getattr(JOINT.drive.stage[0], f.name) for f in fields(StageConfig)})
