@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from cablecomp.cli.shared import warn
 from cablecomp.config import JointConfig
-from cablecomp.estimation.belief import suspicions
+from cablecomp.estimation.belief import same_readings, suspicions
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.table import FloatArray
 
@@ -16,6 +16,13 @@ def believe(config: JointConfig, name: str, columns: Mapping[str, FloatArray]) -
     lines = tuple(f"{name}: {s.text}" for s in suspicions(config, columns))
     warn(lines)
     return lines
+
+
+def believe_all(config: JointConfig, data: Mapping[str, Mapping[str, FloatArray]]) -> tuple[str, ...]:
+    """The same for all recordings of one diagnosis, by name, and which of them are one."""
+    copies = tuple(same_readings(data))
+    warn(copies)
+    return (*(line for name, columns in data.items() for line in believe(config, name, columns)), *copies)
 
 
 def believe_streamed(config: JointConfig, recording: Recording) -> tuple[str, ...]:

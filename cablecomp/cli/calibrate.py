@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.beliefs import believe
+from cablecomp.cli.beliefs import believe_all
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     BudgetOption,
@@ -49,7 +49,7 @@ def calibrate_joint(
     joint = read_joint(config, effects)
     data = read_moving(recordings, reading(joint))
     announce_compilation()
-    doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
+    doubted = believe_all(joint, data)
     with share_bar() as progress:
         found = calibrate(joint, data, seed, progress=progress, budget_s=budget)
     found = replace(found, warnings=(*doubted, *found.warnings))

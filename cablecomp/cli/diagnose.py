@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.beliefs import believe
+from cablecomp.cli.beliefs import believe_all
 from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
@@ -86,7 +86,7 @@ def diagnose_recordings(
     joint = read_joint(config, effects)
     data = read_moving(recordings, reading(joint))
     announce_compilation()
-    doubted = [line for name, columns in data.items() for line in believe(joint, name, columns)]
+    doubted = believe_all(joint, data)
     with share_bar() as progress, forks_allowed():
         found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
     found = replace(found, warnings=(*doubted, *found.warnings))

@@ -7,6 +7,7 @@ suspicion with its numbers; nothing is changed.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from hashlib import blake2b
 from math import log, pi
 from typing import Final
 
@@ -74,6 +75,18 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
         rows = _rows(columns, (INPUT, MOTOR, "joint_torque_Nm"))
         found += _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
     return tuple(found)
+
+
+def same_readings(recordings: Mapping[str, Mapping[str, FloatArray]]) -> Iterator[str]:
+    """A line for each recording that holds, number by number, what one before it does."""
+    first: dict[bytes, str] = {}
+    for name, columns in recordings.items():
+        digest = blake2b()
+        for channel in sorted(columns):
+            digest.update(channel.encode() + np.ascontiguousarray(columns[channel]).tobytes())
+        found = first.setdefault(digest.digest(), name)
+        if found != name:
+            yield f"{name}: holds the same readings as {found}, which count twice so: leave one of them out"
 
 
 def _delays(view: View, fits: Sequence[Suspicion], columns: Mapping[str, FloatArray]) -> list[Suspicion]:

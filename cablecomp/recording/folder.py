@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
@@ -19,20 +20,22 @@ _WRITTEN: Final = ("prediction.csv", "cycles.csv")
 
 
 def find_recordings(places: Iterable[Path]) -> list[Path]:
-    """All recordings of these places, each once, a folder's in the order of their paths.
+    """All recordings of these places, a folder's in the order of their paths; each once, by the path that it is first
+    given by, whatever other path or link leads to it.
 
     A folder is searched to its last subfolder; what is hidden (`.name`), and what `run` or `replay` wrote beside a
     recording, is left alone. Raises InputError for a folder that holds no recording.
     """
-    found: dict[Path, None] = {}
+    found: dict[str, Path] = {}
     for place in places:
         inside = list(_in(place)) if place.is_dir() else [place]
         if not inside:
             raise InputError(
                 f"{place}: holds no recording; looked for *{', *'.join(SUFFIXES)} in it and below"
             )
-        found.update(dict.fromkeys(inside))
-    return list(found)
+        for path in inside:
+            found.setdefault(os.path.realpath(path), path)
+    return list(found.values())
 
 
 def _in(folder: Path) -> Iterator[Path]:

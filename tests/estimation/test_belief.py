@@ -11,7 +11,7 @@ from turning import JOINT, course, recorded
 
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.effects import with_effects
-from cablecomp.estimation.belief import suspicions
+from cablecomp.estimation.belief import same_readings, suspicions
 from cablecomp.estimation.view import Suspicion
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
@@ -98,6 +98,13 @@ def test_a_motor_torque_of_the_other_sign_is_said_across_a_gap_too(gap: bool, si
     said = suspicions(JOINT, {n: v[kept] for n, v in {**COLUMNS, "motor_torque_Nm": torque}.items()})
     turned = [("sign", "motor_torque_Nm")] if sign < 0.0 else []
     assert [(s.kind, s.channel) for s in said if s.kind != "gap"] == turned
+
+
+def test_a_copy_under_another_name_is_said() -> None:
+    other = {**COLUMNS, "joint_position_rad": 1.0001 * COLUMNS["joint_position_rad"]}
+    copy = {name: values.copy() for name, values in reversed(COLUMNS.items())}
+    (said,) = same_readings({"a": COLUMNS, "b": other, "c": copy})
+    assert said.startswith("c: holds the same readings as a")
 
 
 def plant(motor_rad: FloatArray, load_Nm: FloatArray, *effects: EffectSpec) -> dict[str, FloatArray]:
