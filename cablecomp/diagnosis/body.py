@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path, PurePath
 from typing import Literal
 
@@ -96,7 +97,8 @@ def gather_body(
     mode: Sessions | None = None,
     rows: int | None = None,
 ) -> Body:
-    """Clean and thin all recordings; raises InputError for one that lacks what is needed."""
+    """Clean and thin all recordings, those of one clock in order of time; raises InputError for one that lacks what is
+    needed."""
     names = list(recordings)
     if not names:
         raise InputError("no recording was given; a diagnosis needs one or more")
@@ -113,19 +115,27 @@ def gather_body(
 
     found = []
     after = -np.inf
-    for name, e in zip(names, in_processes(gathered, range(len(names))), strict=True):
+    for e in _in_order(in_processes(gathered, range(len(names)))):
         begin, end = float(e.columns["time_s"][0]), float(e.columns["time_s"][-1])
         if begin < after:  # every recording starts its own clock: one goes on after the other
             shift = after + 1.0 - begin
             e = replace(e, columns={**e.columns, "time_s": e.columns["time_s"] + shift}, shift_s=shift)
             end += shift
         after = end
-        stated = stated_of(config, Path(name), recordings[name])
+        stated = stated_of(config, Path(e.name), recordings[e.name])
         motor_is_load = load_channel(config, e.columns) == MOTOR
         found.append(
             replace(e, apart=apart_of(config, stated, shift_s=e.shift_s, motor_is_load=motor_is_load))
         )
-    return Body(tuple(names), *kept_for_the_end(found))
+    return Body(tuple(e.name for e in found), *kept_for_the_end(found))
+
+
+def _in_order(evidence: Iterable[Evidence]) -> list[Evidence]:
+    """In order of time where none begins before another has ended, as recordings of one clock; else as given."""
+    given = list(evidence)
+    by_time = sorted(given, key=lambda e: float(e.columns["time_s"][0]))
+    apart = all(a.columns["time_s"][-1] <= b.columns["time_s"][0] for a, b in pairwise(by_time))
+    return by_time if apart else given
 
 
 def spread(evidence: Sequence[Evidence], most: int) -> tuple[Evidence, ...]:

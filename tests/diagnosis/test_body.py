@@ -92,6 +92,17 @@ def test_clocks_go_on_one_after_the_other() -> None:
     assert body.used[1].shift_s == pytest.approx(float(second[0]) - 0.0, abs=0.05)
 
 
+def test_recordings_of_one_clock_are_taken_in_order_of_time_however_they_are_given() -> None:
+    columns = recorded(seed=1)
+    later = {f"a/{k}": {**columns, "time_s": columns["time_s"] + 100.0 * k} for k in (2, 0, 1)}
+    body = gather_body(JOINT, later)
+    assert body.names == tuple(e.name for e in body.used) == ("a/0", "a/1", "a/2")
+    assert body.clock_s == {}
+    assert [e.columns["time_s"][0] // 100.0 for e in body.used] == [0.0, 1.0, 2.0]
+    twice = gather_body(JOINT, {**later, "b/0": later["a/1"]})
+    assert twice.names == ("a/2", "a/0", "a/1", "b/0")  # more clocks than one: as they are given
+
+
 def test_a_condition_is_the_channels_median_and_has_to_be_there() -> None:
     bent = parse_joint({**PLAIN, "condition": {"bend_rad": "other_bend"}}, "x")
     columns = recorded()
