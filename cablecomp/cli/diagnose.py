@@ -28,7 +28,7 @@ from cablecomp.cli.shared import (
 from cablecomp.cli.sources import Reading, read_moving, reads_recordings
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.diagnosis.result import report_json, write_diagnosis
+from cablecomp.diagnosis.result import PROTOCOL, report_json, write_diagnosis
 from cablecomp.errors import InputError
 from cablecomp.estimation.parallel import forks_allowed
 from cablecomp.recording.atomic import atomic_directory
@@ -90,7 +90,7 @@ def diagnose_recordings(
     with share_bar() as progress, forks_allowed():
         found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
     found = replace(found, warnings=(*doubted, *found.warnings))
-    with atomic_directory(out) as folder:
+    with atomic_directory(out, (PROTOCOL,)) as folder:
         write_diagnosis(found, folder)
         page = diagnosis_page(found, joint_text(found.augmented_joint), concealed_beside(out))
         (folder / "report.html").write_text(page, encoding="utf-8")

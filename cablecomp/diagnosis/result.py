@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.signal.smoothing import FloatArray
+
+PROTOCOL: Final = "next_experiment.toml"
+"""The experiment that a diagnosis proposes; beside one that proposes none there is none."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +222,7 @@ def write_diagnosis(d: Diagnosis, out: Path) -> None:
     comment = ("calibrated values and effects found by the diagnosis",)
     (out / "joint.augmented.toml").write_text(joint_text(d.augmented_joint, comment))
     if d.next_experiment is not None:
-        (out / "next_experiment.toml").write_text(d.next_experiment[1])
+        (out / PROTOCOL).write_text(d.next_experiment[1])
 
 
 def _finite(value: Any) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,10 +14,11 @@ from cablecomp.errors import InputError
 
 
 @contextmanager
-def atomic_directory(out: Path | str) -> Iterator[Path]:
+def atomic_directory(out: Path | str, renewed: Sequence[str] = ()) -> Iterator[Path]:
     """Give a temporary directory beside `out`; on success its files appear in `out`, on failure nothing does.
 
-    Files of an existing `out` that are not written anew stay. InputError if `out` cannot be made.
+    Files of an existing `out` that are not written anew stay, but for those `renewed`: without a new one the old one
+    goes. InputError if `out` cannot be made.
     """
     out = Path(out)
     check_directory(out)
@@ -28,7 +29,10 @@ def atomic_directory(out: Path | str) -> Iterator[Path]:
         raise InputError(f"{out}: cannot be written ({error.strerror}); choose another directory") from None
     try:
         yield temporary
+        gone = [name for name in renewed if not (temporary / name).exists()]
         _move_into(temporary, out)
+        for name in gone:
+            (out / name).unlink(missing_ok=True)
     except BaseException as error:
         shutil.rmtree(temporary, ignore_errors=True)
         _remove_empty(made)

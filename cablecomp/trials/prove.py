@@ -10,6 +10,7 @@ from pathlib import Path
 
 from cablecomp.cluster import Workers, spread
 from cablecomp.config import load_joint
+from cablecomp.diagnosis.result import PROTOCOL
 from cablecomp.errors import CablecompError, InputError
 from cablecomp.trials.reference import Yardstick, measure_truth
 from cablecomp.trials.row import Row
@@ -32,7 +33,7 @@ from cablecomp.trials.sealed import SEALED, check_seal, read_sealed, truth_from
 from cablecomp.trials.shares import write_json
 
 CONFOUNDED = "confounded"
-PROTOCOL, SECOND = "next_experiment.toml", "after-experiment"
+SECOND = "after-experiment"
 
 Conceal = Callable[[Path, "Wish", Callable[[int, int], None]], str]
 """Writes public trials and their sealed truths under a folder; returns the SHA-256 of the seals."""

@@ -15,7 +15,7 @@ from typing import Any
 from cablecomp.cluster import Workers, spread
 from cablecomp.config import load_joint
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.diagnosis.result import write_diagnosis
+from cablecomp.diagnosis.result import PROTOCOL, write_diagnosis
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.folder import find_recordings
@@ -120,7 +120,7 @@ def _timed(work: Diagnose, folder: Path, further: Sequence[Path], out: Path) -> 
 def diagnose_folder(folder: Path, further: Sequence[Path], out: Path) -> None:
     """Diagnose the recordings of a folder (and further ones) with its `joint.toml`; writes the verdict."""
     found = diagnose(load_joint(folder / JOINT_FILE), columns_of(folder, further))
-    with atomic_directory(out) as spare:
+    with atomic_directory(out, (PROTOCOL,)) as spare:
         write_diagnosis(found, spare)
 
 

@@ -54,6 +54,21 @@ def test_a_failure_leaves_nothing_and_a_success_keeps_other_files(tmp_path: Path
     assert [p.name for p in out.parent.iterdir()] == ["out"]
 
 
+def test_what_is_not_written_anew_goes_where_it_belongs_to_what_is(tmp_path: Path) -> None:
+    """The experiment that an earlier diagnosis proposed is none of a later one that proposes none."""
+    out = tmp_path / "out"
+    for proposed in ("first", None, "third"):
+        with atomic_directory(out, ("proposed",)) as folder:
+            (folder / "answer").write_text("")
+            if proposed:
+                (folder / "proposed").write_text(proposed)
+        found = (out / "proposed").read_text() if (out / "proposed").exists() else None
+        assert found == proposed
+    with pytest.raises(RuntimeError, match="stop"), atomic_directory(out, ("proposed",)):
+        raise RuntimeError("stop")
+    assert (out / "proposed").read_text() == "third"
+
+
 def test_an_output_that_cannot_be_made_is_one_clear_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with (

@@ -184,6 +184,8 @@ def behind_stiffness(tmp_path_factory: pytest.TempPathFactory) -> Path:
     joint.write_text(
         joint.read_text().replace("noise_rad = 1e-5", "noise_rad = 1e-6").replace("3e-3", "3e-4")
     )
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/next_experiment.toml").touch()  # of an earlier diagnosis
     assert main(["diagnose", str(path), "--config", str(joint), "--out", str(tmp_path / "out")]) == 0
     return tmp_path / "out"
 
