@@ -17,6 +17,7 @@ from cablecomp.config import JointConfig
 from cablecomp.estimation.evidence import FEWEST, INPUT, JOINT, MOTOR, OVERFLOWN
 from cablecomp.estimation.evidence import load_channel as channel_of_load
 from cablecomp.estimation.lateness import accounted_for, borne_out, delays, rather_late
+from cablecomp.estimation.sensors import odd_sensors
 from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
 from cablecomp.signal.smoothing import FloatArray
 
@@ -63,18 +64,19 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     if len(rows["time_s"]) < FEWEST:
         return tuple(found)
     view = View(config, rows, load)
+    odd = tuple(odd_sensors(view, columns))
+    if any(s.kind == "stuck" for s in odd):  # it would spoil all that follows
+        return (*found, *odd)
     fits = _angles(view)
     fits += _slack(view)
-    if any(
-        f.kind == "unit" or "pretension_bears_Nm" in f.numbers for f in fits
-    ):  # it would spoil all that follows
-        return (*found, *fits)
+    if any(f.kind == "unit" or "pretension_bears_Nm" in f.numbers for f in fits):  # and so would these
+        return (*found, *odd, *fits)
     fits += _torques(view)
     found += fits if found else _delays(view, fits, columns)  # over a gap no delay can be told
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
         rows = _rows(columns, (INPUT, MOTOR, "joint_torque_Nm"))
         found += _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
-    return tuple(found)
+    return (*odd, *found)
 
 
 def same_readings(recordings: Mapping[str, Mapping[str, FloatArray]]) -> Iterator[str]:

@@ -15,7 +15,8 @@ from cablecomp.signal.noise import channel_noise
 _GAP: Final = 10.0
 _PLATEAU: Final = 5
 _ALIKE: Final = 0.02
-_NOISE_ROWS: Final = 200_000
+NOISE_ROWS: Final = 200_000
+"""Rows out of which a channel's noise is told."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,16 @@ class Inspection:
     repeats: Repeats | None
 
 
+def stuck_words(seconds: float, end: str = "motor") -> str:
+    """What is said of a channel that rests while the motor, or the joint, goes on."""
+    return f"rests {seconds:.3g} s while the {end} moves: stuck?"
+
+
+def clipped_words(share: float) -> str:
+    """What is said of a channel that stops at an extreme value."""
+    return f"clipped in {100 * share:.2g} % of the rows"
+
+
 def require_motion(columns: Mapping[str, FloatArray], where: object) -> None:
     """Raise InputError if motor or joint never move: nothing about the drive follows from such a recording."""
     for name in ("motor_position_rad", "joint_position_rad"):
@@ -100,7 +111,7 @@ def _quality(name: str, values: FloatArray, time: FloatArray, motor: FloatArray 
     known = values[np.isfinite(values)]
     noise, coloured, step = None, False, 0.0
     try:
-        found = channel_noise(time[:_NOISE_ROWS], values[:_NOISE_ROWS])
+        found = channel_noise(time[:NOISE_ROWS], values[:NOISE_ROWS])
         noise, coloured, step = found.sigma, found.coloured, found.resolution
     except InputError:  # too short to tell
         pass
@@ -113,11 +124,11 @@ def _quality(name: str, values: FloatArray, time: FloatArray, motor: FloatArray 
         coloured,
         step,
         _stuck(values, time, values if motor is None else motor),
-        0.0 if "position" in name else _clipped(known, step),
+        0.0 if "position" in name else clipped_share(known, step),
     )
 
 
-def _runs(same: FloatArray) -> list[tuple[int, int]]:
+def runs(same: FloatArray) -> list[tuple[int, int]]:
     """(first, last) of each stretch of true."""
     padded = np.concatenate(([False], same.astype(bool), [False]))
     edges = np.flatnonzero(padded[1:] != padded[:-1])
@@ -130,14 +141,14 @@ def _stuck(values: FloatArray, time: FloatArray, motor: FloatArray) -> float:
     longest = 0.0
     if reach <= 0.0 or not np.any(np.diff(values) != 0.0):
         return float(time[-1] - time[0]) if reach > 0.0 and len(values) > 1 else 0.0
-    for first, last in _runs(np.diff(values) == 0.0):
+    for first, last in runs(np.diff(values) == 0.0):
         moved = float(np.ptp(motor[first : last + 1]))
         if moved > reach:
             longest = max(longest, float(time[last] - time[first]))
     return longest
 
 
-def _clipped(known: FloatArray, step: float) -> float:
+def clipped_share(known: FloatArray, step: float) -> float:
     """Share of rows on plateaus at the very greatest and least value into or out of which the channel jumps.
 
     A turning point read in steps rests on an extreme value too, but comes near it slowly: over half of its rest's
@@ -148,7 +159,7 @@ def _clipped(known: FloatArray, step: float) -> float:
         return 0.0
     rows = 0
     for extreme in (known.min(), known.max()):
-        for first, last in _runs(known == extreme):
+        for first, last in runs(known == extreme):
             half = (last - first) // 2
             before, after = known[max(first - half, 0)], known[min(last + half, len(known)) - 1]
             off = max(abs(before - extreme), abs(after - extreme))

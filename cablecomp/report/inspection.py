@@ -12,7 +12,7 @@ from rich.table import Table
 from cablecomp.counting import counted
 from cablecomp.errors import path_text
 from cablecomp.recording.channels import CANONICAL
-from cablecomp.recording.inspection import ChannelQuality, Inspection
+from cablecomp.recording.inspection import ChannelQuality, Inspection, clipped_words, stuck_words
 from cablecomp.recording.mapping import ColumnMap, mapping_text
 from cablecomp.recording.raw_columns import RawColumns
 from cablecomp.recording.suggest import Suggestion
@@ -113,9 +113,9 @@ def _odd(c: ChannelQuality, seen: Inspection) -> list[str]:
     if c.least == c.greatest:
         found.append("constant")
     elif c.stuck_s > 0.05 * seen.duration_s and not c.name.startswith("other_"):  # no sensor of the drive's
-        found.append(f"rests {c.stuck_s:.3g} s while the motor moves: stuck?")
+        found.append(stuck_words(c.stuck_s))
     if c.clipped > 0.0:
-        found.append(f"clipped in {100 * c.clipped:.2g} % of the rows")
+        found.append(clipped_words(c.clipped))
     if c.empty:
         found.append(f"{c.empty} empty")
     return found

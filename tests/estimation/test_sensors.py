@@ -1,0 +1,96 @@
+"""Sensors that stand still, are clipped or were never read are said; rests and what was held are left in peace."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from turning import JOINT, course, recorded
+
+from cablecomp.estimation.belief import suspicions
+from cablecomp.observer import Observer
+from cablecomp.signal.smoothing import FloatArray
+
+TRUE = recorded()
+TIME = TRUE["time_s"]
+RNG = np.random.default_rng(4)
+LOAD = TRUE["joint_torque_Nm"] + 0.01 * RNG.standard_normal(len(TIME))
+TORQUE = -JOINT.drive.ratio * LOAD + 0.01 * np.sign(np.gradient(TRUE["motor_position_rad"]))
+
+
+def said(**changed: FloatArray) -> list[tuple[str, str]]:
+    found = suspicions(JOINT, {**TRUE, **changed})
+    return [(s.kind, s.channel) for s in found if s.kind in ("stuck", "clipped", "unread")]
+
+
+def frozen(name: str, begin_s: float, end_s: float) -> FloatArray:
+    values = TRUE[name].copy()
+    first, after = np.searchsorted(TIME, (begin_s, end_s))
+    values[first:after] = values[first]
+    return values
+
+
+@pytest.mark.parametrize("until_s", [11.0, 30.0])
+@pytest.mark.parametrize("name", ["joint_position_rad", "motor_position_rad"])
+def test_an_encoder_that_stands_while_the_other_goes_on_is_said_to_be_stuck(
+    name: str, until_s: float
+) -> None:
+    """It comes back with a jump, or not at all."""
+    (found,) = suspicions(JOINT, {**TRUE, name: frozen(name, 8.0, until_s)})
+    assert (found.kind, found.channel) == ("stuck", name)
+    assert found.numbers["rests_s"] == pytest.approx(min(until_s, TIME[-1]) - 8.0, abs=0.05)
+    assert "stuck?" in found.text
+
+
+def test_a_motor_angle_that_never_changes_is_said_where_the_joint_goes_far() -> None:
+    assert said(motor_position_rad=np.full(len(TIME), 0.3)) == [("stuck", "motor_position_rad")]
+
+
+def test_a_locked_input_and_rests_are_in_order() -> None:
+    locked = course()
+    locked["motor_position_rad"] = np.zeros_like(TIME)
+    bent = Observer(JOINT).run(locked)["joint_position_rad"]
+    for grid_rad in (0.0, 1e-4):
+        angle = np.round(bent / grid_rad) * grid_rad if grid_rad else bent
+        assert said(**locked, joint_position_rad=angle) == []
+    rests = (TIME > 8.0) & (TIME < 11.0)  # both stand, and go on from where they stand
+    at = np.where(rests, 8.0, np.where(TIME < 8.0, TIME, TIME - 3.0))
+    assert said(**{n: np.interp(at, TIME, v) for n, v in TRUE.items() if n != "time_s"}) == []
+
+
+@pytest.mark.parametrize("lost", [0.4, 0.9])
+def test_motion_lost_on_the_way_is_no_stuck_encoder(lost: float) -> None:
+    """In a sheath the tip stands for most of the motor's range, and goes on from where it stands."""
+    q = JOINT.drive.ratio * TRUE["motor_position_rad"]
+    angle, half = np.zeros_like(q), 0.5 * lost * np.ptp(q)
+    for k in range(1, len(q)):
+        angle[k] = np.clip(angle[k - 1], q[k] - half, q[k] + half)
+    assert said(joint_position_rad=np.round(angle / 1e-3) * 1e-3) == []
+
+
+def test_a_load_that_stops_at_its_greatest_value_is_clipped() -> None:
+    assert said(joint_torque_Nm=LOAD) == []
+    share = np.mean(np.abs(LOAD) > 0.8)
+    found = [
+        s
+        for s in suspicions(JOINT, {**TRUE, "joint_torque_Nm": np.clip(LOAD, -0.8, 0.8)})
+        if s.kind == "clipped"
+    ]
+    assert [s.channel for s in found] == ["joint_torque_Nm"]
+    assert found[0].numbers["share"] == pytest.approx(share, abs=0.1)
+    assert "% of the rows" in found[0].text
+
+
+def test_a_load_that_is_held_or_read_in_coarse_steps_is_not_clipped() -> None:
+    held = np.clip(4.0 * np.sin(0.7 * TIME), -1.0, 1.0)  # as commanded, from end to end
+    assert said(joint_torque_Nm=held) == []
+    assert said(joint_torque_Nm=np.round(TRUE["joint_torque_Nm"] / 0.2) * 0.2) == []
+    assert said(joint_torque_Nm=held + 0.003 * RNG.standard_normal(len(TIME))) == []
+
+
+def test_a_load_of_0_in_every_row_is_said_where_the_motor_carries_one() -> None:
+    none = np.zeros_like(TIME)
+    assert said(joint_torque_Nm=none, motor_torque_Nm=TORQUE) == [("unread", "joint_torque_Nm")]
+    q = TRUE["motor_position_rad"]
+    free = 0.05 * np.sign(np.gradient(q)) + 0.02 * q + 0.005 * RNG.standard_normal(len(TIME))
+    assert said(joint_torque_Nm=none, motor_torque_Nm=free) == []
+    assert said(joint_torque_Nm=none) == []
