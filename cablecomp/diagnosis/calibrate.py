@@ -37,13 +37,15 @@ OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the b
 
 @dataclass(frozen=True)
 class Kept:
-    """A value that stays nominal: `why`, and what would tell it (None: no motion within the limits)."""
+    """A value that stays nominal: `why`, and what would tell it (None: no motion within the limits). Its tolerance, and
+    the sd that it would be told to, are a `share` of it or in its unit, as those of `[tolerance]` are."""
 
     name: str
     nominal: float
     tolerance: float
     why: str
     advice: Advice | None
+    share: bool = True
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,9 @@ def _without(fit: Fit, names: tuple[str, ...]) -> Fit:
 def _kept(drive: Calibrated, name: str, why: str) -> Kept:
     p = next(p for p in drive.fit.problem.parameters if p.name == name)
     advice = what_would_tell(drive.fit.problem.config, p, drive.floor_rad)
-    return Kept(name, p.start, p.sd, why, advice)
+    unit = 1.0 if p.log else p.scale
+    advice = None if advice is None else replace(advice, sd=unit * advice.sd)
+    return Kept(name, p.start, unit * p.sd, why, advice, p.log)
 
 
 def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:

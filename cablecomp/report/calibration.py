@@ -84,6 +84,11 @@ def _kept(k: Kept) -> str:
     told = (
         "no motion within the joint's limits would tell it"
         if k.advice is None
-        else f"{k.advice.motion} would tell it to ± {100 * k.advice.sd:.2g} %"
+        else f"{k.advice.motion} would tell it to ± {_wide(k.advice.sd, k.share)}"
     )
-    return f"{k.name} stays nominal, {k.nominal:.5g} ± {100 * min(k.tolerance, 9.99):.2g} %: {k.why}; {told}"
+    return f"{k.name} stays nominal, {k.nominal:.5g} ± {_wide(k.tolerance, k.share)}: {k.why}; {told}"
+
+
+def _wide(sd: float, share: bool) -> str:
+    """A share in per cent; else the amount, in the unit that the value's name ends with."""
+    return f"{100 * min(sd, 9.99):.2g} %" if share else f"{sd:.2g}"

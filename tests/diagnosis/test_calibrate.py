@@ -19,6 +19,7 @@ from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
+from cablecomp.report.calibration import calibration_notes
 from cablecomp.signal.smoothing import FloatArray
 
 NOMINAL = load_joint(Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml")
@@ -98,6 +99,22 @@ def test_without_information_the_prior_stays_and_that_is_said() -> None:
     advice = kept["mu_output"].advice  # motion under load would tell it, and is named
     assert advice is not None
     assert advice.sd < 0.7 * NOMINAL.tolerance["mu_output"]
+
+
+def test_of_a_zero_that_is_not_told_the_amount_is_said_and_no_share() -> None:
+    """Of the drive's friction a share."""
+    tolerance = {**NOMINAL.tolerance, "joint_torque_offset_Nm": 0.05}
+    columns = recording(NOMINAL, 1)
+    for name in ("joint_torque_Nm", "motor_position_rad"):
+        columns[name] = 0.0 * columns[name]
+    columns["joint_position_rad"] = 2e-5 * np.random.default_rng(2).standard_normal(len(columns["time_s"]))
+    found = calibrate(NOMINAL.model_copy(update={"tolerance": tolerance}), {"one": columns})
+    kept = {k.name: k for k in found.kept}
+    assert (kept["joint_torque_offset_Nm"].tolerance, kept["joint_torque_offset_Nm"].share) == (0.05, False)
+    lines = list(calibration_notes(found))
+    assert any(line.startswith("joint_torque_offset_Nm stays nominal, 0 ± 0.05: ") for line in lines)
+    share = f"{100 * NOMINAL.tolerance['mu_output']:.2g} %"
+    assert any(line.startswith(f"mu_output stays nominal, 0.12 ± {share}: ") for line in lines)
 
 
 def test_without_time_left_the_quick_fit_is_given_and_that_is_said(fitted: Calibration) -> None:
