@@ -15,7 +15,7 @@ from cablecomp.config import JointConfig, claimed_by
 from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import MOTOR, Evidence, gather, load_channel, rows_for
+from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, gather, load_channel, rows_for
 from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.standing import ONE_CLAIM, apart_of, stated_of
 from cablecomp.signal.smoothing import FloatArray
@@ -136,6 +136,21 @@ def _in_order(evidence: Iterable[Evidence]) -> list[Evidence]:
     by_time = sorted(given, key=lambda e: float(e.columns["time_s"][0]))
     apart = all(a.columns["time_s"][-1] <= b.columns["time_s"][0] for a, b in pairwise(by_time))
     return by_time if apart else given
+
+
+def read_by_all(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[str, ...]:
+    """Output channels that are fitted: those that every recording has, but for that of the load."""
+    load = load_channel(config, evidence[0].columns)
+    return tuple(c for c in OUTPUTS if c != load and all(c in e.counted for e in evidence))
+
+
+def read_by_some(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str, list[str]]:
+    """Output channels that are left out because some recordings lack them, with those recordings that have them."""
+    load, fitted = load_channel(config, evidence[0].columns), read_by_all(config, evidence)
+    some = {
+        c: [short(e.name) for e in evidence if c in e.counted] for c in OUTPUTS if c not in (load, *fitted)
+    }
+    return {c: names for c, names in some.items() if names}
 
 
 def spread(evidence: Sequence[Evidence], most: int) -> tuple[Evidence, ...]:

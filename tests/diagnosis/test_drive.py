@@ -67,6 +67,21 @@ def test_two_sensors_of_force_agree_to_some_percent(
     assert found.get("joint_torque_gain") == (None if gain_sd is None else pytest.approx(gain_sd))
 
 
+def test_a_motor_torque_that_not_all_recordings_have_is_left_out_and_said() -> None:
+    """Beside it alone the gain of the joint's sensor is free."""
+    with_it, without = recorded([], 20.0), recorded([], 20.0)
+    felt = simulate(PlantConfig.from_dict(closed(SMALL)), *course(20.0)).channels()["motor_torque_Nm"]
+    with_it["motor_torque_Nm"] = felt + 1e-3 * np.random.default_rng(5).standard_normal(len(felt))
+    recordings = {"a/1": with_it, "a/2": without}
+    joint = parse_joint({**closed(SMALL, "small"), "tolerance": {"EA_N": 0.05}}, "small")
+    found = diagnose(joint, recordings, budget_s=0.0)
+    assert "joint_torque_gain" not in {v.name for v in found.calibration}
+    assert any(note.startswith("motor_torque_Nm of a/1 is left out") for note in found.notes)
+    both = diagnose(joint, {"a/1": with_it, "a/2": with_it}, budget_s=0.0)
+    assert "joint_torque_gain" in {v.name for v in both.calibration}
+    assert not any("is left out" in note for note in both.notes)
+
+
 def test_what_is_calibrated_as_stated_is_exact_without_a_tolerance() -> None:
     fit = fitted({"EA_N": 0.05}, {"a/1": recorded([], 20.0)}, as_stated=True)
     assert [p.name for p in fit.problem.parameters] == ["EA_N", "input_radius_m"]

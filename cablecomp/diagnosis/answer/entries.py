@@ -9,7 +9,7 @@ import numpy as np
 
 from cablecomp.config import Empirical
 from cablecomp.diagnosis.answer.values import as_trials_say, effect_values
-from cablecomp.diagnosis.body import short
+from cablecomp.diagnosis.body import read_by_some, short
 from cablecomp.diagnosis.describe.empirical import value_of
 from cablecomp.diagnosis.describe.unknown import describe
 from cablecomp.diagnosis.explain.confidence import features_of_tried, learnt_level, learnt_of_tried
@@ -37,7 +37,7 @@ from cablecomp.estimation.profile import profile_interval
 from cablecomp.observer import Observer
 
 SAID = 4
-"""Recordings whose clock is told in a note; of more, the file has it."""
+"""Recordings that a note names, or tells the clock of; of more, it says how many."""
 
 TOO_ALIKE = (
     "no motion within the limits, or the reach of these recordings, sets the models that these data cannot tell apart "
@@ -287,6 +287,12 @@ def notes(case: Case) -> tuple[str, ...]:
     unread = [f"{', '.join(e.unread)} of {short(e.name)}" for e in body.used if e.unread]
     if unread:
         found.append(f"hardly read, and left out: {'; '.join(unread)}")
+    for channel, names in read_by_some(case.config, body.used).items():
+        more = f" and {len(names) - SAID} more" if len(names) > SAID else ""
+        found.append(
+            f"{channel} of {', '.join(names[:SAID])}{more} is left out: other recordings have none; diagnose those "
+            "that have it by themselves"
+        )
     for channel, share in not_told_apart(case.config, body.used).items():
         found.append(
             f"{channel} goes with the joint's own motion ({100 * share:.0f} % of it): whether a neighbour "

@@ -10,10 +10,11 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.config.sessions import ZEROS
+from cablecomp.diagnosis.body import read_by_all
 from cablecomp.diagnosis.folds import kind_of_parts, shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError, SlackError
-from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
 from cablecomp.estimation.history import Forgotten, forgotten, full_swing, with_own_carryover
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
 from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_OF_TORQUE
@@ -233,7 +234,7 @@ def _torque_gain(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str,
     """How well a joint's torque sensor without a tolerance agrees with what else reads force; none where nothing does,
     or where how much the drive yields is known by order of magnitude only."""
     read = {load_channel(config, e.columns) for e in evidence}
-    beside = any(c in e.counted for e in evidence for c in OUTPUTS if c != JOINT)
+    beside = any(c != JOINT for c in read_by_all(config, evidence))
     if TORQUE_GAIN in config.tolerance or read != {"joint_torque_Nm"} or not beside:
         return {}
     return {} if vague_drive(of_drive(config)) else {TORQUE_GAIN: GAIN_OF_TORQUE}
@@ -242,11 +243,8 @@ def _torque_gain(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str,
 def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing:
     """Weights before anything is known: a third of what a straight line by motor angle leaves of each output
     channel."""
-    load = load_channel(config, evidence[0].columns)
     sigma = {}
-    for c in OUTPUTS:
-        if c == load or not all(c in e.counted for e in evidence):
-            continue
+    for c in read_by_all(config, evidence):
         y = np.concatenate([e.at_rows(c) - e.at_rows(c).mean() for e in evidence])
         q = np.concatenate([e.at_rows("motor_position_rad") for e in evidence])
         A = np.column_stack((np.ones_like(q), q - q.mean()))
