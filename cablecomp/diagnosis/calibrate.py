@@ -18,7 +18,7 @@ from cablecomp.diagnosis.answer.augmented import augmented_joint, with_tolerance
 from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.counts import count_rad
-from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive
+from cablecomp.diagnosis.calibration.drive import Calibrated, calibrate_drive, own_in_vain
 from cablecomp.diagnosis.calibration.every_sample import by_wide_steps, on_every_sample
 from cablecomp.diagnosis.calibration.motion import Advice, what_would_tell
 from cablecomp.diagnosis.explain.model import Model
@@ -200,7 +200,7 @@ def _tied(fit: Fit) -> tuple[tuple[str, str, float], ...]:
 
 
 def _warnings(drive: Calibrated, fit: Fit, recordings: Mapping[str, Columns]) -> tuple[str, ...]:
-    found = []
+    found = [*own_in_vain(fit.problem.config, drive.fit)]
     if drive.lost_rows:
         total = drive.lost_rows + sum(int(e.counted[JOINT].sum()) for e in drive.fit.problem.evidence)
         found.append(

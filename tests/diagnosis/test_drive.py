@@ -148,6 +148,23 @@ def test_each_of_several_values_is_each_sessions_own() -> None:
 
 
 @pytest.mark.parametrize("by", ["calibrate", "diagnose"])
+@pytest.mark.parametrize(("known", "sessions"), [(0.1, "ab"), (None, "ab"), (None, "a")])
+def test_what_may_differ_between_sessions_and_has_no_tolerance_is_said(
+    by: str, known: float | None, sessions: str
+) -> None:
+    """It is taken as exact, which whoever names it hardly means; of one session nothing can differ."""
+    told = {"EA_N": 0.03, **({} if known is None else {"mu_output": known})}
+    own = {"own": ["joint_position_offset_rad", ZERO, "mu_output"]}
+    joint = parse_joint({**closed(SMALL, "small"), "tolerance": told, "session": own}, "small")
+    recordings = {f"{s}/1": recorded([], 20.0) for s in sessions}
+    found = calibrate(joint, recordings) if by == "calibrate" else diagnose(joint, recordings, budget_s=0.0)
+    lines = [w for w in found.warnings if "[session] own" in w]
+    assert [w.partition(",")[0] for w in lines] == (
+        ["[session] own names mu_output"] if known is None and len(sessions) > 1 else []
+    )
+
+
+@pytest.mark.parametrize("by", ["calibrate", "diagnose"])
 def test_a_tolerance_in_a_unit_of_its_own_stays_in_it(by: str) -> None:
     """A torque's zero known to 50 mN m: told to some of them, not to some hundredths of 1 N m."""
     stated_Nm, misread_Nm = 0.05, 0.03

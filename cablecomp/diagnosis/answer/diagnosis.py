@@ -25,6 +25,7 @@ from cablecomp.diagnosis.answer.entries import (
 )
 from cablecomp.diagnosis.answer.values import as_trials_say, drive_values
 from cablecomp.diagnosis.answer.verdict import not_carried, warnings_of
+from cablecomp.diagnosis.calibration.drive import own_in_vain
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
 from cablecomp.diagnosis.locate.location import Location
@@ -75,6 +76,7 @@ def diagnosis_of(
         traces=tuple(traces(drive.fit, kept.fit, case.covariates, outcome.empirical)),
         warnings=(
             *((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()),
+            *own_in_vain(case.config, drive.fit),
             *warnings_of(kept),
             *not_carried(outcome.augmented, drive.floor_rad),
         ),

@@ -207,6 +207,17 @@ def _parameters(config: JointConfig, evidence: Sequence[Evidence], as_stated: bo
     return tuple(free)
 
 
+def own_in_vain(config: JointConfig, fit: Fit) -> tuple[str, ...]:
+    """A line for what `[session] own` names of several sessions and nothing frees."""
+    free = {*(p.base for p in fit.problem.parameters), *ZEROS, TORQUE_ZERO}
+    named = [n for n in config.session_own if n not in free and not config.tolerance.get(n, 0.0) > 0.0]
+    return tuple(
+        f"[session] own names {n}, of which [tolerance] says nothing: it is taken as exact, and as the same in every "
+        f"session; state how well it is known ({n} = 0.05: to 5 %)"
+        for n in (named if len(fit.problem.sessions) > 1 else ())
+    )
+
+
 def _by_tape(config: JointConfig) -> dict[str, float]:
     """How well free lengths without a tolerance are known; none where the cable's stiffness, which acts as they do, is
     known by order of magnitude only."""
