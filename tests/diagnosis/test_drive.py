@@ -17,7 +17,7 @@ from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
 
-ZERO = "joint_torque_offset_Nm"
+ZERO, ANGLE = "joint_torque_offset_Nm", "joint_position_offset_rad"
 
 
 def fitted(
@@ -214,6 +214,23 @@ def test_a_sessions_own_value_begins_where_the_session_states_it() -> None:
     one = parse_joint({**plain, "tolerance": {"pretension_N": 0.05}}, "small")
     drive = calibrate_drive(one, gather_body(one, recordings).used, np.random.default_rng(0))
     assert rms_left(drive.nominal) > 10.0 * drive.floor_rad  # it is what is stated that tells
+
+
+def test_an_encoders_zero_was_what_its_session_states() -> None:
+    """Of a session that has a part with a zero of its own: the session's. Where none is stated: the joint's."""
+    plain = closed(SMALL, "small")
+    sessions = [
+        {"name": "set", "mounting": "mon", "recordings": ["mon/2"], "values": {ANGLE: 0.5}},
+        {"name": "mon", "recordings": ["mon"], "values": {ANGLE: 0.25}},
+        {"name": "tue", "recordings": ["tue"], "values": {"mu_output": 0.1}},
+    ]
+    told = {"tolerance": {"mu_output": 0.1}, "sensors": {ANGLE: 0.125}}
+    joint = parse_joint({**plain, **told, "session": sessions}, "small")
+    columns = recorded([], 20.0)
+    recordings = dict.fromkeys(("mon/2", "mon/1", "tue/1", "wed/1"), columns)
+    fit = calibrate_drive(joint, gather_body(joint, recordings).used, np.random.default_rng(0)).fit
+    found = {v.session: v.nominal for v in drive_values(fit, joint) if v.name.startswith(ANGLE)}
+    assert found == {"mon": 0.25, "tue": 0.125, "wed": 0.125}
 
 
 @pytest.mark.parametrize(

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, claimed_by
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, covariance
-from cablecomp.estimation.standing import in_its_place, value_of
+from cablecomp.estimation.standing import JOINT_ZERO, ONE_CLAIM, in_its_place, value_of
 from cablecomp.signal.noise import reading_sigma
 
 
@@ -84,8 +85,21 @@ def _zeros(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
     found = []
     for session in problem.sessions:
         count = sum(int(e.counted[JOINT].sum()) for e in problem.evidence if e.session == session)
-        name = "joint_position_offset_rad" + (f"@{session}" if many else "")
+        name = JOINT_ZERO + (f"@{session}" if many else "")
         sd = problem.weighing.sigma[JOINT] / max(count, 1) ** 0.5
-        nominal = config.sensors.joint_position_offset_rad
+        nominal = _stated_zero(fit, config, session)
         found.append(Value(name, float(zeros[session][0]), sd, nominal, session if many else None))
     return tuple(found)
+
+
+def _stated_zero(fit: Fit, config: JointConfig, session: str) -> float:
+    """The joint encoder's zero as the configuration has it in a session: as its own entry states it, or that of a part
+    of it; without one, in general."""
+    names = (e.name for e in fit.problem.evidence if e.session == session)
+    claims = [c for name in names if (c := claimed_by(config, Path(name), ONE_CLAIM)) is not None]
+    stated = [
+        c.values[JOINT_ZERO]
+        for c in sorted(claims, key=lambda c: c.name != session)
+        if JOINT_ZERO in c.values
+    ]
+    return stated[0] if stated else config.sensors.joint_position_offset_rad
