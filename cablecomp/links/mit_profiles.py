@@ -6,9 +6,14 @@ from its own data sheet) and "AK Series Module Product Manual" V3.0.1, 4.3.1 (er
 currents unbalanced" before, and 7 was none); AK80-6 and AK80-9 V1.1 as measured by mini-cheetah-tmotor-python-can
 (pull request 3). Damiao motors: makers' table of default PMAX/VMAX/TMAX (`Limit_Param` of DM_CAN) and manual
 DM-J4310-2EC V1.0 (state nibble, two temperatures, feedback sent to the master's identifier). RobStride: its sample
-program's MIT functions, ranges as in its SDK (`table.py`), temperature in tenths over two bytes. "mini-cheetah":
-B. Katz's own firmware (6-byte reply to identifier 0). PMAX, VMAX and TMAX of a Damiao drive can be changed in the
-drive: it is asked for them, and a drive that has others than the link is not enabled.
+program's MIT functions, temperature in tenths over two bytes; ranges as its user manuals have them, revisions 251112 to
+260713 (4.1.2 type 1 and chapter 6, MIT), read in transcriptions and in what others cite of them, RS06 in two codes that
+cite it alone. Its SDK (`table.py`) and ROS sample state
+others for RS00 (50 rad/s, 17 Nm), RS03 (50 rad/s), RS05 (33 rad/s, 17 Nm) and RS06 (20 rad/s, 60 Nm): the full scale
+of an RS03, measured against its position, is 20 rad/s, as the manual says, and the maker's EDULITE_A3 has the manuals'
+numbers of RS00 and RS05 too. "mini-cheetah": B. Katz's own firmware (6-byte reply to identifier 0). PMAX, VMAX and TMAX
+of a Damiao drive can be changed in the drive: it is asked for them, and a drive that has others than the link is not
+enabled.
 """
 
 from __future__ import annotations
@@ -36,7 +41,7 @@ class MitProfile(NamedTuple):
 _AK = "CubeMars AK Series Actuator Driver Manual V1.0.8 p. 49-50"
 _AK_OLD = "AK V1.1 as measured by mini-cheetah-tmotor-python-can"
 _DM = "Damiao, default PMAX/VMAX/TMAX (Limit_Param of DM_CAN); DM-J4310-2EC manual V1.0"
-_RS = "RobStride SDK, table.py"
+_RS = "RobStride user manual of the model, 4.1.2 and 6, as cited (SDK and ROS sample differ for RS00, RS03, RS05, RS06)"
 _KATZ = "B. Katz, hobbyking_cheetah motor firmware"
 
 
@@ -77,13 +82,13 @@ PROFILES: Final[dict[str, MitProfile]] = {
     "DMG6215": _dm(45.0, 10.0),
     "DMH3510": _dm(280.0, 1.0),
     "DMH6220": _dm(45.0, 10.0),
-    "RS00": _rs(50.0, 17.0),
+    "RS00": _rs(33.0, 14.0),
     "RS01": _rs(44.0, 17.0),
     "RS02": _rs(44.0, 17.0),
-    "RS03": _rs(50.0, 60.0, 5000.0, 100.0),
+    "RS03": _rs(20.0, 60.0, 5000.0, 100.0),
     "RS04": _rs(15.0, 120.0, 5000.0, 100.0),
-    "RS05": _rs(33.0, 17.0),
-    "RS06": _rs(20.0, 60.0, 5000.0, 100.0),
+    "RS05": _rs(50.0, 5.5),
+    "RS06": _rs(50.0, 36.0, 5000.0, 100.0),
     "mini-cheetah": MitProfile(MitRange(12.5, 65.0, 18.0), "katz", 6, _KATZ),
 }
 """Model -> profile. AK80-64 and AK80-80 share the manual's last column."""

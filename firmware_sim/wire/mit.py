@@ -11,7 +11,7 @@ the present position as zero does so while it is enabled too, and says nothing f
 
 Sources: CubeMars, AK Series Actuator Driver Manual V1.0.8, section 5.3, and V3.0.1, 4.3.1 (error codes); B. Katz,
 mini-cheetah motor controller (ranges, truncation, CAN_TIMEOUT); TMotorCANControl (silence after zeroing); RobStride
-sample program (reply, fault frame).
+sample program (reply, fault frame) and user manuals (ranges).
 """
 
 from __future__ import annotations
@@ -73,13 +73,13 @@ MODELS: dict[str, MitModel] = {
     "DMG6215": _dm(12.5, 45.0, 10.0),
     "DMH6220": _dm(12.5, 45.0, 10.0),
     "DM6248P": _dm(12.566, 20.0, 120.0),
-    "RS00": _rs(50.0, 17.0),
+    "RS00": _rs(33.0, 14.0),
     "RS01": _rs(44.0, 17.0),
     "RS02": _rs(44.0, 17.0),
-    "RS03": _rs(50.0, 60.0, 5000.0, 100.0),
+    "RS03": _rs(20.0, 60.0, 5000.0, 100.0),
     "RS04": _rs(15.0, 120.0, 5000.0, 100.0),
-    "RS05": _rs(33.0, 17.0),
-    "RS06": _rs(20.0, 60.0, 5000.0, 100.0),
+    "RS05": _rs(50.0, 5.5),
+    "RS06": _rs(50.0, 36.0, 5000.0, 100.0),
     "mini-cheetah": MitModel(12.5, 65.0, 18.0, maker="katz"),
 }
 ALIASES = {"DM-J4310-2EC": "DM4310", "J4310": "DM4310", "DM-J4340-2EC": "DM4340", "DM-J8009-2EC": "DM8009"}

@@ -219,10 +219,48 @@ def test_tmotor_sends_and_reads_the_same(rigs: Any) -> None:
     assert values == pytest.approx([told.position, told.velocity, told.current])
 
 
-@pytest.mark.parametrize("model", ["RS00", "RS01", "RS02", "RS03", "RS04", "RS05", "RS06"])
-def test_robstrides_sdk_sends_and_reads_the_same(rigs: Any, model: str) -> None:
+ROBSTRIDES = {
+    "RS00": (33.0, 14.0, 500.0, 5.0),
+    "RS01": (44.0, 17.0, 500.0, 5.0),
+    "RS02": (44.0, 17.0, 500.0, 5.0),
+    "RS03": (20.0, 60.0, 5000.0, 100.0),
+    "RS04": (15.0, 120.0, 5000.0, 100.0),
+    "RS05": (50.0, 5.5, 500.0, 5.0),
+    "RS06": (50.0, 36.0, 5000.0, 100.0),
+}
+"""Velocity, torque, kp, kd as in the maker's user manuals, 4.1.2 and 6."""
+
+
+@pytest.mark.parametrize("model", ROBSTRIDES)
+def test_robstrides_are_read_in_the_ranges_of_their_manuals(rigs: Any, model: str) -> None:
+    """Both protocols: all that the wire carries, at the end of each range."""
+    velocity, torque, _, _ = ROBSTRIDES[model]
+    own: Rig = rigs("robstride-socketcan.toml", {'model = "RS01"': f'model = "{model}"'})
+    own.tell(EXTENDED | 0x028001FD, bytes.fromhex("80 00 FF FF FF FF 01 1C"))
+    mit: Rig = rigs(
+        "mit-virtual.toml", {'model = "AK80-9"': f'model = "{model}"', "reply_id = 0 ": "reply_id = 0xFD "}
+    )
+    mit.tell(0xFD, bytes.fromhex("01 80 00 FF FF FF 01 1C"))
+    for rig in (own, mit):
+        rig.link.poll(1.0)
+        joint = rig.link.joints[0]
+        gear = abs(rig.link.config.joint[0].motor.gear_ratio)
+        assert abs(joint.values[MOTOR_VELOCITY]) * gear == pytest.approx(velocity)
+        assert abs(joint.values[MOTOR_TORQUE]) / gear == pytest.approx(torque)
+
+
+@pytest.mark.parametrize("model", ROBSTRIDES)
+def test_robstrides_sdk_sends_and_reads_the_same(
+    rigs: Any, model: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for its ranges of four models, which are not those of the maker's manuals."""
     module = pytest.importorskip("robstride_dynamics.bus", reason=HINT)
     name = f"rs-{model[2:]}"
+    for what, value in zip(("VELOCITY", "TORQUE", "KP", "KD"), ROBSTRIDES[model], strict=True):
+        table = getattr(module, f"MODEL_MIT_{what}_TABLE")
+        differs = what in ("VELOCITY", "TORQUE") and model in ("RS00", "RS03", "RS05", "RS06")
+        assert differs or table[name] == value
+        monkeypatch.setitem(table, name, value)
     rig: Rig = rigs("robstride-socketcan.toml", {'model = "RS01"': f'model = "{model}"\nhost = 0xFF'})
     client = module.RobstrideBus("none", {"elbow": module.Motor(1, name)})
     bus = Listener()
@@ -237,7 +275,9 @@ def test_robstrides_sdk_sends_and_reads_the_same(rigs: Any, model: str) -> None:
         ((identifier, data),), ((want, theirs),) = rig.heard(), bus.sent
         want |= EXTENDED
         assert (identifier & 0xFF0000FF) == (want & 0xFF0000FF)
-        assert (identifier >> 8 & 0xFFFF) - (want >> 8 & 0xFFFF) in (0, 1)
+        # it cuts off where we round, and counts 65534 steps to the range, where there are 65535
+        steps = 0.5 * (1.0 + c.torque_Nm / ROBSTRIDES[model][1])
+        assert 0 <= (identifier >> 8 & 0xFFFF) - (want >> 8 & 0xFFFF) < 1.5 + steps
         assert alike(data, theirs, (16, 16, 16, 16))
     for request, send in ((Request.ENABLE, client.enable), (Request.DISABLE, client.disable)):
         bus.sent.clear()
