@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from fractions import Fraction
+from itertools import product
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -24,13 +25,15 @@ def _units(**factors: Fraction | int | str) -> Mapping[str, Unit]:
     return MappingProxyType({unit: Unit(float(Fraction(factor))) for unit, factor in factors.items()})
 
 
-TIME: Final = _units(s=1, ms="1/1000", us="1/1000000", ns="1/1000000000", min=60)
+TIME: Final = _units(s=1, ms="1/1000", us="1/1000000", ns="1/1000000000", min=60, h=3600)
 ANGLE: Final = MappingProxyType(
     {
         "rad": Unit(1.0),
         "mrad": Unit(1e-3),
         "urad": Unit(1e-6),
         "deg": Unit(math.pi / 180.0),
+        "mdeg": Unit(math.pi / 180_000.0),
+        "gon": Unit(math.pi / 200.0),
         "arcmin": Unit(math.pi / 10800.0),
         "rev": Unit(2.0 * math.pi),
     }
@@ -49,6 +52,7 @@ TORQUE: Final = _units(
     mNm="1/1000",
     uNm="1/1000000",
     Ncm="1/100",
+    cNm="1/100",
     Nmm="1/1000",
     kNm=1000,
     inlbf=_LBF * _INCH,
@@ -72,8 +76,30 @@ UNITS: Final[Mapping[str, Mapping[str, Unit]]] = MappingProxyType(
 )
 """Quantity (the suffix of a name that says its SI unit) -> unit -> how to reach SI."""
 
+_ARMS: Final = {
+    "inlbf": (("in", "inch"), ("lb", "lbs", "lbf")),
+    "inozf": (("in", "inch"), ("oz", "ozf")),
+    "ftlbf": (("ft",), ("lb", "lbs", "lbf")),
+    "kgfcm": (("cm",), ("kg", "kgf")),
+}
+"""Torques that are written arm first or force first, with anything between the two."""
+
+_BETWEEN: Final = ("", "-", "·", "⋅", ".", "*", " ", "_")
+
 _SPELT: Final = MappingProxyType(
     {
+        **{
+            f"{first}{between}{second}": unit
+            for unit, parts in _ARMS.items()
+            for first, second in (*product(*parts), *product(*parts[::-1]))
+            for between in _BETWEEN
+        },
+        **{
+            f"{force}{between}{arm}": f"{force}{arm}"
+            for force, arm in (("N", "m"), ("mN", "m"), ("cN", "m"), ("kN", "m"), ("N", "mm"), ("N", "cm"))
+            for between in _BETWEEN
+            if between
+        },
         "°": "deg",
         "degree": "deg",
         "degrees": "deg",
@@ -88,19 +114,23 @@ _SPELT: Final = MappingProxyType(
         "turns/s": "rev_s",
         "rev/s": "rev_s",
         "dps": "deg_s",
-        "N.m": "Nm",
-        "N·m": "Nm",
-        "N m": "Nm",
-        "N*m": "Nm",
-        "mN.m": "mNm",
-        "mN·m": "mNm",
-        "N·mm": "Nmm",
-        "N.mm": "Nmm",
+        "nm": "Nm",
+        "grad": "gon",
+        "grads": "gon",
+        "gradian": "gon",
+        "gradians": "gon",
         "µs": "us",
         "μs": "us",
         "sec": "s",
         "seconds": "s",
         "second": "s",
+        "mins": "min",
+        "minute": "min",
+        "minutes": "min",
+        "hr": "h",
+        "hrs": "h",
+        "hour": "h",
+        "hours": "h",
         "msec": "ms",
         "usec": "us",
         "nsec": "ns",

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import JsonOption, console, errors
-from cablecomp.cli.sources import RatioOption, Reading, Sources, reads_recordings
+from cablecomp.cli.sources import RatioOption, Reading, Sources, reads_recordings, suggested_map
 from cablecomp.config import load_joint
 from cablecomp.errors import InputError, path_text
 from cablecomp.recording.inspection import Inspection, inspect
@@ -17,13 +17,12 @@ from cablecomp.recording.mapping import (
     FOLDER_MAP,
     ColumnMap,
     find_mapping,
-    joined_maps,
     load_mapping,
     save_mapping,
 )
 from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import read_all
-from cablecomp.recording.suggest import as_mapping, suggest
+from cablecomp.recording.suggest import suggest
 from cablecomp.recording.table import RemarkLog
 from cablecomp.report.inspection import Looked, inspection_json, show
 
@@ -49,7 +48,7 @@ def inspect_recording(
         known = load_mapping(saved)
     ratio = None if config is None else load_joint(config).drive.ratio
     found = suggest(raw.columns, ratio, raw.units)
-    mapping = as_mapping(found) if known is None else joined_maps(as_mapping(found), known)
+    mapping = suggested_map(recording, found, known)
     looked = Looked(recording, raw, found, mapping, *_looked_at(recording, mapping, given))
     place = recording.parent / FOLDER_MAP
     if save:  # before it is shown: a pager may be left early

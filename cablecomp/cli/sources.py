@@ -13,14 +13,14 @@ import typer
 
 from cablecomp.cli.shared import errors
 from cablecomp.config import JointConfig
-from cablecomp.errors import InputError, path_text
+from cablecomp.errors import ConfigError, InputError, path_text
 from cablecomp.recording.can_log import DecodeFrame, by_dbc
 from cablecomp.recording.folder import find_recordings
 from cablecomp.recording.inspection import require_motion
 from cablecomp.recording.mapping import ColumnMap, joined_maps, load_mapping, mapping_from, mapping_text
 from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import Recording, open_recording, read_all
-from cablecomp.recording.suggest import as_mapping, suggest
+from cablecomp.recording.suggest import Suggestion, as_mapping, suggest
 from cablecomp.recording.table import FloatArray, Table
 
 Columns = dict[str, FloatArray]
@@ -63,10 +63,18 @@ class Sources:
         if not self.auto:
             return self.mapping
         raw = raw_columns(path, self.decode)
-        found = as_mapping(suggest(raw.columns, self.ratio, raw.units))
-        found = found if self.mapping is None else joined_maps(found, self.mapping)
+        found = suggested_map(path, suggest(raw.columns, self.ratio, raw.units), self.mapping)
         errors().print(f"{path} is read so:\n{mapping_text(found)}", style="dim")
         return found
+
+
+def suggested_map(path: Path, found: list[Suggestion], known: ColumnMap | None) -> ColumnMap:
+    """The mapping that is suggested, what is known put over it; ConfigError with the file for a unit that is not
+    known."""
+    try:
+        return as_mapping(found, known)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {line}" for line in error.lines) from None
 
 
 class Reading(Protocol):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from cablecomp.recording.channels import QUANTITIES
-from cablecomp.units import unit_named
+from cablecomp.units import UNITS, Unit, unit_named
 
 
 def _set(words: str) -> frozenset[str]:
@@ -33,6 +34,22 @@ _BEGINS: Final = ("motor", "joint", "actuator", "output", "input", "link")
 _ASKED: Final = _set("cmd command commanded des desired target ref reference setpoint goal sp want")
 _MADE: Final = _set("err error residual raw filtered filt model predicted est estimate")
 _SENSED: Final = _set("wrench ft")
+_REMARKS: Final = _set(
+    "x y z fx fy fz mx my mz left right upper lower measured meas actual act value val signal channel ch "
+    "abs absolute rel relative calibrated corrected avg mean side shaft axis primary secondary"
+)
+_COUNTED: Final = _set("count counts cnt cnts tick ticks raw lsb inc incr increments")
+"""What an encoder may read instead of a unit."""
+_NOTHING: Final = ("-", "1")
+_ALSO_UNITS: Final = _set("in ft m t q w i tick ticks")
+"""Words of names that stand for units, or in them, where a unit is expected."""
+_TOLD: Final = frozenset().union(*_WORDS.values(), *_SIDES.values(), _ASKED, _MADE, _REMARKS)
+_IN_MESSAGE = re.compile(r"[./]\w+\[[^\]]*\]$")
+"""A field of a message, with the name or the number of what it belongs to (`/joint_states.position[wrist]`)."""
+_LIKE_A_UNIT = re.compile(
+    r"[kmcdnuµM]?N[kmcd]?m|(k?gf?|lbs?f?|ozf?)[.·*-]?(ft|in|[cm]?m)|(ft|in|[cm]m)[.·*-]?(k?gf?|lbs?f?|ozf?)"
+    r"|[a-zµ]{0,2}(rad|deg|gon)|days?|weeks?"
+)
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]+?)\s*[\])>}]\s*$")
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _CHANNELS: Final = {
@@ -51,16 +68,21 @@ _CHANNELS: Final = {
 
 
 class NameReading(NamedTuple):
-    """A reading of a column's name: the channel that it may be, how well it fits (0..1), the unit it states."""
+    """A reading of a column's name: the channel that it may be, how well it fits (0..1), the unit it states.
+
+    `unknown`: what stands where a unit does, and is none that is known; `counted`: an encoder's counts stand there.
+    """
 
     channel: str
     fit: float
     unit: str | None
+    unknown: str | None = None
+    counted: bool = False
 
 
 def read_name(column: str) -> list[NameReading]:
     """The channels that a column may be by its name, best first; none if the name tells nothing."""
-    bare, unit = _unit(column)
+    bare, unit, unknown = _unit(column)
     words = _words(bare)
     quantities = [q for q, known in _WORDS.items() if words & known]
     sides = [s for s, known in _SIDES.items() if words & known]
@@ -79,7 +101,9 @@ def read_name(column: str) -> list[NameReading]:
         if quantity == "time" and len(quantities) > 1:
             fit -= 0.2
         if fit > 0.2:
-            found.append(NameReading(channel, min(fit, 1.0), unit))
+            counted = quantity == "position" and (unknown or "").lower() in _COUNTED
+            odd = None if counted else unknown
+            found.append(NameReading(channel, min(fit, 1.0), unit, odd, counted))
     return sorted(found, key=lambda reading: -reading.fit)
 
 
@@ -97,11 +121,13 @@ def _side_fit(side: str, sides: list[str], words: set[str]) -> float:
     return -0.25 if sides else -0.1
 
 
-def _unit(column: str) -> tuple[str, str | None]:
-    """The name without its unit, and the unit: in brackets at the end, or as the last part."""
+def _unit(column: str) -> tuple[str, str | None, str | None]:
+    """The name without its unit, the unit, in brackets at the end or as the last part, and one that is not known."""
     match = _BRACKETS.search(column)
-    if match and _known(match[1]):
-        return column[: match.start()], match[1]
+    if match and not _IN_MESSAGE.search(column):
+        known = next((unit for unit in (match[1], match[1].lower()) if _known(unit, UNITS)), None)
+        if known is not None or not _no_unit(match[1], _TOLD - _ALSO_UNITS):
+            return column[: match.start()], known, match[1] if known is None else None
     tail = column
     for separator in ("_", ".", "-", " ", "/"):
         head, found, last = tail.rpartition(separator)
@@ -109,14 +135,30 @@ def _unit(column: str) -> tuple[str, str | None]:
             continue
         two = head.rpartition(separator)
         if two[1] and two[0] and _known(f"{two[2]}_{last}"):
-            return two[0], f"{two[2]}_{last}"
+            return two[0], f"{two[2]}_{last}", None
         if _known(last) and last not in ("m", "h", "l", "in", "min", "F", "C", "K"):
-            return head, last
-    return column, None
+            return head, last, None
+    return _ends_oddly(column)
 
 
-def _known(unit: str) -> bool:
-    return any(unit_named(unit, table) is not None for table in QUANTITIES.values())
+def _ends_oddly(column: str) -> tuple[str, None, str | None]:
+    """A name that ends in what looks like a unit, or in anything behind its only `/` (`torque/furlong`)."""
+    *before, last = re.split(r"[_ /]", column)
+    head = column[: len(column) - len(last) - 1]
+    behind = "/" in column and "/" not in head and not _no_unit(last, _TOLD)
+    told = any(_words(head) & known for known in _WORDS.values())
+    if before and told and (behind or _LIKE_A_UNIT.fullmatch(last)):
+        return head, None, last
+    return column, None, None
+
+
+def _no_unit(text: str, words: frozenset[str]) -> bool:
+    """Whether what stands where a unit may tells something else: which joint, which end, which of several."""
+    return text in _NOTHING or all(word in words or word.isdigit() for word in _words(text) or {text})
+
+
+def _known(unit: str, tables: Mapping[str, Mapping[str, Unit]] = QUANTITIES) -> bool:
+    return any(unit_named(unit, table) is not None for table in tables.values())
 
 
 def _fits(channel: str, unit: str) -> bool:

@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.recording.channels import CANONICAL
+from cablecomp.errors import ConfigError
+from cablecomp.recording.channels import CANONICAL, QUANTITIES
 from cablecomp.recording.column_names import NameReading, read_name
-from cablecomp.recording.mapping import ColumnMap, Source, column_of, meaning
+from cablecomp.recording.mapping import ColumnMap, Source, column_of, joined_maps, meaning
 from cablecomp.recording.table import FloatArray
 
 _DEGREE: Final = 180.0 / np.pi
@@ -40,12 +41,15 @@ _SURE: Final = 0.3
 
 @dataclass
 class Suggestion:
-    """One channel's source, how sure (0..1), and why, in words."""
+    """One channel's source, how sure (0..1), and why, in words; `unknown`: the unit its name states, if not known;
+    `counted`: it states an encoder's counts."""
 
     channel: str
     source: Source
     sure: float
     why: list[str] = field(default_factory=list)
+    unknown: str | None = None
+    counted: bool = False
 
 
 def suggest(
@@ -66,11 +70,35 @@ def suggest(
     return [found[name] for name in (*CANONICAL, *(n for n in found if n not in CANONICAL)) if name in found]
 
 
-def as_mapping(suggestions: list[Suggestion]) -> ColumnMap:
-    """The suggestions as a mapping; `time_s` means itself, also where it is made by joining messages."""
-    return ColumnMap(
+def as_mapping(suggestions: list[Suggestion], known: ColumnMap | None = None) -> ColumnMap:
+    """The suggestions as a mapping; `time_s` means itself, also where it is made by joining messages.
+
+    What is `known` holds over them. Raises ConfigError for every column taken by its name that states a unit which is
+    not known: what it is in is not guessed.
+    """
+    known = ColumnMap(schema=1) if known is None else known
+    mapped = {source.column for source in known.channel.values()}
+    odd = [s for s in suggestions if s.unknown is not None and s.source.column not in mapped]
+    wrong = [s for s in odd if s.channel not in known.channel]
+    if wrong:
+        raise ConfigError(map(_unknown_unit, wrong))
+    suggested = ColumnMap(
         schema=1,
-        channel={s.channel: s.source for s in suggestions if s.source != Source(column="time_s", unit="s")},
+        channel={
+            s.channel: s.source
+            for s in suggestions
+            if s.unknown is None and s.source != Source(column="time_s", unit="s")
+        },
+    )
+    return joined_maps(suggested, known)
+
+
+def _unknown_unit(s: Suggestion) -> str:
+    column = s.source.column
+    quantity, table = next((q, t) for q, t in QUANTITIES.items() if s.channel == f"{q}_{next(iter(t))}")
+    return (
+        f"column {column!r}: unit {s.unknown!r} is not known; accepted for {quantity} are {', '.join(table)}; "
+        f"give it by --map '{s.channel}={column},unit=..,scale=..', or leave it out by --map 'other_x={column}'"
     )
 
 
@@ -105,7 +133,8 @@ def _named(fit: float, name: str, reading: NameReading) -> Suggestion:
         return Suggestion(own.name, Source(column=name, unit=unit or None), 1.0, ["the name is a channel's"])
     source = Source(column=name, unit=reading.unit)
     stated = f", unit {reading.unit}" if reading.unit else ""
-    return Suggestion(reading.channel, source, reading.fit, [f"by name{stated}"])
+    why = [f"by name{stated}"]
+    return Suggestion(reading.channel, source, reading.fit, why, reading.unknown, reading.counted)
 
 
 def _quantity(channel: str) -> str:
@@ -145,10 +174,11 @@ def _angles(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rati
             continue
         raw = values[here.source.column]
         span = float(np.ptp(raw)) if len(raw) else 0.0
-        if span > 200.0 and np.all(raw == np.round(raw)):
+        if here.counted or (span > 200.0 and np.all(raw == np.round(raw))):
+            what = "encoder counts" if here.counted else f"whole numbers over {span:g}: encoder counts"
             _change(
                 here,
-                f"whole numbers over {span:g}: encoder counts; how many per turn is a guess",
+                f"{what}; how many per turn is a guess",
                 counts_per_rev=4096.0,
             )
             here.sure = min(here.sure, 0.3)
@@ -244,8 +274,11 @@ def _axis(found: dict[str, Suggestion], values: Mapping[str, FloatArray], bent: 
     if best != chosen:
         for channel in [c for c, s in found.items() if s.source.column == best]:
             del found[channel]
-        unit = next(r.unit for r in read_name(best) if r.channel == load.channel)
-        _change(load, f"of {len(alike)} named so, what the joint follows most", column=best, unit=unit)
+        chosen_by = next(r for r in read_name(best) if r.channel == load.channel)
+        load.unknown = chosen_by.unknown
+        _change(
+            load, f"of {len(alike)} named so, what the joint follows most", column=best, unit=chosen_by.unit
+        )
 
 
 def _change(here: Suggestion, why: str, **changes: object) -> None:

@@ -183,11 +183,58 @@ def test_dates_and_times_become_seconds(how: str, tmp_path: Path) -> None:
         ("motorpos", "motor_position_rad", None),
         ("jointtorque_mNm", "joint_torque_Nm", "mNm"),
         ("ft_sensor", "joint_torque_Nm", None),
+        ("load torque [ft-lb]", "joint_torque_Nm", "ft-lb"),
+        ("torque (lb·in)", "joint_torque_Nm", "lb·in"),
+        ("joint torque oz·in", "joint_torque_Nm", "oz·in"),
+        ("joint_torque/cNm", "joint_torque_Nm", "cNm"),
+        ("motor angle [gon]", "motor_position_rad", "gon"),
+        ("motor_position_grad", "motor_position_rad", "grad"),
+        ("joint angle [MDEG]", "joint_position_rad", "mdeg"),
+        ("time_hours", "time_s", "hours"),
+        ("torque (measured)", "joint_torque_Nm", None),
+        ("theta (motor side)", "motor_position_rad", None),
+        ("elbow/position", "joint_position_rad", None),
+        ("/joint_states.position[left_gripper_finger]", "joint_position_rad", None),
     ],
 )
 def test_names_that_people_use_are_understood(column: str, channel: str, unit: str | None) -> None:
     best = read_name(column)[0]
     assert (best.channel, best.unit) == (channel, unit)
+
+
+@pytest.mark.parametrize(
+    ("channel", "column", "unit"),
+    [
+        ("joint_torque_Nm", "load torque [furlong]", "furlong"),
+        ("joint_torque_Nm", "joint_torque_kNcm", "kNcm"),
+        ("joint_torque_Nm", "joint_torque (counts)", "counts"),
+        ("motor_position_rad", "motor_position/blinks", "blinks"),
+        ("motor_position_rad", "motor_position_crad", "crad"),
+        ("time_s", "time [ticks]", "ticks"),
+        ("time_s", "time_days", "days"),
+    ],
+)
+def test_a_unit_that_is_not_known_is_never_guessed(
+    channel: str, column: str, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    true = joint(500)
+    log, out = tmp_path / "a.csv", tmp_path / "out.csv"
+    pl.DataFrame({column if name == channel else name: values for name, values in true.items()}).write_csv(
+        log
+    )
+    for command in (["inspect", str(log), "--save"], ["convert", str(log), str(out), "--map", "auto"]):
+        assert main(command) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert f"{log}: column '{column}': unit '{unit}' is not known; accepted for" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    given = ["--map", "auto", "--map", f"{channel}={column},scale=2"]
+    assert main(["convert", str(log), str(out), *given]) == 0
+    np.testing.assert_allclose(read_all(out).columns[channel], 2.0 * true[channel], atol=1e-12)
+
+
+def test_a_length_is_no_angle() -> None:
+    assert read_name("motor position [mm]") == []
 
 
 @pytest.mark.parametrize("column", ["mode", "battery_voltage", "x", "fault_code", "status"])
