@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ from cablecomp.recording.mapping import (
     FOLDER_MAP,
     ColumnMap,
     find_mapping,
+    foreign_column,
     load_mapping,
     save_mapping,
 )
@@ -43,14 +45,17 @@ def inspect_recording(
     given = reading()
     raw = raw_columns(recording, given.decode)
     known = given.mapping
-    saved = find_mapping(recording)
+    place, saved = recording.parent / FOLDER_MAP, find_mapping(recording)
+    names = (*raw.columns, *raw.left_out)
+    if save and place.is_file():
+        _refuse_another_s(place, recording, names)
     if known is None and saved is not None:
-        known = load_mapping(saved)
+        found_there = load_mapping(saved)
+        known = found_there if foreign_column(found_there, names) is None else None
     ratio = None if config is None else load_joint(config).drive.ratio
     found = suggest(raw.columns, ratio, raw.units)
     mapping = suggested_map(recording, found, known)
     looked = Looked(recording, raw, found, mapping, *_looked_at(recording, mapping, given))
-    place = recording.parent / FOLDER_MAP
     if save:  # before it is shown: a pager may be left early
         save_mapping(
             place,
@@ -63,6 +68,16 @@ def inspect_recording(
         show(looked, console)
     if save:
         (errors() if as_json else console).print(f"saved: {place}", soft_wrap=True)
+
+
+def _refuse_another_s(place: Path, recording: Path, names: Sequence[str]) -> None:
+    """Raise InputError if the mapping at `place` is that of a file of other columns: that one still needs it."""
+    other = foreign_column(load_mapping(place), names)
+    if other is not None:
+        raise InputError(
+            f"{place}: is of another recording (it names column {other!r}, which {path_text(recording)} has not); "
+            "rename it to that recording's name with .map.toml at its end, or remove it, and save anew"
+        )
 
 
 def _looked_at(

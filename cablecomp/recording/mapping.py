@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal, Self
 
@@ -141,6 +141,11 @@ def find_mapping(recording: Path) -> Path | None:
     """The mapping saved for this recording, or for all of its folder; None if there is none."""
     own = recording.with_name(f"{recording.name}.map.toml")
     return next((p for p in (own, recording.parent / FOLDER_MAP) if p.is_file()), None)
+
+
+def foreign_column(mapping: ColumnMap, names: Collection[str]) -> str | None:
+    """A column that a mapping names and a file has not: it is that of another file; None if it has all of them."""
+    return next((s.column for s in mapping.channel.values() if s.column not in names), None)
 
 
 def columns_by(mapping: ColumnMap, names: Sequence[str], units: Mapping[str, str]) -> tuple[Column, ...]:

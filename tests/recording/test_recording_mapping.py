@@ -337,6 +337,35 @@ def test_inspect_shows_suggests_and_saves(tmp_path: Path, capsys: pytest.Capture
     assert answer["quality"]["rate_Hz"] == pytest.approx(1000.0)
 
 
+def test_a_mapping_of_another_file_is_neither_taken_nor_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    true = joint(500)
+    first, second, place = tmp_path / "a.csv", tmp_path / "b.csv", tmp_path / FOLDER_MAP
+    pl.DataFrame({"t_ms": true["time_s"] * 1e3, "m_pos": true["motor_position_rad"]}).write_csv(first)
+    pl.DataFrame({"stamp": true["time_s"], "drive_angle": true["motor_position_rad"]}).write_csv(second)
+    assert main(["inspect", str(first), "--save"]) == 0
+    kept = place.read_text()
+    capsys.readouterr()
+    assert main(["inspect", str(second), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["mapping"]["channel"]["motor_position_rad"]["column"] == "drive_angle"
+    assert answer["quality"]["rate_Hz"] == pytest.approx(1000.0)
+    assert main(["inspect", str(second), "--save"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert (
+        f"{place}: is of another recording (it names column 't_ms', which {second} has not); rename"
+        in said.err
+    )
+    assert place.read_text() == kept
+    place.rename(tmp_path / "a.csv.map.toml")
+    assert main(["inspect", str(second), "--save"]) == 0
+    for path in (first, second):
+        assert read_all(path).columns["motor_position_rad"].tolist() == true["motor_position_rad"].tolist()
+
+
 def test_units_that_the_file_states_count_in_a_suggestion(tmp_path: Path) -> None:
     columns = {"t": np.arange(5.0), "m_pos": np.arange(5.0)}
     found = {s.channel: s.source for s in suggest(columns, units={"t": "ms", "m_pos": "deg"})}
