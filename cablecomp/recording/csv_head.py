@@ -18,6 +18,7 @@ _MOST_COLUMNS: Final = 4096
 _PREAMBLE: Final = 100
 """Lines among which the names are looked for."""
 _SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
+_THOUSANDS: Final = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
 _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
 
 
@@ -85,7 +86,14 @@ def _parse_head(text: bytes) -> Head | None:
     names = (name.strip().strip('"').strip() for name in _cells(lines[header].strip("#\r "), separator))
     columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
     before = [line.strip().lstrip("#").strip() for line in lines[: max(header, first - 1)]]
-    comma = separator != "," and first < len(lines) and "," in lines[first]
+    comma = separator != "," and _decimal_comma(
+        [
+            cell.strip().strip('"')
+            for line in lines[first:]
+            if "," in line or "." in line
+            for cell in _cells(line, separator)
+        ]
+    )
     raw = plain_breaks(text[shift:]).split(b"\n")
     size = shift + sum(len(line) + 1 for line in raw[:first])
     found = Head(columns, tuple(c for c in before if c), separator, comma, header + 1, first + 1, size)
@@ -107,6 +115,13 @@ def _separator(header: str, row: str) -> str:
         return best
     numbers = [_is_number(cell) for cell in row.split()]
     return " " if all(numbers) and len(header.strip("# ").split()) == len(numbers) > 1 else best
+
+
+def _decimal_comma(cells: list[str]) -> bool:
+    """Whether cells that no comma stands between hold decimal commas: of any row, as the first may be whole numbers."""
+    commas = [c for c in cells if "," in c and (_is_number(c.replace(",", ".")) or _DATE.fullmatch(c))]
+    points = any("." in c and _is_number(c) for c in cells)
+    return bool(commas) and not (points and all(map(_THOUSANDS.fullmatch, commas)))
 
 
 def _cells(line: str, separator: str) -> list[str]:

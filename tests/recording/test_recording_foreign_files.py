@@ -107,6 +107,24 @@ def test_what_is_no_recording_is_called_by_its_name(tmp_path: Path) -> None:
     assert refusal(tmp_path / "nothing.mat").endswith("is empty; record or export it anew")
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas_are_seen_though_the_first_rows_are_whole_numbers(
+    separator: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.csv"
+    rows = ["time_s;motor_position_rad;joint_torque_Nm", "0;0;0", "1;0,5;-1,25", "2;1;0"]
+    path.write_text("\n".join(rows).replace(";", separator))
+    columns = read_all(path).columns
+    assert columns["motor_position_rad"].tolist() == [0.0, 0.5, 1.0]
+    assert columns["joint_torque_Nm"].tolist() == [0.0, -1.25, 0.0]
+
+
+def test_commas_between_thousands_are_no_decimal_commas(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time_ms;motor_position_deg\n0;0.5\n1,000;0.7\n")
+    assert "line 3: column 'time_ms' holds '1,000'; a number is expected there" in refusal(path)
+
+
 def test_a_bag_without_its_index_is_told_what_to_give_instead(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     assert "is a directory" in refusal(tmp_path / "bag")
