@@ -19,7 +19,7 @@ _PREAMBLE: Final = 100
 """Lines among which the names are looked for."""
 _SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
 _THOUSANDS: Final = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
-_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
+_DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d([.,]\d+)?(Z|[+-]\d\d:?\d\d)?")
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def _below(head: Head, lines: list[bytes]) -> Head:
 
 def seconds_since(cell: str, day: datetime) -> float | None:
     """Seconds from midnight of `day` (UTC) to a date and time; None if the cell holds none."""
-    text = cell.strip()
+    text = cell.strip().replace(",", ".")
     if not _DATE.fullmatch(text):
         return None
     try:

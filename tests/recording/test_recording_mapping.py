@@ -160,6 +160,16 @@ def test_dates_and_times_become_seconds(how: str, tmp_path: Path) -> None:
     assert np.diff(time) == pytest.approx([2.5e-7, 1.00000025], abs=1e-11)
 
 
+def test_dates_may_have_a_decimal_comma(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "when;motor_position_rad\n2024-03-30 23:59:59,500;0,0\n2024-03-31T00:00:00,250;0,5\n", "utf-8"
+    )
+    columns = read_all(path, mapping_from(["time_s=when"])).columns
+    assert np.diff(columns["time_s"]) == pytest.approx([0.75])
+    assert columns["motor_position_rad"].tolist() == [0.0, 0.5]
+
+
 @pytest.mark.parametrize(
     ("column", "channel", "unit"),
     [
