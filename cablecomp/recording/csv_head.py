@@ -17,7 +17,7 @@ _HEAD_LEAST, _HEAD_LIMIT = 1 << 16, 1 << 20
 _MOST_COLUMNS: Final = 4096
 _PREAMBLE: Final = 100
 """Lines among which the names are looked for."""
-_SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab"}
+_SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 _THOUSANDS: Final = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
 _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d([.,]\d+)?(Z|[+-]\d\d:?\d\d)?")
 
@@ -27,7 +27,7 @@ class Head:
     """What stands before the first row: `first_line` is the line of the first row, counted from 1.
 
     `units`: those of a row of units below the names. `dates`: columns that hold dates and times (ISO 8601), read
-    as seconds since midnight of `day`.
+    as seconds since midnight of `day`. `trailing`: a separator stands behind the last cell of a row.
     """
 
     columns: tuple[str, ...]
@@ -39,6 +39,7 @@ class Head:
     size: int
     units: tuple[str, ...] = ()
     dates: frozenset[str] = frozenset()
+    trailing: bool = False
     day: datetime = datetime(1970, 1, 1)
 
 
@@ -83,7 +84,12 @@ def _parse_head(text: bytes) -> Head | None:
         return None
     header, first = _header_at(lines, kept)
     separator = _separator(lines[header], lines[first] if first < len(lines) else "")
-    names = (name.strip().strip('"').strip() for name in _cells(lines[header].strip("#\r "), separator))
+    names = [name.strip().strip('"').strip() for name in _cells(lines[header].strip("#\r "), separator)]
+    row = next(
+        (line for line in lines[first : first + 2] if _numeric(line)), ""
+    )  # below a row of units, if any
+    trailing = _ends_empty(row, separator, len(names) - (names[-1] == ""))
+    names = names[:-1] if trailing and names[-1] == "" else names
     columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
     before = [line.strip().lstrip("#").strip() for line in lines[: max(header, first - 1)]]
     comma = separator != "," and _decimal_comma(
@@ -97,7 +103,7 @@ def _parse_head(text: bytes) -> Head | None:
     raw = plain_breaks(text[shift:]).split(b"\n")
     size = shift + sum(len(line) + 1 for line in raw[:first])
     found = Head(columns, tuple(c for c in before if c), separator, comma, header + 1, first + 1, size)
-    return _below(found, raw[first : first + 2])
+    return _below(replace(found, trailing=trailing), raw[first : first + 2])
 
 
 def _text(raw: bytes) -> str:
@@ -148,7 +154,15 @@ def _header_at(lines: list[str], kept: list[int]) -> tuple[int, int]:
 def _alike(names: str, row: str) -> bool:
     """Whether a line may name the cells of a row: as many, and more than one."""
     separator = _separator(names, row)
-    return len(_cells(names, separator)) == len(_cells(row, separator)) > 1
+    cells, below = _cells(names, separator), _cells(row, separator)
+    whole = [len(c) - (not c[-1].strip()) for c in (cells, below)]  # without a separator behind the last cell
+    return len(cells) == len(below) > 1 or whole[0] == whole[1] > 1
+
+
+def _ends_empty(row: str, separator: str, count: int) -> bool:
+    """Whether a row holds this number of cells and one more behind them, which is empty."""
+    *cells, last = _cells(row, separator) or [""]
+    return len(cells) == count and not last.strip()
 
 
 def _numeric(line: str) -> bool:
@@ -160,6 +174,8 @@ def _numeric(line: str) -> bool:
 def _below(head: Head, lines: list[bytes]) -> Head:
     """Take in a row of units, if there is one, and look for dates in the first row."""
     rows = [[cell.strip().strip('"') for cell in _cells(_text(line), head.separator)] for line in lines]
+    if head.trailing:
+        rows = [row[:-1] if len(row) > len(head.columns) else row for row in rows]
     if rows and len(rows[0]) == len(head.columns) and any(rows[0]) and all(map(_is_unit, rows[0])):
         units = tuple(cell.strip("[]()") for cell in rows.pop(0))
         first_line, size = head.first_line + 1, head.size + len(lines[0]) + 1
@@ -188,6 +204,13 @@ def seconds_since(cell: str, day: datetime) -> float | None:
     whole = (at.replace(microsecond=0) - day).total_seconds()
     fraction = re.search(r"\.\d+", text)
     return whole + (float(fraction[0]) if fraction else 0.0)
+
+
+def odd_unit(cells: list[str]) -> str | None:
+    """Of what seems to be a row of units, the one that is not known; None if it is no such row."""
+    texts = [cell.strip().strip('"') for cell in cells]
+    odd = [text for text in texts if not _is_unit(text)]
+    return odd[0] if 0 < len(odd) < len([t for t in texts if t]) and not any(map(_is_number, texts)) else None
 
 
 def _is_unit(cell: str) -> bool:

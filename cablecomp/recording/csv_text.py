@@ -14,7 +14,7 @@ import polars as pl
 
 from cablecomp.counting import counted
 from cablecomp.errors import InputError
-from cablecomp.recording.csv_head import Head, number, plain_breaks, read_head, seconds_since
+from cablecomp.recording.csv_head import Head, number, odd_unit, plain_breaks, read_head, seconds_since
 from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source import Piece, Truncated, ahead, chunks
 from cablecomp.recording.table import FloatArray
@@ -107,6 +107,10 @@ class _Parser:
         text = text.replace(b'"', b"") if b'"' in text else text
         if self.head.separator == " ":
             text = _BLANKS.sub(b" ", _AT_ENDS.sub(b"", text))
+        if self.head.trailing:
+            text = re.sub(
+                rb"%b[ \t]*$" % re.escape(self.head.separator.encode()), b"", text, flags=re.MULTILINE
+            )
         if self.head.decimal_comma:
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)
@@ -170,8 +174,11 @@ class _Parser:
             cell = cells[self.head.columns.index(name)]
             value = seconds_since(cell, self.head.day) if name in self.head.dates else number(cell)
             if value is None:
+                odd = odd_unit(cells) if self.head.first_line == line == self.head.header_line + 1 else None
+                units = "" if odd is None else f" (of a row of units, {_shown(odd)} is not known)"
                 raise InputError(
-                    f"{where}: column {name!r} holds {_shown(cell)}{ending or '; a number is expected there'}"
+                    f"{where}: column {name!r} holds {_shown(cell)}"
+                    f"{ending or f'; a number is expected there{units}'}"
                 )
             values.append(value)
         return values

@@ -72,13 +72,14 @@ def _stacked(path: Path, table: RawTable, names: tuple[str, ...]) -> dict[str, F
 
 def _numeric(path: Path, table: RawTable) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The columns that hold numbers, and those that do not, tried one by one on the first rows."""
-    good, bad = [], []
+    good, bad, causes = [], [], []
     for name in table.names:
         try:
             next(iter(table.read((name,))), None)
             good.append(name)
-        except InputError:
+        except InputError as error:
             bad.append(name)
+            causes.append(str(error).removeprefix(f"{path}: "))
     if not good:
-        raise InputError(f"{path}: no column holds numbers")
+        raise InputError(f"{path}: no column holds numbers: {causes[0]}")
     return tuple(good), tuple(bad)

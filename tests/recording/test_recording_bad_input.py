@@ -89,7 +89,7 @@ CASES: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "row of no units": (
         "a.csv",
         _replaced(b"\n0,", b"\ns,rad,furlong\n0,"),
-        ("line 2", "'time_s' holds 's'"),
+        ("line 2", "'time_s' holds 's'", "of a row of units, 'furlong' is not known"),
     ),
     "a date that is none": (
         "a.csv",

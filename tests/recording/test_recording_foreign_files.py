@@ -16,6 +16,7 @@ import scipy.io
 from cablecomp.errors import InputError
 from cablecomp.recording.can_log import Frame
 from cablecomp.recording.mapping import mapping_from
+from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import open_recording, read_all
 from cablecomp.recording.suggest import suggest
 
@@ -123,6 +124,46 @@ def test_commas_between_thousands_are_no_decimal_commas(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time_ms;motor_position_deg\n0;0.5\n1,000;0.7\n")
     assert "line 3: column 'time_ms' holds '1,000'; a number is expected there" in refusal(path)
+
+
+@pytest.mark.parametrize("head", ["time_s,motor_position_rad", "time_s,motor_position_rad,"])
+@pytest.mark.parametrize("units", ["", "s,rad\n", "s,rad,\n"])
+def test_a_separator_behind_every_row_is_no_column(head: str, units: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"{head}\n{units}0,1,\n1,2,\n2,3,\n")
+    columns = read_all(path).columns
+    assert {n: v.tolist() for n, v in columns.items()} == {
+        "time_s": [0.0, 1.0, 2.0],
+        "motor_position_rad": [1.0, 2.0, 3.0],
+    }
+    path.write_text(f"{head}\n{units}0,1,\n1,\n2,3,\n")
+    line = 3 + bool(units)
+    assert f"line {line}: has 1 cell where the header names 2 columns" in refusal(path)
+
+
+def test_bars_stand_between_cells_too(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time_s|motor_position_rad\n0|1\n1|2\n")
+    assert read_all(path).columns["motor_position_rad"].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("t,q\n0,1,2\n1,2,3\n", "line 2: has 3 cells where the header names 2 columns"),
+        ("t:q\n0:1\n1:2\n", "line 2: column 't:q' holds '0:1'"),
+        (
+            "t,q\ns,furlong\n0,1\n",
+            "line 2: column 't' holds 's'; a number is expected there (of a row of units, ",
+        ),
+    ],
+)
+def test_a_file_without_a_column_of_numbers_says_where_and_why(text: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        raw_columns(path)
+    assert f"{path}: no column holds numbers: {says}" in str(caught.value)
 
 
 def test_a_bag_without_its_index_is_told_what_to_give_instead(tmp_path: Path) -> None:
