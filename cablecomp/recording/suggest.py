@@ -103,9 +103,9 @@ def _unknown_unit(s: Suggestion) -> str:
 
 
 def _by_names(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> list[Suggestion]:
-    """Give each channel the column whose name fits best; each column once."""
+    """Give each channel the column whose name fits best; each column once, and none without a reading."""
     offers: list[tuple[float, int, str, NameReading]] = []
-    for k, name in enumerate(columns):
+    for k, name in enumerate(n for n, values in columns.items() if np.any(np.isfinite(values))):
         own = meaning(name)
         if own is not None and own.name in CANONICAL:
             offers.append((2.0, k, name, NameReading(own.name, 1.0, None)))

@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from message_files import Cdr
+from springy_joint import joint
 
 from cablecomp.cli.app import main
+from cablecomp.recording.reader import read_all
 from cablecomp.recording.ros_messages import DYNAMIC_JOINT_STATES, JOINT_STATES, TYPES, RosRows
 
 ROW = {
@@ -88,6 +91,21 @@ def test_a_converted_recording_is_read_by_others_and_by_us(tmp_path: Path) -> No
     ours, theirs = (np.genfromtxt(tmp_path / n, delimiter=",", names=True) for n in ("b.csv", "a.csv"))
     for name in theirs.dtype.names:
         assert ours[name] == pytest.approx(theirs[name], abs=1e-9)
+
+
+def test_what_is_suggested_of_joint_states_reads_them_though_some_hold_no_reading(tmp_path: Path) -> None:
+    pytest.importorskip("mcap", reason="optional package mcap is not installed")
+    pytest.importorskip("rosbags", reason="optional package rosbags is not installed")
+    true = joint(400)
+    del true["motor_torque_Nm"]
+    pl.DataFrame(true).write_csv(tmp_path / "a.csv")
+    assert main(["convert", str(tmp_path / "a.csv"), str(tmp_path / "a.mcap"), "--ros2"]) == 0
+    assert main(["convert", str(tmp_path / "a.mcap"), str(tmp_path / "b.csv"), "--map", "auto"]) == 0
+    assert main(["inspect", str(tmp_path / "a.mcap"), "--save"]) == 0
+    for read in (read_all(tmp_path / "b.csv").columns, read_all(tmp_path / "a.mcap").columns):
+        assert not [name for name in read if "velocity" in name or name == "motor_torque_Nm"]
+        for name, values in true.items():
+            np.testing.assert_allclose(read[name], values, atol=1e-9, err_msg=name)
 
 
 def test_ros_messages_go_into_mcap_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
