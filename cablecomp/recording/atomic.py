@@ -6,7 +6,7 @@ import itertools
 import os
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from cablecomp.durable import replace_durably
@@ -63,7 +63,8 @@ def atomic_file(path: Path | str) -> Iterator[Path]:
         yield temporary
         replace_durably(temporary, path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # where there is no such folder, there is no file either
+            temporary.unlink()
         raise InputError(f"{path}: cannot be written ({_why(error)}); choose another place") from None
     except BaseException:
         temporary.unlink(missing_ok=True)

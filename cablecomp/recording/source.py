@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import stat
 import threading
 import zlib
 from collections.abc import Iterator
@@ -70,6 +71,10 @@ def identify(path: Path) -> Opened:
     if (path / "metadata.yaml").is_file():
         return Opened("bag", False)
     try:
+        if not (stat.S_ISREG(mode := path.stat().st_mode) or stat.S_ISDIR(mode)):
+            raise InputError(
+                f"{path}: is a pipe or a device; write what comes from it to a file, and give that"
+            )
         with path.open("rb") as file:
             head = file.read(_SNIFF)
     except IsADirectoryError:

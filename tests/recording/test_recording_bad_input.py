@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import os
 from pathlib import Path
 
 import numpy as np
@@ -150,6 +151,15 @@ def test_missing_file_and_directory_are_named(tmp_path: Path) -> None:
         read_all(tmp_path / "none.csv")
     with pytest.raises(InputError, match="is a directory"):
         read_all(tmp_path)
+
+
+def test_a_pipe_is_told_that_a_file_is_needed(tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(
+        InputError, match=f"{path}: is a pipe or a device; write what comes from it to a file"
+    ):
+        read_all(path)
 
 
 @pytest.mark.parametrize("row", [0, 1, 70_000, 299_999])

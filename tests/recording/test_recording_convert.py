@@ -109,3 +109,14 @@ def test_matlab_files_of_both_kinds_read_alike(tmp_path: Path) -> None:
         ).columns
         for name in ("time_s", "motor_position_rad", "joint_position_rad"):
             assert columns[name].tobytes() == true[name].tobytes(), path
+
+
+def test_a_file_is_no_folder_to_write_into(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "a.csv"
+    log.write_text("time_s,motor_position_rad\n0,0\n1,1\n")
+    for ending in ("csv", "parquet"):
+        assert main(["convert", str(log), str(log / f"x.{ending}")]) == 2
+        said = capsys.readouterr().err
+        assert said == (
+            f"cablecomp: {log / f'x.{ending}'}: cannot be written (Not a directory); choose another place\n"
+        )
