@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from itertools import count
@@ -122,8 +122,15 @@ def run(
     """Control a joint over a link, real or simulated; ends with a timing report and a recording that
     `replay` accepts.
     """
+    if comparison:
+        others = {
+            "--protocol": protocol, "--mode": mode, "--resume": resume, "--fault": fault, "--nominal": nominal,
+            "--live": live, "--view": view, "--plotjuggler": plotjuggler, "--no-bounds": not bounds,
+            "--without-drive-timeout": without_drive_timeout,
+        }  # fmt: skip
+        _goes_with_compare([name for name, given in others.items() if given], duration)
     joint = read_joint(config, effects)
-    bus, wanted = _bus_and_control(link, control, joint, None if comparison else mode, sim=sim)
+    bus, wanted = _bus_and_control(link, control, joint, mode, sim=sim)
     if comparison:
         from cablecomp.cli.demo import compare_controllers  # brings the plant
 
@@ -150,6 +157,19 @@ def run(
             watch = watch if beside is None else beside.watch
             report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
         _finish(report, joint, config, beside, as_json)
+
+
+def _goes_with_compare(others: Sequence[str], duration: float | None) -> None:
+    """Raise InputError for options that a comparison would ignore, and a duration too short for a motion."""
+    if others:
+        raise InputError(
+            f"run: {', '.join(others)} cannot go with --compare, which asks for its own motions of simulated joints; "
+            "leave it out, or run without --compare"
+        )
+    if duration is not None and duration <= 3.0:
+        raise InputError(
+            f"run: --duration {duration:g} leaves --compare no motion, as its last 3 s lead back; give more than 3"
+        )
 
 
 def _bus_and_control(

@@ -19,6 +19,7 @@ from cablecomp.runtime.simulated import SimulationWish
 
 CONTROL = CONFIGS / "control/wrist-capstan.toml"
 LINK = CONFIGS / "links/wrist-virtual.toml"
+COMPARE = ("run", "--config", str(JOINT), "--sim", "--compare")
 
 
 def simulated(joint: Path = JOINT, control: Path | None = CONTROL, **options: object) -> list[str]:
@@ -58,6 +59,18 @@ def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
         (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
         (["run", "--config", str(JOINT), "--sim", "--fast", "--fault", "gremlins"], "gremlins"),
         (["run", "--config", str(JOINT), "--link", str(LINK), "--fast"], "--sim"),
+        ([*COMPARE, "--fault", "foo"], "--fault cannot go with --compare"),
+        (
+            [*COMPARE, "--protocol", "nope", "--resume", "nope"],
+            "--protocol, --resume cannot go with --compare",
+        ),
+        ([*COMPARE, "--mode", "force"], "--mode cannot"),
+        (
+            [*COMPARE, "--nominal", "--live", "--view", "--plotjuggler"],
+            "--nominal, --live, --view, --plotjuggler",
+        ),
+        ([*COMPARE, "--no-bounds"], "--no-bounds cannot"),
+        ([*COMPARE, "--duration", "2"], "--duration 2 leaves --compare no motion"),
         (["design", "--config", str(JOINT), "--rate", "-5"], "-5"),
         (["fly"], "fly"),
     ],
