@@ -8,13 +8,14 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import JsonOption, console, echo_json
+from cablecomp.cli.shared import JsonOption, console, echo_json, warn
 from cablecomp.cli.sources import RatioOption, Reading, reads_recordings
 from cablecomp.config import load_joint
 from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
 from cablecomp.recording.progress import progress_bar
+from cablecomp.report.inspection import missing_channels
 
 
 @reads_recordings
@@ -39,6 +40,7 @@ def convert_recording(
     source = reading(None if config is None else load_joint(config)).open(recording)
     with progress_bar(f"convert {recording.name}") as progress:
         rows = convert(source, to, (begin, end), progress, dict(map(_late, late or ())), ros)
+    warn(missing_channels(source.channels))
     if as_json:
         echo_json({"written": to, "rows": rows, "channels": source.channels, "notes": source.notes})
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -34,6 +35,12 @@ class Looked(NamedTuple):
     why: str
 
 
+def missing_channels(channels: Sequence[str]) -> list[str]:
+    """A line that names the channels without which nothing can be compared, if any are missing."""
+    missing = [name for name in _NEEDED if name not in channels]
+    return [f"missing: {', '.join(missing)}; which columns are they?"] if missing else []
+
+
 def show(looked: Looked, console: Console) -> None:
     """Print what was found: columns and what they may mean, quality, remarks, the mapping."""
     raw, mapping, seen = looked.raw, looked.mapping, looked.seen
@@ -52,9 +59,8 @@ def show(looked: Looked, console: Console) -> None:
         console.print(f"not yet a recording: {looked.why}", style="yellow")
     else:
         _show_quality(seen, console)
-        missing = [name for name in _NEEDED if name not in {c.name for c in seen.channels}]
-        if missing:
-            console.print(f"missing: {', '.join(missing)}; which columns are they?", style="yellow")
+        for line in missing_channels([c.name for c in seen.channels]):
+            console.print(line, style="yellow")
     for note in looked.notes:
         console.print(f"note: {note}")
     console.print("\nmapping:\n" + mapping_text(mapping))

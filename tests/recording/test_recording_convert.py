@@ -120,3 +120,13 @@ def test_a_file_is_no_folder_to_write_into(tmp_path: Path, capsys: pytest.Captur
         assert said == (
             f"cablecomp: {log / f'x.{ending}'}: cannot be written (Not a directory); choose another place\n"
         )
+
+
+def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, to = tmp_path / "a.csv", tmp_path / "b.csv"
+    pl.DataFrame({"t": [0.0, 0.1, 0.2], "joint angle": [0.0, 0.1, 0.0]}).write_csv(log)
+    assert main(["convert", str(log), str(to), "--map", "auto", "--json"]) == 0
+    assert "missing: motor_position_rad, joint_torque_Nm; which columns are they?" in capsys.readouterr().err
+    pl.DataFrame(joint(10)).write_csv(log)
+    assert main(["convert", str(log), str(to)]) == 0
+    assert capsys.readouterr().err == ""
