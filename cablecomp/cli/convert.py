@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +14,7 @@ from cablecomp.config import load_joint
 from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.recording.convert import convert
+from cablecomp.recording.csv_head import number
 from cablecomp.recording.progress import progress_bar
 from cablecomp.report.inspection import missing_channels
 
@@ -37,6 +38,10 @@ def convert_recording(
     as_json: JsonOption = False,
 ) -> None:
     """Write a recording in canonical channels: SI units, our signs, one clock."""
+    if not begin <= end:
+        raise InputError(
+            f"--from {begin:g} --to {end:g}: a time, and none before it, in seconds are accepted"
+        )
     source = reading(None if config is None else load_joint(config)).open(recording)
     with progress_bar(f"convert {recording.name}") as progress:
         rows = convert(source, to, (begin, end), progress, dict(map(_late, late or ())), ros)
@@ -51,9 +56,9 @@ def convert_recording(
 
 def _late(word: str) -> tuple[str, float]:
     channel, _, text = word.partition("=")
-    try:
-        return channel.strip(), float(text)
-    except ValueError:
-        raise InputError(
-            f"--late {word}: CHANNEL=SECONDS is accepted, such as joint_torque_Nm=0.04"
-        ) from None
+    seconds = number(text)
+    if seconds is None or not isfinite(seconds):
+        raise InputError(f"--late {word}: CHANNEL=SECONDS is accepted, such as joint_torque_Nm=0.04")
+    if channel.strip() == "time_s":
+        raise InputError(f"--late {word}: time_s is the clock that others are late by; give another channel")
+    return channel.strip(), seconds

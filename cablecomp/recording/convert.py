@@ -70,8 +70,12 @@ def _set_right(source: Recording, late_s: Mapping[str, float]) -> Iterator[Block
         whole[name] = np.interp(time + late, time, whole[name])
     latest, earliest = max(*late_s.values(), 0.0), min(*late_s.values(), 0.0)
     first, last = np.searchsorted(time, [time[0] - earliest, time[-1] - latest], side="left")
-    if last > first:
-        yield Block(1, {n: v[first:last] for n, v in whole.items()}, 1.0)
+    if last <= first:
+        said = ", ".join(f"{name}={late:g}" for name, late in late_s.items())
+        raise InputError(
+            f"{source.path}: lasts {time[-1] - time[0]:g} s, of which --late {said} leaves no row; give less"
+        )
+    yield Block(1, {n: v[first:last] for n, v in whole.items()}, 1.0)
 
 
 class _Counted:

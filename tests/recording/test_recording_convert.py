@@ -130,3 +130,30 @@ def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest
     pl.DataFrame(joint(10)).write_csv(log)
     assert main(["convert", str(log), str(to)]) == 0
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--late", "time_s=0.04"], "--late time_s=0.04: time_s is the clock"),
+        (["--late", "joint_torque_Nm=nan"], "--late joint_torque_Nm=nan: CHANNEL=SECONDS is accepted"),
+        (["--late", "joint_torque_Nm=inf"], "--late joint_torque_Nm=inf: CHANNEL=SECONDS is accepted"),
+        (["--late", "joint_torque_Nm="], "--late joint_torque_Nm=: CHANNEL=SECONDS is accepted"),
+        (
+            ["--late", "joint_torque_Nm=1e9"],
+            "a.csv: lasts 0.009 s, of which --late joint_torque_Nm=1e+09 leaves no",
+        ),
+        (["--from", "nan"], "--from nan --to inf: a time, and none before it, in seconds"),
+        (["--to", "nan"], "--from -inf --to nan: a time"),
+        (["--from", "2", "--to", "1"], "--from 2 --to 1: a time"),
+    ],
+)
+def test_a_time_that_cannot_be_is_refused_by_its_option(
+    words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pl.DataFrame(joint(10)).write_csv(tmp_path / "a.csv")
+    assert main(["convert", str(tmp_path / "a.csv"), str(tmp_path / "b.csv"), *words]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert says in said
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
