@@ -15,8 +15,8 @@ def out_option(words: str) -> Any:
     return typer.Option("--out", callback=writable, help=words)
 
 
-def writable(out: Path | None) -> Path | None:
-    """The folder; raises InputError if it can be none that is written into."""
+def writable(option: typer.CallbackParam, out: Path | None) -> Path | None:
+    """The folder of an option; raises InputError if it can be none that is written into."""
     if out is not None:
-        check_directory(out)
+        check_directory(out, option.opts[0])
     return out

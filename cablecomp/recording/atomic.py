@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -41,17 +42,28 @@ def atomic_directory(out: Path | str, renewed: Sequence[str] = ()) -> Iterator[P
         raise
 
 
-def check_directory(out: Path) -> None:
-    """Raise InputError if `out` can be no directory that files are written into; nothing is made."""
+def check_directory(out: Path, option: str = "--out") -> None:
+    """Raise InputError if `out`, the value of an option, can be no directory that files are written into; nothing is
+    left there."""
     for place in (out, *out.absolute().parents):
         if place.is_dir():
             if not os.access(place, os.W_OK | os.X_OK):
                 raise InputError(f"{out}: may not be written; choose another directory")
+            try:
+                os.rmdir(
+                    tempfile.mkdtemp(prefix=".cablecomp-", dir=place)
+                )  # the system may say no all the same
+            except OSError as error:
+                raise InputError(
+                    f"{out}: cannot be written ({_why(error)}); choose another directory"
+                ) from None
             return
         if os.path.lexists(place):
             what = "is a file" if place.exists() else "is a link that leads nowhere"
             where = "" if place == out else f"{place} "
-            raise InputError(f"{out}: {where}{what}; --out takes a directory, which is made if it is missing")
+            raise InputError(
+                f"{out}: {where}{what}; {option} takes a directory, which is made if it is missing"
+            )
 
 
 @contextmanager

@@ -133,6 +133,29 @@ def test_a_folder_that_cannot_be_one_is_refused_before_any_work(
     assert taken.read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.parametrize(("command", "option"), [("info", "--figures"), ("design", "--out")])
+def test_the_option_that_takes_a_folder_is_named(
+    command: str, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    assert main([command, "--config", "wrist-capstan", option, str(taken)]) == 2
+    assert f"{taken}: is a file; {option} takes a directory" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", OUTS)
+def test_a_folder_that_the_system_refuses_is_refused_before_any_work(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if not Path("/proc/self").is_dir():
+        pytest.skip("there is no folder here that takes no file whoever writes it")
+    assert main([name, *OUTS[name], "--out", "/proc/foo"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("cablecomp: /proc/foo: ")
+    assert "written" in said
+    assert "choose another directory" in said
+
+
 def test_a_packed_recording_with_an_unpacked_name_is_taken_and_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
