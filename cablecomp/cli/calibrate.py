@@ -47,7 +47,7 @@ def calibrate_joint(
 ) -> None:
     """What the drive's values are, with honest intervals: EA, pretension, friction, ratio, zeros; old -> new."""
     joint = read_joint(config, effects)
-    data = read_moving(recordings, reading(joint))
+    data = read_moving(recordings, reading(joint), "calibration")
     announce_compilation()
     doubted = believe_all(joint, data)
     with share_bar() as progress:

@@ -84,7 +84,7 @@ def diagnose_recordings(
         work_fleet("diagnose", recordings, config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)
-    data = read_moving(recordings, reading(joint))
+    data = read_moving(recordings, reading(joint), "diagnosis")
     announce_compilation()
     doubted = believe_all(joint, data)
     with share_bar() as progress, forks_allowed():

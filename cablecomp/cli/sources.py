@@ -106,12 +106,17 @@ def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:
     return with_options
 
 
-def read_moving(recordings: Sequence[Path], reading: Sources) -> dict[str, Columns]:
+def read_moving(recordings: Sequence[Path], reading: Sources, what: str) -> dict[str, Columns]:
     """Channels of every recording that these files and folders hold, by path; raises InputError for one without
-    motion."""
+    motion, or without a channel that `what` is done with them needs."""
+    from cablecomp.estimation.evidence import NEEDED  # brings solvers: only where recordings are fitted
+
     data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
     for name, columns in data.items():
-        require_motion({"joint_position_rad": columns.get("joint_position_rad", columns["time_s"])}, name)
+        missing = next((key for key in NEEDED if key not in columns), None)
+        if missing is not None:
+            raise InputError(f"{name}: channel `{missing}` is missing; a {what} needs {', '.join(NEEDED)}")
+        require_motion({"joint_position_rad": columns["joint_position_rad"]}, name)
     return data
 
 

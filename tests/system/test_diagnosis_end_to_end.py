@@ -149,16 +149,18 @@ def test_a_joint_that_rests_wherever_it_is_read_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("command", "words"), [("diagnose", "a diagnosis needs"), ("calibrate", "a calibration needs")]
+)
 def test_a_missing_channel_is_one_line_and_leaves_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    command: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "bare.csv"
     write_canonical(path, {"time_s": np.arange(50.0), "motor_position_rad": np.zeros(50)})
-    code = main(
-        ["diagnose", str(path), "--config", str(joint_file(tmp_path)), "--out", str(tmp_path / "out")]
-    )
+    code = main([command, str(path), "--config", str(joint_file(tmp_path)), "--out", str(tmp_path / "out")])
     assert code == 2
-    assert "joint_position_rad" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"{path}: channel `joint_position_rad` is missing; {words} time_s, motor" in said
     assert not (tmp_path / "out").exists()
 
 
