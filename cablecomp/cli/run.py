@@ -155,7 +155,8 @@ def run(
             watch = last.enter_context(_onlookers(joint, out, shown.watch, view, plotjuggler, said))
             beside = LiveRun(joint, bus.rate_Hz, out, watch, stepped=fast) if live else None
             watch = watch if beside is None else beside.watch
-            report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
+            with _named(resume):
+                report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
         _finish(report, joint, config, beside, as_json)
 
 
@@ -170,6 +171,17 @@ def _goes_with_compare(others: Sequence[str], duration: float | None) -> None:
         raise InputError(
             f"run: --duration {duration:g} leaves --compare no motion, as its last 3 s lead back; give more than 3"
         )
+
+
+@contextmanager
+def _named(snapshot: Path | None) -> Iterator[None]:
+    """What is wrong with a snapshot is said of its file."""
+    try:
+        yield
+    except InputError as error:
+        if snapshot is None or not str(error).startswith("snapshot: "):
+            raise
+        raise InputError(f"{snapshot}: {error}") from None
 
 
 def _bus_and_control(

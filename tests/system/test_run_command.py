@@ -59,6 +59,10 @@ def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
         (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
         (["run", "--config", str(JOINT), "--sim", "--fast", "--fault", "gremlins"], "gremlins"),
         (["run", "--config", str(JOINT), "--link", str(LINK), "--fast"], "--sim"),
+        (
+            ["run", "--config", str(JOINT), "--sim", "--fast", "--resume", str(JOINT)],
+            f"cablecomp: {JOINT}: snapshot: is none of ours",
+        ),
         ([*COMPARE, "--fault", "foo"], "--fault cannot go with --compare"),
         (
             [*COMPARE, "--protocol", "nope", "--resume", "nope"],
