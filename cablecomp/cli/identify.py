@@ -31,7 +31,9 @@ def identify(
 ) -> None:
     """True and acting coefficient of friction from a bench recording, the thesis's way."""
     joint = read_joint(config, effects)
-    bench = bench_recording(reading(joint).read(recording).columns, joint)
+    source = reading(joint)
+    source.check(recording)
+    bench = bench_recording(source.read(recording).columns, joint)
     found = evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)
     if as_json:
         echo_json(found)

@@ -43,6 +43,7 @@ def inspect_recording(
 ) -> None:
     """What a recording holds: columns and what they may mean, rate, gaps, stuck or clipped sensors, noise."""
     given = reading()
+    given.check(recording)
     raw = raw_columns(recording, given.decode)
     known = given.mapping
     place, saved = recording.parent / FOLDER_MAP, find_mapping(recording)

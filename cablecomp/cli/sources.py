@@ -7,19 +7,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Protocol, get_type_hints
+from typing import Annotated, Any, Protocol, get_args, get_type_hints
 
 import typer
 
 from cablecomp.cli.shared import errors
 from cablecomp.config import JointConfig
 from cablecomp.errors import ConfigError, InputError, path_text
-from cablecomp.recording.can_log import DecodeFrame, by_dbc
+from cablecomp.recording.can_log import CanKind, DecodeFrame, by_dbc
 from cablecomp.recording.folder import find_recordings
 from cablecomp.recording.inspection import require_motion
 from cablecomp.recording.mapping import ColumnMap, joined_maps, load_mapping, mapping_from, mapping_text
 from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import Recording, open_recording, read_all
+from cablecomp.recording.source import identify
 from cablecomp.recording.suggest import Suggestion, as_mapping, suggest
 from cablecomp.recording.table import FloatArray, Table
 
@@ -51,8 +52,16 @@ class Sources:
     decode: Callable[[], DecodeFrame] | None
     ratio: float | None
 
+    def check(self, path: Path) -> None:
+        """Raise InputError if it is said what the frames of a file mean that is no CAN log."""
+        if self.decode is not None and identify(path).kind not in get_args(CanKind):
+            raise InputError(
+                f"{path}: is no CAN log, which --link, --dbc and --joint are for; leave them out"
+            )
+
     def open(self, path: Path) -> Recording:
         """Open one recording; see `open_recording`."""
+        self.check(path)
         return open_recording(path, self._mapping(path), self.decode)
 
     def read(self, path: Path, gaps: bool = False) -> Table:
@@ -111,6 +120,9 @@ def read_moving(recordings: Sequence[Path], reading: Sources, what: str) -> dict
     motion, or without a channel that `what` is done with them needs."""
     from cablecomp.estimation.evidence import NEEDED  # brings solvers: only where recordings are fitted
 
+    for path in recordings:
+        if path.is_file():  # in a folder, CAN logs may lie beside other recordings
+            reading.check(path)
     data = {path_text(path): reading.read(path, gaps=True).columns for path in find_recordings(recordings)}
     for name, columns in data.items():
         missing = next((key for key in NEEDED if key not in columns), None)
@@ -128,6 +140,8 @@ def sources(
     config: JointConfig | None = None,
 ) -> Sources:
     """Sources from the options of a command; raises InputError for what does not fit together."""
+    if joint is not None and link is None:
+        raise InputError("--joint says which joint of a link file: give that with --link, or leave it out")
     if link is not None and dbc is not None:
         raise InputError("--link and --dbc say the same: give one of them")
     decode: Callable[[], DecodeFrame] | None = None

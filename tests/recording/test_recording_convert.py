@@ -12,6 +12,7 @@ from springy_joint import joint
 
 from cablecomp.cli.app import main
 from cablecomp.errors import InputError
+from cablecomp.examples import example
 from cablecomp.recording.mapping import mapping_from
 from cablecomp.recording.reader import open_recording, read_all
 
@@ -153,6 +154,27 @@ def test_a_time_that_cannot_be_is_refused_by_its_option(
 ) -> None:
     pl.DataFrame(joint(10)).write_csv(tmp_path / "a.csv")
     assert main(["convert", str(tmp_path / "a.csv"), str(tmp_path / "b.csv"), *words]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert says in said
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--link", "wrist-virtual"], "a.csv: is no CAN log, which --link, --dbc and --joint are for"),
+        (["--joint", "foo"], "--joint says which joint of a link file"),
+    ],
+)
+@pytest.mark.parametrize("command", ["convert", "inspect", "calibrate", "identify"])
+def test_what_frames_of_a_bus_mean_is_said_of_no_other_file(
+    command: str, words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pl.DataFrame(joint(10)).write_csv(tmp_path / "a.csv")
+    given = {"convert": [str(tmp_path / "b.csv")], "inspect": []}.get(command, ["--config", "wrist-capstan"])
+    words = [str(example("links", w)) if w == "wrist-virtual" else w for w in words]
+    assert main([command, str(tmp_path / "a.csv"), *given, *words]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert says in said
