@@ -62,7 +62,7 @@ def convert(
 
 def _set_right(source: Recording, late_s: Mapping[str, float]) -> Iterator[Block]:
     """The whole recording as one block, late channels moved to where they belong."""
-    source.require(late_s, "which is said to be late")
+    source.require(late_s, "as --late sets it right")
     parts = [block.columns for block in source.blocks()]
     whole = {n: np.concatenate([p[n] for p in parts]) for n in source.channels}
     time = whole["time_s"]

@@ -139,6 +139,10 @@ def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest
         (["--late", "time_s=0.04"], "--late time_s=0.04: time_s is the clock"),
         (["--late", "joint_torque_Nm=nan"], "--late joint_torque_Nm=nan: CHANNEL=SECONDS is accepted"),
         (["--late", "joint_torque_Nm=inf"], "--late joint_torque_Nm=inf: CHANNEL=SECONDS is accepted"),
+        (
+            ["--late", "nope=0.04"],
+            "a.csv: has no column nope, needed as --late sets it right; found: time_s, ",
+        ),
         (["--late", "joint_torque_Nm="], "--late joint_torque_Nm=: CHANNEL=SECONDS is accepted"),
         (
             ["--late", "joint_torque_Nm=1e9"],
