@@ -23,6 +23,7 @@ def show_guide(
 ) -> None:
     """Read the guide: recordings, diagnosis, hardware and safety, effects of your own, figures, reference."""
     console = Console()
+    text = None if name is None else text_of(name)  # before anything is written
     if html is not None:
         from cablecomp.guide.page import guide_page  # brings the look of all pages, and so plotly
 
@@ -31,8 +32,8 @@ def show_guide(
         except OSError as error:
             raise InputError(f"{html}: cannot be written ({error.strerror}); give another file") from None
         console.print(f"guide: {html}", soft_wrap=True)
-    if name is not None:
-        console.print(Markdown(text_of(name)))
+    if text is not None:
+        console.print(Markdown(text))
     elif html is None:
         table = Table(show_header=False, box=None)
         for each in names():

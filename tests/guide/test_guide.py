@@ -23,9 +23,12 @@ def test_every_topic_is_listed_and_shown(name: str, capsys: pytest.CaptureFixtur
     assert "not run" not in said
 
 
-def test_an_unknown_topic_names_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["guide", "cooking"]) == 2
+def test_an_unknown_topic_names_those_there_are_and_leaves_no_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["guide", "cooking", "--html", str(tmp_path / "guide.html")]) == 2
     assert "hardware" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 class _Page(HTMLParser):
