@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from cablecomp import examples
 from cablecomp.cli.folders import out_option
-from cablecomp.cli.shared import JsonOption, echo_json
+from cablecomp.cli.shared import JsonOption, Output, echo_json
 from cablecomp.errors import InputError
 from cablecomp.recording.atomic import atomic_file
 
@@ -25,7 +24,7 @@ def copy_example(
     as_json: JsonOption = False,
 ) -> None:
     """Copy out a configuration that comes with the project: a joint, a link, a controller; or list them."""
-    console = Console(markup=False, emoji=False)
+    console = Output(markup=False, emoji=False)
     if name is None:
         listed = {
             f"{kind}/{each}": _about(examples.example(kind, each))

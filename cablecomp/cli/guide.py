@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markdown import Markdown
 from rich.table import Table
 
+from cablecomp.cli.shared import Output
 from cablecomp.durable import write_durably
 from cablecomp.errors import InputError
 from cablecomp.guide.topics import names, text_of, title_of
@@ -22,7 +22,7 @@ def show_guide(
     ] = None,
 ) -> None:
     """Read the guide: recordings, diagnosis, hardware and safety, effects of your own, figures, reference."""
-    console = Console()
+    console = Output()
     text = None if name is None else text_of(name)  # before anything is written
     if html is not None:
         from cablecomp.guide.page import guide_page  # brings the look of all pages, and so plotly

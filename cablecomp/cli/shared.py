@@ -28,7 +28,16 @@ if TYPE_CHECKING:
 
 DEMO_LINK = "wrist-virtual"
 
-console = Console(markup=False, emoji=False)
+
+class Output(Console):
+    """Standard output; whoever reads it may leave early, which is no error."""
+
+    def on_broken_pipe(self) -> None:
+        """Leave it to the program's end (`app.main`): by itself, rich ends it with 1."""
+        raise BrokenPipeError
+
+
+console = Output(markup=False, emoji=False)
 """Prints what it is given: a name or a path may look like markup."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import os
 import re
 import subprocess
 import sys
@@ -166,6 +167,21 @@ def test_a_packed_recording_with_an_unpacked_name_is_taken_and_said(
     out = str(tmp_path / "out")
     assert main(["replay", str(packed), "--config", "wrist-capstan", "--no-bounds", "--out", out]) == 0
     assert "note: is gzip although it is named .csv; read unpacked" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words", [["inspect", "a.csv"], ["guide"], ["example"], ["info", "--config", "wrist-capstan"]]
+)
+def test_who_has_read_enough_makes_no_error(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time_s,motor_position_rad\n0,0\n1,1\n2,0\n")
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "cablecomp.cli", *words]
+    done = subprocess.run(
+        command, stdout=writer, stderr=subprocess.PIPE, cwd=tmp_path, timeout=120, check=False
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_an_effect_that_there_is_not_is_told_with_the_file_and_the_nearest(
