@@ -71,7 +71,7 @@ class Case:
 class Outcome:
     """What is made of a search.
 
-    `weighed`: every effect of its model; `named`: those that are sure enough, what moves the joint most first. `kept`:
+    `weighed`: every effect of its model; `named`: those that are sure enough, in order (`in_order`). `kept`:
     the model to go by, without effects where none is named; `laws`: laws without a name beside it. `baseline`,
     `augmented`: errors of the calibrated drive, and of what is kept. `remainder`: what that leaves; `repeated_rad`:
     what the machine itself repeats; `structured`: what is left is more than noise.

@@ -12,17 +12,16 @@ from cablecomp.diagnosis.answer.augmented import (
     with_tolerances_of,
 )
 from cablecomp.diagnosis.answer.entries import (
-    by_the_clock,
     candidates,
     channel_word,
     named_of,
     next_experiment,
-    notes,
     remainder,
     tested,
     tied_of,
     traces,
 )
+from cablecomp.diagnosis.answer.notes import by_the_clock, notes
 from cablecomp.diagnosis.answer.values import as_trials_say, drive_values
 from cablecomp.diagnosis.answer.verdict import not_carried, warnings_of
 from cablecomp.diagnosis.calibration.drive import own_in_vain
