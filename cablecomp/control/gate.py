@@ -175,15 +175,17 @@ def gate(
     if cut:
         flags |= RATE_LIMITED
     fast, most = limits.velocity_max_rad_s, limits.torque_max_Nm
-    slow, weak = _within(v, 0.0, fast), _within(tau, 0.0, most)
+    slow, weak, up, down = _within(v, 0.0, fast), _within(tau, 0.0, most), fast, -fast
     if limits.tells_position:
-        edge = wire.position.step
-        up = 0.0 if position >= high - edge or motor_position_rad >= high else fast
-        down = 0.0 if position <= low + edge or motor_position_rad <= low else -fast
+        edge = wire[0][1]
+        if position >= high - edge or motor_position_rad >= high:
+            up = 0.0
+        if position <= low + edge or motor_position_rad <= low:
+            down = 0.0
     else:
-        room = high - motor_position_rad, motor_position_rad - low
-        up, down = max(room[0], 0.0) / BRAKE_S, -max(room[1], 0.0) / BRAKE_S
-        if (room[0] <= 0.0 < weak) or (room[1] <= 0.0 and weak < 0.0):
+        above, below = high - motor_position_rad, motor_position_rad - low
+        up, down = min(max(above, 0.0) / BRAKE_S, fast), -min(max(below, 0.0) / BRAKE_S, fast)
+        if (above <= 0.0 < weak) or (below <= 0.0 and weak < 0.0):
             weak, flags = 0.0, flags | POSITION_LIMITED
     if not down <= slow <= up:
         slow, flags = up if slow > up else down, flags | POSITION_LIMITED
@@ -196,7 +198,7 @@ def gate(
     )
     if cut:
         flags |= RATE_LIMITED
-    slow = _carried(slow, max(down, -fast), min(up, fast), wire.velocity) or 0.0
+    slow = _carried(slow, down, up, wire.velocity) or 0.0
     return SafeCommand(position, slow, torque, flags, spare_rad, spare_Nm)
 
 
