@@ -46,7 +46,8 @@ class GateLimits:
 
     Position target rate in rad/s, torque feed-forward rate in Nm/s; `age_s` is that of the motor position.
     `wire`: what the message can carry, so that the limits hold for what is read off the wire.
-    `tells_position`: the drive is told a position; else its limits hold by where the motor is.
+    `tells_position`: the drive is told a position; else its limits hold by where the motor is. `balance_Nm`: the torque
+    under which the motor stays where it is, an open circuit's pretension held.
     """
 
     position_min_rad: float = -inf
@@ -59,6 +60,7 @@ class GateLimits:
     age_s: float = 0.1
     wire: Wire = ANY_WIRE
     tells_position: bool = True
+    balance_Nm: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("velocity_max_rad_s", "torque_max_Nm", "position_rate_rad_s", "torque_rate_Nm_s"):
@@ -151,7 +153,8 @@ def gate(
     and last, so that nothing overrules it, by rate: `|q - q_before| <= rate period`, whatever the motor is
     said to be at; velocity and torque by magnitude, torque by rate. At a limit of position no velocity leads
     on: a drive follows it beyond, by its damping over its stiffness. A drive that is told no position gets
-    no more velocity than brings it to the limit within `BRAKE_S`, and at it no torque that leads on. What
+    no more velocity than brings it to the limit within `BRAKE_S`, and at it no torque that leads on, beyond
+    what holds an open circuit's pretension. What
     comes out is what the wire carries, so all of it holds there. `before`: the last command that was sent;
     `age_s`: age of `motor_position_rad`.
     """
@@ -185,8 +188,9 @@ def gate(
     else:
         above, below = high - motor_position_rad, motor_position_rad - low
         up, down = min(max(above, 0.0) / BRAKE_S, fast), -min(max(below, 0.0) / BRAKE_S, fast)
-        if (above <= 0.0 < weak) or (below <= 0.0 and weak < 0.0):
-            weak, flags = 0.0, flags | POSITION_LIMITED
+        even = _within(limits.balance_Nm, 0.0, most)
+        if (above <= 0.0 and weak > even) or (below <= 0.0 and weak < even):
+            weak, flags = even, flags | POSITION_LIMITED
     if not down <= slow <= up:
         slow, flags = up if slow > up else down, flags | POSITION_LIMITED
     if slow != v:

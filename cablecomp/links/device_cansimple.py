@@ -214,7 +214,7 @@ class CanSimpleDrive:
             frame, clipped = cansimple.set_input_vel(self._node, velocity_rad_s * self._to_turns_s, torque)
         else:
             frame, clipped = cansimple.set_input_torque(self._node, torque)
-        return Outgoing((frame, *self._polled), clipped)
+        return Outgoing((frame,), clipped, self._polled)
 
     def wire(self) -> Wire:
         """See `Drive.wire`; feed-forwards beside a position are int16 thousandths, all else is float32."""

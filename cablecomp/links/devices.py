@@ -41,10 +41,12 @@ class Claim(NamedTuple):
 
 
 class Outgoing(NamedTuple):
-    """Frames of one command, and the CLIP_* bits of what had to be saturated."""
+    """Frames of one command, the CLIP_* bits of what had to be saturated, and frames that go along and ask for readings
+    alone."""
 
     frames: tuple[Frame, ...]
     clipped: int
+    asking: tuple[Frame, ...] = ()
 
 
 class Drive(Protocol):

@@ -77,8 +77,8 @@ class Link(Protocol):
         """Ask a drive to change state; False = the bus did not take it, None = the protocol has no such request."""
 
     def stop(self) -> bool:
-        """Ask every drive to let go, by the quickest way that it has; never raises; False = a frame was not
-        taken."""
+        """Ask every drive to let go, by the quickest way that it has; never raises; False = there is one for which the
+        bus has taken no such request since its last command."""
 
     def sync(self, step: int) -> bool:
         """Send the step counter (u32, little-endian) on `sync_id`: a simulated bus in stepped time takes one
@@ -131,6 +131,8 @@ class BusLink:
         self._ignored = 0
         self._sent = 0
         self._clipped = 0
+        self._told: set[int] = set()
+        self._next_stop = 0
 
     def open(self) -> None:
         """See `Link.open`."""
@@ -156,13 +158,17 @@ class BusLink:
         drive, readings = self._drives[joint], self.joints[joint]
         if drive is None:
             raise InputError(f"joint `{readings.name}` has no motor on this link; add [joint.motor]")
-        frames, clipped = drive.command(command)
+        frames, clipped, asking = drive.command(command)
         self._clipped += clipped != 0
+        if self._told:
+            self._told.discard(joint)
         for identifier, data in frames:
             if self._port.send(identifier, data):
                 self._sent += 1
             else:
                 clipped |= NOT_TAKEN
+        for identifier, data in asking:
+            self._sent += self._port.send(identifier, data)
         readings.sent += 1
         readings.unanswered += 1
         return clipped
@@ -189,14 +195,20 @@ class BusLink:
         return all(taken) if taken else None
 
     def stop(self) -> bool:
-        """See `Link.stop`; both the stop and the disable request go out, for drives that know only one."""
-        done = True
-        for joint, drive in enumerate(self._drives):
-            if drive is not None:
-                stopped = self.request(joint, Request.STOP)
-                disabled = self.request(joint, Request.DISABLE)
-                done = done and bool(stopped or disabled)
-        return done
+        """See `Link.stop`; both the stop and the disable request go out, for drives that know only one. Where the bus
+        takes only some of them, those that it did not take are first the next time."""
+        drives = [j for j, drive in enumerate(self._drives) if drive is not None]
+        wanted = [(j, r) for r in (Request.STOP, Request.DISABLE) for j in drives]
+        wanted = wanted[self._next_stop :] + wanted[: self._next_stop]
+        refused = None
+        for k, (joint, request) in enumerate(wanted):
+            taken = self.request(joint, request)
+            if taken:
+                self._told.add(joint)
+            elif taken is False and refused is None:
+                refused = k
+        self._next_stop = 0 if refused is None else (self._next_stop + refused) % len(wanted)
+        return len(self._told) == len(drives)
 
     def sync(self, step: int) -> bool:
         """See `Link.sync`; raises InputError if the configuration names no `sync_id`."""

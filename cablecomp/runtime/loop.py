@@ -96,7 +96,7 @@ class Loop:
         self._stage_s = options.begin_s
         self._armed_s = 0.0
         self._asked_to_stop = ""
-        self._watched = False  # to the end of the time after a stop
+        self._told = False  # every drive, that it has to let go
         self._unread = ((0, 0), (0, 0))
 
     @property
@@ -160,7 +160,6 @@ class Loop:
             for joint in self.joints:
                 joint.keep(tick.now_s)
             if done:
-                self._watched = True
                 return
 
     def _tick(self, tick: Tick) -> bool:
@@ -173,7 +172,7 @@ class Loop:
         elif self.stage is RunStage.RUNNING:
             self._run(tick)
         else:
-            self.link.stop()
+            self._told = self.link.stop()
             for joint in self.joints:
                 joint.stand(now)
             return now - self._stage_s >= self.options.after_s
@@ -314,7 +313,7 @@ class Loop:
     def _close(self) -> None:
         """Stop command, whatever happened; then the link and every log, each one tried."""
         try:
-            if self.stage is not RunStage.STOPPING or not self._watched:
+            if self.stage is not RunStage.STOPPING or not self._told:
                 self._stop_for_sure()
             if self.stage is not RunStage.STOPPING:
                 self.stop_reason = self.stop_reason or "ended by an error"

@@ -157,7 +157,11 @@ def joint_setup(
     motor = link.joint[c.place].motor
     tells_position = motor is None or motor.mode in (Mode.POSITION, Mode.IMPEDANCE)
     limits = GateLimits.of(
-        c.config.limits, bus.wire(c.place), tells_position=tells_position, age_s=times.motor_stop_s
+        c.config.limits,
+        bus.wire(c.place),
+        tells_position=tells_position,
+        age_s=times.motor_stop_s,
+        balance_Nm=-compensator.preload_Nm,
     )
     return JointSetup(c.place, c.name, config, compensator, health, limits, times, references)
 

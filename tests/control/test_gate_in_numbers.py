@@ -182,6 +182,26 @@ def test_a_drive_that_is_told_no_position_is_held_by_where_the_motor_is(
     assert safe.flags == flags
 
 
+@pytest.mark.parametrize(
+    ("motor", "asked", "passed"),
+    [
+        (3.0, -2.0, -2.0),
+        (3.0, 0.0, -1.2),
+        (3.0, -1.1, -1.2),
+        (-3.0, -1.2, -1.2),
+        (-3.0, -1.4, -1.2),
+        (-3.0, 0.5, 0.5),
+    ],
+)
+def test_what_holds_an_open_circuits_pretension_leads_nowhere(
+    motor: float, asked: float, passed: float
+) -> None:
+    """Balance is at -1.2 Nm: at the upper limit no more than that passes, at the lower one no less."""
+    limits = replace(FREE, tells_position=False, balance_Nm=-1.2)
+    safe = gate(Command(motor, 0.0, asked), SafeCommand(motor, 0.0, 0.0, 0), motor, 0.0, T, limits)
+    assert safe.motor_torque_Nm == passed
+
+
 def test_after_a_command_that_never_went_out_there_is_none() -> None:
     safe = gate(Command(0.1, 0.0, 0.0), SafeCommand(nan, 0.0, 0.0, 0), 0.1, 0.0, T, LIMITS)
     assert safe.flags == NOT_FINITE

@@ -141,6 +141,21 @@ def test_a_stop_that_the_bus_does_not_take_is_said_again_where_a_run_ends_by_an_
     assert not mit.joint.enabled
 
 
+def test_a_stop_that_the_bus_does_not_take_for_as_long_as_is_watched_is_said_on(
+    mit: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two requests a tick for 0.1 s, none of them taken, and some more."""
+    over = [False]
+    refusing(monkeypatch, first_ones(230, lambda i, d: over[0] and i == 1))
+
+    def watch(loop: Loop, tick: Tick) -> None:
+        over[0] = over[0] or loop.since_s > 0.0485
+
+    assert mit.run(0.05, watch=watch).stop_reason == "time is over"
+    mit.joint.hear()
+    assert not mit.joint.enabled
+
+
 def test_a_drive_left_enabled_is_asked_to_let_go_until_the_bus_takes_it(
     odrive: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
