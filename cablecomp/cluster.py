@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context, parent_process
+from socket import create_connection
 from threading import Thread
 from typing import Any, Final, Generic, TypeVar
 
@@ -129,9 +130,15 @@ def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address
     try:
         from distributed import Client
         from distributed import as_completed as completed
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError:
         raise InputError("--scheduler needs Dask: pip install 'cablecomp[cluster]'") from None
     try:
+        scheme, place = parse_address(address)
+        if scheme not in ("tcp", "tls"):
+            raise ValueError("tcp://HOST:PORT and tls://HOST:PORT are accepted")
+        # a client that gets no answer would be waited for once more as it goes
+        create_connection(parse_host_port(place), CONNECT_S).close()
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         words = str(error).partition("\n")[0]

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from errno import EISDIR
 from pathlib import Path
 
 
 def write_durably(path: Path, data: bytes) -> None:
     """Write a file whole, in the place of one that may be there; raises OSError and leaves the old one."""
+    if not path.name:
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
     temporary = path.with_name(f".{path.name}.partial-{os.getpid()}")
     try:
         temporary.write_bytes(data)

@@ -89,6 +89,9 @@ def first_line(place: str) -> str:
     return " ".join((ast.get_docstring(found) or "").split("\n\n")[0].split())
 
 
+INTERRUPTED = 130
+"""Exit code of a command that was stopped by Ctrl-C."""
+
 app = typer.Typer(
     cls=Commands,
     help="Real-time hysteresis compensator for cable-driven joints.",
@@ -122,7 +125,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
     try:
         code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed from the start
+            sys.stdout.flush()
+        if code == INTERRUPTED:
+            return _fail("stopped by the user", INTERRUPTED)
         return code if isinstance(code, int) else 0
     except ConfigError as error:
         return max(_fail(line, 2) for line in error.lines)
@@ -135,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CablecompError as error:
         return _fail(str(error), 4)
     except (KeyboardInterrupt, typer.Abort):  # the latter where a question is answered by Ctrl-C or Ctrl-D
-        return _fail("stopped by the user", 130)
+        return _fail("stopped by the user", INTERRUPTED)
     except BrokenPipeError:  # whoever read our output has enough
         _drop_output()
         return 0
@@ -171,7 +177,7 @@ def _misused(error: Exception, said: str) -> str:
 
 def _drop_output() -> None:
     """Let nothing more be tried on a standard output that took no more."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, AttributeError):
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, sys.stdout.fileno())
         os.close(nothing)

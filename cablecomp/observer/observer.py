@@ -211,8 +211,14 @@ class Observer:
             self._bounds.forget()
 
     def stiffness(self) -> float:
-        """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded."""
-        return 1.0 / self._joint.compliance()
+        """Present tangent stiffness dM/dtheta [N m/rad] of the drive, in the direction last loaded; raises InputError
+        before the first sample, which has loaded it in none."""
+        compliance = self._joint.compliance()
+        if not compliance > 0.0:
+            raise InputError(
+                f"{self.config.name}: no sample has been taken yet; step one, then ask its stiffness"
+            )
+        return 1.0 / compliance
 
     def merge_error_rad(self) -> float:
         """Bound [rad] on the error of the present deflection that merging of profile pieces can have made."""

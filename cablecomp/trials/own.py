@@ -7,7 +7,6 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -26,6 +25,7 @@ from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.curves import Concealed, Curves, curves, score_concealed
 from cablecomp.trials.run import (
     JOINT_FILE,
+    PIECES,
     Announce,
     Diagnose,
     Job,
@@ -39,7 +39,7 @@ from cablecomp.trials.run import (
 from cablecomp.trials.sealed import SEALED, check_seal, read_sealed
 from cablecomp.trials.shares import write_json
 
-PIECES, SCORED = "pieces", "concealed.json"
+SCORED = "concealed.json"
 Columns = Mapping[str, FloatArray]
 Conceal = Callable[[Path, "OwnWish", Path, Callable[[int, int], None]], str]
 """Reads pieces of recordings, writes public trials and sealed truths into a folder; returns the SHA-256 of the
@@ -111,9 +111,7 @@ def _conceal(own: Own, wish: OwnWish, tell: Tell) -> str:
             write_joint(folder / JOINT_FILE, joint_of_piece(own.joint, drawn))
         return own.conceal(pieces, wish, own.out, lambda done, of: tell("concealing", done, of))
     except InputError:
-        shutil.rmtree(pieces)
-        with suppress(OSError):  # it holds something else
-            own.out.rmdir()
+        shutil.rmtree(pieces, ignore_errors=True)
         raise
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
@@ -23,7 +23,8 @@ from cablecomp.recording.reader import read_all
 from cablecomp.trials.sealed import SEALED, digest
 from cablecomp.trials.shares import write_json
 
-COMMITMENT, PUBLIC, VERDICTS, RECORDINGS = "commitment.json", "trials", "verdicts", "recordings"
+COMMITMENT, BEGUN = "commitment.json", "concealing.json"
+PUBLIC, VERDICTS, RECORDINGS, PIECES = "trials", "verdicts", "recordings", "pieces"
 JOINT_FILE = "joint.toml"
 
 Tell = Callable[[str, int, int], None]
@@ -65,20 +66,50 @@ class Place:
 def committed(out: Path, wanted: Mapping[str, Any], conceal: Callable[[], str]) -> str:
     """Conceal the trials, or find them concealed already; returns the SHA-256 that was committed to.
 
-    Raises InputError if the folder holds another run, or what was written is not what was announced.
+    What is wanted is written before anything is concealed: what a run left that was stopped meanwhile goes on for the
+    same wish alone, and what stands there by itself is nobody's to replace. Raises InputError if the folder holds
+    another run, or what was written is not what was announced.
     """
-    path = out / COMMITMENT
+    path, begun = out / COMMITMENT, out / BEGUN
     if path.exists():
-        found = json.loads(path.read_text())
-        sha256: str = found.pop("sha256")
-        if found != dict(wanted):
+        found = _read(path)
+        sha256 = found.pop("sha256", None)
+        if found != dict(wanted) or not isinstance(sha256, str):
             raise InputError(f"{out}: holds another run ({found}); give another folder with --out")
         return sha256
-    sha256 = conceal()
+    if begun.exists():
+        if (found := _read(begun)) != dict(wanted):
+            raise InputError(
+                f"{out}: holds another run's beginning ({found}); give another folder with --out"
+            )
+    elif there := next((name for name in (PUBLIC, SEALED, VERDICTS, PIECES) if (out / name).exists()), None):
+        raise InputError(f"{out / there}: is there already, and of no run; give another folder with --out")
+    else:
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(begun, dict(wanted))
+    try:
+        sha256 = conceal()
+    except InputError:  # nothing of it is left
+        begun.unlink(missing_ok=True)
+        with suppress(OSError):  # it holds something else
+            out.rmdir()
+        raise
     if digest(out / SEALED) != sha256:
         raise InputError(f"{out / SEALED}: is not what its SHA-256 says; run again in another folder")
     write_json(path, {**wanted, "sha256": sha256})
+    begun.unlink(missing_ok=True)
     return sha256
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """What a run wrote of itself; raises InputError for what none did."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        found = None
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: is nothing that a run wrote; give another folder with --out")
+    return found
 
 
 Job = tuple[Diagnose, Path, Sequence[Path], Path]

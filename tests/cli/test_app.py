@@ -209,3 +209,19 @@ def test_who_waits_for_a_compiler_is_told_so_first(
     first, last = capsys.readouterr().err.splitlines()
     assert first.startswith("compiling the kernels, once for this version")
     assert last == "cablecomp: the compiler would begin here"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell that closes an output before a command begins")
+@pytest.mark.parametrize("words", ["--version", "--help", "guide"])
+def test_a_closed_output_is_no_error(words: str) -> None:
+    command = f"exec '{sys.executable}' -m cablecomp.cli {words} >&-"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("place", [".", "/"])
+def test_a_folder_for_a_file_is_said(place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["guide", "--html", place]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"cablecomp: {place}: cannot be written")
+    assert len(said.splitlines()) == 1

@@ -123,3 +123,12 @@ def test_a_temperature_that_creeps_up_to_what_breaks_a_cable_leaves_the_way_back
             refused.append(k)
     assert refused
     assert refused == list(range(refused[0], 2000))
+
+
+def test_a_stiffness_before_the_first_sample_is_of_no_direction() -> None:
+    observer = Observer(joint("closed"))
+    with pytest.raises(InputError, match="no sample has been taken yet"):
+        observer.stiffness()
+    observer.step(Sample(0.0, 0.0, 0.0))
+    observer.step(Sample(0.1, 0.0, 0.1))
+    assert observer.stiffness() > 0.0
