@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from math import expm1, inf, isfinite, isnan, nan, pi
+from math import expm1, inf, isfinite, isnan, nan, pi, remainder
+from typing import Final
+
+_AGREEING: Final = 3
+_INTERVALS: Final = 5.0
+_PATIENCE_S: Final = 1.0
+_SLOWEST_S: Final = 12.0
+"""The longest interval that counts as usual, and what is taken for it before readings have told."""
+_SHARE: Final = 0.25
+"""Of the newest interval in the usual one."""
 
 
 class Channel:
@@ -68,11 +77,18 @@ class Channel:
 
 
 class Seldom(Channel):
-    """A channel that may come seldom: `held` while what came last was turned down (`hold`), which counts as old
-    (`age_s`) from `confirm_s` on, or from when the next two readings should have come, at the pace of the last two.
+    """A channel that may come seldom: `held` while what came last was turned down (`hold`).
+
+    How far a value may lie grows with the time since the last accepted one; an angle (`turn`: its period) is as far as
+    the shorter way round. A level further away is believed once three readings in a row, over no less than
+    `confirm_s`, lie within `floor` of the one before: what was wrong is then the value that was held.
+
+    `old_from_s`: when it begins to count as old. Turned down, from `confirm_s` on, or from when the next two readings
+    should have come, at the pace of the last two; silent, after five of its usual intervals, which are taken for long
+    until some have come, and no less than 1 s.
     """
 
-    __slots__ = ("_confirm_s", "_old_from_s", "held")
+    __slots__ = ("_agreeing", "_confirm_s", "_level", "_pace_s", "_since_s", "_turn", "held", "old_from_s")
 
     def __init__(
         self,
@@ -82,21 +98,62 @@ class Seldom(Channel):
         confirm_s: float,
         most: float = inf,
         least: float | None = None,
+        turn: float = inf,
     ) -> None:
         super().__init__(rate, floor, hold_s, most, least)
         self._confirm_s = confirm_s
-        self._old_from_s = inf
+        self._turn = turn
+        self._agreeing = 0
+        self._level = self._since_s = nan
+        self._pace_s = _SLOWEST_S
+        self.old_from_s = inf
         self.held = False
+
+    def take(self, value: float, arrived_s: float) -> bool:
+        """Judge one new value that came at `arrived_s`; False = turned down."""
+        if not self._least < value < self._most:
+            self._agreeing = 0
+            self.suspect = True
+            self.refused += 1
+            return False
+        waited = arrived_s - self.arrived_s
+        step, reach = value - self.value, self._rate * waited + self._floor
+        if abs(step) > reach and self._apart(step) > reach and not self._agrees(value, arrived_s):
+            self.suspect = True
+            self.refused += 1
+            return False
+        if step:
+            self.changed_s = arrived_s
+        self.suspect = self.held = False
+        self.value, self.arrived_s, self._agreeing = value, arrived_s, 0
+        self._pace_s += _SHARE * ((waited if waited < _SLOWEST_S else _SLOWEST_S) - self._pace_s)
+        patience = _INTERVALS * self._pace_s
+        self.old_from_s = arrived_s + (patience if patience > _PATIENCE_S else _PATIENCE_S)
+        return True
+
+    def _apart(self, step: float) -> float:
+        """How far a step goes, an angle's the shorter way round."""
+        return abs(remainder(step, self._turn)) if isfinite(step) else inf
+
+    def _agrees(self, value: float, arrived_s: float) -> bool:
+        """Whether a value far from the last accepted one is the last of enough that agree."""
+        if self._agreeing and self._apart(value - self._level) <= self._floor:
+            self._agreeing += 1
+        else:
+            self._agreeing, self._since_s = 1, arrived_s
+        self._level = value
+        return self._agreeing >= _AGREEING and arrived_s - self._since_s >= self._confirm_s
 
     def hold(self, arrived_s: float) -> None:
         """Note that the value that came at `arrived_s` was turned down."""
         if not self.held:
-            self._old_from_s = arrived_s + max(self._confirm_s, 2.5 * (arrived_s - self.arrived_s))
+            waited = 0.0 if isnan(self.value) else arrived_s - self.arrived_s
+            self.old_from_s = min(self.old_from_s, arrived_s + max(self._confirm_s, 2.5 * waited))
             self.held = True
 
     def age_s(self, now_s: float) -> float:
-        """For how long it has counted as old that readings were turned down (0 = it does not)."""
-        return max(now_s - self._old_from_s, 0.0) if self.held else 0.0
+        """For how long it has counted as old that readings were turned down, or stayed out (0 = it does not)."""
+        return max(now_s - self.old_from_s, 0.0)
 
 
 class Sustained:

@@ -4,7 +4,7 @@ each other.
 
 from __future__ import annotations
 
-from math import expm1, inf, isnan, nan
+from math import expm1, inf, isnan, nan, tau
 from typing import Final, NamedTuple
 
 from cablecomp.control.options import HealthOptions
@@ -228,9 +228,7 @@ class Health:
             n = updates[place]
             if n != further.seen:
                 further.seen = n
-                if further.take(values[place], arrived[place]):
-                    further.held = False
-                else:
+                if not further.take(values[place], arrived[place]):
                     further.hold(arrived[place])
                     values[place] = further.value
             if further.held:
@@ -262,7 +260,8 @@ class Health:
             "_Nm": (o.torque_rate_Nm_s, _TORQUE_FLOOR_Nm),
         }
         found = next((limit for unit, limit in rates.items() if channel.endswith(unit)), (inf, 0.0))
-        return Seldom(*found, hold_s, o.confirm_s)
+        turn = tau if channel.endswith("_rad") else inf
+        return Seldom(*found, hold_s, o.confirm_s, turn=turn)
 
     def _encoders(self, now_s: float, predicted_rad: float, target_rad: float) -> int:
         flags, limit, motor = 0, self._o.joint_residual_rad, self.motor

@@ -7,7 +7,7 @@ from math import exp, inf, nan
 
 import pytest
 
-from cablecomp.runtime.channel import Channel, Latency, Shaking, Sustained
+from cablecomp.runtime.channel import Channel, Latency, Seldom, Shaking, Sustained
 
 T = 1.0 / 1024.0
 
@@ -66,6 +66,39 @@ def test_the_first_value_is_taken_wherever_it_is() -> None:
     assert (channel.arrived_s, channel.changed_s, channel.suspect) == (-inf, -inf, False)
     assert channel.seen == 0
     assert channel.take(12345.0, 7.0)
+
+
+@pytest.mark.parametrize(("moved", "taken"), [(0.125 + 6.0, True), (0.125 + 6.01, False)])
+def test_what_is_seldom_may_have_moved_since_its_last_good_value_by_rate_times_time(
+    moved: float, taken: bool
+) -> None:
+    channel = Seldom(2.0, 0.125, T, 1.0, 100.0)
+    assert channel.take(1.0, 0.0)
+    for k in (1.0, 2.0):
+        assert not channel.take(nan, k)
+    assert channel.take(1.0 + moved, 3.0) is taken
+
+
+def test_a_level_takes_three_readings_in_a_row_that_agree() -> None:
+    """However far apart they come; what is no number, and what is out of range, breaks the row."""
+    channel = Seldom(1e-6, 0.125, T, 0.5, 100.0)
+    assert channel.take(1.0, 0.0)
+    for k, value in enumerate((9.0, 9.1, 9.3, 9.3, nan, 9.3, 9.3, 500.0, 9.3, 9.4, 1e308, -1e308, inf)):
+        assert not channel.take(value, k + 1.0)
+    assert [channel.take(value, 20.0 + k) for k, value in enumerate((9.3, 9.2, 9.1))] == [False, False, True]
+    assert channel.value == 9.1
+
+
+def test_readings_that_agree_have_to_last() -> None:
+    channel = Seldom(1e-6, 0.125, T, 8.0 * T, 100.0)
+    assert channel.take(1.0, 0.0)
+    assert [channel.take(9.0, k * T) for k in range(1, 10)] == 8 * [False] + [True]
+
+
+def test_no_step_is_too_great_to_be_judged() -> None:
+    channel = Seldom(1.0, 0.05, T, 0.1, turn=6.283185307179586)
+    assert channel.take(1.7e308, 0.0)
+    assert [channel.take(-1.7e308, float(k)) for k in range(1, 4)] == [False, False, True]
 
 
 def test_a_condition_lasts_from_its_first_step() -> None:
