@@ -32,9 +32,10 @@ from cablecomp.signals import Sample
     ENCODERS_DISAGREE,
     TEMPERATURE_UNTRUE,
     OTHER_UNTRUE,
-) = (1 << bit for bit in range(18))
+    TEMPERATURE_STALE,
+    OTHER_STALE,
+) = (1 << bit for bit in range(20))
 FATAL: Final = MOTOR_LAGS | MOTOR_STUCK | ENCODERS_DISAGREE
-_UNTRUE: Final = TEMPERATURE_UNTRUE | OTHER_UNTRUE
 
 _WORDS: Final = (
     "motor position is stale",
@@ -55,6 +56,8 @@ _WORDS: Final = (
     "encoders disagree",
     "temperature cannot be true",
     "a further channel cannot be true",
+    "temperature is stale",
+    "a further channel is stale",
 )
 _FAR = 5.0  # times the joint residual's limit: no joint moves there in a few samples
 _FAR_S = 0.003
@@ -100,7 +103,8 @@ class Health:
     Motor position, joint torque, joint position are held at their last plausible value. So are temperature and
     `others`: what is turned down of them is put back in the readings too, so that what is recorded is what the observer
     saw. Further channels are judged by the unit in their name; of one without, only that it is finite.
-    `needs_temperature`: an effect reads it. All else passes as it came.
+    `needs_temperature`: an effect reads it. What effects read has to have come before a joint is ready, and counts as
+    old once it stays out (`Seldom`). All else passes as it came.
     """
 
     def __init__(
@@ -139,6 +143,7 @@ class Health:
         self._others = others
         self._needs_temperature = needs_temperature
         self._further: list[tuple[Seldom, int, int]] = []
+        self._needed: list[tuple[Seldom, int]] = []
         self._unanswered = o.unanswered
         self._lead_rad = inf if o.lead_rad is None else o.lead_rad
         self._stuck_rad = inf if o.stuck_rad is None else o.stuck_rad + 2.0 * motor_step_rad
@@ -192,13 +197,18 @@ class Health:
                 load_age = self._mismatch.age_s
         if self._needs_joint:
             load_age = max(load_age, joint_age, self._residual.age_s)
-        if flags & _UNTRUE:
-            load_age = max(load_age, self._untrue_s(now_s))
         ready = (
             not isnan(motor.value)
             and (has_torque or not self._needs_torque)
             and (has_joint or not self._needs_joint)
         )
+        for further, stale in self._needed:
+            if not further.old_from_s > now_s:
+                load_age = max(load_age, further.age_s(now_s))
+                if not further.held:
+                    flags |= stale
+            if isnan(further.value):
+                ready = False
         others = self._others
         sample = Sample(
             now_s,
@@ -236,18 +246,17 @@ class Health:
         return flags
 
     def _name_further(self, readings: JointReadings) -> list[tuple[Seldom, int, int]]:
-        """Temperature and the further channels, whose names the readings know: where they lie, and their flags."""
+        """Temperature and the further channels, whose names the readings know: where they lie, and their flags; which
+        of them effects read."""
         names = readings.channels
         self._further += [(self._of_name(names[TEMPERATURE]), TEMPERATURE, TEMPERATURE_UNTRUE)]
         self._further += [(self._of_name(names[place]), place, OTHER_UNTRUE) for place in self._others]
+        needed = self._further if self._needs_temperature else self._further[1:]
+        self._needed += [
+            (further, TEMPERATURE_STALE if untrue == TEMPERATURE_UNTRUE else OTHER_STALE)
+            for further, _, untrue in needed
+        ]
         return self._further
-
-    def _untrue_s(self, now_s: float) -> float:
-        """For how long what effects read beside the common channels has counted as old."""
-        needed = OTHER_UNTRUE | (TEMPERATURE_UNTRUE if self._needs_temperature else 0)
-        return max(
-            (further.age_s(now_s) for further, _, untrue in self._further if untrue & needed), default=0.0
-        )
 
     def _of_name(self, channel: str) -> Seldom:
         """What is plausible of a further channel, by the unit that its name ends in."""

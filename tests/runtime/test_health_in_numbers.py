@@ -17,14 +17,14 @@ def test_every_flag_has_its_bit_and_its_words() -> None:
         *(h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE, h.MOTOR_JUMP, h.TORQUE_JUMP, h.JOINT_JUMP),
         *(h.TORQUE_SATURATED, h.JOINT_RESIDUAL, h.TORQUE_MISMATCH, h.MOTOR_LAGS, h.UNANSWERED, h.LATE),
         *(h.SHAKES, h.MOTOR_STUCK, h.JOINT_STUCK, h.ENCODERS_DISAGREE),
-        *(h.TEMPERATURE_UNTRUE, h.OTHER_UNTRUE),
+        *(h.TEMPERATURE_UNTRUE, h.OTHER_UNTRUE, h.TEMPERATURE_STALE, h.OTHER_STALE),
     )
-    assert flags == tuple(1 << k for k in range(18))
+    assert flags == tuple(1 << k for k in range(20))
     words = [word for flag in flags for word in h.health_names(flag)]
-    assert len(words) == len(set(words)) == 18
+    assert len(words) == len(set(words)) == 20
     assert h.health_names(sum(flags)) == tuple(words)
     symptoms = {
-        "stale": (h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE),
+        "stale": (h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE, h.TEMPERATURE_STALE, h.OTHER_STALE),
         "jumped": (h.MOTOR_JUMP, h.TORQUE_JUMP, h.JOINT_JUMP),
         "stuck": (h.MOTOR_STUCK, h.JOINT_STUCK),
         "disagree": (h.JOINT_RESIDUAL, h.TORQUE_MISMATCH, h.ENCODERS_DISAGREE),
@@ -203,6 +203,64 @@ def test_a_leap_of_a_further_channel_is_judged_by_its_unit(name: str, good: floa
     for value, flags in ((good, 0), (bad, h.OTHER_UNTRUE), (good, 0)):
         checked = fed.cycle(**ALL, other_0=value)
         assert (checked.flags, checked.sample.other) == (flags, (good,))
+
+
+def test_a_joint_waits_for_the_temperature_that_an_effect_reads() -> None:
+    for came in ({}, {"temperature": -273.0}, {"temperature": nan}):
+        fed = Fed(needs_temperature=True)
+        for k in range(20):
+            checked = fed.cycle(**ALL, **came)
+            assert not checked.ready
+            assert checked.load_age_s == (max(k - 8, 0) * T if came else 0.0)
+            assert checked.flags == (h.TEMPERATURE_UNTRUE if came else 0)
+        over = fed.cycle(**ALL, temperature=20.0)
+        assert (over.ready, over.load_age_s, over.flags) == (True, 0.0, 0)
+        assert Fed().cycle(**ALL, **came).ready  # nothing reads it
+
+
+def test_a_joint_waits_for_the_further_channels_that_effects_read() -> None:
+    fed = Fed(count=1, others=(len_of_channels(),))
+    assert not fed.cycle(**ALL).ready
+    assert not fed.cycle(**ALL, other_0=nan).ready
+    assert fed.cycle(**ALL, other_0=1.0).ready
+
+
+@pytest.mark.parametrize("needed", [True, False])
+def test_a_thermometer_that_falls_silent_makes_old_what_lives_on_it(needed: bool) -> None:
+    """It came ten times a second; it is missed after a second, and no more once it comes again."""
+    fed = Fed(needs_temperature=needed, period_s=0.1)
+    for _ in range(40):
+        assert fed.cycle(**ALL, temperature=20.0).flags == 0
+    for k in range(1, 100):
+        checked = fed.cycle(**ALL)
+        assert checked.load_age_s == pytest.approx(max(0.1 * k - 1.0, 0.0) if needed else 0.0, abs=1e-9)
+        if k != 10:
+            assert checked.flags == (h.TEMPERATURE_STALE if needed and k > 10 else 0)
+        assert checked.ready
+    untrue = fed.cycle(**ALL, temperature=nan)
+    assert untrue.flags == h.TEMPERATURE_UNTRUE
+    assert untrue.load_age_s == pytest.approx(9.0 if needed else 0.0)
+    over = fed.cycle(**ALL, temperature=21.0)
+    assert (over.flags, over.load_age_s, over.sample.temperature_degC) == (0, 0.0, 21.0)
+
+
+@pytest.mark.parametrize("every", [1, 10, 100])
+def test_a_slow_thermometer_is_no_alarm_and_is_missed_later(every: int) -> None:
+    """Every 0.1, 1 or 10 s, some readings lost, the first two at once."""
+    fed = Fed(needs_temperature=True, period_s=0.1)
+    for k in range(30 * every):
+        came = {"temperature": 20.0} if k < 2 or (k % every == 0 and k % (7 * every)) else {}
+        checked = fed.cycle(**ALL, **came)
+        assert (checked.flags, checked.load_age_s) == (0, 0.0)
+    silent = [fed.cycle(**ALL).load_age_s for _ in range(601)]
+    assert silent[-1] > 0.0
+
+
+def test_a_further_channel_that_falls_silent_is_said() -> None:
+    fed = Fed(count=1, others=(len_of_channels(),), period_s=0.1)
+    for _ in range(40):
+        assert fed.cycle(**ALL, other_0=1.0).flags == 0
+    assert [fed.cycle(**ALL).flags for _ in range(12)][-1] == h.OTHER_STALE
 
 
 def test_a_further_channel_without_a_unit_may_be_anything_finite() -> None:
