@@ -28,7 +28,8 @@ class Session(Frozen):
 
     `own`: names of the parameters that may differ from session to session. `recordings`: patterns of paths
     (`*`, `?`, `[..]` as in a shell; a folder stands for all that is in it), matched from the right; one that is a
-    recording's own path goes before all others, of several the longest. `values`: what this session's own parameters
+    recording's own path goes before all others, of several the longest, of these the one in the shortest list, and a
+    part of a mounting before that mounting. `values`: what this session's own parameters
     are, by name. `mounting`: the session that this is a part of, where the drive stood differently in its recordings
     (before and after an event; bent more or less): zeros, and what is `own`, are the mounting's.
     """

@@ -89,13 +89,26 @@ def claiming(config: JointConfig, recording: Path | None) -> list[Session]:
 
 
 def claimed_by(config: JointConfig, recording: Path, instead: str) -> Session | None:
-    """The session that claims a recording; None if there is none. Raises InputError, which says what to do `instead`,
-    if several do."""
+    """The session that claims a recording; None if there is none. Of several that do, a part of a mounting goes before
+    that mounting, and one that names the recording before those that name more. Raises InputError, which says what to
+    do `instead`, if several are left."""
     matching = claiming(config, recording)
+    if len(matching) > 1:
+        matching = _closest(matching, recording)
     if len(matching) > 1:
         names = ", ".join(s.name for s in matching)
         raise InputError(f"{recording}: several sessions claim it ({names}); {instead}")
     return matching[0] if matching else None
+
+
+def _closest(claims: list[Session], recording: Path) -> list[Session]:
+    """Of sessions that claim a recording alike those that are about it the most."""
+    mountings = {s.mounting for s in claims if s.mounting != s.name}
+    parts = [s for s in claims if s.name not in mountings] or claims
+    if not all(s.names(recording) for s in parts):
+        return parts  # how many patterns there are says nothing of how much they match
+    fewest = min(len(s.recordings) for s in parts)
+    return [s for s in parts if len(s.recordings) == fewest]
 
 
 def session_of(config: JointConfig, recording: Path | None, name: str | None) -> Session | None:

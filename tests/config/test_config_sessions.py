@@ -138,6 +138,48 @@ recordings = ["mon/s/rec.csv"]
         assert (found and found.name) == expected, path
 
 
+TWICE = """
+[[session]]
+name = "each"
+recordings = ["s/a.csv", "s/b.csv"]
+[[session]]
+name = "each s/b.csv"
+mounting = "{mounting}"
+recordings = [{recordings}]
+"""
+
+
+@pytest.mark.parametrize("mounting", ["each", "", "each s/b.csv"])
+@pytest.mark.parametrize("recordings", ['"s/b.csv"', '"s/c.csv", "s/b.csv"'])
+def test_of_equal_claims_the_part_goes_before_its_mounting_and_the_shorter_list_before_the_longer(
+    mounting: str, recordings: str
+) -> None:
+    joint = config(TWICE.format(mounting=mounting, recordings=recordings))
+    whole = session_of(joint, Path("s/a.csv"), None)
+    assert whole is not None
+    assert whole.name == "each"
+    if mounting == "each" or "," not in recordings:
+        part = session_of(joint, Path("x/s/b.csv"), None)
+        assert part is not None
+        assert part.name == "each s/b.csv"
+    else:
+        with pytest.raises(InputError, match=r"several sessions claim it \(each, each s/b.csv\)"):
+            session_of(joint, Path("x/s/b.csv"), None)
+
+
+def test_the_number_of_patterns_decides_nothing() -> None:
+    text = """
+[[session]]
+name = "all"
+recordings = ["s*/*.csv"]
+[[session]]
+name = "some"
+recordings = ["s/a*.csv", "s/b*.csv"]
+"""
+    with pytest.raises(InputError, match="several sessions claim it"):
+        session_of(config(text), Path("s/b.csv"), None)
+
+
 def test_a_sessions_values_take_the_place_of_the_joints_own() -> None:
     joint = config(SESSIONS)
     monday = in_session(joint, joint.sessions[0])
