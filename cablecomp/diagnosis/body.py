@@ -15,7 +15,8 @@ from cablecomp.config import JointConfig, claimed_by
 from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import MOTOR, OUTPUTS, Evidence, gather, load_channel, rows_for
+from cablecomp.estimation.departures import FEWEST
+from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, gather, load_channel, rows_for
 from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.standing import ONE_CLAIM, apart_of, stated_of
 from cablecomp.signal.smoothing import FloatArray
@@ -139,17 +140,25 @@ def _in_order(evidence: Iterable[Evidence]) -> list[Evidence]:
 
 
 def read_by_all(config: JointConfig, evidence: Sequence[Evidence]) -> tuple[str, ...]:
-    """Output channels that are fitted: those that every recording has, but for that of the load."""
+    """Output channels that are fitted: those that count somewhere in every recording, and in one of them at enough
+    instants to tell what is left of them, but for that of the load."""
     load = load_channel(config, evidence[0].columns)
-    return tuple(c for c in OUTPUTS if c != load and all(c in e.counted for e in evidence))
+    return tuple(c for c in OUTPUTS if c != load and (c == JOINT or _counts(c, evidence)))
+
+
+def _counts(channel: str, evidence: Sequence[Evidence]) -> bool:
+    count = [int(e.counted[channel].sum()) if channel in e.counted else 0 for e in evidence]
+    return min(count) > 0 and max(count) > FEWEST
 
 
 def read_by_some(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str, list[str]]:
-    """Output channels that are left out because some recordings lack them, with those recordings that have them."""
+    """Output channels that are left out because some recordings lack them, with those recordings that have them: where
+    they count or, if they count nowhere, where they were read."""
     load, fitted = load_channel(config, evidence[0].columns), read_by_all(config, evidence)
-    some = {
-        c: [short(e.name) for e in evidence if c in e.counted] for c in OUTPUTS if c not in (load, *fitted)
-    }
+    some = {}
+    for c in (c for c in OUTPUTS if c not in (load, *fitted)):
+        read = [e for e in evidence if c in e.counted]
+        some[c] = [short(e.name) for e in [e for e in read if e.counted[c].any()] or read]
     return {c: names for c, names in some.items() if names}
 
 

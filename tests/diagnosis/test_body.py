@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,9 +12,10 @@ import pytest
 from turning import JOINT, recorded
 
 from cablecomp.config import parse_joint
-from cablecomp.diagnosis.body import gather_body, session_names
+from cablecomp.diagnosis.body import gather_body, read_by_all, read_by_some, session_names
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
+from cablecomp.estimation.standing import stated_of
 from cablecomp.signal.smoothing import FloatArray
 
 PLAIN = JOINT.model_dump(by_alias=True, exclude_none=True)
@@ -52,6 +54,42 @@ def test_parts_of_a_mounting_are_one_session_with_what_else_is_in_its_folder() -
     joint = parse_joint({**PLAIN, "session": parts}, "x")
     names = [f"data/monday/{k}.csv" for k in (1, 2, 3)]
     assert set(session_names(joint, names).values()) == {"monday"}
+
+
+def test_a_part_of_a_mounting_goes_before_a_mounting_that_names_all_of_its_recordings() -> None:
+    """A session not called after its folder, with an event in one of its recordings."""
+    entries = [
+        {"name": "mine", "recordings": ["s/a.csv", "s/b.csv"], "values": {"pretension_N": 30.0}},
+        {"name": "mine s/b.csv", "mounting": "mine", "recordings": ["s/b.csv"]},
+    ]
+    entries[1]["values"] = {"pretension_N": 33.0}
+    joint = parse_joint({**PLAIN, "session": entries}, "x")
+    names = ["x/s/a.csv", "x/s/b.csv"]
+    assert set(session_names(joint, names).values()) == {"mine"}
+    stated = [stated_of(joint, Path(name), {})["pretension_N"] for name in names]
+    assert stated == [30.0, 33.0]
+
+
+@pytest.mark.parametrize("count", [0, 1, 8])
+def test_a_channel_that_hardly_counts_is_left_out_as_one_that_is_not_there(count: int) -> None:
+    """What little of it there is lies where the end is kept."""
+    torque = "motor_torque_Nm"
+    whole = gather_body(JOINT, {"a/1": with_torque(1), "a/2": with_torque(2)}).used
+    assert torque in read_by_all(JOINT, whole)
+    assert read_by_some(JOINT, whole) == {}
+    counted = np.zeros_like(whole[1].counted[torque])
+    counted[:count] = True
+    hardly = replace(whole[1], counted={**whole[1].counted, torque: counted})
+    assert (torque in read_by_all(JOINT, [whole[0], hardly])) is (count > 0)
+    assert read_by_some(JOINT, [whole[0], hardly]) == ({} if count else {torque: ["a/1"]})
+    assert torque not in read_by_all(JOINT, [hardly])
+    assert read_by_some(JOINT, [hardly]) == {torque: ["a/2"]}
+    assert ANGLE in read_by_all(JOINT, [hardly])
+
+
+def with_torque(seed: int) -> dict[str, FloatArray]:
+    columns = recorded(seed=seed)
+    return {**columns, "motor_torque_Nm": -JOINT.drive.ratio * columns["joint_torque_Nm"]}
 
 
 def test_a_recording_stands_apart_as_its_session_states() -> None:

@@ -203,4 +203,7 @@ def test_a_channel_that_is_not_followed_is_said(left: float, said: bool) -> None
     problem = SimpleNamespace(channels=fit.problem.channels, evidence=evidence)
     lines = list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms))))
     assert bool(lines) is said
+    nowhere = [SimpleNamespace(at_rows=at_rows, counted={"motor_torque_Nm": np.zeros(2000, dtype=np.bool_)})]
+    problem = SimpleNamespace(channels=fit.problem.channels, evidence=nowhere)
+    assert not list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms))))
     assert all(line.startswith("motor_torque_Nm is not followed") for line in lines)

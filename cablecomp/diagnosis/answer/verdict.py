@@ -104,7 +104,10 @@ def _not_followed(fit: Fit) -> Iterator[str]:
     """Channels beside the joint's angle that the model follows hardly or not at all."""
     for c in (c for c in fit.problem.channels if c != JOINT):
         read = [e.at_rows(c)[e.counted[c]] for e in fit.problem.evidence if c in e.counted]
-        own = float(np.sqrt(np.mean(np.concatenate([x - np.mean(x) for x in read if len(x)]) ** 2)))
+        read = [x - np.mean(x) for x in read if len(x)]
+        if not read:
+            continue  # it counts nowhere
+        own = float(np.sqrt(np.mean(np.concatenate(read) ** 2)))
         left = rms_left(fit, c)
         if left > LIMITS.not_followed * own:
             yield (
