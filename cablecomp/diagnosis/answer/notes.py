@@ -46,8 +46,8 @@ def notes(case: Case) -> tuple[str, ...]:
     for channel, names in read_by_some(case.config, body.used).items():
         more = f" and {len(names) - SAID} more" if len(names) > SAID else ""
         found.append(
-            f"{channel} of {', '.join(names[:SAID])}{more} is left out: other recordings have none; diagnose those "
-            "that have it by themselves"
+            f"{channel} of {', '.join(names[:SAID])}{more} is left out: not every recording tells it; diagnose those "
+            "that do by themselves"
         )
     for channel, share in not_told_apart(case.config, body.used).items():
         found.append(
