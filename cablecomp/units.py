@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from fractions import Fraction
 from itertools import product
@@ -84,7 +85,26 @@ _ARMS: Final = {
 }
 """Torques that are written arm first or force first, with anything between the two."""
 
-_BETWEEN: Final = ("", "-", "·", "⋅", ".", "*", " ", "_")
+_BETWEEN: Final = ("", "-", "·", ".", " ", "_")
+_ALIKE: Final = str.maketrans(
+    {
+        **dict.fromkeys("∙•⋅×*", "·"),
+        **dict.fromkeys("º˚", "°"),
+        **dict.fromkeys("µμ", "u"),
+        "℃": "°C",
+        "℉": "°F",
+        "⁻": "^-",
+        "¹": "1",
+    }
+)
+"""Signs that are taken for one another."""
+_PER: Final = re.compile(r"(?:^|[ ·.]|(?<=°))(s|sec|min)\^?-1$")
+_TURNS: Final = {
+    "rad": ("rad", "radian", "radians"),
+    "mrad": ("mrad",),
+    "deg": ("deg", "degree", "degrees", "°"),
+    "rev": ("rev", "revs", "revolution", "revolutions", "turn", "turns", "r", "U"),
+}
 
 _SPELT: Final = MappingProxyType(
     {
@@ -100,27 +120,32 @@ _SPELT: Final = MappingProxyType(
             for between in _BETWEEN
             if between
         },
-        "°": "deg",
-        "degree": "deg",
-        "degrees": "deg",
-        "radian": "rad",
-        "radians": "rad",
-        "turn": "rev",
-        "turns": "rev",
-        "rad/s": "rad_s",
-        "mrad/s": "mrad_s",
-        "deg/s": "deg_s",
-        "°/s": "deg_s",
-        "turns/s": "rev_s",
-        "rev/s": "rev_s",
+        **{word: unit for unit, words in _TURNS.items() for word in words if word not in ("r", "U")},
+        **{
+            f"{word}{per}{second}": f"{unit}_s"
+            for unit, words in _TURNS.items()
+            for word, per, second in product(words, ("/", " per "), ("s", "sec", "second", "seconds"))
+        },
+        **{
+            f"{word}{per}{minute}": "rpm"
+            for word, per, minute in product((*_TURNS["rev"], "1"), ("/", " per "), ("min", "minute"))
+        },
+        **{
+            f"{force}{between}{arm}": "Nm"
+            for force, between, arm in product(
+                ("newton", "newtons"), _BETWEEN, ("meter", "meters", "metre", "metres")
+            )
+        },
+        **{
+            f"{unit}{between}{kind}": unit
+            for unit, between, kind in product(("A", "mA"), ("", " ", "_"), ("rms", "RMS"))
+        },
         "dps": "deg_s",
         "nm": "Nm",
         "grad": "gon",
         "grads": "gon",
         "gradian": "gon",
         "gradians": "gon",
-        "µs": "us",
-        "μs": "us",
         "sec": "s",
         "seconds": "s",
         "second": "s",
@@ -139,10 +164,13 @@ _SPELT: Final = MappingProxyType(
         "C": "degC",
         "°C": "degC",
         "celsius": "degC",
+        **dict.fromkeys(("deg C", "deg_C", "deg c", "degrees C", "degrees c"), "degC"),
+        **dict.fromkeys(("deg F", "deg_F", "deg f", "degrees F", "degrees f"), "degF"),
         "F": "degF",
         "°F": "degF",
         "kelvin": "K",
         "newton": "N",
+        "newtons": "N",
         "in": "inch",
     }
 )
@@ -151,8 +179,15 @@ _SPELT: Final = MappingProxyType(
 
 def unit_named(text: str, table: Mapping[str, Unit]) -> Unit | None:
     """The unit of a quantity's table that a text means (`deg`, `°`, `degrees`); None if none does."""
-    name = text.strip()
+    name = plain_signs(text)
+    name = _PER.sub(r"/\1", name)
+    name = f"1{name}" if name.startswith("/") else name
     return table.get(name) or table.get(_SPELT.get(name, _SPELT.get(name.lower(), "")))
+
+
+def plain_signs(text: str) -> str:
+    """A unit's text in the signs that are usual (`·` of all dots and crosses, `u` of micro), without a full stop."""
+    return text.strip().rstrip(".").translate(_ALIKE)
 
 
 class Stated(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.shared import JsonOption, console, errors
-from cablecomp.cli.sources import RatioOption, Reading, Sources, reads_recordings, suggested_map
+from cablecomp.cli.sources import RatioOption, Reading, Sources, reads_recordings, unit_error
 from cablecomp.config import load_joint
 from cablecomp.errors import InputError, path_text
 from cablecomp.recording.inspection import Inspection, inspect
@@ -24,7 +24,7 @@ from cablecomp.recording.mapping import (
 )
 from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import read_all
-from cablecomp.recording.suggest import suggest
+from cablecomp.recording.suggest import as_mapping, suggest, unknown_units
 from cablecomp.recording.table import RemarkLog
 from cablecomp.report.inspection import Looked, inspection_json, show
 
@@ -55,8 +55,11 @@ def inspect_recording(
         known = found_there if foreign_column(found_there, names) is None else None
     ratio = None if config is None else load_joint(config).drive.ratio
     found = suggest(raw.columns, ratio, raw.units)
-    mapping = suggested_map(recording, found, known)
-    looked = Looked(recording, raw, found, mapping, *_looked_at(recording, mapping, given))
+    needed, left_out = unknown_units(found, known)
+    mapping = as_mapping(found, known)
+    seen, notes, why = (None, (), "; ".join(needed)) if needed else _looked_at(recording, mapping, given)
+    looked = Looked(recording, raw, found, mapping, seen, (*notes, *left_out), why)
+    save = save and not needed
     if save:  # before it is shown: a pager may be left early
         save_mapping(
             place,
@@ -69,6 +72,8 @@ def inspect_recording(
         show(looked, console)
     if save:
         (errors() if as_json else console).print(f"saved: {place}", soft_wrap=True)
+    if needed:
+        raise unit_error(recording, needed)
 
 
 def _refuse_another_s(place: Path, recording: Path, names: Sequence[str]) -> None:

@@ -21,7 +21,7 @@ from cablecomp.recording.mapping import ColumnMap, joined_maps, load_mapping, ma
 from cablecomp.recording.raw_columns import raw_columns
 from cablecomp.recording.reader import Recording, open_recording, read_all
 from cablecomp.recording.source import identify
-from cablecomp.recording.suggest import Suggestion, as_mapping, suggest
+from cablecomp.recording.suggest import as_mapping, suggest, unknown_units
 from cablecomp.recording.table import FloatArray, Table
 
 Columns = dict[str, FloatArray]
@@ -72,18 +72,20 @@ class Sources:
         if not self.auto:
             return self.mapping
         raw = raw_columns(path, self.decode)
-        found = suggested_map(path, suggest(raw.columns, self.ratio, raw.units), self.mapping)
+        suggested = suggest(raw.columns, self.ratio, raw.units)
+        needed, left_out = unknown_units(suggested, self.mapping)
+        if needed:
+            raise unit_error(path, needed)
+        found = as_mapping(suggested, self.mapping)
         errors().print(f"{path} is read so:\n{mapping_text(found)}", style="dim")
+        for line in left_out:
+            errors().print(f"{path}: {line}", style="yellow", soft_wrap=True, markup=False)
         return found
 
 
-def suggested_map(path: Path, found: list[Suggestion], known: ColumnMap | None) -> ColumnMap:
-    """The mapping that is suggested, what is known put over it; ConfigError with the file for a unit that is not
-    known."""
-    try:
-        return as_mapping(found, known)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {line}" for line in error.lines) from None
+def unit_error(path: Path, lines: Sequence[str]) -> ConfigError:
+    """The error for needed columns of a file whose units are not known."""
+    return ConfigError(f"{path}: {line}" for line in lines)
 
 
 class Reading(Protocol):

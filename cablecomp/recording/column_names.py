@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from cablecomp.recording.channels import QUANTITIES
-from cablecomp.units import UNITS, Unit, unit_named
+from cablecomp.units import UNITS, Unit, plain_signs, unit_named
 
 
 def _set(words: str) -> frozenset[str]:
@@ -34,22 +34,37 @@ _BEGINS: Final = ("motor", "joint", "actuator", "output", "input", "link")
 _ASKED: Final = _set("cmd command commanded des desired target ref reference setpoint goal sp want")
 _MADE: Final = _set("err error residual raw filtered filt model predicted est estimate")
 _SENSED: Final = _set("wrench ft")
-_REMARKS: Final = _set(
-    "x y z fx fy fz mx my mz left right upper lower measured meas actual act value val signal channel ch "
-    "abs absolute rel relative calibrated corrected avg mean side shaft axis primary secondary"
-)
-_COUNTED: Final = _set("count counts cnt cnts tick ticks raw lsb inc incr increments")
+_COUNTED: Final = _set("count counts cnt cnts tick ticks lsb inc incr increments bit bits")
 """What an encoder may read instead of a unit."""
-_NOTHING: Final = ("-", "1")
-_ALSO_UNITS: Final = _set("in ft m t q w i tick ticks")
-"""Words of names that stand for units, or in them, where a unit is expected."""
-_TOLD: Final = frozenset().union(*_WORDS.values(), *_SIDES.values(), _ASKED, _MADE, _REMARKS)
+_TOLD: Final = frozenset().union(*_WORDS.values(), *_SIDES.values(), _ASKED, _MADE)
 _IN_MESSAGE = re.compile(r"[./]\w+\[[^\]]*\]$")
 """A field of a message, with the name or the number of what it belongs to (`/joint_states.position[wrist]`)."""
-_LIKE_A_UNIT = re.compile(
-    r"[kmcdnuµM]?N[kmcd]?m|(k?gf?|lbs?f?|ozf?)[.·*-]?(ft|in|[cm]?m)|(ft|in|[cm]m)[.·*-]?(k?gf?|lbs?f?|ozf?)"
-    r"|[a-zµ]{0,2}(rad|deg|gon)|days?|weeks?"
+_PREFIX: Final = "(?:da|[GMkhdcmunp])?"
+_FORCE: Final = rf"(?:{_PREFIX}N|[mk]?gf?|[mk]p|lbs?f?|ozf?|kips?|dyn)"
+_ARM: Final = rf"(?:{_PREFIX}m|ft|in|inch|feet|foot)"
+_ANGLE: Final = r"(?:[a-z]{0,2}(?:rad|deg|gon)|°)"
+_SYMBOL: Final = (
+    rf"(?:{_FORCE}|{_ARM}|{_FORCE}{_ARM}|{_ARM}{_FORCE}|{_ANGLE}|{_PREFIX}(?:s|A|V|W|Hz|Pa|bar)|K|°?C|°?F|[pk]si"
+    r"|(?:m|u|n)?secs?|mins?|hr?s?|revs?|Apk|App|kp)"
 )
+_SPELT_OUT: Final = (
+    r"(?:(?:milli|micro|nano|centi|deci|kilo|mega)?(?:newton|met(?:er|re)|gram|pound|ounce|second|degree|radian"
+    r"|volt|amp|ampere|watt|gradian|grad|gon|pond)s?|inch(?:es)?|foot|feet|minutes?|hours?|days?|weeks?|years?"
+    r"|turns?|cycles?|revolutions?|force|pct)"
+)
+_PIECE: Final = rf"(?:{_SYMBOL}|{_SPELT_OUT})(?:\^-?[1-4]|[²³]|(?<=[a-z])-[1-4])?"
+_LIKE_A_UNIT: Final = re.compile(
+    rf"(?:1 ?/ ?)?{_PIECE}(?: ?[ ·./_-] ?{_PIECE})*|1 ?0*\s?{_PREFIX}s|%.*|percent.*|\d+ ?bits?"
+)
+"""Text made of pieces of units, with powers of ten and of themselves (`kNcm`, `ft-lb`, `100ns`, `deg/h`)."""
+_ALONE: Final = _set("dyn foot feet force")
+"""Pieces of units that alone mean something else: a kind of model, of limb, of quantity."""
+_ENDS_LIKE_A_UNIT: Final = re.compile(
+    rf"{_PREFIX}N{_ARM}|(?:{_FORCE})[.·-]?{_ARM}|{_ARM}[.·-]?(?:{_FORCE})|{_ANGLE}|lbs?|oz|kg|daN|days?|weeks?|%"
+)
+"""Of such text, what is none where nothing but its place at the end of a name says so."""
+_FURTHER: Final = re.compile(r"\s*[,;].*|\s+(?:since|from|after)\s.*")
+"""What may stand behind a unit in brackets."""
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]+?)\s*[\])>}]\s*$")
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _CHANNELS: Final = {
@@ -101,7 +116,7 @@ def read_name(column: str) -> list[NameReading]:
         if quantity == "time" and len(quantities) > 1:
             fit -= 0.2
         if fit > 0.2:
-            counted = quantity == "position" and (unknown or "").lower() in _COUNTED
+            counted = quantity == "position" and bool(_words(unknown or "") & _COUNTED)
             odd = None if counted else unknown
             found.append(NameReading(channel, min(fit, 1.0), unit, odd, counted))
     return sorted(found, key=lambda reading: -reading.fit)
@@ -125,36 +140,54 @@ def _unit(column: str) -> tuple[str, str | None, str | None]:
     """The name without its unit, the unit, in brackets at the end or as the last part, and one that is not known."""
     match = _BRACKETS.search(column)
     if match and not _IN_MESSAGE.search(column):
-        known = next((unit for unit in (match[1], match[1].lower()) if _known(unit, UNITS)), None)
-        if known is not None or not _no_unit(match[1], _TOLD - _ALSO_UNITS):
-            return column[: match.start()], known, match[1] if known is None else None
-    tail = column
+        text, head = match[1], column[: match.start()]
+        first = _FURTHER.sub("", text)
+        ways = [
+            w
+            for way in (text, first, first.removeprefix("in ").strip())
+            for w in (way, way.lower() if len(way) > 1 else way)
+        ]
+        known = next((unit for unit in ways if _known(unit, UNITS)), None)
+        if known is not None:
+            return head, known, None
+        if _like_a_unit(text):
+            return head, None, text
+        if head.strip():  # a remark; the unit may stand before it
+            stem, unit, unknown = _unit(head.rstrip())
+            return f"{stem} {text}", unit, unknown
     for separator in ("_", ".", "-", " ", "/"):
-        head, found, last = tail.rpartition(separator)
+        head, found, last = column.rpartition(separator)
         if not found or not head:
             continue
         two = head.rpartition(separator)
-        if two[1] and two[0] and _known(f"{two[2]}_{last}"):
-            return two[0], f"{two[2]}_{last}", None
+        both = f"{two[2]}_{last}"
+        if two[1] and two[0] and _known(both):
+            return two[0], both, None
         if _known(last) and last not in ("m", "h", "l", "in", "min", "F", "C", "K"):
-            return head, last, None
+            return head.removesuffix(" in") if separator == " " else head, last, None
     return _ends_oddly(column)
 
 
 def _ends_oddly(column: str) -> tuple[str, None, str | None]:
-    """A name that ends in what looks like a unit, or in anything behind its only `/` (`torque/furlong`)."""
+    """A name that ends in what looks like a unit (`torque_kNcm`, `position/cycles`) and is none that is known."""
     *before, last = re.split(r"[_ /]", column)
     head = column[: len(column) - len(last) - 1]
-    behind = "/" in column and "/" not in head and not _no_unit(last, _TOLD)
+    behind = "/" in column and "/" not in head and last.lower() not in _TOLD and _like_a_unit(last)
     told = any(_words(head) & known for known in _WORDS.values())
-    if before and told and (behind or _LIKE_A_UNIT.fullmatch(last)):
+    if before and told and (behind or _ENDS_LIKE_A_UNIT.fullmatch(plain_signs(last))):
         return head, None, last
     return column, None, None
 
 
-def _no_unit(text: str, words: frozenset[str]) -> bool:
-    """Whether what stands where a unit may tells something else: which joint, which end, which of several."""
-    return text in _NOTHING or all(word in words or word.isdigit() for word in _words(text) or {text})
+def _like_a_unit(text: str) -> bool:
+    """Whether text where a unit may stand is made of pieces of units, or counts; else it is a remark."""
+    plain = plain_signs(text)
+    if plain in _ALONE:
+        return False
+    counts = re.split(r"[ _]", plain.lower())[-1] in _COUNTED
+    return counts or any(
+        _LIKE_A_UNIT.fullmatch(t) for t in (plain, plain.lower() if len(plain) > 2 else plain)
+    )
 
 
 def _known(unit: str, tables: Mapping[str, Mapping[str, Unit]] = QUANTITIES) -> bool:

@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from cablecomp.errors import ConfigError
 from cablecomp.recording.channels import CANONICAL, QUANTITIES
 from cablecomp.recording.column_names import NameReading, read_name
 from cablecomp.recording.mapping import ColumnMap, Source, column_of, joined_maps, meaning
@@ -35,6 +34,7 @@ _COUNTS: Final = (
 )
 _STILL: Final = 0.3
 """How much less a column that never changes fits than its name says."""
+_NEEDED: Final = ("time_s", "motor_position_rad", "joint_position_rad", "joint_torque_Nm")
 _SURE: Final = 0.3
 """Least correlation from which on a sign is read off."""
 
@@ -73,15 +73,9 @@ def suggest(
 def as_mapping(suggestions: list[Suggestion], known: ColumnMap | None = None) -> ColumnMap:
     """The suggestions as a mapping; `time_s` means itself, also where it is made by joining messages.
 
-    What is `known` holds over them. Raises ConfigError for every column taken by its name that states a unit which is
-    not known: what it is in is not guessed.
+    What is `known` holds over them. Columns taken by their names that state a unit which is not known are left out, as
+    what they are in is not guessed: see `unknown_units`.
     """
-    known = ColumnMap(schema=1) if known is None else known
-    mapped = {source.column for source in known.channel.values()}
-    odd = [s for s in suggestions if s.unknown is not None and s.source.column not in mapped]
-    wrong = [s for s in odd if s.channel not in known.channel]
-    if wrong:
-        raise ConfigError(map(_unknown_unit, wrong))
     suggested = ColumnMap(
         schema=1,
         channel={
@@ -90,15 +84,30 @@ def as_mapping(suggestions: list[Suggestion], known: ColumnMap | None = None) ->
             if s.unknown is None and s.source != Source(column="time_s", unit="s")
         },
     )
-    return joined_maps(suggested, known)
+    return suggested if known is None else joined_maps(suggested, known)
+
+
+def unknown_units(
+    suggestions: list[Suggestion], known: ColumnMap | None = None
+) -> tuple[list[str], list[str]]:
+    """A line for each column that states a unit which is not known, and of which nothing else is `known`: those of
+    channels without which nothing can be compared, and those that are left out."""
+    channels = {} if known is None else known.channel
+    mapped = {source.column for source in channels.values()}
+    odd = [
+        s for s in suggestions if s.unknown and s.source.column not in mapped and s.channel not in channels
+    ]
+    needed = [_unknown_unit(s) for s in odd if s.channel in _NEEDED]
+    return needed, [f"left out: {_unknown_unit(s)}" for s in odd if s.channel not in _NEEDED]
 
 
 def _unknown_unit(s: Suggestion) -> str:
     column = s.source.column
     quantity, table = next((q, t) for q, t in QUANTITIES.items() if s.channel == f"{q}_{next(iter(t))}")
+    other = f", or leave it out by --map 'other_x={column}'" if s.channel in _NEEDED else ""
     return (
         f"column {column!r}: unit {s.unknown!r} is not known; accepted for {quantity} are {', '.join(table)}; "
-        f"give it by --map '{s.channel}={column},unit=..,scale=..', or leave it out by --map 'other_x={column}'"
+        f"give it by --map '{s.channel}={column},unit=..,scale=..'{other}"
     )
 
 
