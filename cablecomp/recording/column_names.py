@@ -161,11 +161,18 @@ def _unit(column: str) -> tuple[str, str | None, str | None]:
             continue
         two = head.rpartition(separator)
         both = f"{two[2]}_{last}"
-        if two[1] and two[0] and _known(both):
+        if two[1] and two[0] and _known(both) and (separator not in "_ " or _may_be(two[0], both, last)):
             return two[0], both, None
         if _known(last) and last not in ("m", "h", "l", "in", "min", "F", "C", "K"):
             return head.removesuffix(" in") if separator == " " else head, last, None
     return _ends_oddly(column)
+
+
+def _may_be(stem: str, both: str, last: str) -> bool:
+    """Whether two parts are one unit: not where the name's quantity has another (`force_in_lbf`)."""
+    quantities = {q for q, known in _WORDS.items() if _words(stem) & known}
+    alone = _known(last) or _ENDS_LIKE_A_UNIT.fullmatch(last)
+    return not alone or not quantities or not quantities.isdisjoint(_by_unit(both))
 
 
 def _ends_oddly(column: str) -> tuple[str, None, str | None]:

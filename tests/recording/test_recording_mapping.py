@@ -219,6 +219,12 @@ def test_dates_may_have_a_decimal_comma(tmp_path: Path) -> None:
         ("joint torque (Nm, filtered)", "joint_torque_Nm", "Nm"),
         ("joint torque [newton metre]", "joint_torque_Nm", "newton metre"),
         ("joint angle in deg", "joint_position_rad", "deg"),
+        ("cable force in lbf", "tension_h_N", "lbf"),
+        ("tension_1_in_lbf", "tension_h_N", "lbf"),
+        ("force_in_lbf", "tension_h_N", "lbf"),
+        ("pull_in_ozf", "tension_h_N", "ozf"),
+        ("joint_torque_in_lbf", "joint_torque_Nm", "in_lbf"),
+        ("joint_load_in_oz", "joint_torque_Nm", "in_oz"),
     ],
 )
 def test_names_that_people_use_are_understood(column: str, channel: str, unit: str | None) -> None:
