@@ -115,12 +115,24 @@ def _text(raw: bytes) -> str:
 
 
 def _separator(header: str, row: str) -> str:
-    """What stands between names; blanks where nothing else does and the row below has as many cells."""
-    best = max(_SEPARATORS, key=header.count)
-    if best in header:
-        return best
-    numbers = [_is_number(cell) for cell in row.split()]
-    return " " if all(numbers) and len(header.strip("# ").split()) == len(numbers) > 1 else best
+    """What stands between names: as often in the row below, and there between numbers, if anything does, else most
+    often; blanks where nothing else does and the row has as many cells. A bar that the row lacks is part of a name."""
+    here = [s for s in _SEPARATORS if s in header and (s != "|" or s in row or not row.strip())]
+    if not here:
+        numbers = [_is_number(cell) for cell in row.split()]
+        return " " if all(numbers) and len(header.strip("# ").split()) == len(numbers) > 1 else ","
+    agreeing = [s for s in here if _as_often(header, row, s)]
+    apart = [
+        s for s in agreeing if all(_is_number(c.strip().replace(",", ".")) for c in row.split(s) if c.strip())
+    ]
+    return max(apart or agreeing or here, key=header.count)
+
+
+def _as_often(header: str, row: str, separator: str) -> bool:
+    """Whether two lines have as many cells, one that is empty behind the last separator counted or not."""
+    counts = [line.count(separator) for line in (header, row)]
+    ends = [line.rstrip(" \r").endswith(separator) for line in (header, row)]
+    return counts[0] == counts[1] or counts[0] - ends[0] == counts[1] - ends[1] > 0
 
 
 def _decimal_comma(cells: list[str]) -> bool:

@@ -148,6 +148,27 @@ def test_bars_stand_between_cells_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        ("time,|F| [N],|M| [Nm]\n0,1,2\n1,2,3\n", ["time", "|F| [N]", "|M| [Nm]"]),
+        ("t;|q|;|y|\n0;1;2\n1;2;3\n", ["t", "|q|", "|y|"]),
+        ("|t| |q|\n0 1\n1 2\n", ["|t|", "|q|"]),
+        ("|t|,|q|,\n0,1,\n1,2,\n", ["|t|", "|q|"]),
+        ("t, s;q, rad\n0,5;1,5\n1,5;2,5\n", ["t, s", "q, rad"]),
+        ("t|q|y\n0|1|2|\n1|2|3|\n", ["t", "q", "y"]),
+    ],
+)
+def test_what_separates_is_told_by_header_and_row_together(
+    text: str, columns: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    found = raw_columns(path).columns
+    assert list(found) == columns
+    assert all(np.ptp(values) == 1.0 for values in found.values())
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("t,q\n0,1,2\n1,2,3\n", "line 2: has 3 cells where the header names 2 columns"),
