@@ -85,10 +85,7 @@ def _parse_head(text: bytes) -> Head | None:
     header, first = _header_at(lines, kept)
     separator = _separator(lines[header], lines[first] if first < len(lines) else "")
     names = [name.strip().strip('"').strip() for name in _cells(lines[header].strip("#\r "), separator)]
-    row = next(
-        (line for line in lines[first : first + 2] if _numeric(line)), ""
-    )  # below a row of units, if any
-    trailing = _ends_empty(row, separator, len(names) - (names[-1] == ""))
+    trailing = _trailing(lines[first:], separator, names)
     names = names[:-1] if trailing and names[-1] == "" else names
     columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
     before = [line.strip().lstrip("#").strip() for line in lines[: max(header, first - 1)]]
@@ -169,6 +166,17 @@ def _alike(names: str, row: str) -> bool:
     cells, below = _cells(names, separator), _cells(row, separator)
     whole = [len(c) - (not c[-1].strip()) for c in (cells, below)]  # without a separator behind the last cell
     return len(cells) == len(below) > 1 or whole[0] == whole[1] > 1
+
+
+def _trailing(below: list[str], separator: str, names: list[str]) -> bool:
+    """Whether a separator stands behind the last cell of rows: in the first, and where the header ends so too, nothing
+    behind it in any row seen, as a last column without a name may be empty in the first."""
+    row = next((line for line in below[:2] if _numeric(line)), "")  # below a row of units, if any
+    unnamed = names[-1] == ""
+    if not _ends_empty(row, separator, len(names) - unnamed):
+        return False
+    cells = [_cells(line, separator) for line in below if unnamed and _numeric(line)]
+    return not any(len(row) == len(names) and row[-1].strip() for row in cells)
 
 
 def _ends_empty(row: str, separator: str, count: int) -> bool:

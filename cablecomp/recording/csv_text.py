@@ -108,9 +108,9 @@ class _Parser:
         if self.head.separator == " ":
             text = _BLANKS.sub(b" ", _AT_ENDS.sub(b"", text))
         if self.head.trailing:
-            text = re.sub(
-                rb"%b[ \t]*$" % re.escape(self.head.separator.encode()), b"", text, flags=re.MULTILINE
-            )
+            separator = self.head.separator.encode()
+            blanks = b" " if separator == b"\t" else rb" \t"  # else empty cells before it would go too
+            text = re.sub(rb"%b[%b]*$" % (re.escape(separator), blanks), b"", text, flags=re.MULTILINE)
         if self.head.decimal_comma:
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)

@@ -141,6 +141,21 @@ def test_a_separator_behind_every_row_is_no_column(head: str, units: str, tmp_pa
     assert f"line {line}: has 1 cell where the header names 2 columns" in refusal(path)
 
 
+def test_a_last_cell_before_a_separator_may_be_empty(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    for separator in ("\t", ";", ","):
+        path.write_text("t,q,y,\n0,1,2,\n1,2,,\n2,3,4,\n".replace(",", separator))
+        columns = raw_columns(path).columns
+        np.testing.assert_array_equal(columns["y"], [2.0, np.nan, 4.0])
+        assert list(columns) == ["t", "q", "y"]
+
+
+def test_a_last_column_without_a_name_may_be_empty_in_the_first_row(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,q,\n0,1,\n1,2,5\n2,3,4\n")
+    np.testing.assert_array_equal(raw_columns(path).columns["(column 3)"], [np.nan, 5.0, 4.0])
+
+
 def test_bars_stand_between_cells_too(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time_s|motor_position_rad\n0|1\n1|2\n")
