@@ -33,6 +33,8 @@ GAP: Final = 10.0
 """Usual steps that make a gap."""
 MOVED: Final = 0.05
 """Share of its range that a channel has to have moved across a gap for the gap to matter."""
+LEAST_STEPS: Final = 2.0
+"""Times what it moves by from row to row (95 % less) that it has to have moved across it as well."""
 
 _ANGLES: Final = {
     180.0 / pi: "joint_position_rad seems to be in degrees",
@@ -225,7 +227,8 @@ def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
         if values is None or not np.any(np.isfinite(values)):
             continue
         moved = np.abs(np.diff(values)) / max(float(np.nanmax(values) - np.nanmin(values)), 1e-300)
-        at = np.flatnonzero((steps > GAP * usual) & (moved > MOVED))
+        noise = LEAST_STEPS * np.nanpercentile(moved, 95.0)  # a channel at rest moves by its noise alone
+        at = np.flatnonzero((steps > GAP * usual) & (moved > MOVED) & (moved > noise))
         if len(at):
             k = int(at[np.argmax(moved[at])])
             more = f" ({len(at) - 1} more such gaps)" if len(at) > 1 else ""

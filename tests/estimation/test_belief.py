@@ -83,6 +83,15 @@ def test_lost_motion_is_no_delay(gap_share: float) -> None:
     assert not [k for k in kinds(joint_position_rad=behind) if k[0] == "delay"]
 
 
+def test_a_gap_over_which_nothing_moved_but_noise() -> None:
+    """With the motor held its range is its noise, of which any two rows differ by a good part."""
+    rng = np.random.default_rng(4)
+    held = {**COLUMNS, "motor_position_rad": 0.3 + 1e-5 * rng.standard_normal(len(TIME))}
+    held["joint_torque_Nm"] = 0.5 + 1e-3 * rng.standard_normal(len(TIME))
+    kept = (TIME < 6.0) | (TIME > 7.0)
+    assert not [s for s in suspicions(JOINT, {c: v[kept] for c, v in held.items()}) if s.kind == "gap"]
+
+
 def test_a_gap_over_which_the_joint_moved() -> None:
     kept = (COLUMNS["time_s"] < 8.0) | (COLUMNS["time_s"] > 10.0)
     (said,) = suspicions(JOINT, {n: v[kept] for n, v in COLUMNS.items()})
