@@ -16,12 +16,14 @@ from cablecomp.links.records import (
 )
 from cablecomp.runtime import health as h
 
+FURTHER = len(CHANNELS)
+"""Where further channels begin."""
 PLACES = (
     ("motor", MOTOR_POSITION),
     ("torque", JOINT_TORQUE),
     ("joint", JOINT_POSITION),
     ("temperature", TEMPERATURE),
-    ("other_0", len(CHANNELS)),
+    ("other_0", FURTHER),
 )
 T = 1.0 / 1024.0
 N = 0.25
