@@ -67,13 +67,30 @@ class Truth(NamedTuple):
 
 
 @dataclass
-class MitJoint:
+class OnABus:
+    """A joint on a bus that nothing loads; `tick`: periods that have gone by."""
+
+    bus: can.BusABC
+    angle: float = 0.0
+    tick: int = 0
+    terminal = None
+
+    def set_load(self, number: int, torque_Nm: float) -> None:
+        """No load."""
+
+    def set_wall(self, number: int, position_rad: float | None) -> None:
+        """No wall."""
+
+    def truth(self, number: int) -> Truth:
+        return Truth(self.angle * RATIO)
+
+
+@dataclass
+class MitJoint(OnABus):
     """Rotor (kg m2) behind an AK80-9 with number 1 that answers on identifier 0, and sensor node 1; it notes
     every frame it hears. `mute`: hears, says nothing; `tell`: what it makes of its own angle before saying it.
     """
 
-    bus: can.BusABC
-    angle: float = 0.0
     enabled: bool = False
     mute: bool = False
     inertia: float = 2e-3
@@ -85,19 +102,8 @@ class MitJoint:
     ticks: list[int] = field(default_factory=list)
     tell: Callable[[float], float] = lambda angle: angle
     disturb: Callable[[MitJoint], None] | None = None
-    terminal = None
-    tick: int = 0
     period_s: float = 1e-3
     sequence: int = 0
-
-    def set_load(self, number: int, torque_Nm: float) -> None:
-        """No load."""
-
-    def set_wall(self, number: int, position_rad: float | None) -> None:
-        """No wall."""
-
-    def truth(self, number: int) -> Truth:
-        return Truth(self.angle * RATIO)
 
     def advance(self, periods: int = 1) -> None:
         """One period: hear, answer, move, say where the joint is."""

@@ -13,22 +13,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import can
-from mit_joint import RATIO, Truth
+from mit_joint import RATIO, OnABus
 
 IDLE, CLOSED_LOOP = 1, 8
 TURN = 2.0 * math.pi
 
 
 @dataclass
-class OdriveJoint:
+class OdriveJoint(OnABus):
     """Axis 1, which takes `delay_s` to close its loop and then follows its input; it notes what it hears.
 
     `beats`: whether its heartbeats are heard; `tells`: a state that it tells in place of its own; `disturb`: called
     every period.
     """
 
-    bus: can.BusABC
-    angle: float = 0.0
     closed: bool = False
     delay_s: float = 0.0
     beats: bool = True
@@ -38,17 +36,6 @@ class OdriveJoint:
     asked: int | None = None
     closed_at: tuple[float, float | None] | None = None
     states: list[int] = field(default_factory=list)
-    tick: int = 0
-    terminal = None
-
-    def set_load(self, number: int, torque_Nm: float) -> None:
-        """No load."""
-
-    def set_wall(self, number: int, position_rad: float | None) -> None:
-        """No wall."""
-
-    def truth(self, number: int) -> Truth:
-        return Truth(self.angle * RATIO)
 
     def advance(self, periods: int = 1) -> None:
         """One millisecond: hear, move, say where motor and joint are."""
