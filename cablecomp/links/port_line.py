@@ -131,18 +131,16 @@ class LinePort(PortBase):
             return False
         if not self._flush():
             return False
-        if self._pending:
-            self.counters.send_failures += 1
-            return False
-        packed = self._pack(identifier, data)
-        self._pending += packed
-        if not self._flush():
-            return False
-        if len(self._pending) == len(packed):  # none of it: it shall not go out later than it was meant to
-            self._pending.clear()
-            self.counters.send_failures += 1
-            return False
-        return True
+        if not self._pending:
+            packed = self._pack(identifier, data)
+            self._pending += packed
+            if not self._flush():
+                return False
+            if len(self._pending) < len(packed):
+                return True
+            self._pending.clear()  # none of it: it shall not go out later than it was meant to
+        self.counters.send_failures += 1
+        return False
 
     def _flush(self) -> bool:
         """Hand over what waits, as far as the line takes it; False = the line is gone."""

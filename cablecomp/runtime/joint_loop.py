@@ -125,12 +125,13 @@ class JointLoop:
         checked = self._check(now_s, nan)
         self._observe(checked, now_s, None)
         self._judge(checked, now_s, drive=False)
-        if not self.stop_reason and not isfinite(self._sent.motor_position_rad):
-            self.first(now_s)  # the bus has not taken it yet: nothing else goes out before
-        elif not self.stop_reason:
-            motor = checked.sample.motor_position_rad
-            wish = self.taking_up.step(self._sent, motor, self.enabled, mode, now_s)
-            self._send_gated(wish, checked, now_s)
+        if not self.stop_reason:
+            if isfinite(self._sent.motor_position_rad):
+                motor = checked.sample.motor_position_rad
+                wish = self.taking_up.step(self._sent, motor, self.enabled, mode, now_s)
+                self._send_gated(wish, checked, now_s)
+            else:
+                self.first(now_s)  # the bus has not taken it yet: nothing else goes out before
         self._finish(None)
 
     def begin(self) -> None:
