@@ -10,7 +10,14 @@ import pytest
 from turning import JOINT, recorded
 
 from cablecomp.diagnosis.body import gather_body
-from cablecomp.diagnosis.explain.held_down import another, hardly_ahead, seen_once, slight, too_little
+from cablecomp.diagnosis.explain.held_down import (
+    another,
+    hardly_ahead,
+    seen_once,
+    slight,
+    stands_in,
+    too_little,
+)
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.ties import alone_by_far
@@ -56,6 +63,21 @@ def test_what_takes_off_a_hundredth_beside_another_effect_may_be_the_others_form
     said = slight(model, term, (), ScoreDifference(gain, z, z), share)
     assert bool(said) is bool(expected)
     assert expected in said
+
+
+@pytest.mark.parametrize(
+    ("beside", "put_in", "z", "held"),
+    [(True, True, 1.3, True), (True, True, 2.6, False), (True, False, 1.3, False), (False, True, 1.3, False)],
+)
+def test_what_is_put_in_anothers_place_has_to_be_missed_beside_others(
+    beside: bool, put_in: bool, z: float, held: bool
+) -> None:
+    """As a further effect has to be; alone its confidence says what it is worth."""
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    term = asked["bearing_friction"]
+    model: Any = SimpleNamespace(terms=(asked["series_compliance"], term) if beside else (term,))
+    said = stands_in(model, term, {term.name} if put_in else set(), ScoreDifference(0.2, z, z))
+    assert said == (f"in another's place, z = {z:.1f}; 2.5 are asked for" if held else "")
 
 
 @pytest.mark.parametrize(

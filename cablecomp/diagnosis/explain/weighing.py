@@ -18,6 +18,7 @@ from cablecomp.diagnosis.explain.held_down import (
     in_part_a_drag,
     seen_once,
     slight,
+    stands_in,
     too_little,
 )
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
@@ -29,7 +30,7 @@ from cablecomp.diagnosis.explain.model import (
     without,
 )
 from cablecomp.diagnosis.explain.rivals import ALONE, NO_RIVAL, Rivals, rivals
-from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded, halves, scales, score_difference
+from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, score_difference
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.ties import surest_alone
 from cablecomp.diagnosis.explain.usual import lost_in_usual
@@ -126,11 +127,9 @@ def _weighed(
         confidence, why_not = min(confidence, LIMITS.little_told), little
     elif small := slight(final, term, selection.rounds, own, removes):
         confidence, why_not = min(confidence, LIMITS.little_told), small
-    elif term.name in found.put_in and not demanded(own):
-        confidence = min(confidence, LIMITS.little_told)
-        why_not = f"in another's place, z = {own.z:.1f}; {LIMITS.z:g} are asked for"
     elif open_to := (
-        hardly_ahead(term, lead)
+        stands_in(final, term, found.put_in, own)
+        or hardly_ahead(term, lead)
         or seen_once(final, term, lead)
         or greased(final, term)
         or in_part_a_drag(final, term, selection.rounds, lead)
