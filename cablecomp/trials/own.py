@@ -25,6 +25,7 @@ from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.curves import Concealed, Curves, curves, score_concealed
 from cablecomp.trials.run import (
     JOINT_FILE,
+    NOT_DIAGNOSED,
     PIECES,
     Announce,
     Diagnose,
@@ -171,7 +172,7 @@ def _scored(places: Sequence[Place], truths: Sequence[Mapping[str, Any]]) -> lis
     found = []
     for p, t in zip(places, truths, strict=True):
         twin, mine = twins[t["round"]], verdict_of(p.verdict)
-        if mine.said is None and mine.failed == "not diagnosed":
+        if mine.said is None and mine.failed == NOT_DIAGNOSED:
             continue
         if twin.said is None:
             continue

@@ -16,6 +16,7 @@ from cablecomp.trials.reference import Yardstick, measure_truth
 from cablecomp.trials.row import Row
 from cablecomp.trials.run import (
     JOINT_FILE,
+    NOT_DIAGNOSED,
     Announce,
     Diagnose,
     Job,
@@ -100,7 +101,7 @@ def _experiment_all(blind: Blind, places: Sequence[Place], tell: Tell, until: fl
         if not protocol.exists() or time.monotonic() >= until:
             continue
         further = second / "experiment.csv.gz"
-        if not (second / "timing.json").exists():
+        if verdict_of(second).failed == NOT_DIAGNOSED:
             second.mkdir(parents=True, exist_ok=True)
             try:
                 blind.experiment(p.sealed, protocol, further)

@@ -26,6 +26,8 @@ from cablecomp.trials.shares import write_json
 COMMITMENT, BEGUN = "commitment.json", "concealing.json"
 PUBLIC, VERDICTS, RECORDINGS, PIECES = "trials", "verdicts", "recordings", "pieces"
 JOINT_FILE = "joint.toml"
+NOT_DIAGNOSED = "not diagnosed"
+"""What is said to have failed of a trial whose folder holds no verdict, or a damaged one."""
 
 Tell = Callable[[str, int, int], None]
 """Told what is being done, how much of it is done, and of how much."""
@@ -55,7 +57,7 @@ class Place:
     @property
     def is_diagnosed(self) -> bool:
         """Whether its diagnosis was made, or failed."""
-        return (self.verdict / "timing.json").exists()
+        return verdict_of(self.verdict).failed != NOT_DIAGNOSED
 
     @property
     def sealed(self) -> Path:
@@ -122,7 +124,7 @@ def diagnose_all(
 
     `until`: an instant of `time.monotonic` after which nothing more is begun, once `least` have been done.
     """
-    left = [j for j in jobs if not (j[3] / "timing.json").exists()]
+    left = [j for j in jobs if verdict_of(j[3]).failed == NOT_DIAGNOSED]
     done = len(jobs) - len(left)
     tell(what, done, len(jobs))
     with closing(spread(_timed, left, workers)) as outcomes:
@@ -172,11 +174,13 @@ class Verdict:
 
 
 def verdict_of(place: Path) -> Verdict:
-    """The verdict in a folder."""
-    if not (place / "timing.json").exists():
-        return Verdict(None, nan, "not diagnosed")
-    timing = json.loads((place / "timing.json").read_text())
-    seconds = nan if timing["seconds"] is None else float(timing["seconds"])
-    if timing["failed"] or not (place / "diagnosis.json").exists():
-        return Verdict(None, seconds, timing["failed"] or "no verdict")
-    return Verdict(json.loads((place / "diagnosis.json").read_text()), seconds, "")
+    """The verdict in a folder; what is damaged there is none, and is made anew by `diagnose_all`."""
+    try:
+        timing = json.loads((place / "timing.json").read_text(encoding="utf-8"))
+        seconds = nan if timing["seconds"] is None else float(timing["seconds"])
+        if timing["failed"] or not (place / "diagnosis.json").exists():
+            return Verdict(None, seconds, str(timing["failed"]) or "no verdict")
+        said = json.loads((place / "diagnosis.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return Verdict(None, nan, NOT_DIAGNOSED)
+    return Verdict(said, seconds, "") if isinstance(said, dict) else Verdict(None, nan, NOT_DIAGNOSED)

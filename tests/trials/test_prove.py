@@ -104,6 +104,21 @@ def test_the_whole_way_in_order_and_again_without_work(tmp_path: Path) -> None:
         prove(blind, replace(wish, trials=3), lambda what, done, of: None, log.append)
 
 
+@pytest.mark.parametrize("name", ["timing.json", "diagnosis.json", "after-experiment/timing.json"])
+def test_a_verdict_that_was_damaged_is_made_anew(tmp_path: Path, name: str) -> None:
+    log: list[str] = []
+    blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), Workers(0), _fake_diagnosis(log))
+    wish = Wish(1, 5, "none,confounded", "catalogue", "none")
+    prove(blind, wish, lambda what, done, of: None, log.append)
+    before = len(log)
+    (damaged,) = tmp_path.glob(f"verdicts/00000/{name}")
+    damaged.write_text('{"seconds": 1', encoding="utf-8")
+    board = prove(blind, wish, lambda what, done, of: None, log.append)
+    assert [r.outcome for r in board.rows] == ["consistent"]
+    assert log[-1] == f"diagnosed 00000 with {int('/' in name)}"
+    assert len(log) > before + 1
+
+
 def test_a_budget_that_is_spent_leaves_the_rest_for_the_next_time(tmp_path: Path) -> None:
     log: list[str] = []
     blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), Workers(0), _fake_diagnosis(log))
