@@ -17,7 +17,7 @@ from cablecomp.recording.atomic import atomic_directory
 _C: Final = Template("""\
 /* Load and deflection of the joint $name: $count play operators (Prandtl-Ishlinskii) fitted to its observer.
  * deflection = a M + b M^2 + sum w_i z_i,  z_i <- min(max(z_i, M - r_i), M + r_i),  q_out = ratio q_in + deflection.
- * Fit: $rms rad RMS on loops up to +-$most N m. Left out:
+ * Fit: $rms rad RMS on loops up to $most Nm either way. Left out:
 $lost
  * C99, no library but <math.h>'s fmin and fmax, no allocation; all state is the caller's. SI units. */
 #include <math.h>
@@ -31,7 +31,7 @@ static const double ${prefix}_linear[2] = {$linear};
 static const double ${prefix}_weight[$count] = {$weights};
 static const double ${prefix}_radius[$count] = {$radii};
 
-/* Deflection [rad] at a load [N m]; the state moves along. */
+/* Deflection [rad] at a load [Nm]; the state moves along. */
 double ${prefix}_deflection(${prefix}_state *s, double load) {
     double sum = ${prefix}_linear[0] * load + ${prefix}_linear[1] * load * load;
     for (size_t i = 0; i < $count; ++i) {
@@ -41,14 +41,14 @@ double ${prefix}_deflection(${prefix}_state *s, double load) {
     return sum;
 }
 
-/* Joint angle [rad] at a motor angle [rad] and a load [N m]; the state moves along. */
+/* Joint angle [rad] at a motor angle [rad] and a load [Nm]; the state moves along. */
 double ${prefix}_step(${prefix}_state *s, double motor, double load) {
     return ${prefix}_ratio * motor + ${prefix}_deflection(s, load);
 }
 """)
 
 _SLAVE: Final = Template('''\
-"""$name: joint angle from motor angle and load. $rms rad RMS on loops up to +-$most N m. Left out:
+"""$name: joint angle from motor angle and load. $rms rad RMS on loops up to $most Nm either way. Left out:
 $lost"""
 
 from $package import Fmi${version}Causality, Fmi${version}Slave, $real

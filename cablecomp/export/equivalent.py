@@ -33,7 +33,7 @@ class Equivalent(NamedTuple):
         """What these numbers leave out, one line each."""
         effects = ", ".join(effect.id for effect in config.effect)
         return (
-            f"of the loop at +-{self.most_Nm:.4g} N m the equivalent leaves {1e3 * self.rms_rad:.3g} mrad RMS of "
+            f"of the loop at ±{self.most_Nm:.4g} Nm the equivalent leaves {1e3 * self.rms_rad:.3g} mrad RMS of "
             f"{1e3 * self.reach_rad:.3g} mrad",
             "smaller loads: their loops are narrower than those of one dry "
             "friction; the drive is stiffer at each reversal",

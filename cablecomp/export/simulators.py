@@ -100,8 +100,8 @@ def _range(config: JointConfig) -> str:
 def _remarks(config: JointConfig, found: Equivalent, *more: str) -> str:
     """Comment with the numbers in words and what is left out."""
     lines = [
-        f"stiffness {found.stiffness_Nm_per_rad:.5g} N m/rad, friction of the path {found.friction_Nm:.4g} N m, "
-        f"equivalent backlash {1e3 * found.backlash_rad:.4g} mrad, at +-{found.most_Nm:.4g} N m",
+        f"stiffness {found.stiffness_Nm_per_rad:.5g} Nm/rad, friction of the path {found.friction_Nm:.4g} Nm, "
+        f"equivalent backlash {1e3 * found.backlash_rad:.4g} mrad, at ±{found.most_Nm:.4g} Nm",
         "left out:",
         *(f"  {line}" for line in (*more, *found.lost(config))),
     ]

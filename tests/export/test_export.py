@@ -164,6 +164,12 @@ def test_the_equivalent_lies_on_the_observers_loop() -> None:
     assert all(found.lost(JOINT))
 
 
+def test_what_is_written_and_what_is_said_write_loads_alike() -> None:
+    texts = (*SPRING.lost(JOINT), mujoco_model(JOINT, SPRING, MotorModel()), c_source(JOINT, PLAYS))
+    assert not any("+-" in text or " N m " in text for text in texts)
+    assert "±2 Nm" in texts[0]
+
+
 def test_the_result_is_had_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "--config", "wrist-capstan", "--urdf", "--out", str(tmp_path), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
