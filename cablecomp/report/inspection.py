@@ -86,6 +86,8 @@ def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap)
         told = reason is not None and reason.channel == channel
         sure = f"{100 * min(reason.sure, 1.0):.0f} %" if told and reason is not None else ""
         words = "; ".join(reason.why) if told and reason is not None else ("as mapped" if channel else "")
+        if reason is not None and reason.unknown is not None and not channel:
+            words = f"unit {reason.unknown} is not known"
         table.add_row(name, low, high, channel, sure, words)
     for name in raw.left_out:
         table.add_row(name, "text", "", "", "", "")

@@ -11,6 +11,7 @@ import pytest
 from springy_joint import joint
 
 from cablecomp.cli.app import main
+from cablecomp.cli.shared import console
 from cablecomp.recording.column_names import read_name
 from cablecomp.recording.reader import read_all
 from cablecomp.units import UNITS, unit_named
@@ -112,8 +113,9 @@ def test_a_unit_that_is_not_known_is_never_guessed(
 
 
 def test_a_further_channel_of_an_unknown_unit_is_left_out_and_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(console, "_width", 200)
     true = joint(500)
     log, out = tmp_path / "a.csv", tmp_path / "out.csv"
     pl.DataFrame({**true, "cable tension 1 (kg)": true["time_s"]}).write_csv(log)
@@ -122,7 +124,9 @@ def test_a_further_channel_of_an_unknown_unit_is_left_out_and_said(
     assert capsys.readouterr().err.count(f"{log}: {says}") == 1
     assert "tension_h_N" not in read_all(out).columns
     assert main(["inspect", str(log)]) == 0
-    assert " ".join(capsys.readouterr().out.split()).count(f"note: {says}") == 1
+    shown = " ".join(capsys.readouterr().out.split())
+    assert shown.count(f"note: {says}") == 1
+    assert "cable tension 1 (kg) 0 0.499 unit kg is not known" in shown
 
 
 @pytest.mark.parametrize(
