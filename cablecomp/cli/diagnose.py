@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from cablecomp.cli.beliefs import believe_all
-from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
+from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, refuse_options, work_fleet
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     BudgetOption,
@@ -29,7 +29,6 @@ from cablecomp.cli.sources import Reading, read_moving, reads_recordings
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import PROTOCOL, report_json, write_diagnosis
-from cablecomp.errors import InputError
 from cablecomp.estimation.parallel import forks_allowed
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.diagnosis_page import diagnosis_page
@@ -76,11 +75,15 @@ def diagnose_recordings(
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:
-        if session is not None or effects is not None or seed or budget < inf:
-            raise InputError(
-                "--session, --seed, --budget, --effects: of a fleet every night is diagnosed by itself, as its joint's "
-                "configuration says; leave them out"
-            )
+        refuse_options(
+            reading(),
+            {
+                "--session": session is not None,
+                "--seed": seed != 0,
+                "--budget": budget < inf,
+                "--effects": effects is not None,
+            },
+        )
         work_fleet("diagnose", recordings, config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)

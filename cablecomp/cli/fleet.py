@@ -4,7 +4,7 @@ night by itself."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Final
@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
 from cablecomp.cli.shared import announce_compilation, console, echo_json, plain_counts
+from cablecomp.cli.sources import Sources
 from cablecomp.cluster import Workers
 from cablecomp.counting import counted
 from cablecomp.errors import InputError
@@ -42,6 +43,18 @@ def asked_for(workers: int | None, scheduler: str | None) -> Workers | None:
     if workers is not None and scheduler is not None:
         raise InputError("--workers and --scheduler say two places to work: give one of them")
     return None if workers is None and scheduler is None else Workers(workers or 0, scheduler)
+
+
+def refuse_options(reading: Sources, given: Mapping[str, bool]) -> None:
+    """Raise InputError if an option was given that a fleet has no use for; `given`: those of the command, by name."""
+    mapped = reading.mapping is not None or reading.auto
+    options = {**given, "--map": mapped, "--link, --dbc": reading.decode is not None}
+    found = [name for name, is_given in options.items() if is_given]
+    if found:
+        raise InputError(
+            f"{', '.join(found)}: of a fleet every night is taken by itself, as its joint's configuration and the "
+            "mapping beside it (`cablecomp inspect LOG --save`) say; leave out what is named here"
+        )
 
 
 def work_fleet(

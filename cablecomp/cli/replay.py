@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from cablecomp.cli.beliefs import believe_streamed
-from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, work_fleet
+from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, refuse_options, work_fleet
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     BoundsOption,
@@ -67,6 +67,15 @@ def replay(
     """
     fleet = asked_for(workers, scheduler)
     if fleet is not None:
+        refuse_options(
+            reading(),
+            {
+                "--session": session is not None,
+                "--effects": effects is not None,
+                "--view": view,
+                "--no-bounds": not bounds,
+            },
+        )
         work_fleet("replay", [recording], config, out, fleet, as_json)
         return
     joint = read_joint(config, effects)

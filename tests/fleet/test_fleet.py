@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cablecomp.cli import main
 from cablecomp.cluster import Workers
 from cablecomp.errors import InputError
 from cablecomp.examples import example
@@ -86,6 +87,26 @@ def test_each_joint_is_told_by_what_it_does(tmp_path: Path, made_up: list[str]) 
     again = run_fleet("replay", nights([place], config), tmp_path / "out", Workers(0), told)
     assert sorted(made_up) == ["drifting/night-00.csv", "sound/night-03.csv"]
     assert again.reused == 30
+
+
+@pytest.mark.parametrize(
+    "given", ["--map auto", "--map time_s=t", "--session a", "--effects own.py", "--no-bounds", "--view"]
+)
+def test_what_a_fleet_has_no_use_for_is_refused(
+    given: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [
+        "replay",
+        str(folders(tmp_path / "in", ("a",), 1)),
+        "--config",
+        "capstan-arm",
+        "--workers",
+        "1",
+    ]
+    assert main([*command, *given.split(), "--out", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"cablecomp: {given.split()[0]}: of a fleet every night is taken by itself")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_joint_has_its_own_configuration_or_that_of_all(tmp_path: Path) -> None:
