@@ -61,7 +61,7 @@ def work_fleet(
     work: Work, folders: Sequence[Path], config: Path | None, out: Path, workers: Workers, as_json: bool
 ) -> None:
     """Work through a fleet, show and write what became of it."""
-    places = nights(folders, config)
+    places = nights(folders, config, out)
     announce_compilation()
     columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     errors = Console(stderr=True, markup=False, highlight=False)

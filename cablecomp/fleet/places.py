@@ -36,16 +36,21 @@ class Night:
         return found.hexdigest()
 
 
-def nights(folders: Sequence[Path], config: Path | None) -> list[Night]:
+def nights(folders: Sequence[Path], config: Path | None, out: Path | None = None) -> list[Night]:
     """Every joint's nights, in order.
 
     A folder inside `folders` is a joint; what lies in it are its nights. A `joint.toml` in the joint's folder holds
-    for it, else `config`. Raises InputError where a folder holds no joint or a joint has no configuration.
+    for it, else `config`. Raises InputError where a folder holds no joint or a joint has no configuration, or where
+    `out`, what is written into, would be one of its joints the next time.
     """
     found: list[Night] = []
     for folder in folders:
         if not folder.is_dir():
             raise InputError(f"{folder}: is no folder; a fleet lies in FOLDER/JOINT/RECORDING")
+        if out is not None and out.resolve().is_relative_to(folder.resolve()):
+            raise InputError(
+                f"{out}: lies in {folder}, whose folders are joints; give another place with --out"
+            )
         inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
         if not inside:
             raise InputError(f"{folder}: holds no folder; a fleet lies in FOLDER/JOINT/RECORDING")

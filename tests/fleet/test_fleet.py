@@ -116,6 +116,9 @@ def test_a_joint_has_its_own_configuration_or_that_of_all(tmp_path: Path) -> Non
     assert {n.joint: n.config for n in nights([place], common)} == {"a": place / "a/joint.toml", "b": common}
     with pytest.raises(InputError, match=r"b/joint\.toml: is missing"):
         nights([place], None)
+    for out in (place, place / "replay", place / "a/replay"):
+        with pytest.raises(InputError, match="whose folders are joints; give another place with --out"):
+            nights([place], common, out)
     with pytest.raises(InputError, match="FOLDER/JOINT/RECORDING"):
         nights([place / "a"], common)
 
