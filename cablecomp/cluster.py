@@ -14,7 +14,7 @@ from socket import create_connection
 from threading import Thread
 from typing import Any, Final, Generic, TypeVar
 
-from cablecomp.errors import CablecompError, InputError
+from cablecomp.errors import CablecompError, ConfigError, InputError, printable
 
 R = TypeVar("R")
 
@@ -65,10 +65,12 @@ def _told(work: Callable[..., R], job: tuple[Any, ...]) -> tuple[R | None, str]:
     """Result, or what went wrong: an exception need not survive the way back to the caller."""
     try:
         return work(*job), ""
+    except ConfigError as error:
+        return None, "; ".join(error.lines)
     except CablecompError as error:
-        return None, str(error)
+        return None, printable(str(error))
     except Exception as error:  # whatever it is, it is this job's own failure
-        return None, f"{type(error).__name__}: {error}"
+        return None, printable(f"{type(error).__name__}: {error}")
 
 
 def _in_processes(

@@ -12,6 +12,7 @@ from plotly.subplots import make_subplots
 from rich.table import Table
 
 from cablecomp.counting import counted
+from cablecomp.errors import printable
 from cablecomp.fleet.fleet import Fleet, JointStory
 from cablecomp.fleet.rows import Row
 from cablecomp.report import page, style
@@ -47,7 +48,9 @@ def fleet_page(fleet: Fleet, command: str) -> str:
 
 def failures(fleet: Fleet) -> list[str]:
     """Which nights failed, and why, a line each."""
-    return [f"{row['joint']}/{row['night']}: {row['failed']}" for row in fleet.rows if row["failed"]]
+    return [
+        printable(f"{row['joint']}/{row['night']}: {row['failed']}") for row in fleet.rows if row["failed"]
+    ]
 
 
 def _counted(fleet: Fleet) -> str:

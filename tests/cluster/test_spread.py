@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from cablecomp.cluster import Done, Workers, spread
-from cablecomp.errors import InputError
+from cablecomp.errors import ConfigError, InputError
 
 
 def square(x: int) -> int:
@@ -53,6 +53,16 @@ def test_one_failure_stops_nothing() -> None:
     assert {x: d.result for x, d in done.items() if not d.failed} == {1: 1, 2: 4, 6: 36}
     assert done[3].failed == "ZeroDivisionError: three"
     assert done[4].failed == "four.csv: is empty"
+
+
+def missing(path: str) -> None:
+    """Says what is wrong with a configuration and where, in more than one line."""
+    raise ConfigError([f"{path}: missing key `name`", f"{path}: missing key `drive`"])
+
+
+def test_what_is_wrong_with_a_job_is_one_line() -> None:
+    (done,) = spread(missing, [("a\nb.toml",)], Workers(0))
+    assert done.failed == "a b.toml: missing key `name`; a b.toml: missing key `drive`"
 
 
 def threads(_: int) -> int:

@@ -13,7 +13,7 @@ from cablecomp.errors import InputError
 from cablecomp.examples import example
 from cablecomp.fleet import fleet as fleet_module
 from cablecomp.fleet.change import EVIDENCE, change
-from cablecomp.fleet.fleet import run_fleet
+from cablecomp.fleet.fleet import Fleet, run_fleet
 from cablecomp.fleet.places import Night, nights
 from cablecomp.fleet.rows import Compliance, Kept, Parts, step_within
 from cablecomp.recording.replay import Replayed
@@ -107,6 +107,11 @@ def test_what_a_fleet_has_no_use_for_is_refused(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"cablecomp: {given.split()[0]}: of a fleet every night is taken by itself")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_night_that_failed_is_told_of_on_one_line() -> None:
+    row = {"joint": "a", "night": "odd\nname.csv", "failed": "is cut off"}
+    assert failures(Fleet("replay", (row,), (), 0)) == ["a/odd name.csv: is cut off"]
 
 
 def test_a_joint_has_its_own_configuration_or_that_of_all(tmp_path: Path) -> None:
