@@ -13,13 +13,13 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
-from cablecomp.cli.shared import announce_compilation, console, echo_json, plain_counts
+from cablecomp.cli.shared import announce_compilation, console, echo_json, plain_counts, warn
 from cablecomp.cli.sources import Sources
 from cablecomp.cluster import Workers
 from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.fleet.fleet import Work, run_fleet
-from cablecomp.fleet.places import nights
+from cablecomp.fleet.places import nights, strays
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.report.fleet_page import failures, fleet_page, fleet_table
 
@@ -62,6 +62,7 @@ def work_fleet(
 ) -> None:
     """Work through a fleet, show and write what became of it."""
     places = nights(folders, config, out)
+    warn(strays(folders))
     announce_compilation()
     columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     errors = Console(stderr=True, markup=False, highlight=False)

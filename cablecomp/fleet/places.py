@@ -10,7 +10,7 @@ from typing import Final
 
 from cablecomp import __version__
 from cablecomp.errors import InputError
-from cablecomp.recording.folder import find_recordings
+from cablecomp.recording.folder import SUFFIXES, find_recordings
 
 JOINT_FILE: Final = "joint.toml"
 
@@ -62,6 +62,17 @@ def nights(folders: Sequence[Path], config: Path | None, out: Path | None = None
     if twice:
         joint_name, night = sorted(twice)[0]
         raise InputError(f"{joint_name}/{night}: two places have this joint and night; rename one of them")
+    return found
+
+
+def strays(folders: Sequence[Path]) -> list[str]:
+    """A line for each folder of a fleet with recordings that lie in no joint's folder: these are left out."""
+    found = []
+    for folder in folders:
+        names = sorted(p.name for p in folder.iterdir() if p.is_file() and p.name.lower().endswith(SUFFIXES))
+        if names:
+            more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+            found.append(f"{folder}: {names[0]}{more}: left out, as in no joint's folder")
     return found
 
 

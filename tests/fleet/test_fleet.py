@@ -14,7 +14,7 @@ from cablecomp.examples import example
 from cablecomp.fleet import fleet as fleet_module
 from cablecomp.fleet.change import EVIDENCE, change
 from cablecomp.fleet.fleet import Fleet, run_fleet
-from cablecomp.fleet.places import Night, nights
+from cablecomp.fleet.places import Night, nights, strays
 from cablecomp.fleet.rows import Compliance, Kept, Parts, step_within
 from cablecomp.recording.replay import Replayed
 from cablecomp.recording.table import Block
@@ -126,6 +126,14 @@ def test_a_joint_has_its_own_configuration_or_that_of_all(tmp_path: Path) -> Non
             nights([place], common, out)
     with pytest.raises(InputError, match="FOLDER/JOINT/RECORDING"):
         nights([place / "a"], common)
+
+
+def test_a_recording_in_no_joints_folder_is_told_of(tmp_path: Path) -> None:
+    place = folders(tmp_path / "in", ("a",), 1)
+    assert strays([place]) == []
+    for name in ("b.MCAP", "c.csv", "notes.txt"):
+        (place / name).touch()
+    assert strays([place]) == [f"{place}: b.MCAP and 1 more: left out, as in no joint's folder"]
 
 
 @pytest.mark.parametrize("how", ["", "trend", "step"])
