@@ -145,7 +145,8 @@ def _cells(line: str, separator: str) -> list[str]:
 
 def _header_at(lines: list[str], kept: list[int]) -> tuple[int, int]:
     """Places of the line of names and of the line after it: the first that is no comment, the comment right above rows
-    of numbers (numpy writes it so), or what follows a preamble (of other numbers of cells than the rows)."""
+    of numbers (numpy writes it so), or what follows a preamble (of other numbers of cells than the rows, or filled up
+    to as many, as spreadsheets do)."""
     top = kept[0]
     if _numeric(lines[top]):
         above = [k for k in range(top) if lines[k].strip()]
@@ -153,11 +154,46 @@ def _header_at(lines: list[str], kept: list[int]) -> tuple[int, int]:
             return above[-1], top
         return top, top + 1
     below = kept[1:_PREAMBLE]
-    if below and not _alike(lines[top], lines[below[0]]):
-        for k, after in pairwise(below):
-            if not _numeric(lines[k]) and _alike(lines[k], lines[after]) and _numeric(lines[after]):
-                return k, k + 1
-    return top, top + 1
+    found = _above_numbers(lines, kept[:_PREAMBLE])
+    filled_up = below and _alike(lines[top], lines[below[0]])
+    if found is None or (
+        filled_up and (_states_units(lines[top]) or not _are_names(lines[found], lines[top]))
+    ):
+        return top, top + 1
+    return found, found + 1
+
+
+def _above_numbers(lines: list[str], kept: list[int]) -> int | None:
+    """Place of the first line of words that may name the numbers right below it, or below a row of units."""
+    for before, (k, after) in zip([None, *kept], pairwise(kept), strict=False):
+        if _numeric(lines[k]) or not _alike(lines[k], lines[after]) or not _numeric(lines[after]):
+            continue
+        words = _words(lines[k])
+        units = all(map(_is_unit, words)) or odd_unit(words) is not None
+        named = before is not None and _alike(lines[before], lines[k]) and not _numeric(lines[before])
+        return before if units and named else k
+    return None
+
+
+def _words(line: str) -> list[str]:
+    """What stands in the cells of a line that are not empty."""
+    cells = [cell.strip().strip('"').strip() for cell in _cells(line, _separator(line, line))]
+    return [cell for cell in cells if cell]
+
+
+def _are_names(line: str, above: str) -> bool:
+    """Whether a line holds words alone, each once, none of them a number or a unit, and as many as one above it."""
+    words = _words(line)
+    if len(words) < len(_words(above)):
+        return False
+    texts = not any(map(_is_unit, words)) and all(any(map(str.isalpha, word)) for word in words)
+    return texts and len(set(words)) == len(words) and not any(map(_is_number, words))
+
+
+def _states_units(line: str) -> bool:
+    """Whether a word of a line ends in a unit (`time_s`, `angle [deg]`)."""
+    ends = [re.split(r"[\s_\[\]()]+", word.rstrip("])")) for word in _words(line)]
+    return any(len(parts) > 1 and parts[-1] and _is_unit(parts[-1]) for parts in ends)
 
 
 def _alike(names: str, row: str) -> bool:

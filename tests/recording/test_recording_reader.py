@@ -50,9 +50,14 @@ def _same(path: Path) -> None:
         TEXT.replace("time_s", "# time_s").encode(),
         ("Logger v1.2\nserial: 123\n\n" + TEXT).encode(),
         ("Logger,1.2\nchannels;a;b;c;d\n" + TEXT).encode(),
+        ("Operator,Ann,\nSerial,123,\n" + TEXT).encode(),
+        ("time of day,operator,rig\n" + TEXT).encode(),
+        ("Logger v1.2\n" + TEXT.replace("Nm\n", "Nm\ns,rad,Nm\n")).encode(),
+        ("Operator,Ann,\n" + TEXT.replace("Nm\n", "Nm\ns,rad,Nm\n")).encode(),
     ],
     ids=["plain", "crlf", "cr", "bom", "semicolon", "tab", "comma decimals", "blanks", "quotes", "no end",
-         "blank end", "blank head", "only blanks", "aligned", "names as a comment", "preamble", "table before"],
+         "blank end", "blank head", "only blanks", "aligned", "names as a comment", "preamble", "table before",
+         "preamble filled up", "preamble like names", "preamble and units", "filled up and units"],
 )  # fmt: skip
 @pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".txt", ".parquet"])
 def test_csv_dialects_and_wrong_endings_read_the_same(content: bytes, ending: str, tmp_path: Path) -> None:
@@ -61,6 +66,14 @@ def test_csv_dialects_and_wrong_endings_read_the_same(content: bytes, ending: st
     _same(path)
     path.write_bytes(gzip.compress(content[:40]) + gzip.compress(content[40:]))
     _same(path)
+
+
+@pytest.mark.parametrize("row", ["warming,up,now", "warming,,", "ERR,ERR,ERR", ",0.25,1"])
+def test_words_in_the_first_row_are_no_names(row: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(TEXT.replace("Nm\n", f"Nm\n{row}\n"))
+    with pytest.raises(InputError, match="line 3: column 'time_s' "):
+        read_all(path)
 
 
 def test_a_block_knows_its_lines(tmp_path: Path) -> None:
