@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cablecomp.cli.shared import JsonOption, console, echo_json, warn
+from cablecomp.cli.shared import JsonOption, console, each_once, echo_json, warn
 from cablecomp.cli.sources import RatioOption, Reading, reads_recordings
 from cablecomp.config import load_joint
 from cablecomp.counting import counted
@@ -43,8 +43,9 @@ def convert_recording(
             f"--from {begin:g} --to {end:g}: a time, and none before it, in seconds are accepted"
         )
     source = reading(None if config is None else load_joint(config)).open(recording)
+    late_s = each_once("--late", map(_late, late or ()))
     with progress_bar(f"convert {recording.name}") as progress:
-        rows = convert(source, to, (begin, end), progress, dict(map(_late, late or ())), ros)
+        rows = convert(source, to, (begin, end), progress, late_s, ros)
     warn(missing_channels(source.channels))
     if as_json:
         echo_json({"written": to, "rows": rows, "channels": source.channels, "notes": source.notes})

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final, get_args, get_origin
 import typer
 
 from cablecomp.cli.folders import out_option
-from cablecomp.cli.shared import JsonOption, console, echo_json, warn
+from cablecomp.cli.shared import JsonOption, console, each_once, echo_json, warn
 from cablecomp.config import doubts, load_joint, read_toml, validated
 from cablecomp.config.draft import Draft, draft_text
 from cablecomp.config.reference import CONVENTIONS, reference
@@ -59,7 +59,7 @@ def init(
             typer.echo(reference(model, f"{head}\n{'=' * len(head)}"))
         return
     values = dict(read_toml(answers)) if answers is not None else {}
-    values |= dict(_answer(word) for word in given or ())
+    values |= each_once("--set", map(_answer, given or ()))
     if answers is None and not given:
         if not sys.stdin.isatty():
             raise InputError(

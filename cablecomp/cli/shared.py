@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 import typer
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cablecomp.control.motors import DriveGains
     from cablecomp.control.options import ControlConfig
 
+T = TypeVar("T")
 DEMO_LINK = "wrist-virtual"
 
 
@@ -97,6 +98,16 @@ def warn(lines: Iterable[str]) -> None:
     asking = errors()
     for words in lines:
         asking.print(words, style="yellow")
+
+
+def each_once(option: str, pairs: Iterable[tuple[str, T]]) -> dict[str, T]:
+    """What an option says of each key; raises InputError for a key given twice: of two values, one would be ignored."""
+    found: dict[str, T] = {}
+    for key, value in pairs:
+        if key in found:
+            raise InputError(f"{option}: {key} is given twice; give it once")
+        found[key] = value
+    return found
 
 
 def echo_json(result: object) -> None:

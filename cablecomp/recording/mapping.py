@@ -109,6 +109,8 @@ def mapping_from(words: Iterable[str]) -> ColumnMap:
         column, *options = _split(rest)
         if not equals or not channel.strip() or not column:
             raise InputError(f"--map {word}: CHANNEL=COLUMN[,unit=..][,sign=-1].. or a TOML file is accepted")
+        if channel.strip() in table:
+            raise InputError(f"--map: {channel.strip()} is given twice; give it once")
         table[channel.strip()] = {"column": column, **dict(_option(word, option) for option in options)}
     return validated(ColumnMap, {"channel": table}, "--map")
 

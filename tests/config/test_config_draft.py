@@ -69,6 +69,8 @@ def test_every_cable_makes_a_joint_and_an_unknown_pretension_is_an_order_of_magn
 def test_everything_wrong_is_said_at_once_and_nothing_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    assert main(["init", "--out", str(tmp_path), "--set", "name=a", "--set", "name=b"]) == 2
+    assert capsys.readouterr().err == "cablecomp: --set: name is given twice; give it once\n"
     assert main(["init", "--out", str(tmp_path), "--set", "cable=stel", "--set", "output_radius=30"]) == 2
     said = capsys.readouterr().err
     assert "steel-7x7" in said

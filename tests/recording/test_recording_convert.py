@@ -148,6 +148,10 @@ def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest
             ["--late", "joint_torque_Nm=1e9"],
             "a.csv: lasts 0.009 s, of which --late joint_torque_Nm=1e+09 leaves no",
         ),
+        (
+            ["--late", "joint_torque_Nm=0.1", "--late", "joint_torque_Nm=0.2"],
+            "--late: joint_torque_Nm is given twice; give it once",
+        ),
         (["--from", "nan"], "--from nan --to inf: a time, and none before it, in seconds"),
         (["--to", "nan"], "--from -inf --to nan: a time"),
         (["--from", "2", "--to", "1"], "--from 2 --to 1: a time"),

@@ -75,6 +75,7 @@ def test_a_source_means_sign_times_scale_times_si_of_column_less_zero(
         (["motor_position_rad=x,torque_constant_Nm_per_A=1"], "takes a torque from a current"),
         (["motor_position_rad=x,scale=0"], "scale 0"),
         (["time_s=x,sign=-1"], "runs backwards"),
+        (["time_s=x", "time_s=time_s"], "--map: time_s is given twice; give it once"),
     ],
 )
 def test_a_mapping_that_cannot_be_is_refused(words: list[str], says: str, tmp_path: Path) -> None:
