@@ -35,14 +35,16 @@ def convert(
     ends that have no value then are left out, and all of the recording is held in memory. `ros`: ROS 2's
     messages, in MCAP.
 
-    The file appears only when it is whole. Raises InputError for another ending, if nothing is left, or as
-    reading does.
+    The file appears only when it is whole. Raises InputError for another ending, for the recording itself, if nothing
+    is left, or as reading does.
     """
     ending = next((e for e in _ENDINGS if to.name.endswith(e)), None)
     if ending is None:
         raise InputError(f"{to}: {', '.join(_ENDINGS)} are accepted endings")
     if ros and ending != ".mcap":
         raise InputError(f"{to}: ROS 2's messages go into .mcap; give that ending")
+    if to.exists() and to.samefile(source.path):
+        raise InputError(f"{to}: is the recording itself, which stays as it is; give another file to write")
     blocks = _set_right(source, late_s) if late_s else source.blocks()
     counted = _Counted(blocks, between_s, progress)
     names = order(source.channels)

@@ -123,6 +123,20 @@ def test_a_file_is_no_folder_to_write_into(tmp_path: Path, capsys: pytest.Captur
         )
 
 
+def test_a_recording_is_not_written_over_by_what_it_is_converted_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, link = tmp_path / "a.csv", tmp_path / "b.csv"
+    pl.DataFrame(joint(10)).write_csv(log)
+    link.symlink_to(log)
+    before = log.read_bytes()
+    for to in (log, link):
+        assert main(["convert", str(log), str(to), "--from", "0.005"]) == 2
+        assert f"{to}: is the recording itself, which stays as it is; give another" in capsys.readouterr().err
+    assert log.read_bytes() == before
+    assert link.is_symlink()
+
+
 def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, to = tmp_path / "a.csv", tmp_path / "b.csv"
     pl.DataFrame({"t": [0.0, 0.1, 0.2], "joint angle": [0.0, 0.1, 0.0]}).write_csv(log)
