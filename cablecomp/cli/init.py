@@ -86,7 +86,8 @@ def init(
 
 def _refuse_to_overwrite(place: Path, text: str | None = None) -> None:
     """Raise InputError where another text stands (None: any)."""
-    if place.exists() and place.read_text(encoding="utf-8") != text:
+    there = place.read_text(encoding="utf-8", errors="replace") if place.is_file() else None
+    if place.exists() and (text is None or there != text):
         raise InputError(f"{place}: is there already, and differs; remove it or give another --out")
 
 

@@ -98,6 +98,20 @@ def test_a_file_that_differs_is_not_overwritten(tmp_path: Path, capsys: pytest.C
     assert (tmp_path / "joint.toml").read_text() == before
 
 
+@pytest.mark.parametrize("there", [b"\xff\xfe\x00", None], ids=["no text", "folder"])
+def test_whatever_stands_where_a_joint_is_to_be_written_stays(
+    there: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = tmp_path / "joint.toml"
+    if there is None:
+        place.mkdir()
+    else:
+        place.write_bytes(there)
+    assert init(tmp_path) == 2
+    assert f"{place}: is there already, and differs" in capsys.readouterr().err
+    assert place.is_dir() if there is None else place.read_bytes() == there
+
+
 def test_a_metre_for_a_millimetre_is_asked_about(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert init(tmp_path, output_radius_mm=30_000.0) == 0
     assert "output_radius_m" in capsys.readouterr().err
