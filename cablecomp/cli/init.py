@@ -67,7 +67,8 @@ def init(
             )
         _refuse_to_overwrite(out / "joint.toml")
         values = _asked()
-    draft = validated(Draft, values, "init" if answers is None else str(answers))
+    place = "init" if answers is None else f"{answers} with --set" if given else str(answers)
+    draft = validated(Draft, values, place)
     files = {"joint.toml": draft_text(draft), **_link(draft)}
     for name, text in files.items():
         _refuse_to_overwrite(out / name, text)
@@ -92,10 +93,13 @@ def _refuse_to_overwrite(place: Path, text: str | None = None) -> None:
 
 
 def _answer(word: str) -> tuple[str, Any]:
-    """A KEY=VALUE as TOML would have it; what is no number is text."""
+    """A KEY=VALUE as TOML would have it; what is no number is text, with quotes around it or without."""
     key, equals, text = word.partition("=")
     if not equals or not key.strip():
         raise InputError(f"--set {word}: KEY=VALUE is accepted, such as cable=steel-7x7")
+    quoted = re.fullmatch(r'\s*"([^"]*)"\s*', text)
+    if quoted is not None:
+        return key.strip(), quoted[1]
     try:
         return key.strip(), float(text)
     except ValueError:

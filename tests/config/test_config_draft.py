@@ -90,6 +90,16 @@ def test_a_file_of_answers_is_read_as_any_configuration_is(
     assert "did you mean `output_radius_mm = 30`?" in capsys.readouterr().err
 
 
+def test_a_number_is_a_name_as_the_error_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answers = tmp_path / "idea.toml"
+    answers.write_text("".join(f"{k} = {v if isinstance(v, float) else repr(v)}\n" for k, v in KNOWN.items()))
+    command = ["init", "--from", str(answers), "--out", str(tmp_path)]
+    assert main([*command, "--set", "name=5"]) == 2
+    assert "idea.toml with --set: key `name` is 5.0; text in quotes is accepted" in capsys.readouterr().err
+    assert main([*command, "--set", 'name="5"']) == 0
+    assert load_joint(tmp_path / "joint.toml").name == "5"
+
+
 def test_a_file_that_differs_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert init(tmp_path) == 0
     before = (tmp_path / "joint.toml").read_text()
