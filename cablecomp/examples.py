@@ -33,10 +33,15 @@ def example(kind: str, name: str) -> Path:
 
 
 def resolve(path: Path | str, kind: str) -> Path:
-    """The path itself, or the example that a bare name (no suffix, no such file here) stands for."""
+    """The path itself, or the example that a bare name (no suffix, no such file here) stands for; raises InputError for
+    a bare name of neither."""
     path = Path(path)
     bare = path.name == str(path) and not path.suffix and not path.is_file()
-    return example(kind, path.name) if bare and path.name in names(kind) else path
+    if not bare or (path.name not in names(kind) and path.exists()):
+        return path
+    if path.name not in names(kind):
+        raise InputError(f"{path}: no such file here, and no example; examples are {', '.join(names(kind))}")
+    return example(kind, path.name)
 
 
 def find(name: str) -> Path:

@@ -28,6 +28,19 @@ def test_a_copy_of_an_example_loads_as_the_example(kind: str, name: str, tmp_pat
     assert copied.model_copy(update=changes) == original.model_copy(update=changes)
 
 
+@pytest.mark.parametrize("command", ["info", "design", "calibrate a.csv", "inspect a.csv"])
+def test_a_name_that_is_no_example_is_told_which_are(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("time_s,motor_position_rad\n0,0\n1,1\n")
+    assert main([*command.split(), "--config", "capstan-am"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(
+        "cablecomp: capstan-am: no such file here, and no example; examples are capstan-arm, "
+    )
+
+
 def test_a_bare_name_stands_for_an_example_unless_such_a_file_is_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
