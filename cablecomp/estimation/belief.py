@@ -67,7 +67,7 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
         return tuple(found)
     view = View(config, rows, load)
     odd = tuple(odd_sensors(view, columns))
-    if any(s.kind == "stuck" for s in odd):  # it would spoil all that follows
+    if any(s.kind in ("stuck", "wrapped") for s in odd):  # it would spoil all that follows
         return (*found, *odd)
     fits = _angles(view)
     fits += _slack(view)

@@ -1,5 +1,5 @@
 """A check before belief, of sensors by themselves: one that stands still while the other goes on, one that is clipped,
-a load that was never read."""
+an angle that begins anew at each turn, a load that was never read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ import numpy as np
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import INPUT, JOINT, MOTOR
 from cablecomp.estimation.view import Suspicion, View
-from cablecomp.recording.inspection import NOISE_ROWS, clipped_share, clipped_words, runs, stuck_words
+from cablecomp.recording.inspection import (
+    NOISE_ROWS,
+    clipped_share,
+    clipped_words,
+    runs,
+    stuck_words,
+    turns_words,
+    whole_turns,
+)
 from cablecomp.signal.noise import channel_noise
 from cablecomp.signal.smoothing import FloatArray
 
@@ -38,6 +46,7 @@ def odd_sensors(view: View, columns: Mapping[str, FloatArray]) -> Iterator[Suspi
     """What sensors show by themselves: nothing of rests, of a locked input, of a joint that is free."""
     yield from _stuck(view, JOINT, view.y, view.ratio * view.q, "motor")
     yield from _stuck(view, INPUT, view.q, view.y, "joint")
+    yield from _wrapped(columns)
     yield from _clipped(columns)
     yield from _unread(view, columns)
 
@@ -61,6 +70,17 @@ def _stuck(view: View, name: str, values: FloatArray, other: FloatArray, end: st
         rests_s, moved = found
         words = f"{name} {stuck_words(rests_s, end)} The other end goes {moved:.3g} rad of the joint's angle meanwhile"
         yield Suspicion("stuck", name, words, {"rests_s": rests_s, "moved_rad": moved})
+
+
+def _wrapped(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
+    """Angles that jump by whole turns, as of an encoder that counts within one."""
+    for name in (INPUT, JOINT):
+        kept = np.isfinite(columns[name])
+        at = whole_turns(columns[name][kept])
+        if len(at):
+            first_s = float(columns["time_s"][kept][at[0] + 1])
+            words = f"{name} {turns_words(len(at))} First at {first_s:.6g} s; write it on without jumps (numpy.unwrap)"
+            yield Suspicion("wrapped", name, words, {"jumps": float(len(at)), "first_s": first_s})
 
 
 def _clipped(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:

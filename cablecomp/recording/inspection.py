@@ -7,14 +7,18 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
+from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.recording.table import FloatArray
 from cablecomp.signal.noise import channel_noise
 
+IntArray = npt.NDArray[np.intp]
 _GAP: Final = 10.0
 _PLATEAU: Final = 5
 _ALIKE: Final = 0.02
+_TURN: Final = 2.0 * np.pi
 NOISE_ROWS: Final = 200_000
 """Rows out of which a channel's noise is told."""
 
@@ -26,7 +30,8 @@ class ChannelQuality:
     `noise`: 1 sigma of a reading, quantisation included (None = cannot be told); `coloured`: filtered, so that
     the noise is a lower bound; `step`: resolution seen (0 = none); `stuck_s`: longest time without any change
     while the motor moved by over 1 % of its range; `clipped`: share of rows that rest on the greatest or least
-    value for 5 rows and more and came there at once (never of positions: joints have stops and backlash).
+    value for 5 rows and more and came there at once (never of positions: joints have stops and backlash); `turns`:
+    jumps by a whole turn (of positions).
     """
 
     name: str
@@ -38,6 +43,7 @@ class ChannelQuality:
     step: float
     stuck_s: float
     clipped: float
+    turns: int
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,21 @@ def stuck_words(seconds: float, end: str = "motor") -> str:
 def clipped_words(share: float) -> str:
     """What is said of a channel that stops at an extreme value."""
     return f"clipped in {100 * share:.2g} % of the rows"
+
+
+def turns_words(count: int) -> str:
+    """What is said of an angle that begins anew at each turn."""
+    return f"jumps by a whole turn {counted(count, 'time')}: begun anew at each turn?"
+
+
+def whole_turns(angle_rad: FloatArray) -> IntArray:
+    """Places after which an angle jumps by 2 pi, give or take what it moves by from row to row; none in one whose usual
+    steps are of that size themselves."""
+    steps = np.abs(np.diff(angle_rad))
+    usual = float(np.percentile(steps, 95.0)) if len(steps) else 0.0
+    if usual > _TURN / 4.0:
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero(np.abs(steps - _TURN) < max(3.0 * usual, 1e-3 * _TURN))
 
 
 def require_motion(columns: Mapping[str, FloatArray], where: object) -> None:
@@ -125,6 +146,7 @@ def _quality(name: str, values: FloatArray, time: FloatArray, motor: FloatArray 
         step,
         _stuck(values, time, values if motor is None else motor),
         0.0 if "position" in name else clipped_share(known, step),
+        len(whole_turns(known)) if "position" in name else 0,
     )
 
 

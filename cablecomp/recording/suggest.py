@@ -10,6 +10,7 @@ import numpy as np
 
 from cablecomp.recording.channels import CANONICAL, QUANTITIES
 from cablecomp.recording.column_names import NameReading, read_name
+from cablecomp.recording.inspection import whole_turns
 from cablecomp.recording.mapping import ColumnMap, Source, column_of, joined_maps, meaning
 from cablecomp.recording.table import FloatArray
 
@@ -201,9 +202,8 @@ def _angles(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rati
         far = float(np.max(np.abs(values[here.source.column]), initial=0.0)) > 2.0 * np.pi
         if ratio is None and bare and far and other.source.unit == "deg":
             _change(here, "over a turn in radians, and the other angle is in degrees", unit="deg")
-    slope, strength = _slope(
-        _in_si(motor, values[motor.source.column]), _in_si(joint, values[joint.source.column])
-    )
+    turned, followed = (_unwrapped(_in_si(s, values[s.source.column])) for s in (motor, joint))
+    slope, strength = _slope(turned, followed)
     if abs(strength) < _SURE:
         joint.why.append("hardly follows the motor: is it this column?")
         joint.sure = min(joint.sure, 0.2)
@@ -298,6 +298,11 @@ def _change(here: Suggestion, why: str, **changes: object) -> None:
 def _in_si(here: Suggestion, raw: FloatArray) -> FloatArray:
     column = column_of(here.channel, here.source)
     return raw * column.factor + column.offset
+
+
+def _unwrapped(angle_rad: FloatArray) -> FloatArray:
+    """An angle without the jumps of an encoder that begins anew at each turn."""
+    return np.unwrap(angle_rad) if len(whole_turns(angle_rad)) else angle_rad
 
 
 def _slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from rich.table import Table
 from cablecomp.counting import counted
 from cablecomp.errors import path_text
 from cablecomp.recording.channels import CANONICAL
-from cablecomp.recording.inspection import ChannelQuality, Inspection, clipped_words, stuck_words
+from cablecomp.recording.inspection import ChannelQuality, Inspection, clipped_words, stuck_words, turns_words
 from cablecomp.recording.mapping import ColumnMap, mapping_text
 from cablecomp.recording.raw_columns import RawColumns
 from cablecomp.recording.suggest import Suggestion
@@ -124,6 +124,8 @@ def _odd(c: ChannelQuality, seen: Inspection) -> list[str]:
         found.append(stuck_words(c.stuck_s))
     if c.clipped > 0.0:
         found.append(clipped_words(c.clipped))
+    if c.turns:
+        found.append(turns_words(c.turns))
     if c.empty:
         found.append(f"{c.empty} empty")
     return found

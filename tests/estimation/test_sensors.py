@@ -22,6 +22,16 @@ def said(**changed: FloatArray) -> list[tuple[str, str]]:
     return [(s.kind, s.channel) for s in found if s.kind in ("stuck", "clipped", "unread")]
 
 
+@pytest.mark.parametrize("name", ["joint_position_rad", "motor_position_rad"])
+def test_an_angle_that_begins_anew_at_each_turn_is_said(name: str) -> None:
+    """Said alone: what jumps so spoils all that is told of slopes."""
+    middle = float(np.mean(TRUE[name]))
+    (found,) = suspicions(JOINT, {**TRUE, name: (TRUE[name] - middle) % (2.0 * np.pi)})
+    crossings = np.count_nonzero(np.diff(np.sign(TRUE[name] - middle)))
+    assert (found.kind, found.channel, found.numbers["jumps"]) == ("wrapped", name, crossings)
+    assert "jumps by a whole turn" in found.text
+
+
 def frozen(name: str, begin_s: float, end_s: float) -> FloatArray:
     values = TRUE[name].copy()
     first, after = np.searchsorted(TIME, (begin_s, end_s))

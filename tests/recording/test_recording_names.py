@@ -13,7 +13,9 @@ from springy_joint import joint
 from cablecomp.cli.app import main
 from cablecomp.cli.shared import console
 from cablecomp.recording.column_names import read_name
+from cablecomp.recording.inspection import inspect
 from cablecomp.recording.reader import read_all
+from cablecomp.recording.suggest import suggest
 from cablecomp.units import UNITS, unit_named
 
 
@@ -127,6 +129,17 @@ def test_a_further_channel_of_an_unknown_unit_is_left_out_and_said(
     shown = " ".join(capsys.readouterr().out.split())
     assert shown.count(f"note: {says}") == 1
     assert "cable tension 1 (kg) 0 0.499 unit kg is not known" in shown
+
+
+def test_an_angle_that_begins_anew_at_each_turn_turns_no_sign_round() -> None:
+    true = joint(4000)
+    turned = (true["motor_position_rad"] + 0.1) % (2.0 * np.pi)
+    columns = {**true, "motor_position_rad": turned}
+    signs = {s.channel: s.source.sign for s in suggest(columns)}
+    assert set(signs.values()) == {1}
+    turns = {c.name: c.turns for c in inspect(columns).channels}
+    assert turns["motor_position_rad"] == np.count_nonzero(np.abs(np.diff(turned)) > np.pi) > 0
+    assert turns["joint_position_rad"] == turns["joint_torque_Nm"] == 0
 
 
 @pytest.mark.parametrize(
