@@ -86,6 +86,8 @@ def _columns_table(raw: RawColumns, found: list[Suggestion], mapping: ColumnMap)
         told = reason is not None and reason.channel == channel
         sure = f"{100 * min(reason.sure, 1.0):.0f} %" if told and reason is not None else ""
         words = "; ".join(reason.why) if told and reason is not None else ("as mapped" if channel else "")
+        if not len(finite):
+            words = "is empty"
         if reason is not None and reason.unknown is not None and not channel:
             words = f"unit {reason.unknown} is not known"
         table.add_row(name, low, high, channel, sure, words)
@@ -107,7 +109,8 @@ def _show_quality(seen: Inspection, console: Console) -> None:
     for c in seen.channels:
         noise = "–" if c.noise is None else f"{'≥ ' if c.coloured else ''}{c.noise:.3g}"
         step = f"{c.step:.3g}" if c.step else "–"
-        table.add_row(c.name, f"{c.least:.6g}", f"{c.greatest:.6g}", noise, step, "; ".join(_odd(c, seen)))
+        low, high = (f"{v:.6g}" if np.isfinite(v) else "–" for v in (c.least, c.greatest))
+        table.add_row(c.name, low, high, noise, step, "; ".join(_odd(c, seen)))
     console.print(table)
     if seen.repeats is not None:
         r = seen.repeats

@@ -131,6 +131,17 @@ def test_a_further_channel_of_an_unknown_unit_is_left_out_and_said(
     assert "cable tension 1 (kg) 0 0.499 unit kg is not known" in shown
 
 
+def test_a_column_without_a_number_is_said_to_be_empty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "a.csv"
+    pl.DataFrame({**joint(500), "temperature_degC": [""] * 500}).write_csv(log)
+    assert main(["inspect", str(log)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "– – is empty" in shown
+    assert "nan" not in shown
+
+
 def test_an_angle_that_begins_anew_at_each_turn_turns_no_sign_round() -> None:
     true = joint(4000)
     turned = (true["motor_position_rad"] + 0.1) % (2.0 * np.pi)
