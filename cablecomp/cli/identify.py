@@ -10,6 +10,7 @@ import typer
 
 from cablecomp.cli.shared import Config, EffectsOption, JsonOption, console, echo_json, read_joint
 from cablecomp.cli.sources import Reading, reads_recordings
+from cablecomp.errors import InputError
 from cablecomp.report.info import bench_table
 from cablecomp.thesis.bench.evaluate import bench_recording, evaluate_bench
 
@@ -33,7 +34,11 @@ def identify(
     joint = read_joint(config, effects)
     source = reading(joint)
     source.check(recording)
-    bench = bench_recording(source.read(recording).columns, joint)
+    columns = source.read(recording).columns
+    try:
+        bench = bench_recording(columns, joint)
+    except InputError as error:
+        raise InputError(f"{recording}: {error}") from None
     found = evaluate_bench(bench, joint, sensor_stiffness_Nm_per_rad=sensor_stiffness, narrow_tensions=narrow)
     if as_json:
         echo_json(found)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cablecomp.cli import main
 from cablecomp.config import JointConfig, load_joint, parse_joint
 from cablecomp.errors import InputError
 from cablecomp.thesis.bench.evaluate import BenchRecording, evaluate_bench
@@ -205,6 +206,20 @@ def test_a_recording_without_holds_gives_acting_values_only() -> None:
     assert result.loading.acting is not None
     assert result.loading.acting.value == pytest.approx(0.07, rel=0.01)
     assert any("no hold" in note for note in result.notes)
+
+
+def test_a_recording_that_is_no_bench_s_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "a.csv"
+    for head, says in (
+        (
+            "time_s,motor_position_rad,joint_position_rad,joint_torque_Nm",
+            "bench recording has 1 sample; 30 or",
+        ),
+        ("time_s,motor_position_rad,joint_position_rad,other_x", "recording has no channel joint_torque_Nm"),
+    ):
+        log.write_text(f"{head}\n0,0,0,0\n")
+        assert main(["identify", str(log), "--config", "snow-closed-rig"]) == 2
+        assert capsys.readouterr().err.startswith(f"cablecomp: {log}: {says}")
 
 
 def test_bad_recordings_are_refused_in_one_line() -> None:

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cablecomp.counting import counted
 from cablecomp.errors import InputError
 from cablecomp.thesis.bench.segments import Segment
 
+_FEWEST = 30
+"""Samples of which ramps and holds are told."""
 Array = npt.NDArray[np.float64]
 
 
@@ -29,10 +32,14 @@ class BenchRecording:
     def __post_init__(self) -> None:
         arrays = (self.time_s, self.load_Nm, self.deflection_rad)
         lengths = {len(array) for array in arrays}
-        if len(lengths) != 1 or min(lengths) < 30:
+        if len(lengths) != 1:
             raise InputError(
                 f"bench recording has {', '.join(str(len(array)) for array in arrays)} times, loads, "
-                "deflections; equal numbers, 30 or more, are accepted"
+                "deflections; equal numbers are accepted"
+            )
+        if min(lengths) < _FEWEST:
+            raise InputError(
+                f"bench recording has {counted(min(lengths), 'sample')}; {_FEWEST} or more are accepted"
             )
         for name, array in zip(("time_s", "load_Nm", "deflection_rad"), arrays, strict=True):
             bad = np.flatnonzero(~np.isfinite(array))
