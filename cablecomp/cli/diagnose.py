@@ -17,11 +17,12 @@ from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     BudgetOption,
     ChanceOption,
-    Config,
     EffectsOption,
+    FleetConfig,
     JsonOption,
     announce_compilation,
     console,
+    needed_config,
     read_joint,
     share_bar,
 )
@@ -50,7 +51,7 @@ def diagnose_recordings(
     recordings: Annotated[
         list[Path], typer.Argument(help="recordings of one joint, or folders: all recordings in them")
     ],
-    config: Config,
+    config: FleetConfig = None,
     out: Annotated[Path, out_option("folder for diagnosis.json, report.html, joint.augmented.toml")] = Path(
         "diagnosis"
     ),
@@ -86,6 +87,7 @@ def diagnose_recordings(
         )
         work_fleet("diagnose", recordings, config, out, fleet, as_json)
         return
+    config = needed_config(config)
     joint = read_joint(config, effects)
     data = read_moving(recordings, reading(joint), "diagnosis")
     announce_compilation()

@@ -16,11 +16,12 @@ from cablecomp.cli.fleet import SchedulerOption, WorkersOption, asked_for, refus
 from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     BoundsOption,
-    Config,
     EffectsOption,
+    FleetConfig,
     JsonOption,
     announce_compilation,
     console,
+    needed_config,
     read_joint,
     warn,
 )
@@ -44,7 +45,7 @@ def replay(
     recording: Annotated[
         Path, typer.Argument(help="recording (CSV, Parquet, npz, mat, MCAP, ROS bag, CAN log)")
     ],
-    config: Config,
+    config: FleetConfig = None,
     out: Annotated[Path, out_option("folder for prediction.csv, replay.json, report.html")] = Path("replay"),
     bounds: BoundsOption = True,
     session: Annotated[
@@ -78,6 +79,7 @@ def replay(
         )
         work_fleet("replay", [recording], config, out, fleet, as_json)
         return
+    config = needed_config(config)
     joint = read_joint(config, effects)
     source = comparable(reading(joint).open(recording), joint)
     joint, stood, said = as_it_stood(joint, recording, source.head, session)

@@ -42,13 +42,21 @@ console = Output(markup=False, emoji=False)
 """Prints what it is given: a name or a path may look like markup."""
 
 
-def _joint(path: Path) -> Path:
-    return resolve(path, "joints")
+def _joint(path: Path | None) -> Path | None:
+    return None if path is None else resolve(path, "joints")
 
 
 Config = Annotated[
     Path,
     typer.Option("--config", callback=_joint, help="joint configuration (TOML), or the name of an example"),
+]
+FleetConfig = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        callback=_joint,
+        help="joint configuration (TOML), or the name of an example; of a fleet, for joints without their own",
+    ),
 ]
 Control = Annotated[
     Path | None, typer.Option("--control", help="control file (TOML); made up from the joint if absent")
@@ -66,6 +74,15 @@ BudgetOption = Annotated[
     float, typer.Option("--budget", min=0.0, help="seconds after which nothing is begun: the best so far")
 ]
 ChanceOption = Annotated[int, typer.Option("--seed", min=0, help="of noise replicas and resampling")]
+
+
+def needed_config(config: Path | None) -> Path:
+    """The configuration of a joint by itself; raises InputError if none was given."""
+    if config is None:
+        raise InputError(
+            "--config: is missing; give a joint's TOML file, or the name of an example (`cablecomp example` lists them)"
+        )
+    return config
 
 
 def read_joint(path: Path, effects: Sequence[Path] | None = None) -> JointConfig:

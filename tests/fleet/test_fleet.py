@@ -109,6 +109,23 @@ def test_what_a_fleet_has_no_use_for_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("command", ["replay", "diagnose"])
+def test_a_configuration_for_all_is_needed_by_joints_without_their_own(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = folders(tmp_path / "in", ("a",), 1)
+    out = ["--out", str(tmp_path / "out")]
+    assert main([command, str(place), "--workers", "1", *out]) == 2
+    said = (
+        f"cablecomp: {place / 'a/joint.toml'}: is missing; add it, or give one for all joints with --config\n"
+    )
+    assert capsys.readouterr().err == said
+    assert main([command, str(place / "a/night-00.csv"), *out]) == 2
+    assert capsys.readouterr().err.startswith(
+        "cablecomp: --config: is missing; give a joint's TOML file, or "
+    )
+
+
 def test_a_night_that_failed_is_told_of_on_one_line() -> None:
     row = {"joint": "a", "night": "odd\nname.csv", "failed": "is cut off"}
     assert failures(Fleet("replay", (row,), (), 0)) == ["a/odd name.csv: is cut off"]
