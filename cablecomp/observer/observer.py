@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NoReturn
 
@@ -187,9 +187,11 @@ class Observer:
 
     def copy(self) -> Observer:
         """An independent observer in the same state."""
-        twin = Observer(self.config, bounds=self._bounds is not None)
-        twin.restore(self.snapshot())
-        return twin
+        return _restored(self.config, self._bounds is not None, self.snapshot())
+
+    def __reduce__(self) -> tuple[Callable[..., Observer], tuple[JointConfig, bool, bytes]]:
+        """What `copy`, `deepcopy` and `pickle` make one of: the state is written in place, and no two may share it."""
+        return _restored, (self.config, self._bounds is not None, self.snapshot())
 
     # --- what can be asked ----------------------------------------------------------------------------------------
 
@@ -327,3 +329,10 @@ class Observer:
                 motor_torque,
             ),
         )
+
+
+def _restored(config: JointConfig, bounds: bool, snapshot: bytes) -> Observer:
+    """An observer of that joint in the state of a snapshot."""
+    observer = Observer(config, bounds=bounds)
+    observer.restore(snapshot)
+    return observer

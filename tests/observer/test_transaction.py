@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from math import inf, nan
 from pathlib import Path
@@ -260,6 +262,27 @@ def test_a_vector_of_no_time_is_no_state(time_s: float) -> None:
     assert other.snapshot() == before
     other.set_vector(Observer(config).vector())  # of one that knows nothing: before any time
     assert other.snapshot() == Observer(config).snapshot()
+
+
+def copied_by_pickle(observer: Observer) -> Observer:
+    twin: Observer = pickle.loads(pickle.dumps(observer))
+    return twin
+
+
+@pytest.mark.parametrize("bounds", [False, True])
+@pytest.mark.parametrize("copied", [Observer.copy, copy.copy, copy.deepcopy, copied_by_pickle])
+def test_a_copy_goes_its_own_way(copied: Callable[[Observer], Observer], bounds: bool) -> None:
+    config = joint("closed")
+    observer = Observer(config, bounds=bounds)
+    samples = walk(config, np.random.default_rng(6), 20)
+    for sample in samples[:10]:
+        observer.step(sample)
+    before = observer.snapshot()
+    twin = copied(observer)
+    found = [twin.step_ahead(sample, sample.time_s, 0.0, 0.0) for sample in samples[10:]]
+    assert observer.snapshot() == before != twin.snapshot()
+    for (estimate, _), sample in zip(found, samples[10:], strict=True):
+        assert same(estimate, observer.step(sample))
 
 
 def test_an_impossible_state_is_told_and_no_snapshot_of_it_is_taken_up() -> None:
