@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from struct import error as StructError
 from typing import NoReturn
 
 import numpy as np
@@ -22,7 +23,7 @@ from cablecomp.mechanics.status import STATUS_OK
 from cablecomp.observer.block import block_of, estimates
 from cablecomp.observer.bounds import BoundPair
 from cablecomp.observer.compiled import CompiledJoint
-from cablecomp.observer.refusal import refused
+from cablecomp.observer.refusal import refused, unreadable
 from cablecomp.observer.rows import answers
 from cablecomp.observer.snapshot import pack, unpack
 from cablecomp.observer.wraps import WrapProfile, wrap_profiles
@@ -70,13 +71,16 @@ class Observer:
         it has to be asked for by itself."""
         if self._inverts:
             return self.step(sample), NAN
+        try:
+            self._joint.put_ahead(time_s, motor_position_rad, joint_torque_Nm)
+        except StructError:
+            raise unreadable(Sample(time_s, motor_position_rad, joint_torque_Nm)) from None
         fresh = self._read(sample)
-        self._joint.put_ahead(time_s, motor_position_rad, joint_torque_Nm)
         status, ahead = self._joint.step_and_predict()
         estimate = self._taken(sample, status, fresh)
         if ahead != STATUS_OK:
             return estimate, NAN
-        return estimate, float(self._joint.joint[1]) - self._ratio * motor_position_rad
+        return estimate, float(self._joint.joint[1]) - self._ratio * float(motor_position_rad)
 
     def peek(self, sample: Sample) -> Estimate:
         """Predict the joint for a sample (for instance the load expected next) and commit nothing."""
@@ -86,11 +90,14 @@ class Observer:
     def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
         """`peek` for a loop: the deflection [rad] alone, at another load and motor angle, all else as in the
         last sample."""
-        self._joint.put_asked(time_s, motor_position_rad, joint_torque_Nm)
+        try:
+            self._joint.put_asked(time_s, motor_position_rad, joint_torque_Nm)
+        except StructError:
+            raise unreadable(Sample(time_s, motor_position_rad, joint_torque_Nm)) from None
         _, status = self._joint.step(False)
         if status != STATUS_OK:
             self._refuse(status, time_s, False)
-        return float(self._joint.joint[0]) - self._ratio * motor_position_rad
+        return float(self._joint.joint[0]) - self._ratio * float(motor_position_rad)
 
     def run(self, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
         """Step through a block of samples given as canonical channels; returns the estimates as columns.
@@ -273,17 +280,21 @@ class Observer:
 
     def _read(self, sample: Sample) -> bool:
         """Write a sample's readings into the kernel's row; True if the state was started for it, as it is the first."""
-        time, motor, load, joint, torque, temperature, other = sample
-        if self._source == "motor_torque":
-            load = -(torque - self._motor_zero) / self._ratio
-        elif self._source == "none":
-            load = self._zero_load
-        self._joint.put_sample(time, motor, load, joint, temperature)
-        if self.channels:
-            self._joint.put_other(other)
+        try:
+            _, motor, load, joint, torque, temperature, other = sample
+            time = sample.time_s
+            if self._source == "motor_torque":
+                load = -(torque - self._motor_zero) / self._ratio
+            elif self._source == "none":
+                load = self._zero_load
+            self._joint.put_sample(time, motor, load, joint, temperature)
+            if self.channels:
+                self._joint.put_other(other)
+        except (AttributeError, TypeError, ValueError, StructError):
+            raise unreadable(sample) from None
         if self._last_time != -math.inf:
             return False
-        self._start(time, motor)
+        self._start(float(time), float(motor))  # of other numbers it would be compiled anew
         return True
 
     def _taken(self, sample: Sample, status: int, fresh: bool) -> Estimate:
@@ -312,7 +323,7 @@ class Observer:
     def _estimate(self, sample: Sample, low: float, high: float) -> Estimate:
         # in the order of `Answer`, which itself would cost 0.4 us of a step's 4
         joint, drive, load, tension_h, tension_l, _, _, _, motor_torque, _ = self._joint.answer.tolist()
-        rigid = self._ratio * sample.motor_position_rad
+        rigid = self._ratio * float(sample.motor_position_rad)
         shift = joint - drive - rigid
         # made without Python's own call of its class, which took a third longer
         return tuple.__new__(

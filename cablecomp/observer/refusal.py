@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 from enum import IntEnum
 
 from cablecomp.errors import InputError
 from cablecomp.mechanics import status as o
+from cablecomp.signals import Sample
 
 
 class Refusal(IntEnum):
@@ -63,3 +65,19 @@ def refused(
     if reason is Refusal.BREAKS:
         words = f"puts {strength:.4g} times its breaking force on a cable; lower the load or check breaking_force_N"
     return SampleRefused(reason, time_s, index, words)
+
+
+def unreadable(sample: object) -> InputError:
+    """The error for what a row of readings cannot hold: what is no `Sample`, or one with what is no number."""
+    if not isinstance(sample, Sample):
+        return InputError(f"sample: a `cablecomp.Sample` is accepted, not {type(sample).__name__}")
+    for name, value in zip(Sample._fields[:-1], sample, strict=False):
+        try:
+            struct.pack("d", value)
+        except struct.error:
+            return InputError(
+                f"sample: {name} is {value!r:.40}; a number is accepted, NaN where there is none"
+            )
+    return InputError(
+        f"sample: other is {sample.other!r:.40}; a tuple of numbers is accepted, NaN where there is none"
+    )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from observer_joints import joint, pull_unit
 
 from cablecomp.config import EffectEntry
 from cablecomp.errors import InputError
+from cablecomp.mechanics.start import joint_start
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
 
@@ -132,3 +135,52 @@ def test_a_stiffness_before_the_first_sample_is_of_no_direction() -> None:
     observer.step(Sample(0.0, 0.0, 0.0))
     observer.step(Sample(0.1, 0.0, 0.1))
     assert observer.stiffness() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [
+        (Sample(0.1, 0.0, None), "joint_torque_Nm is None"),  # type: ignore[arg-type]
+        (Sample(0.1, "0.0", 0.0), "motor_position_rad is '0.0'"),  # type: ignore[arg-type]
+        (Sample(0.1, 0.0, 0.0, other=None), "other is None"),  # type: ignore[arg-type]
+        ([*Sample(0.1, 0.0, 0.0)], "not list"),
+        ((0.1, 0.0, 0.0), "not tuple"),
+    ],
+)
+def test_what_holds_no_numbers_is_told_by_name_and_leaves_no_trace(bad: Sample, words: str) -> None:
+    gauge = {"id": "crosstalk", "channel": "other_gauge", "load_coefficient": 1e-3}
+    config = joint("closed").model_copy(update={"effect": (EffectEntry.model_validate(gauge),)})
+    observer = Observer(config)
+    for _ in range(2):  # before the first sample, and after it
+        before = observer.snapshot()
+        for ask in (observer.step, observer.peek, lambda bad: observer.step_ahead(bad, 0.2, 0.0, 0.0)):
+            with pytest.raises(InputError, match=f"^sample: .*{words}"):
+                ask(bad)
+            assert observer.snapshot() == before
+        observer.step(Sample(0.0, 0.0, 0.0, other=(0.0,)))
+
+
+def test_a_look_ahead_at_no_number_leaves_no_trace() -> None:
+    observer = Observer(joint("closed"))
+    unknown = observer.snapshot()
+    with pytest.raises(InputError, match="joint_torque_Nm is None"):
+        observer.step_ahead(Sample(0.0, 0.0, 0.0), 0.1, 0.0, None)  # type: ignore[arg-type]
+    assert observer.snapshot() == unknown
+    observer.step(Sample(0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="time_s is None"):
+        observer.peek_deflection(None, 0.0, 0.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", [np.int16, np.float32, np.array])
+def test_numbers_of_any_kind_give_the_same_answer(kind: Callable[[float], float]) -> None:
+    """In full: a rigid angle in half the digits would cost the deflection more than it holds."""
+    plain, other = Observer(joint("closed")), Observer(joint("closed"))
+    other.compile()
+    before = len(joint_start.signatures)
+    for time, motor, load in ((0.0, 0.0, 0.0), (1.0, 3.0, 1.0), (2.0, -1.0, 0.0)):
+        known = plain.step(Sample(time, motor, load))
+        found = other.step(Sample(kind(time), kind(motor), kind(load)))
+        assert np.array_equal(found, known, equal_nan=True)
+        assert type(found.deflection_rad) is float
+    assert type(other.peek_deflection(3.0, kind(1.0), 0.0)) is float
+    assert len(joint_start.signatures) == before  # a loop does not wait for a compiler
