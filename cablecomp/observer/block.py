@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.mechanics.profile import Floats
@@ -13,11 +15,12 @@ from cablecomp.observer.rows import Answer, Readings, readings
 def block_of(config: JointConfig, channels: Sequence[str], columns: Mapping[str, Floats]) -> Readings:
     """The readings of these columns; `channels`: the further ones that the joint's effects read.
 
-    Raises InputError for a channel that is missing, that of the joint's load first of all.
+    Raises InputError for a channel that is missing, or does not hold one number for each time.
     """
-    read = readings(len(columns["time_s"]), len(channels))
-    read.time[:] = columns["time_s"]
-    read.motor[:] = columns["motor_position_rad"]
+    time = _need(columns, "time_s")
+    read = readings(len(time), len(channels))
+    read.time[:] = time
+    read.motor[:] = _need(columns, "motor_position_rad")
     source, sensors = config.observer.load, config.sensors
     if source == "motor_torque":
         read.load[:] = -(_need(columns, "motor_torque_Nm") - config.motor_zero_Nm) / config.drive.ratio
@@ -26,9 +29,9 @@ def block_of(config: JointConfig, channels: Sequence[str], columns: Mapping[str,
     elif source == "joint_torque":
         read.load[:] = _need(columns, "joint_torque_Nm")
     if "joint_position_rad" in columns:
-        read.joint[:] = columns["joint_position_rad"]
+        read.joint[:] = _need(columns, "joint_position_rad")
     if "temperature_degC" in columns:
-        read.temperature[:] = columns["temperature_degC"]
+        read.temperature[:] = _need(columns, "temperature_degC")
     for k, name in enumerate(channels):
         read.other[:, k] = _need(columns, name)
     return read
@@ -53,6 +56,16 @@ def estimates(answer: Answer, low: Floats, high: Floats, rigid: Floats) -> dict[
 
 
 def _need(columns: Mapping[str, Floats], name: str) -> Floats:
+    """A channel's values, one for each time."""
     if name not in columns:
         raise InputError(f"channel `{name}` is missing; the recording has {', '.join(sorted(columns))}")
-    return columns[name]
+    count = np.size(columns["time_s"])
+    try:
+        found = np.asarray(columns[name], dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"channel `{name}` holds what is no number; numbers are accepted") from None
+    if found.shape != (count,):
+        raise InputError(
+            f"channel `{name}` has the shape {found.shape}; one value for each time is accepted: ({count},)"
+        )
+    return found

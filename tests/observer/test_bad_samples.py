@@ -184,3 +184,31 @@ def test_numbers_of_any_kind_give_the_same_answer(kind: Callable[[float], float]
         assert type(found.deflection_rad) is float
     assert type(other.peek_deflection(3.0, kind(1.0), 0.0)) is float
     assert len(joint_start.signatures) == before  # a loop does not wait for a compiler
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"motor_position_rad": None}, "`motor_position_rad` is missing"),
+        ({"time_s": None}, "`time_s` is missing"),
+        ({"motor_position_rad": np.zeros(1)}, r"`motor_position_rad` has the shape \(1,\)"),
+        ({"joint_torque_Nm": np.zeros((4, 1))}, r"`joint_torque_Nm` has the shape \(4, 1\)"),
+        ({"temperature_degC": np.zeros(3)}, "`temperature_degC` has the shape"),
+        ({"joint_position_rad": ["high"] * 4}, "`joint_position_rad` holds what is no number"),
+        ({"time_s": 1.0}, "`time_s` has the shape"),
+    ],
+)
+def test_a_block_holds_one_number_of_each_channel_for_each_time(
+    changed: dict[str, np.ndarray | None], words: str
+) -> None:
+    observer = Observer(joint("closed"))
+    before = observer.snapshot()
+    block = {k: v for k, v in (columns(np.zeros(4)) | changed).items() if v is not None}
+    with pytest.raises(InputError, match=words):
+        observer.run(block)
+    assert observer.snapshot() == before
+
+
+def test_a_joint_is_a_configuration() -> None:
+    with pytest.raises(InputError, match="`config` is a str; give a JointConfig"):
+        Observer("capstan-arm")  # type: ignore[arg-type]
