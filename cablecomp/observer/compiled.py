@@ -104,6 +104,10 @@ class CompiledJoint:
             self._address = kernel_address(st.step_rows, *self._one, True)
         return self._address
 
+    def time_s(self) -> float:
+        """Time of the state: that of the sample last committed."""
+        return float(self.named.context.time)
+
     def compliance(self) -> float:
         """Present tangent compliance dtheta/dM [rad/(N m)] of the drive."""
         return float(self.named.context.compliance)

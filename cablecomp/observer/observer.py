@@ -43,6 +43,10 @@ class Observer:
     """
 
     def __init__(self, config: JointConfig, *, bounds: bool = False) -> None:
+        if not isinstance(config, JointConfig):
+            raise InputError(
+                f"`config` is a {type(config).__name__}; give a JointConfig (`load_joint`, `parse_joint`)"
+            )
         self.config = config
         self.model: Model = assemble(config, extend(config))
         self.channels = other_channels(config)
@@ -147,20 +151,20 @@ class Observer:
                 raise InputError(
                     f"snapshot: holds an impossible state ({found[0]}); start from a known state instead"
                 )
-        except InputError:
+        except BaseException:
             for part, old in zip(self._all_arrays(), before[0], strict=True):
                 part[:] = old
             self._last_time = before[1]
             raise
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path | str) -> None:
         """Write the snapshot to a file: a power cut leaves the old file or the new one; raises OSError."""
-        write_durably(path, self.snapshot())
+        write_durably(Path(path), self.snapshot())
 
-    def load(self, path: Path) -> None:
+    def load(self, path: Path | str) -> None:
         """Restore from a file written by `save`."""
         try:
-            data = path.read_bytes()
+            data = Path(path).read_bytes()
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror}); give a snapshot file") from None
         self.restore(data)
@@ -175,7 +179,8 @@ class Observer:
 
         Raises InputError, and changes nothing, if it cannot be such a state.
         """
-        last = float(vector[-1])
+        vector = np.asarray(vector, dtype=np.float64)
+        last = float(vector[-1]) if vector.ndim == 1 and len(vector) else NAN
         unknown = last == -math.inf and not np.any(vector[-1 - len(self._joint.heights) : -1])
         if not (math.isfinite(last) or unknown) or not self._joint.take_up(vector[:-1]):
             raise InputError(
@@ -260,8 +265,10 @@ class Observer:
 
     def _violations(self) -> list[str]:
         if self._last_time == -math.inf:
-            return []
+            return [f"{self.pieces()} points before any time"] if self.pieces() else []
         found = violations(self.model, self._joint.memory, self._joint.heights)
+        if self._last_time != self._joint.time_s():
+            found.append(f"the last sample at {self._last_time} s, the state at {self._joint.time_s()} s")
         for memory, heights in [] if self._bounds is None else self._bounds.states():
             found += profile_violations(self.model, memory, heights)
         return found

@@ -46,7 +46,9 @@ def unpack(
 ) -> float:
     """Fill the states from a snapshot and return the time of its last sample; after an InputError they may be
     half filled."""
-    body, digest = data[:-32], data[-32:]
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise InputError(f"snapshot: the bytes of Observer.snapshot are accepted, not {type(data).__name__}")
+    body, digest = bytes(data[:-32]), bytes(data[-32:])
     if len(data) < 60 or not body.startswith(MAGIC):
         raise InputError(
             "snapshot: is none of ours (wrong first bytes); give a file written by Observer.save"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from hashlib import sha256
+from math import inf, nan
 from pathlib import Path
+from struct import pack
 
 import numpy as np
 import pytest
@@ -96,6 +98,29 @@ def test_a_snapshot_cut_short_and_sealed_anew_is_one_line(length: int) -> None:
     body = observer.snapshot()[:-32][:length]
     with pytest.raises(InputError, match="more or less than its joint's state"):
         Observer(joint("closed")).restore(body + sha256(body).digest())
+
+
+@pytest.mark.parametrize(("of", "time_s"), [(0, 5.0), (1, nan), (1, inf), (1, -inf), (1, 5.0)])
+def test_a_snapshot_whose_time_is_not_its_states_is_not_taken_up(of: int, time_s: float) -> None:
+    observers = Observer(joint("closed")), Observer(joint("closed"))
+    observers[1].step(Sample(1.0, 0.0, 0.1))
+    body = observers[of].snapshot()[:-32]
+    body = body[:28] + pack("<d", time_s) + body[36:]
+    with pytest.raises(InputError, match="impossible state"):
+        observers[1].restore(body + sha256(body).digest())
+    observers[1].step(Sample(1.5, 0.0, 0.1))
+
+
+def test_a_snapshot_is_bytes_of_any_kind_and_its_file_a_path_of_any_kind(tmp_path: Path) -> None:
+    observer, other = Observer(joint("closed")), Observer(joint("closed"))
+    observer.step(Sample(0.0, 0.0, 0.1))
+    observer.save(str(tmp_path / "joint.snapshot"))
+    other.load(str(tmp_path / "joint.snapshot"))
+    other.restore(memoryview(observer.snapshot()))
+    assert other.snapshot() == observer.snapshot()
+    for none in (None, "joint.snapshot"):
+        with pytest.raises(InputError, match="the bytes of"):
+            other.restore(none)  # type: ignore[arg-type]
 
 
 def test_the_planned_swing_erases_and_a_smaller_one_does_not() -> None:

@@ -241,7 +241,7 @@ def test_a_vector_is_checked_and_zeros_mean_that_nothing_is_known() -> None:
     before = other.snapshot()
     broken = vector.copy()
     broken[-2] = -231.0
-    for bad in (broken, vector[:-1], vector + 0.5):
+    for bad in (broken, vector[:-1], vector + 0.5, vector[:0], vector[None]):
         with pytest.raises(InputError, match="no state"):
             other.set_vector(bad)
         assert other.snapshot() == before
