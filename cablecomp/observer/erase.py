@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cablecomp.config import Limits
 from cablecomp.errors import InputError
 from cablecomp.observer.observer import Observer
+from cablecomp.signals import Sample
 
 LEG = 60  # samples of each leg of an excitation; quasi-static, so their number only has to show the extremes
 AGREE = 1e-9  # of the joint's load-free deflection scale: two histories count as one
@@ -50,7 +51,8 @@ def plan_erase(
 
     Erased means: an observer that started from uniform tension and goes through the same excitation predicts
     the same from then on. Found by bisection on copies; the observer itself stays as it is. Limits: those
-    given, else the configuration's; a load limit must be stated in one of them. Raises InputError without one.
+    given, else the configuration's; a load limit must be stated in one of them. Raises InputError without one, and
+    SampleRefused where the joint cannot be there.
     """
     limits = observer.config.limits if limits is None else limits
     most = limits.joint_torque_max_Nm
@@ -59,14 +61,24 @@ def plan_erase(
             f"{observer.config.name}: `limits.joint_torque_max_Nm` is missing; state how far the load may swing"
         )
     at = (time_s, motor_position_rad, joint_torque_Nm)
-    swings = {first: _smallest(observer, at, most, first, turn=False) for first in (1, -1)}
+    known = _told_its_load(observer)
+    known.peek(Sample(*at, temperature_degC=20.0, other=(0.0,) * len(known.channels)))
+    swings = {first: _smallest(known, at, most, first, turn=False) for first in (1, -1)}
     first = min(swings, key=lambda sign: swings[sign])
     low, high = limits.motor_position_min_rad, limits.motor_position_max_rad
     room = 2.0 * pi
     if low is not None and high is not None:
         room = max(high - motor_position_rad, motor_position_rad - low)
-    turns = [_smallest(observer, at, room, sign, turn=True) for sign in (1, -1)]
+    turns = [_smallest(known, at, room, sign, turn=True) for sign in (1, -1)]
     return ErasePlan(swings[first], first, min(turns), most, room)
+
+
+def _told_its_load(observer: Observer) -> Observer:
+    """A copy that is told its load, whatever the observer itself finds that from."""
+    options = observer.config.observer.model_copy(update={"load": "joint_torque"})
+    known = Observer(observer.config.model_copy(update={"observer": options}))
+    known.set_vector(observer.vector())
+    return known
 
 
 def excitation(at: tuple[float, float, float], size: float, first: int, turn: bool) -> Columns:

@@ -154,3 +154,35 @@ def test_erasing_says_what_it_needs() -> None:
     )
     with pytest.raises(InputError, match="joint_torque_max_Nm"):
         plan_erase(Observer(config), 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("at", "words"),
+    [
+        ((nan, 0.0, 0.0), "no finite"),
+        ((1.0, nan, 0.0), "no finite"),
+        ((1.0, 0.0, inf), "no finite"),
+        ((0.0, 0.0, 0.0), "backwards"),
+        ((1.0, 1e3, 0.0), "runs out of cable"),
+        ((1.0, 0.0, None), "joint_torque_Nm is None"),
+    ],
+)
+def test_nothing_is_planned_from_where_the_joint_cannot_be(
+    at: tuple[float, float, float], words: str
+) -> None:
+    observer = Observer(joint("closed", limits={"joint_torque_max_Nm": 1.0}))
+    observer.step(Sample(0.5, 0.0, 0.0))
+    with pytest.raises(InputError, match=words):
+        plan_erase(observer, *at)
+
+
+@pytest.mark.parametrize("load", ["motor_torque", "both_encoders", "none"])
+def test_a_plan_does_not_ask_where_the_load_is_known_from(load: str) -> None:
+    limits = {"joint_torque_max_Nm": 1.0}
+    told = Observer(joint("closed", limits=limits))
+    finds = Observer(joint("closed", limits=limits, observer={"load": load}))
+    told.step(Sample(0.0, 0.0, 0.0))
+    finds.step(Sample(0.0, 0.0, 0.0, 0.0, 0.0))
+    plan = plan_erase(finds, 0.1, 0.0, 0.2)
+    assert plan.possible
+    assert plan == plan_erase(told, 0.1, 0.0, 0.2)
