@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -61,6 +62,8 @@ def experiment(sealed: Path, protocol: Path, out: Path) -> None:
 
 
 def _command(module: str, options: Mapping[str, object], *words: str) -> Sequence[str]:
+    """The command line of a process that ends with this one, whatever ends it."""
+    options = {**options, "--starter": os.getpid()}
     return [sys.executable, "-m", module, *words, *(str(x) for pair in options.items() for x in pair)]
 
 
@@ -70,14 +73,18 @@ def _concealed(module: str, options: Mapping[str, object], progress: OnProgress)
         _command(module, options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as process:
         assert process.stdout is not None
-        for line in process.stdout:
-            words, last = line.split(), line
-            if words[:1] == ["written"]:
-                progress(int(words[1]), int(words[3]))
-            elif words[:1] == ["sha256"]:
-                sha256 = words[1]
-            elif words[:1] == ["left"]:
-                warn([line.strip()])
+        try:
+            for line in process.stdout:
+                words, last = line.split(), line
+                if words[:1] == ["written"]:
+                    progress(int(words[1]), int(words[3]))
+                elif words[:1] == ["sha256"]:
+                    sha256 = words[1]
+                elif words[:1] == ["left"]:
+                    warn([line.strip()])
+        except BaseException:
+            process.kill()  # else it would be waited for to its end
+            raise
     if process.returncode != 0 or not sha256:
         raise InputError(_last_line(last))
     return sha256

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import subprocess
+import sys
+import time
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,6 +20,7 @@ import pytest
 from blind_joint import JOINT, recording
 from blind_verdict import verdict
 
+from cablecomp.cli import concealing
 from cablecomp.cluster import Workers
 from cablecomp.config_text import joint_text
 from cablecomp.errors import InputError
@@ -145,3 +150,32 @@ def test_a_broken_seal_is_not_opened(tmp_path: Path) -> None:
         check_seal(tmp_path / SEALED, sha256)
     with pytest.raises(InputError, match="lacks or misstates 'kind'"):
         truth_from({k: v for k, v in plain.items() if k != "kind"})
+
+
+def test_who_conceals_is_not_waited_for_by_who_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = "import time; print('written 1 of 2', flush=True); time.sleep(10)"
+    monkeypatch.setattr(concealing, "_command", lambda *given: [sys.executable, "-S", "-c", said])
+
+    def interrupted(done: int, of: int) -> None:
+        raise KeyboardInterrupt
+
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        concealing.conceal_joints(Path("out"), Wish(2, 1, "single", "mixed", "none"), 1, interrupted)
+    assert time.monotonic() - begin < 5.0
+
+
+def test_who_conceals_ends_with_who_is_killed() -> None:
+    assert concealing._command("firmware_sim.conceal", {})[-2:] == ["--starter", str(os.getpid())]
+    code = (
+        "import os, time; from firmware_sim.starter import end_with; "
+        "end_with(os.getppid()); print('there', flush=True); time.sleep(10)"
+    )
+    shell = ["sh", "-c", '"$0" -c "$1" & wait', sys.executable, code]
+    begin = time.monotonic()
+    with subprocess.Popen(shell, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2]) as starter:
+        assert starter.stdout is not None
+        assert starter.stdout.readline() == b"there\n"
+        starter.kill()
+        starter.stdout.read()  # until nobody holds its other end any more
+    assert time.monotonic() - begin < 8.0
