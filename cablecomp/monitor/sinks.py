@@ -53,7 +53,8 @@ class PlotJuggler:
 
 
 class Foxglove:
-    """A WebSocket server on loopback that Foxglove connects to: topic `/live`, JSON."""
+    """A WebSocket server on loopback that Foxglove connects to: topic `/live`, JSON; where its usual port is taken, as
+    by another run, at a free one (`port`)."""
 
     def __init__(self, port: int = FOXGLOVE_PORT) -> None:
         try:
@@ -61,7 +62,10 @@ class Foxglove:
         except ImportError:
             raise InputError("--foxglove needs a package: pip install 'cablecomp[live]'") from None
         self._foxglove = foxglove
-        self._server = foxglove.start_server(name="cablecomp", host="127.0.0.1", port=port)
+        try:
+            self._server = foxglove.start_server(name="cablecomp", host="127.0.0.1", port=port)
+        except RuntimeError:
+            self._server = foxglove.start_server(name="cablecomp", host="127.0.0.1", port=0)
         self._channel: Any = None
         self.port: int = self._server.port
 

@@ -42,7 +42,7 @@ class Onlookers:
 def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[tuple[Instrument, tuple[str, ...]]]:
     """A viewer for the time of a run: the instrument to hand to it, and a line about each place to look.
 
-    Raises InputError if the viewer cannot serve, such as for a port that is taken.
+    Raises InputError if the viewer cannot serve, such as for a file that cannot be written.
     """
     context = get_context("spawn")
     here, there = context.Pipe()

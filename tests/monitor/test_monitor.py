@@ -149,6 +149,16 @@ LISTEN = """(port) => new Promise((done, fail) => {
 })"""
 
 
+def test_foxglove_is_served_beside_another_run() -> None:
+    pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = other.getsockname()[1]
+        sink = Foxglove(port=taken)
+        assert sink.port != taken
+        socket.create_connection(("127.0.0.1", sink.port), timeout=1.0).close()
+        sink.close()
+
+
 @needs_browser
 def test_a_foxglove_client_gets_the_channel_its_schema_and_frames() -> None:
     pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
