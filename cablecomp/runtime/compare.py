@@ -24,6 +24,7 @@ from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, Watch, run_joints
 from cablecomp.runtime.setup import Contestant, same_joint
 from cablecomp.runtime.simulated import Simulation, SimulationFactory, SimulationWish
+from cablecomp.runtime.ways_out import ASKED_BY_USER
 from cablecomp.signal.noise import reading_sigma
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -135,7 +136,8 @@ def compare(
     """Calibrate from one recording of 60 s, then run the contestants on motions not seen before, in
     stepped time.
 
-    All on the independent plant, whose parameters lie off the nominal ones by draws of their tolerance.
+    All on the independent plant, whose parameters lie off the nominal ones by draws of their tolerance. A signal
+    that stops one of the runs ends it all by KeyboardInterrupt.
     """
     started = now()
     base = _Base(config, link, control, factory, options, watch)
@@ -236,6 +238,8 @@ class _Base(NamedTuple):
             report = run_joints(contestants, link, self.control, protocol, options, simulation, self.watch)
         finally:
             simulation.close()
+        if report.stop_reason.startswith(ASKED_BY_USER):
+            raise KeyboardInterrupt
         if report.stop_reason != TIME_IS_OVER:
             raise InputError(
                 f"{name}: the run stopped early: {report.stop_reason}; see {options.out}/events.jsonl"

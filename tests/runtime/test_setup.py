@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from cablecomp.cli.simulation import _timing
 from cablecomp.config import load_joint
+from cablecomp.control.motors import control_for
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
 from cablecomp.links.load import load_link
 from cablecomp.links.protocols import tells
+from cablecomp.runtime import compare
 from cablecomp.runtime.setup import _check_measured, _reads_temperature
 
 LINKS = Path(__file__).parents[2] / "configs/links"
@@ -65,3 +68,24 @@ def test_a_temperature_is_needed_where_an_effect_goes_with_it(
 ) -> None:
     joint = with_effects(load_joint("wrist-capstan"), [effect] if effect else [])
     assert _reads_temperature(joint) is reads
+
+
+@pytest.mark.parametrize("why", ["asked by the user", "asked by the user (SIGTERM)"])
+def test_a_comparison_that_is_stopped_by_a_signal_is_no_fault_of_the_input(
+    why: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    closed = []
+    simulation = SimpleNamespace(close=lambda: closed.append(True))
+    monkeypatch.setattr(compare, "run_joints", lambda *given: SimpleNamespace(stop_reason=why))
+    joint, link = load_joint("wrist-capstan"), load_link("wrist-virtual")
+    with pytest.raises(KeyboardInterrupt):
+        compare.compare(
+            joint,
+            link,
+            control_for(joint),
+            lambda wish: simulation,  # type: ignore[arg-type, return-value]
+            lambda config, columns: pytest.fail("goes on"),
+            compare.CompareOptions(tmp_path),
+            lambda: 0.0,
+        )
+    assert closed
