@@ -45,9 +45,9 @@ def to_nlsys(
         raise InputError(f"period_s is {period_s}; a time above 0 s is accepted")
     if states is None:
         return _exact(config, period_s, name)
-    if not 1 <= states <= 64:
+    if states not in range(1, 65):
         raise InputError(f"states is {states}; 1 to 64, or None for the whole history, are accepted")
-    return _reduced(config, period_s, name, fit_plays(config, states, load_max_Nm))
+    return _reduced(config, period_s, name, fit_plays(config, int(states), load_max_Nm))
 
 
 def _exact(config: JointConfig, period_s: float, name: str) -> Any:

@@ -108,7 +108,7 @@ def test_what_tries_states_of_its_own_is_sent_to_the_reduced_system() -> None:
         system.dynamics(0.0, np.ones(system.nstates), np.zeros(2))
 
 
-@pytest.mark.parametrize("states", [0, -1, 65])
+@pytest.mark.parametrize("states", [0, -1, 65, 1.5, math.nan, "16"])
 def test_a_number_of_states_that_makes_no_sense_is_refused(states: int) -> None:
     with pytest.raises(InputError, match="1 to 64"):
         to_nlsys(JOINT, states=states)
