@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import plotly.graph_objects as go
@@ -167,6 +167,7 @@ def calibrate(
 
     After `budget_s` [s] no further step begins: the best so far is given, and a warning says so.
     """
+    _check(seed, sessions, budget_s)
     joint, data = _joint(config), columns_of(recordings, _mapping(mapping))
     return CalibrationResult(
         _calibrate(joint, data, seed, sessions, progress, budget_s), _doubts(joint, data)
@@ -187,6 +188,7 @@ def diagnose(
 
     After `budget_s` [s] no further hypothesis is begun: what was found by then is weighed, and a warning says so.
     """
+    _check(seed, sessions, budget_s)
     joint, data = _joint(config), columns_of(recordings, _mapping(mapping))
     return DiagnosisResult(_diagnose(joint, data, progress, seed, sessions, budget_s), _doubts(joint, data))
 
@@ -225,6 +227,16 @@ def _joint(config: JointConfig | Path | str) -> JointConfig:
             f"`config` is a {type(config).__name__}; give a JointConfig (`load_joint`, `parse_joint`) or a file's path"
         )
     return load_joint(config)
+
+
+def _check(seed: int, sessions: Sessions | None, budget_s: float) -> None:
+    """Raise InputError for options that the command line would not take either."""
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"`seed` is {seed!r}; a whole number from 0 on is accepted")
+    if sessions is not None and sessions not in get_args(Sessions):
+        raise InputError(f"`sessions` is {sessions!r}; {', '.join(get_args(Sessions))} or None is accepted")
+    if not budget_s >= 0.0:
+        raise InputError(f"`budget_s` is {budget_s!r}; a time from 0 s on is accepted")
 
 
 def _mapping(given: Mapped) -> ColumnMap | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -64,3 +65,15 @@ def test_errors_are_one_line(given: object, words: str) -> None:
 def test_a_recording_in_the_joints_place_is_told_in_one_line() -> None:
     with pytest.raises(InputError, match="`config` is a dict; give a JointConfig"):
         cablecomp.replay(JOINT, COLUMNS)  # type: ignore[arg-type]  # wrong on purpose
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"seed": -1}, {"seed": 1.5}, {"seed": None}, {"sessions": "every"}, {"budget_s": float("nan")}]
+)
+@pytest.mark.parametrize("call", [cablecomp.calibrate, cablecomp.diagnose])
+def test_an_option_that_makes_no_sense_is_told_by_name(
+    call: Callable[..., object], wrong: dict[str, object]
+) -> None:
+    (name,) = wrong
+    with pytest.raises(InputError, match=f"`{name}` is {wrong[name]!r}; "):
+        call(COLUMNS, JOINT, **wrong)
