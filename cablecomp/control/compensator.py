@@ -8,7 +8,7 @@ deflection(wanted load)) / N`.
 
 from __future__ import annotations
 
-from math import isfinite, tanh
+from math import inf, isfinite, tanh
 from typing import NamedTuple, Protocol
 
 from cablecomp.config import JointConfig
@@ -94,7 +94,7 @@ class Compensator:
         gains: Gains = DEFAULT_GAINS,
         motor: MotorModel | None = None,
     ) -> None:
-        if not period_s > 0.0:
+        if not 0.0 < period_s < inf:
             raise InputError(f"period_s is {period_s}; a time above 0 is accepted")
         self.options = options
         self.gains = gains_of(options, gains)
@@ -127,6 +127,7 @@ class Compensator:
         self._linear = options.linear_stiffness_Nm_per_rad
         self._from_sensor = options.load != "reference"
         self._goes_to_position = options.mode is ControlMode.POSITION
+        self._asks_for_motion = options.mode is not ControlMode.FORCE
         self._looks_ahead = options.feed_forward is not FeedForward.LINEAR
 
     def enable(self) -> None:
@@ -152,9 +153,17 @@ class Compensator:
     ) -> Command:
         """One period; returns the motor command (rad, rad/s, Nm at the input pulley) and the observer's view.
 
-        `joint_ok` False: the joint encoder's value is not to be trusted, feedback on it rests.
+        `joint_ok` False: the joint encoder's value is not to be trusted, feedback on it rests. Raises SampleRefused,
+        and InputError for a reference whose motion is not finite; neither leaves a trace.
         """
         self.observed = False
+        r = reference
+        if self._asks_for_motion and not isfinite(
+            r.joint_position_rad + r.joint_velocity_rad_s + r.joint_acceleration_rad_s2
+        ):
+            raise InputError(
+                f"reference: finite position, velocity and acceleration are accepted, not {reference}"
+            )
         if self._goes_to_position:
             return self._position(sample, reference, feed, joint_ok)
         before = self.estimate

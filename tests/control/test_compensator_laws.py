@@ -4,7 +4,7 @@ feedback that settles.
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 from pathlib import Path
 
 import numpy as np
@@ -302,3 +302,22 @@ def test_what_is_asked_of_the_observer_at_once_is_what_is_asked_one_by_one(load:
         found, expected = (c.step(now, wanted, feed) for c in pair)
         assert np.array_equal(found, expected, equal_nan=True)
     assert one.snapshot() == other.snapshot()
+
+
+@pytest.mark.parametrize(
+    "wrong", [Reference(nan), Reference(0.0, nan), Reference(inf), Reference(0.0, 0.0, 0.0, nan)]
+)
+@pytest.mark.parametrize("mode", ["position", "impedance"])
+def test_a_reference_that_is_no_motion_is_refused_and_leaves_no_trace(wrong: Reference, mode: str) -> None:
+    asked, spared = controller(mode=mode, torque_from="sensor"), controller(mode=mode, torque_from="sensor")
+    for k in range(3):
+        found = [c.step(sample(k, 0.0, 0.1, 0.0), Reference(0.1)) for c in (asked, spared)]
+        assert np.array_equal(*found, equal_nan=True)
+        with pytest.raises(InputError, match=r"^reference: finite"):
+            asked.step(sample(k, 0.0, 0.1, 0.0), wrong)
+
+
+@pytest.mark.parametrize("period_s", [0.0, nan, inf])
+def test_a_period_is_a_time(period_s: float) -> None:
+    with pytest.raises(InputError, match="period_s is"):
+        Compensator(JOINT, CompensatorOptions(), period_s, Spring())
