@@ -128,6 +128,9 @@ class Compensator:
         self._from_sensor = options.load != "reference"
         self._goes_to_position = options.mode is ControlMode.POSITION
         self._asks_for_motion = options.mode is not ControlMode.FORCE
+        self._by_encoders = config.observer.load == "both_encoders" or (
+            not self._goes_to_position and options.torque_from == "encoders"
+        )
         self._looks_ahead = options.feed_forward is not FeedForward.LINEAR
 
     def enable(self) -> None:
@@ -167,9 +170,7 @@ class Compensator:
         if self._goes_to_position:
             return self._position(sample, reference, feed, joint_ok)
         before = self.estimate
-        if feed.held and before is not None and self.options.torque_from == "encoders":
-            # Old readings of one encoder against new ones of the other would be taken for a load:
-            # better none.
+        if before is not None and self._must_not_compare(feed):
             return self._force(sample, reference, feed, before)
         estimate = self._known_torque(sample)
         self.estimate, self.observed = estimate, True
@@ -196,6 +197,8 @@ class Compensator:
         """Take the sample in; returns the load expected next and, where the same call of the observer gives it, the
         deflection under it (else NaN)."""
         measured = sample.joint_torque_Nm
+        if self.estimate is not None and self._must_not_compare(feed):
+            return self._expected_load(self.estimate.joint_torque_Nm, reference), NAN
         if not self._looks_ahead or measured != measured or feed.held:
             self.estimate, self.observed = self.observer.step(sample), True
             known = self.estimate.joint_torque_Nm
@@ -212,6 +215,10 @@ class Compensator:
             raise
         self.observed = True
         return load, ahead
+
+    def _must_not_compare(self, feed: Feed) -> bool:
+        """Whether old readings of one encoder against new ones of the other would be taken for a load: better none."""
+        return feed.held and self._by_encoders
 
     def _expected_load(self, measured_Nm: float, reference: Reference) -> float:
         """Load of the next instant; `measured_Nm`: the sensor's, or where there is none the observer's."""

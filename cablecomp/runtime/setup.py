@@ -132,8 +132,6 @@ def joint_setup(
             f"link `{link.name}` has {len(link.joint)} joints; joint {c.place + 1} is not among them"
         )
     chosen = c.options.model_copy(update={"mode": mode})
-    force = mode is not ControlMode.POSITION
-    both = force and chosen.torque_from == "encoders"
     config = observed(c.config, chosen)
     _check_measured(link, c.place, config.observer.load)
     observer = Observer(config, bounds=bounds)
@@ -141,14 +139,14 @@ def joint_setup(
         observer.load(resume)
     compensator = Compensator(config, chosen, period, observer, gains=gains, motor=control.motor)
     times = times_of(link, period)
-    sensor = config.observer.load == "joint_torque"
+    load = config.observer.load
     health = Health(
         control.health,
         config.drive.ratio,
         times.fresh_s,
         period,
-        needs_torque=sensor,
-        needs_joint=both,
+        needs_torque=load == "joint_torque",
+        needs_joint=load == "both_encoders",
         needs_temperature=_reads_temperature(config),
         others=_places(bus.joints[c.place], observer.channels),
         preload_Nm=compensator.preload_Nm,

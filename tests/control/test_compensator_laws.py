@@ -321,3 +321,22 @@ def test_a_reference_that_is_no_motion_is_refused_and_leaves_no_trace(wrong: Ref
 def test_a_period_is_a_time(period_s: float) -> None:
     with pytest.raises(InputError, match="period_s is"):
         Compensator(JOINT, CompensatorOptions(), period_s, Spring())
+
+
+@pytest.mark.parametrize("options", [{}, {"mode": "force"}])
+def test_an_encoder_that_grew_old_is_not_taken_for_a_load(options: dict[str, object]) -> None:
+    """The motor turns on while the joint's last reading is held."""
+    sees = JOINT.observer.model_copy(update={"load": "both_encoders"})
+    config = JOINT.model_copy(update={"observer": sees})
+    chosen, observer = CompensatorOptions.model_validate(options), Observer(config)
+    c = Compensator(config, chosen, T, observer)
+    c.step(sample(0, 0.0, nan, 0.0), Reference())
+    load = c.step(sample(1, 0.0, nan, 0.0), Reference()).joint_torque_Nm
+    before = observer.snapshot()
+    for k in range(2, 20):
+        command = c.step(sample(k, 1e-3 * k, nan, 0.0), Reference(), Feed(1.0, held=True))
+        assert command.joint_torque_Nm == load
+    assert observer.snapshot() == before
+    assert not c.observed
+    c.step(sample(20, 0.02, nan, 0.02 * N), Reference())
+    assert c.observed

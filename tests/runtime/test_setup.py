@@ -9,13 +9,18 @@ import pytest
 
 from cablecomp.cli.simulation import _timing
 from cablecomp.config import load_joint
+from cablecomp.control.command import Reference
+from cablecomp.control.compensator import DEFAULT_GAINS
 from cablecomp.control.motors import control_for
+from cablecomp.control.options import CompensatorOptions, ControlConfig, ControlMode
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
+from cablecomp.links.link import BusLink
 from cablecomp.links.load import load_link
 from cablecomp.links.protocols import tells
+from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE
 from cablecomp.runtime import compare
-from cablecomp.runtime.setup import _check_measured, _reads_temperature
+from cablecomp.runtime.setup import Contestant, _check_measured, _reads_temperature, joint_setup
 
 LINKS = Path(__file__).parents[2] / "configs/links"
 TORQUE, POSITION = "joint_torque_Nm", "joint_position_rad"
@@ -89,3 +94,30 @@ def test_a_comparison_that_is_stopped_by_a_signal_is_no_fault_of_the_input(
             lambda: 0.0,
         )
     assert closed
+
+
+@pytest.mark.parametrize(
+    ("mode", "load", "silent"),
+    [
+        ("position", "both_encoders", JOINT_POSITION),
+        ("force", "joint_torque", JOINT_POSITION),  # there the encoders tell the load
+        ("position", "joint_torque", JOINT_TORQUE),
+    ],
+)
+def test_what_the_load_is_found_from_may_not_grow_old(mode: str, load: str, silent: int) -> None:
+    joint, bus = load_joint("wrist-capstan"), BusLink(load_link("wrist-virtual"))
+    options = joint.observer.model_copy(update={"load": load})
+    joint = joint.model_copy(update={"observer": options})
+    contestant = Contestant(0, "wrist", joint, CompensatorOptions())
+    setup = joint_setup(
+        contestant, ControlMode(mode), bus, ControlConfig(), lambda time_s: Reference(), DEFAULT_GAINS, 1e-3
+    )
+    readings = bus.joints[0]
+    for k in range(40):
+        for place in (MOTOR_POSITION, JOINT_POSITION, JOINT_TORQUE, MOTOR_TORQUE):
+            if place != silent or k < 20:
+                readings.values[place], readings.arrived_s[place] = 0.0, 1e-3 * k
+                readings.updates[place] += 1
+        checked = setup.health.check(readings, 1e-3 * k)
+        assert checked.ready
+        assert checked.load_age_s == pytest.approx(1e-3 * max(k - 19, 0))
