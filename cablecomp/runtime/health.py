@@ -34,7 +34,8 @@ from cablecomp.signals import Sample
     OTHER_UNTRUE,
     TEMPERATURE_STALE,
     OTHER_STALE,
-) = (1 << bit for bit in range(20))
+    MOTOR_TORQUE_STALE,
+) = (1 << bit for bit in range(21))
 FATAL: Final = MOTOR_LAGS | MOTOR_STUCK | ENCODERS_DISAGREE
 
 _WORDS: Final = (
@@ -58,6 +59,7 @@ _WORDS: Final = (
     "a further channel cannot be true",
     "temperature is stale",
     "a further channel is stale",
+    "motor torque is stale",
 )
 _FAR = 5.0  # times the joint residual's limit: no joint moves there in a few samples
 _FAR_S = 0.003
@@ -95,7 +97,7 @@ class Checked(NamedTuple):
 
 
 class Health:
-    """Watches one joint. `needs_torque`, `needs_joint`: channels that the feed-forward lives on;
+    """Watches one joint. `needs_torque`, `needs_joint`, `needs_motor_torque`: channels that the feed-forward lives on;
     `others`: places of the further channels that the observer reads, in its order; `preload_Nm`: by which an
     open circuit's pretension pulls at the motor; `motor_step_rad`: what the drive rounds its position to, so that a
     motor that moves by less shows no change.
@@ -116,6 +118,7 @@ class Health:
         *,
         needs_torque: bool = True,
         needs_joint: bool = False,
+        needs_motor_torque: bool = False,
         needs_temperature: bool = False,
         others: tuple[int, ...] = (),
         preload_Nm: float = 0.0,
@@ -140,6 +143,7 @@ class Health:
         self._fresh_s = fresh_s
         self._needs_torque = needs_torque
         self._needs_joint = needs_joint
+        self._needs_motor_torque = needs_motor_torque
         self._others = others
         self._needs_temperature = needs_temperature
         self._further: list[tuple[Seldom, int, int]] = []
@@ -256,6 +260,10 @@ class Health:
             (further, TEMPERATURE_STALE if untrue == TEMPERATURE_UNTRUE else OTHER_STALE)
             for further, _, untrue in needed
         ]
+        if self._needs_motor_torque:  # a drive may tell it in a message of its own, and more seldom
+            told = Seldom(inf, 0.0, self._fresh_s, self._o.confirm_s)
+            self._further.append((told, MOTOR_TORQUE, MOTOR_TORQUE_STALE))
+            self._needed.append((told, MOTOR_TORQUE_STALE))
         return self._further
 
     def _of_name(self, channel: str) -> Seldom:

@@ -147,6 +147,7 @@ def joint_setup(
         period,
         needs_torque=load == "joint_torque",
         needs_joint=load == "both_encoders",
+        needs_motor_torque=load == "motor_torque",
         needs_temperature=_reads_temperature(config),
         others=_places(bus.joints[c.place], observer.channels),
         preload_Nm=compensator.preload_Nm,

@@ -18,13 +18,17 @@ def test_every_flag_has_its_bit_and_its_words() -> None:
         *(h.TORQUE_SATURATED, h.JOINT_RESIDUAL, h.TORQUE_MISMATCH, h.MOTOR_LAGS, h.UNANSWERED, h.LATE),
         *(h.SHAKES, h.MOTOR_STUCK, h.JOINT_STUCK, h.ENCODERS_DISAGREE),
         *(h.TEMPERATURE_UNTRUE, h.OTHER_UNTRUE, h.TEMPERATURE_STALE, h.OTHER_STALE),
+        h.MOTOR_TORQUE_STALE,
     )
-    assert flags == tuple(1 << k for k in range(20))
+    assert flags == tuple(1 << k for k in range(21))
     words = [word for flag in flags for word in h.health_names(flag)]
-    assert len(words) == len(set(words)) == 20
+    assert len(words) == len(set(words)) == 21
     assert h.health_names(sum(flags)) == tuple(words)
     symptoms = {
-        "stale": (h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE, h.TEMPERATURE_STALE, h.OTHER_STALE),
+        "stale": (
+            *(h.MOTOR_STALE, h.TORQUE_STALE, h.JOINT_STALE, h.TEMPERATURE_STALE, h.OTHER_STALE),
+            h.MOTOR_TORQUE_STALE,
+        ),
         "jumped": (h.MOTOR_JUMP, h.TORQUE_JUMP, h.JOINT_JUMP),
         "stuck": (h.MOTOR_STUCK, h.JOINT_STUCK),
         "disagree": (h.JOINT_RESIDUAL, h.TORQUE_MISMATCH, h.ENCODERS_DISAGREE),

@@ -7,7 +7,7 @@ from math import inf, nan, tau
 import pytest
 from fed_health import ALL, FURTHER, Fed, T, options
 
-from cablecomp.links.records import TEMPERATURE
+from cablecomp.links.records import MOTOR_TORQUE, TEMPERATURE
 from cablecomp.runtime import health as h
 
 
@@ -183,3 +183,21 @@ def test_a_further_channel_without_a_unit_may_be_anything_finite() -> None:
     for value in (0.0, 1e300, -1e300, 5.0):
         checked = fed.cycle(**ALL, other_0=value)
         assert (checked.flags, checked.sample.other) == (0, (value,))
+
+
+@pytest.mark.parametrize("every", [1, 10])
+def test_a_motor_torque_that_stays_out_is_old_where_the_load_is_found_from_it(every: int) -> None:
+    """It may come in a message of its own, while the motor's position goes on."""
+    fed = Fed(needs_torque=False, needs_motor_torque=True)
+    readings = fed.readings
+    for k in range(3000):
+        if k % every == 0 and k < 1500:
+            readings.arrived_s[MOTOR_TORQUE] = (fed.k + 1) * T
+            readings.updates[MOTOR_TORQUE] += 1
+            checked = fed.cycle(motor=0.0, motor_torque=0.1)
+        else:
+            checked = fed.cycle(motor=0.0)
+        if k < 1500:
+            assert (checked.flags, checked.load_age_s, checked.ready) == (0, 0.0, True)
+    assert checked.flags == h.MOTOR_TORQUE_STALE
+    assert checked.load_age_s > 0.4

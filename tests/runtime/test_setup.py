@@ -20,6 +20,7 @@ from cablecomp.links.load import load_link
 from cablecomp.links.protocols import tells
 from cablecomp.links.records import JOINT_POSITION, JOINT_TORQUE, MOTOR_POSITION, MOTOR_TORQUE
 from cablecomp.runtime import compare
+from cablecomp.runtime.joint_loop import JointSetup
 from cablecomp.runtime.setup import Contestant, _check_measured, _reads_temperature, joint_setup
 
 LINKS = Path(__file__).parents[2] / "configs/links"
@@ -96,6 +97,26 @@ def test_a_comparison_that_is_stopped_by_a_signal_is_no_fault_of_the_input(
     assert closed
 
 
+def set_up(bus: BusLink, mode: ControlMode, load: str) -> JointSetup:
+    """A wrist whose load is found from that, on the first place of a bus."""
+    joint = load_joint("wrist-capstan")
+    options = joint.observer.model_copy(update={"load": load})
+    joint = joint.model_copy(update={"observer": options})
+    contestant = Contestant(0, "wrist", joint, CompensatorOptions())
+    return joint_setup(
+        contestant, mode, bus, ControlConfig(), lambda time_s: Reference(), DEFAULT_GAINS, 1e-3
+    )
+
+
+@pytest.mark.parametrize("load", ["motor_torque", "none"])
+def test_no_joint_is_ready_before_the_motor_torque_that_its_load_is_found_from(load: str) -> None:
+    bus = BusLink(load_link("wrist-virtual"))
+    setup, readings = set_up(bus, ControlMode.POSITION, load), bus.joints[0]
+    readings.values[MOTOR_POSITION] = readings.arrived_s[MOTOR_POSITION] = 0.0
+    readings.updates[MOTOR_POSITION] += 1
+    assert setup.health.check(readings, 0.0).ready is (load == "none")
+
+
 @pytest.mark.parametrize(
     ("mode", "load", "silent"),
     [
@@ -105,14 +126,8 @@ def test_a_comparison_that_is_stopped_by_a_signal_is_no_fault_of_the_input(
     ],
 )
 def test_what_the_load_is_found_from_may_not_grow_old(mode: str, load: str, silent: int) -> None:
-    joint, bus = load_joint("wrist-capstan"), BusLink(load_link("wrist-virtual"))
-    options = joint.observer.model_copy(update={"load": load})
-    joint = joint.model_copy(update={"observer": options})
-    contestant = Contestant(0, "wrist", joint, CompensatorOptions())
-    setup = joint_setup(
-        contestant, ControlMode(mode), bus, ControlConfig(), lambda time_s: Reference(), DEFAULT_GAINS, 1e-3
-    )
-    readings = bus.joints[0]
+    bus = BusLink(load_link("wrist-virtual"))
+    setup, readings = set_up(bus, ControlMode(mode), load), bus.joints[0]
     for k in range(40):
         for place in (MOTOR_POSITION, JOINT_POSITION, JOINT_TORQUE, MOTOR_TORQUE):
             if place != silent or k < 20:
