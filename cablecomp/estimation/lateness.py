@@ -48,6 +48,8 @@ def delays(view: View) -> list[Suspicion]:
         believed = after < LATE_GAIN * before < inf and before > NOTHING * np.ptp(view.y)
         if abs(late) < 1.5 * step or not believed:
             continue
+        if not after < LATE_GAIN * _left_shifted(view, name, 0.0, step):
+            continue  # it is noise, which any shift averages between two readings
         found.append(_delay(view, name, late, before, after))
     at_rest = view.ratio * np.ptp(view.q) < 0.1 * np.ptp(view.y)
     if at_rest and any(
@@ -180,13 +182,16 @@ def _least(left: Callable[[float], float], most: float, close: float = 0.005) ->
     return best, at(0.0), at(best)
 
 
-def _left_shifted(view: View, name: str, shift_s: float) -> float:
+def _left_shifted(view: View, name: str, shift_s: float, apart_s: float = 0.0) -> float:
+    """What is left with a channel shifted: the mean of two readings of it so far apart."""
     some = _some(view)
     time, y, M = view.time[some], view.y[some], view.M[some]
+    whole = view.y if name == JOINT else view.M
+    before, after = (np.interp(time + shift_s + part * apart_s, view.time, whole) for part in (-0.5, 0.5))
     if name == JOINT:
-        y = np.interp(time + shift_s, view.time, view.y)
+        y = 0.5 * (before + after)
     else:
-        M = np.interp(time + shift_s, view.time, view.M)
+        M = 0.5 * (before + after)
     try:
         followers = _followers(view, time, view.q[some], M)
     except CablecompError:  # such a load the nominal drive cannot bear

@@ -46,6 +46,13 @@ def test_what_is_no_more_than_rounding_is_not_said_to_be_late() -> None:
     assert suspicions(JOINT, {**slight, "joint_torque_Nm": late, "joint_position_rad": angle}) == ()
 
 
+def test_noise_alone_is_not_late() -> None:
+    """A joint that rests: between two readings their noise is averaged, whatever the shift."""
+    noise = 1e-5 * np.random.default_rng(3).standard_normal(len(TIME))
+    still = {"time_s": TIME, "motor_position_rad": noise, "joint_torque_Nm": 0.0 * TIME + 0.4}
+    assert suspicions(JOINT, {**still, "joint_position_rad": noise[::-1]}) == ()
+
+
 def test_signs() -> None:
     assert kinds(joint_torque_Nm=-COLUMNS["joint_torque_Nm"]) == [("sign", "joint_torque_Nm")]
     assert ("sign", "joint_position_rad") in kinds(joint_position_rad=-COLUMNS["joint_position_rad"])
