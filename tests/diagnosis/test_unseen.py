@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -86,6 +87,8 @@ def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() ->
     _, hidden = could_be_unseen(fit, pool, [])
     mount = next(h for h in hidden if h.effect == "series_compliance")
     assert mount.amount > 0.0
+    assert f"up to {mount.amount:.3g} rad/(N m) of it" in mount.why
+    assert f"up to {mount.amount:.3g} of it" in replace(mount, unit="-").why
     bare = mount.joint.model_copy(update={"effect": ()})
 
     def left(joint: JointConfig) -> FloatArray:

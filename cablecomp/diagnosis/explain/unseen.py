@@ -34,9 +34,8 @@ class Hidden:
         """For readers."""
         names = " and ".join(f"`{name}`" for name in self.parameters)
         does = "within its tolerance makes" if len(self.parameters) == 1 else "within their tolerances make"
-        return (
-            f"{names} {does} up for it: up to {self.amount:.3g} {self.unit} of it leave no trace in these data"
-        ).replace("  ", " ")
+        size = f"{self.amount:.3g} {self.unit.removeprefix('-')}".rstrip()
+        return f"{names} {does} up for it: up to {size} of it leave no trace in these data"
 
 
 def could_be_unseen(
