@@ -32,10 +32,11 @@ def notes(case: Case) -> tuple[str, ...]:
         total = sum(len(e.rows) for e in body.used)
         found.append(f"{drive.lost_rows} of {total} rows given up to the history before the first sample")
     left = [e.quiet.get(JOINT, 1.0) / e.group for e in drive.fit.problem.evidence]
-    if min(left) < 1.0:
+    percent = round(100 * float(np.sqrt(np.mean(left))))
+    if percent < 100:
         found.append(
             "what was read between the rows that are judged is averaged into them: they have "
-            f"{100 * float(np.sqrt(np.mean(left))):.0f} % of a reading's noise, and errors are of such rows"
+            f"{percent} % of a reading's noise, and errors are of such rows"
         )
     outliers = sum(e.outliers for e in body.used)
     if outliers:
@@ -60,10 +61,10 @@ def notes(case: Case) -> tuple[str, ...]:
             "told from what goes with the load then, and is not asked for unless another joint turns it"
         )
     if body.clock_s:
-        begun = [f"{short(name)} from {s:.4g} s" for name, s in body.clock_s.items()]
+        begun = [f"of {short(name)} is {s:.4g} s" for name, s in body.clock_s.items()]
         more = f" and {len(begun) - SAID} more, `clock_s` in diagnosis.json" if len(begun) > SAID else ""
         found.append(
-            "recordings that start their own clock are taken one after the other; on the clock of this page "
+            "recordings that start their own clock are taken one after the other; on the clock of this page, 0 s "
             f"{', '.join(begun[:SAID])}{more}"
         )
     return tuple(found)
