@@ -69,7 +69,7 @@ def _weighed(
 ) -> Weighed:
     even, effect = ScoreDifference(0.5, 9.0, 9.0), hypothesis(name.partition(":")[0], name)
     evidence = {"lead": lead, "share_total": removes if last is None else last}
-    return Weighed(effect, None, evidence, confidence, (), even, "", removes)
+    return Weighed(effect, None, evidence, confidence, {}, even, "", removes)
 
 
 @pytest.mark.parametrize(
@@ -201,6 +201,23 @@ def test_what_trials_say_not_to_exclude_is_told_where_nothing_has_a_name(
     found: Any = [SimpleNamespace(confidence=confidence, rivals=())]
     told = [names for names, _ in entries.tied_of(found, selection)]
     assert told == ([("gravity_load", "pulley_runout")] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("ahead", "said"),
+    [
+        (1.4, "tell them apart by 1.4 standard errors"),
+        (-2.3, "strand_break predicts data left out better, by 2.3"),
+    ],
+)
+def test_what_stands_in_for_an_effect_is_told_with_how_far_data_tell_these_apart(
+    ahead: float, said: str
+) -> None:
+    """By the rival that is nearest among them, whatever is nearest of all that was tried."""
+    weighed = replace(_weighed("clamp_slip", 0.5, 0.9), rivals={"gravity_load": 3.0, "strand_break": ahead})
+    ((names, why),) = entries.tied_of([weighed], cast(Any, SimpleNamespace(rounds=[])))
+    assert names == ("clamp_slip", "gravity_load", "strand_break")
+    assert said in why
 
 
 @pytest.mark.parametrize(

@@ -159,7 +159,11 @@ def tied_of(found: Sequence[Weighed], selection: Selection) -> tuple[tuple[tuple
     rows = []
     for w in found:
         if w.rivals:
-            why = f"data left out tell them apart by {w.difference.z:.1f} standard errors alone"
+            nearest = min(w.rivals, key=w.rivals.__getitem__)
+            z = w.rivals[nearest]
+            why = f"data left out tell them apart by {z:.1f} standard errors alone"
+            if z < 0.0:
+                why = f"{nearest} predicts data left out better, by {-z:.1f} standard errors alone"
             rows.append(((w.term.name, *w.rivals), why))
     level, first = learnt_level(), (selection.rounds[0].tried if selection.rounds else ())
     if level is not None and found and all(w.confidence < LIMITS.name for w in found):

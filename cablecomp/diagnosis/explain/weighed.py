@@ -16,8 +16,8 @@ from cablecomp.diagnosis.thresholds import LIMITS
 
 @dataclass(frozen=True)
 class Weighed:
-    """One effect of the final model: its evidence, confidence, rivals that stand in for it, its score against
-    the nearest one.
+    """One effect of the final model: its evidence, confidence, rivals that stand in for it with the standard errors by
+    which data left out put it ahead of each, its score against the nearest of all that were tried.
 
     `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the
     last to come, whichever is more: effects that trade places take off little as the last, what others hide
@@ -29,7 +29,7 @@ class Weighed:
     depends: Dependence | None
     evidence: Mapping[str, float]
     confidence: float
-    rivals: tuple[str, ...]
+    rivals: Mapping[str, float]
     difference: ScoreDifference
     why_not: str
     removes: float

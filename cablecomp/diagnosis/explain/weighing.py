@@ -144,7 +144,8 @@ def _weighed(
     said = {**evidence, "z": own.z, "gain": own.gain}
     if (moves := moves_rad(final, term)) is not None:
         said["moves_rad"] = moves
-    return Weighed(term, depends, said, confidence, instead.effects, nearest, why_not, removes, better)
+    ties = {name: instead.differences[name].z for name in instead.effects}
+    return Weighed(term, depends, said, confidence, ties, nearest, why_not, removes, better)
 
 
 def _beyond_noise(fit: Fit) -> float:
