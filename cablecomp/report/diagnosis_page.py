@@ -101,9 +101,10 @@ def _missing(result: Mapping[str, Any]) -> Iterator[str]:
         yield page.table(("parameter", "value", "unit", "95 % interval"), rows)
         if m["depends_on"]:
             yield page.paragraph(f"{depends(m['depends_on'])}.")
+        most = " in the channel in which it shows most" if result["channels"] else ""
         yield page.paragraph(
             f"Takes {percent(known(m['heldout_gain']))} off the calibrated "
-            f"drive's held-out mean square; probability "
+            f"drive's held-out mean square{most}; probability "
             f"that the name is right: {100 * known(m['confidence']):.0f} %. Source: {effect.source}."
         )
         yield page.fold("the evidence", page.table(("evidence", "value"), list(m["evidence"].items())))

@@ -88,6 +88,14 @@ def test_a_small_share_is_not_said_to_be_none_nor_a_large_one_all(share: float, 
     assert percent(share) == said
 
 
+def test_of_several_channels_a_share_is_said_to_be_of_the_one_in_which_it_shows_most(
+    found: Diagnosis,
+) -> None:
+    said = "mean square in the channel in which it shows most; probability"
+    assert said in text_of(diagnosis_page(found))
+    assert said not in text_of(diagnosis_page(replace(found, channels={})))
+
+
 def test_a_name_beside_a_far_larger_one_says_what_it_takes_off_of_what_that_leaves(found: Diagnosis) -> None:
     first = replace(found.named[0], evidence={"gain": 0.97})
     second = replace(found.named[0], heldout_gain=0.0031, evidence={"gain": 0.447})
