@@ -11,6 +11,7 @@ from cablecomp.config import Empirical, JointConfig
 from cablecomp.diagnosis.body import Body
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.describe.empirical import Found
+from cablecomp.diagnosis.explain.dependence import Dependence
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.weighed import Weighed
 from cablecomp.diagnosis.locate.covariates import Covariates
@@ -92,6 +93,13 @@ class Outcome:
     def names(self) -> list[str]:
         """Names of what is named."""
         return [w.term.name for w in self.named]
+
+    @property
+    def told(self) -> list[str]:
+        """The same, and of what is kept what the drive's own parameters, or a named effect's, depend on."""
+        depends = (t for t in self.kept.terms if isinstance(t, Dependence))
+        mine = [d.name for d in depends if d.of_drive or any(d.belongs_to(w.term) for w in self.named)]
+        return [*self.names, *mine]
 
     @property
     def empirical(self) -> list[Empirical]:

@@ -68,7 +68,7 @@ def diagnosis_of(
         could_be_unseen=tuple(unseen),
         remainder=remainder(case, outcome, rng),
         remainder_location=outcome.remainder.location,
-        tested=tested(found.selection, outcome.names),
+        tested=tested(found.selection, outcome.told),
         notes=(*notes(case), *by_the_clock(kept), *alike),
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
