@@ -149,7 +149,7 @@ def _facts(result: Mapping[str, Any], unit: Scale) -> Iterator[Fact]:
         )
     if before["heldout_rmse_rad"] and result["missing_physics"]:
         gain = 1.0 - (known(after["heldout_rmse_rad"]) / before["heldout_rmse_rad"]) ** 2
-        yield Fact("Square removed", f"{100.0 * gain:.0f} %", "on data left out in turn", "good")
+        yield Fact("Square removed", percent(gain), "on data left out in turn", "good")
     if repeats_limit(result):
         yield Fact("The machine repeats to", angle(result["repeatability_rad"], unit), "what the data allow")
     yield Fact("Sensors' noise", angle(result["noise_floor_rad"], unit), "as it shows in the joint angle")

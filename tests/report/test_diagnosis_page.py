@@ -111,6 +111,11 @@ def test_the_answer_stands_before_everything_else(found: Diagnosis) -> None:
         assert part in first, part
 
 
+def test_a_square_of_which_something_is_left_is_not_said_to_be_removed_whole(found: Diagnosis) -> None:
+    left = replace(found.augmented, heldout_rmse_rad=0.04 * found.baseline.heldout_rmse_rad)
+    assert "Square removed 99.8 %" in text_of(diagnosis_page(replace(found, augmented=left)))
+
+
 def test_the_answer_says_what_a_law_without_a_name_takes_off_the_rest(found: Diagnosis) -> None:
     law = Law("wave_by_motor_angle", "motor_angle", 0.91, 21.0)
     for d in (
