@@ -103,7 +103,7 @@ def gather_body(
     names = list(recordings)
     if not names:
         raise InputError("no recording was given; a diagnosis needs one or more")
-    _need_alike(recordings)
+    _need_alike(config, recordings)
     sessions = session_names(config, names, mode)
     samples = [len(recordings[n]["time_s"]) for n in names]
     wanted = LIMITS.rows if rows is None else rows
@@ -176,16 +176,18 @@ def spread(evidence: Sequence[Evidence], most: int) -> tuple[Evidence, ...]:
     return tuple(e for k, e in enumerate(evidence) if k in chosen)
 
 
-def _need_alike(recordings: Mapping[str, Columns]) -> None:
-    """Raise InputError for a recording without times, or without a load that others have."""
-    loaded = {n for n, c in recordings.items() if "joint_torque_Nm" in c}
+def _need_alike(config: JointConfig, recordings: Mapping[str, Columns]) -> None:
+    """Raise InputError for a recording without times, or without the channel that is others' load."""
+    loads = {n: load_channel(config, c) for n, c in recordings.items()}
+    load = MOTOR if MOTOR in loads.values() else "joint_torque_Nm"
+    loaded = {n for n, channel in loads.items() if channel == load}
     for name, columns in recordings.items():
         if not len(columns.get("time_s", ())):
             raise InputError(f"{name}: channel `time_s` is missing or empty; record it")
         if loaded and name not in loaded:
             raise InputError(
-                f"{name}: channel `joint_torque_Nm` is missing, which {min(loaded)} has; diagnose recordings with and "
-                "without a load on their own"
+                f"{name}: channel `{load}` is missing, which {min(loaded)} has for its load; diagnose recordings with "
+                "and without it on their own"
             )
 
 

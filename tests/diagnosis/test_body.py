@@ -46,6 +46,17 @@ def test_a_recording_that_several_sessions_claim_is_refused(mode: Literal["each"
         gather_body(joint, {"mon/s/rec.csv": recorded()}, mode)
 
 
+@pytest.mark.parametrize("load", ["joint_torque_Nm", "motor_torque_Nm"])
+def test_recordings_with_and_without_a_load_are_refused_whichever_comes_first(load: str) -> None:
+    whole = recorded()
+    whole[load] = whole.pop("joint_torque_Nm")
+    bare = {k: v for k, v in whole.items() if k != load}
+    joint = parse_joint({**PLAIN, "observer": {"load": load.removesuffix("_Nm")}}, "x")
+    for given in ({"a": whole, "b": bare}, {"b": bare, "a": whole}):
+        with pytest.raises(InputError, match=f"b: channel `{load}` is missing, which a has for its load"):
+            gather_body(joint, given)
+
+
 def test_parts_of_a_mounting_are_one_session_with_what_else_is_in_its_folder() -> None:
     parts = [
         {"name": "before", "mounting": "monday", "recordings": ["monday/1.csv"]},
