@@ -169,7 +169,9 @@ def energy_map(traces: Sequence[Traces], covariate: str, floor_rad: float) -> An
 
 
 def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scale) -> Any:
-    """Mean residual along a covariate, loading and unloading apart, before and after, with the floor."""
+    """Mean residual of what was fitted along a covariate, loading and unloading apart, before and after, with the
+    floor."""
+    fitted = np.concatenate([np.asarray(t.counted) for t in traces])
     values = np.concatenate([t.covariates[covariate] for t in traces])
     direction = np.concatenate(
         [t.covariates.get("load_direction", np.zeros(len(t.measured_rad))) for t in traces]
@@ -187,7 +189,7 @@ def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scal
     for key, name, colour in (("before_rad", "before", BEFORE), ("after_rad", "after", AFTER)):
         residual = _joined(traces, key)
         for way, rows, dash in groups:
-            mask = rows & np.isfinite(residual)
+            mask = rows & fitted & np.isfinite(residual)
             if np.count_nonzero(mask) < 20:
                 continue
             centres, means = _binned(values[mask], residual[mask])

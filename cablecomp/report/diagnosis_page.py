@@ -200,10 +200,11 @@ def _where(d: Diagnosis, mismatch: Sequence[Mapping[str, Any]], unit: Scale) -> 
         body += page.columns(
             page.figure(
                 figures.along(d.traces, usable[0], floor, unit),
-                "Mean error; the grey band is the sensors' noise.",
+                "Mean error of what was fitted; the grey band is the sensors' noise.",
             ),
             page.figure(
-                figures.energy_map(d.traces, _grid_axis(usable), floor), "RMS error in noise floors."
+                figures.energy_map(d.traces, _grid_axis(usable), floor),
+                "RMS error in noise floors, of what was not fitted too.",
             ),
         )
     return Section("Where the mismatch is", body, lead)

@@ -289,6 +289,16 @@ def test_the_map_shows_rms_in_noise_floors(found: Diagnosis) -> None:
     np.testing.assert_allclose(after[np.isfinite(after)], 1.0, atol=2e-3)
 
 
+def test_the_mean_error_is_that_of_what_was_fitted(found: Diagnosis) -> None:
+    """An unknown history at the beginning moves no point of the curve."""
+    trace = found.traces[0]
+    counted = np.arange(len(trace.measured_rad)) >= 200
+    moved = replace(trace, before_rad=trace.measured_rad - np.where(counted, 0.0, 1e-3), counted=counted)
+    lines = [s for s in figures.along([moved], "load", NOISE, Scale(1.0, "rad")).data if "before" in s.name]
+    assert lines
+    assert all(np.max(np.abs(line.y)) == 0.0 for line in lines)
+
+
 def test_the_law_that_ties_sessions_is_drawn_at_their_values(found: Diagnosis) -> None:
     """A parameter that grows with a condition: base + rate times the condition, at each value of it."""
     by_bend = {"parameter": "mu_output", "on": "bend", "per_unit": 0.2}
