@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from planted import columns
+from turning import JOINT, recorded
 
-from cablecomp.diagnosis.locate.covariates import UNITS, covariates, join, reversals
+from cablecomp.diagnosis.locate.covariates import FURTHER, UNITS, covariates, join, reversals
+from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import gather
 
 
 def test_a_triangle_has_its_direction_rate_and_distance() -> None:
@@ -54,6 +57,17 @@ def test_names_are_those_of_the_contract() -> None:
     found = covariates(columns("sweep"))
     assert set(found.values) == {*UNITS, "other:elbow"}
     assert all(len(values) == found.samples for values in found.values.values())
+
+
+def test_a_condition_s_channel_is_called_after_the_condition() -> None:
+    read = {
+        **recorded(),
+        "other_bend": np.full(len(recorded()["time_s"]), 0.7),
+        "other_near": recorded()["time_s"],
+    }
+    bent = JOINT.model_copy(update={"condition": {"bend_rad": "other_bend"}})
+    seen = covariates_of(bent, gather(bent, "r", read, "all", fine_rows=400, judged_rows=100))
+    assert [name for name in seen.values if name.startswith(FURTHER)] == ["condition:bend_rad", "other:near"]
 
 
 def test_joining_keeps_what_all_recordings_have() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cablecomp.diagnosis.describe.memory import lagged, play
 from cablecomp.diagnosis.describe.periodic import Periodicity
+from cablecomp.diagnosis.locate.covariates import FURTHER
 from cablecomp.diagnosis.locate.series import Series
 from cablecomp.diagnosis.locate.views import elapsed
 from cablecomp.signal.smoothing import FloatArray, IntArray
@@ -138,8 +139,8 @@ def _outer_terms(series: Series) -> Iterator[Term]:
     for name in values:
         if name == "temperature":
             yield from _outer("(ϑ − ϑ₀)", "K", values[name], load)
-        elif name.startswith("other:"):
-            yield from _outer(name.removeprefix("other:"), "unit", values[name], load)
+        elif name.startswith(FURTHER):
+            yield from _outer(name.partition(":")[2], "unit", values[name], load)
 
 
 def _outer(symbol: str, unit: str, values: FloatArray, load: FloatArray) -> Iterator[Term]:

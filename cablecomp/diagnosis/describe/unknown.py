@@ -12,6 +12,7 @@ from cablecomp.diagnosis.describe.memory import lagged, play
 from cablecomp.diagnosis.describe.periodic import Periodicity, periodicity, which_angle
 from cablecomp.diagnosis.describe.terms import terms
 from cablecomp.diagnosis.folds import alternate_blocks
+from cablecomp.diagnosis.locate.covariates import FURTHER
 from cablecomp.diagnosis.locate.crossfit import block_sums, gains
 from cablecomp.diagnosis.locate.segments import segment
 from cablecomp.diagnosis.locate.series import Series, thin
@@ -162,7 +163,7 @@ def _present(series: Series) -> FloatArray:
             if name == "joint_angle":
                 parts.append(products(contrasts(hats(values[name], 4)), path))
     for name in values:
-        if name == "temperature" or name.startswith("other:"):
+        if name == "temperature" or name.startswith(FURTHER):
             parts.append(contrasts(hats(values[name], 4)))
             parts.append(products(contrasts(hats(values[name], 3)), path))
     return np.column_stack(parts)

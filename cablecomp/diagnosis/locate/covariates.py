@@ -30,7 +30,10 @@ UNITS: Final[Mapping[str, str]] = {
     "acceleration": "rad/s²",
     "temperature": "°C",
 }
-"""Public names of the covariates, and their units; further channels follow as `other:<name>`."""
+"""Public names of the covariates, and their units; further channels follow as in `FURTHER`."""
+FURTHER: Final = ("other:", "condition:")
+"""What stands before a further channel's name: `other:<name>`, or `condition:<name>` of one that tells how the drive
+stood."""
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,12 +17,17 @@ from cablecomp.signal.smoothing import FloatArray
 
 
 def covariates_of(config: JointConfig, e: Evidence, left: FloatArray | None = None) -> Covariates:
-    """Covariates on all fine rows; `left`: what a fit leaves of the joint's angle [rad] there."""
+    """Covariates on all fine rows, a condition's channel under the condition's name; `left`: what a fit leaves of the
+    joint's angle [rad] there."""
     columns = {k: v for k, v in e.columns.items() if k != "motor_torque_Nm"}
     columns["joint_torque_Nm"] = np.broadcast_to(
         np.asarray(load_of(config, e.columns), dtype=np.float64), columns["time_s"].shape
     ).copy()
-    return covariates(columns, None if left is None else columns[JOINT] - left)
+    found = covariates(columns, None if left is None else columns[JOINT] - left)
+    called = {
+        f"other:{c.removeprefix('other_')}": f"condition:{name}" for name, c in config.condition.items()
+    }
+    return replace(found, values={called.get(name, name): v for name, v in found.values.items()})
 
 
 def series_of(fit: Fit, seen: Sequence[Covariates], floor_rad: float) -> Series:
