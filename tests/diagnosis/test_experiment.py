@@ -104,6 +104,9 @@ def test_nothing_is_proposed_that_sets_no_models_apart(seen: Covariates) -> None
     nothing, (note,) = proposed(MOUNT, MOUNT)
     assert nothing is None
     assert "by more than 0.0 noise floors" in note
+    assert (
+        "a further channel (motor_torque_Nm, tension_h_N, tension_l_N), a closer" in note
+    )  # the load was recorded
 
 
 def test_what_a_straight_line_in_the_load_explains_sets_nothing_apart(seen: Covariates) -> None:

@@ -32,10 +32,11 @@ from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.profile import profile_interval
 from cablecomp.observer import Observer
 
+FURTHER = ("joint_torque_Nm", "motor_torque_Nm", "tension_h_N", "tension_l_N")
+"""Channels that may tell apart what the joint's angle does not."""
 TOO_ALIKE = (
     "no motion within the limits, or the reach of these recordings, sets the models that these data cannot tell apart "
-    "by more than {:.1f} noise floors (RMS): a further channel (joint_torque_Nm, motor_torque_Nm, tensions), a closer "
-    "[tolerance] of what makes up for them, or wider [limits], may"
+    "by more than {:.1f} noise floors (RMS): {}a closer [tolerance] of what makes up for them, or wider [limits], may"
 )
 
 
@@ -233,7 +234,9 @@ def next_experiment(
     if best is None:
         return None, ()
     if best.separation < APART:
-        return None, (TOO_ALIKE.format(best.separation),)
+        further = [c for c in FURTHER if c not in first.columns]
+        channel = f"a further channel ({', '.join(further)}), " if further else ""
+        return None, (TOO_ALIKE.format(best.separation, channel),)
     return (best.why, best.protocol.to_toml()), ()
 
 
