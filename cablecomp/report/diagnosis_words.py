@@ -24,7 +24,7 @@ _AS_USUAL: Final = (
 _COVARIATES: Final[Mapping[str, str]] = {
     "load_direction": "direction of the load",
     "load_rate": "rate of the load",
-    "dwell": "time since the load stopped",
+    "dwell": "time at constant load",
     "reversal": "load since the last reversal",
     "motor_angle": "motor angle",
     "joint_angle": "joint angle",

@@ -22,7 +22,7 @@ from cablecomp.report.diagnosis_answer import shown_first
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_tables import between, by_recording, interval
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
-from cablecomp.report.diagnosis_words import percent
+from cablecomp.report.diagnosis_words import covariate, percent
 from cablecomp.report.page import number
 from cablecomp.report.replay_figures import Scale
 
@@ -269,6 +269,9 @@ def test_a_joint_without_load_is_drawn_over_its_motor(found: Diagnosis) -> None:
     free = replace(trace, covariates={**trace.covariates, "load": np.zeros(len(trace.measured_rad))})
     assert "motor angle" in figures.loops(free, Scale(1e3, "mrad")).layout.xaxis.title.text
     assert "Before and after" in text_of(diagnosis_page(replace(found, traces=(free,))))
+    assert (
+        covariate("dwell") == "time at constant load"
+    )  # which it is from the beginning on: none that moved stopped
 
 
 def test_names_are_escaped(found: Diagnosis) -> None:

@@ -214,7 +214,7 @@ def _dwell_views(series: Series) -> Iterator[View]:
     shape[held, 1:] = rest
     shape[~held, 0] = 1.0
     yield View("dwell", "goes on in the load's direction after it stops", products(shape, direction))
-    yield View("dwell", "changes with the time since the load stopped", contrasts(shape))
+    yield View("dwell", "changes with the time at constant load", contrasts(shape))
 
 
 def products(basis: FloatArray, factors: FloatArray) -> FloatArray:
