@@ -108,9 +108,8 @@ def _show(summary: ReplaySummary, joint: JointConfig, stood: str | None) -> None
     table = Table(show_header=False, box=None)
     if summary.rmse_rad is not None:
         table.add_row("prediction error, RMS", f"{1e3 * summary.rmse_rad:.5g} mrad")
-        table.add_row(
-            "best straight line, RMS", f"{1e3 * (summary.baseline_linear_rmse_rad or 0.0):.5g} mrad"
-        )
+    if summary.baseline_linear_rmse_rad is not None:
+        table.add_row("best straight line, RMS", f"{1e3 * summary.baseline_linear_rmse_rad:.5g} mrad")
     table.add_row("samples", f"{summary.samples:,}")
     if joint.sessions:
         table.add_row("session", stood or "none matches: the joint's own values")

@@ -17,6 +17,8 @@ from cablecomp import __version__
 from cablecomp.cli import app, main
 from cablecomp.errors import InputError
 
+CONFIGS = Path(__file__).parents[2] / "configs"
+
 HEAVY = {"numba", "scipy", "polars", "plotly", "control", "can", "pydantic"}
 
 
@@ -167,6 +169,20 @@ def test_a_packed_recording_with_an_unpacked_name_is_taken_and_said(
     out = str(tmp_path / "out")
     assert main(["replay", str(packed), "--config", "wrist-capstan", "--no-bounds", "--out", out]) == 0
     assert "note: is gzip although it is named .csv; read unpacked" in capsys.readouterr().out
+
+
+def test_of_a_joint_without_a_load_no_straight_line_over_the_load_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stated = (CONFIGS / "joints" / "wrist-capstan.toml").read_text()
+    (tmp_path / "joint.toml").write_text(f'{stated}\n[observer]\nload = "none"\n')
+    rows = "".join(f"{1e-3 * k},{2e-3 * k},{7e-4 * k}\n" for k in range(200))
+    (tmp_path / "free.csv").write_text(f"time_s,motor_position_rad,joint_position_rad\n{rows}")
+    words = [str(tmp_path / "free.csv"), "--config", str(tmp_path / "joint.toml"), "--no-bounds"]
+    assert main(["replay", *words, "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "prediction error" in said
+    assert "best straight line" not in said
 
 
 @pytest.mark.parametrize(
