@@ -11,6 +11,7 @@ from cablecomp.counting import counted
 from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.result import Diagnosis, Traces, report_json
 from cablecomp.effects import Effect, catalogue
+from cablecomp.estimation.parameter import parts_of
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report import page
 from cablecomp.report.concealed_page import concealed_section
@@ -116,7 +117,8 @@ def _parameter(effect: Effect, name: str, entry: Any) -> tuple[str, str, str, st
         return name, str(entry), "", ""
     value, sd = known(entry["value"]), known(entry["sd"])
     ends = entry.get("interval_95")
-    known_as = next((p for p in effect.parameters if p.name == name), None)
+    base, _, condition = parts_of(name)
+    known_as = next((p for p in effect.parameters if p.name == base and not condition), None)
     if known_as is not None and known_as.held:
         return name, with_sd(value, sd), known_as.unit, "chosen, not fitted"
     if known_as is None:

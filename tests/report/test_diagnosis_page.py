@@ -335,11 +335,15 @@ def test_a_profile_interval_stands_in_place_of_two_standard_deviations(found: Di
 
 def test_what_was_chosen_has_no_interval(found: Diagnosis) -> None:
     (named,) = found.named
-    steps = {"slip_m": Value("slip_m", 1e-4, 1e-6), "second_after_s": Value("second_after_s", 12.5, 0.0)}
+    steps = {
+        "slip_m@mon": Value("slip_m@mon", 1e-4, 1e-6),
+        "second_after_s": Value("second_after_s", 12.5, 0.0),
+    }
     d = replace(found, named=(replace(named, effect="clamp_slip", parameters=steps),))
     text = text_of(diagnosis_page(d))
     assert text.count("chosen, not fitted") == 1
     assert between(12.5, 12.5) not in text
+    assert re.search(r"slip_m@mon \S+ ± \S+ m ", text)  # in its unit, though a session's own
 
 
 def test_an_interval_stays_inside_what_the_value_can_be() -> None:
