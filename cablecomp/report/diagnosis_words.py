@@ -9,7 +9,7 @@ from typing import Any, Final
 from cablecomp.estimation.parameter import parts_of
 
 ANSWERS: Final[Mapping[str, str]] = {
-    "consistent": "The drive's own physics account for these data; nothing is left beyond noise.",
+    "consistent": "The drive's known physics account for these data; nothing is left beyond noise.",
     "recalibrate": "Nominal values were off; no physics is missing.",
     "explained": "Physics was missing, data left out support it, and what is left is noise.",
     "partly explained": "Physics was missing and data left out support it. Structure remains beside it, which is "

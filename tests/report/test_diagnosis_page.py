@@ -22,7 +22,6 @@ from cablecomp.report.diagnosis_answer import shown_first
 from cablecomp.report.diagnosis_page import diagnosis_page
 from cablecomp.report.diagnosis_tables import between, by_recording, interval
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
-from cablecomp.report.diagnosis_words import covariate, percent
 from cablecomp.report.page import number
 from cablecomp.report.replay_figures import Scale
 
@@ -70,22 +69,6 @@ def test_all_parts_of_the_result_are_on_the_page(found: Diagnosis) -> None:
         "kept for the end",
     ):
         assert part in text, part
-
-
-@pytest.mark.parametrize(
-    ("share", "said"),
-    [
-        (0.0, "0 %"),
-        (1.0, "100 %"),
-        (0.354, "35 %"),
-        (-0.02, "-2 %"),
-        (0.0031, "0.3 %"),
-        (0.9996, "99.96 %"),
-        (1e-7, "0 %"),
-    ],
-)
-def test_a_small_share_is_not_said_to_be_none_nor_a_large_one_all(share: float, said: str) -> None:
-    assert percent(share) == said
 
 
 def test_of_several_channels_a_share_is_said_to_be_of_the_one_in_which_it_shows_most(
@@ -269,9 +252,6 @@ def test_a_joint_without_load_is_drawn_over_its_motor(found: Diagnosis) -> None:
     free = replace(trace, covariates={**trace.covariates, "load": np.zeros(len(trace.measured_rad))})
     assert "motor angle" in figures.loops(free, Scale(1e3, "mrad")).layout.xaxis.title.text
     assert "Before and after" in text_of(diagnosis_page(replace(found, traces=(free,))))
-    assert (
-        covariate("dwell") == "time at constant load"
-    )  # which it is from the beginning on: none that moved stopped
 
 
 def test_names_are_escaped(found: Diagnosis) -> None:
