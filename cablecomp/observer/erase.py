@@ -24,8 +24,8 @@ class ErasePlan:
     """What erases the present history.
 
     `load_swing_Nm`: smallest amplitude A of a swing of the joint torque from its present value to `first` A, to
-    -A and back; `motor_turn_rad`: smallest travel of the motor there and back at the present load; each is
-    infinite if none within the limits does it. `load_limit_Nm`, `turn_limit_rad`: how far the search could go.
+    -A and back; `motor_turn_rad`: smallest travel of the motor to either side and back at the present load; each
+    is infinite if none within the limits does it. `load_limit_Nm`, `turn_limit_rad`: how far the search could go.
     """
 
     load_swing_Nm: float
@@ -66,9 +66,11 @@ def plan_erase(
     swings = {first: _smallest(known, at, most, first, turn=False) for first in (1, -1)}
     first = min(swings, key=lambda sign: swings[sign])
     low, high = limits.motor_position_min_rad, limits.motor_position_max_rad
-    room = 2.0 * pi
-    if low is not None and high is not None:
-        room = max(high - motor_position_rad, motor_position_rad - low)
+    # a turn goes as far to either side
+    below = inf if low is None else max(motor_position_rad - low, 0.0)
+    above = inf if high is None else max(high - motor_position_rad, 0.0)
+    room = min(below, above)
+    room = 2.0 * pi if room == inf else room
     turns = [_smallest(known, at, room, sign, turn=True) for sign in (1, -1)]
     return ErasePlan(swings[first], first, min(turns), most, room)
 

@@ -148,6 +148,18 @@ def test_the_planned_swing_erases_and_a_smaller_one_does_not() -> None:
     assert abs(a - b) < 1e-12
 
 
+def test_no_turn_beyond_the_motor_s_limits_is_planned() -> None:
+    """It goes as far to either side, and so no farther than the nearer limit."""
+    config = joint("closed")
+    known = Observer(config)
+    known.step(Sample(0.0, 0.0, 0.1))
+    for low, high, most in ((-0.5, 3.0, 0.5), (None, 0.25, 0.25)):
+        limits = Limits(joint_torque_max_Nm=1.0, motor_position_min_rad=low, motor_position_max_rad=high)
+        plan = plan_erase(known, 0.0, 0.0, 0.1, limits)
+        assert plan.turn_limit_rad == most
+        assert plan.motor_turn_rad <= most or plan.motor_turn_rad == np.inf
+
+
 def test_erasing_says_what_it_needs() -> None:
     config = parse_joint(
         {"schema": 1, "name": "bare", "drive": {"circuit": "closed", "stage": [WIDE]}}, "test"
