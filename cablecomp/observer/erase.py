@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cablecomp.config import Limits
+from cablecomp.effects.base import cable_strain
 from cablecomp.errors import InputError
 from cablecomp.observer.observer import Observer
 from cablecomp.signals import Sample
 
 LEG = 60  # samples of each leg of an excitation; quasi-static, so their number only has to show the extremes
-AGREE = 1e-9  # of the joint's load-free deflection scale: two histories count as one
+AGREE = 1e-9  # of the excitation's deflection, or of the strain under T0: two histories count as one
 Columns = dict[str, NDArray[np.float64]]
 
 
@@ -128,7 +129,7 @@ def _erases(observer: Observer, at: tuple[float, float, float], size: float, fir
         a, b = known.run(columns), fresh.run(columns)
     except InputError:
         return False  # the joint cannot take this much
-    unit = float(np.max(np.abs(b["deflection_rad"]))) + 1e-12
+    unit = max(float(np.max(np.abs(b["deflection_rad"]))), cable_strain(observer.config))
     if abs(a["deflection_rad"][-1] - b["deflection_rad"][-1]) > AGREE * unit:
         return False
     for mine, other in zip(known.profiles(), fresh.profiles(), strict=True):

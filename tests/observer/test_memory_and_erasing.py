@@ -12,7 +12,7 @@ import pytest
 from joints import WIDE
 from observer_joints import joint, pull_unit
 
-from cablecomp.config import Limits, parse_joint
+from cablecomp.config import JointConfig, Limits, parse_joint
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 from cablecomp.observer.erase import excitation, plan_erase
@@ -158,6 +158,22 @@ def test_no_turn_beyond_the_motor_s_limits_is_planned() -> None:
         plan = plan_erase(known, 0.0, 0.0, 0.1, limits)
         assert plan.turn_limit_rad == most
         assert plan.motor_turn_rad <= most or plan.motor_turn_rad == np.inf
+
+
+def once_loaded(config: JointConfig) -> Observer:
+    """Loaded to half of R T0 and unloaded again in 40 s, at motor angle 0."""
+    load = 0.5 * pull_unit(config) * (1.0 - np.abs(np.linspace(-1.0, 1.0, 41)))
+    known = Observer(config)
+    known.run({"time_s": np.arange(41.0), "motor_position_rad": np.zeros(41), "joint_torque_Nm": load})
+    return known
+
+
+def test_a_turn_without_load_erases_when_it_has_unwound_the_bump() -> None:
+    """There the deflection that histories are compared over is next to none; (2-74) in its general form."""
+    config = joint("open", {"input_radius_m": 0.04})
+    limits = Limits(joint_torque_max_Nm=0.1, motor_position_min_rad=-5.0, motor_position_max_rad=5.0)
+    plan = plan_erase(once_loaded(config), 40.0, 0.0, 0.0, limits)
+    assert plan.motor_turn_rad == pytest.approx(np.log(1.5) / 0.12, rel=0.01)
 
 
 def test_erasing_says_what_it_needs() -> None:
