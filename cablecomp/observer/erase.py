@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, pi
@@ -13,6 +14,7 @@ from cablecomp.config import Limits
 from cablecomp.effects.base import cable_strain
 from cablecomp.errors import InputError
 from cablecomp.observer.observer import Observer
+from cablecomp.observer.refusal import SampleRefused
 from cablecomp.signals import Sample
 
 LEG = 60  # samples of each leg of an excitation; quasi-static, so their number only has to show the extremes
@@ -103,23 +105,32 @@ def excitation(at: tuple[float, float, float], size: float, first: int, turn: bo
 def _smallest(
     observer: Observer, at: tuple[float, float, float], most: float, first: int, turn: bool
 ) -> float:
-    """Smallest size within `most` that erases, by bisection; infinite if `most` does not."""
-    if not _erases(observer, at, most, first, turn):
+    """Smallest size within `most` that erases, by bisection; infinite if none does that the joint can take."""
+    high = most
+    if _erases(observer, at, most, first, turn) is None:  # a cable would be slack, or a drum unwound
+        high = _bisected(most, lambda size: _erases(observer, at, size, first, turn) is None)[0]
+    if not _erases(observer, at, high, first, turn):
         return inf
+    return _bisected(high, lambda size: bool(_erases(observer, at, size, first, turn)))[1]
+
+
+def _bisected(most: float, beyond: Callable[[float], bool]) -> tuple[float, float]:
+    """The sizes next to each other, up to a millionth of `most`, between which `beyond` comes true."""
     low, high = 0.0, most
-    for _ in range(40):
+    while high - low > 1e-6 * most:
         middle = 0.5 * (low + high)
-        if _erases(observer, at, middle, first, turn):
+        if beyond(middle):
             high = middle
         else:
             low = middle
-        if high - low < 1e-6 * most:
-            break
-    return high
+    return low, high
 
 
-def _erases(observer: Observer, at: tuple[float, float, float], size: float, first: int, turn: bool) -> bool:
-    """True if after the excitation the history no longer shows: neither in the tensions nor along the wraps."""
+def _erases(
+    observer: Observer, at: tuple[float, float, float], size: float, first: int, turn: bool
+) -> bool | None:
+    """Whether after the excitation the history no longer shows, neither in the tensions nor along the wraps; None if
+    the joint cannot take this much."""
     known, fresh = observer.copy(), Observer(observer.config)
     columns = excitation(at, size, first, turn) | {name: np.zeros(3 * LEG) for name in observer.channels}
     begin = {key: value[:1].copy() for key, value in columns.items()}
@@ -127,8 +138,8 @@ def _erases(observer: Observer, at: tuple[float, float, float], size: float, fir
     try:
         fresh.run(begin)
         a, b = known.run(columns), fresh.run(columns)
-    except InputError:
-        return False  # the joint cannot take this much
+    except SampleRefused:
+        return None
     unit = max(float(np.max(np.abs(b["deflection_rad"]))), cable_strain(observer.config))
     if abs(a["deflection_rad"][-1] - b["deflection_rad"][-1]) > AGREE * unit:
         return False

@@ -176,6 +176,15 @@ def test_a_turn_without_load_erases_when_it_has_unwound_the_bump() -> None:
     assert plan.motor_turn_rad == pytest.approx(np.log(1.5) / 0.12, rel=0.01)
 
 
+def test_limits_beyond_what_the_joint_can_take_hide_nothing_that_erases() -> None:
+    """The cable of an open circuit hangs slack at -R T0, and a drum is unwound within a turn of the motor; (3-22)."""
+    config = joint("open", {"input_radius_m": 0.04, "wrap_output_rad": 5.0, "wrap_input_rad": 5.0})
+    unit = pull_unit(config)
+    plan = plan_erase(once_loaded(config), 40.0, 0.0, 0.0, Limits(joint_torque_max_Nm=2.0 * unit))
+    assert plan.load_swing_Nm == pytest.approx(0.5 / 1.5 * unit, rel=1e-3)
+    assert plan.motor_turn_rad < 5.0
+
+
 def test_erasing_says_what_it_needs() -> None:
     config = parse_joint(
         {"schema": 1, "name": "bare", "drive": {"circuit": "closed", "stage": [WIDE]}}, "test"
