@@ -17,32 +17,34 @@ from cablecomp.effects.base import (
     pretension_moment,
 )
 from cablecomp.effects.compiled_term import term
+from cablecomp.effects.lag import lagged
 
 
 @term(
     parameters=("coefficient", "bend", "reference", "lag", "stick", "hanging"),
-    state=("known", "time", "warm", "slid"),
+    state=("known", "time", "read", "warm", "slid"),
 )
 def _expand(c: Any, p: Any, s: Any) -> None:
     """p: coefficient [1/K], its growth [1/K], reference [degC], lag [s], by how much what expands sticks [K], moment
-    R T0 that hangs [N m] (closed circuit: 0); s: whether a reading came before, its time [s], temperature of what
-    expands then, and that which it had slid to [degC].
+    R T0 that hangs [N m] (closed circuit: 0); s: whether a reading came before, its time [s], that reading,
+    temperature of what expands then, and that which it had slid to [degC]. It goes straight from sample to sample.
 
     Without a temperature nothing is changed.
     """
-    warm = c.temperature
-    if math.isnan(warm):
+    read = c.temperature
+    if math.isnan(read):
         if c.first and c.commit:
             s.known = 0.0
     else:
         goes_on = s.known != 0.0 and not c.first
+        warm = read
         if p.lag > 0.0 and goes_on:
-            warm += (s.warm - warm) * math.exp(-(c.time - s.time) / p.lag)
+            warm = lagged(s.warm, s.read, read, c.time - s.time, p.lag) if c.time > s.time else s.warm
         slid = warm
         if p.stick > 0.0 and goes_on:
             slid = min(max(s.slid, warm - p.stick), warm + p.stick)
         if c.commit:
-            s.known, s.time, s.warm, s.slid = 1.0, c.time, warm, slid
+            s.known, s.time, s.read, s.warm, s.slid = 1.0, c.time, read, warm, slid
         over = slid - p.reference
         factor = max(1.0 + p.coefficient * over * (1.0 + p.bend * over), LEAST_PRETENSION)
         if p.hanging > 0.0:

@@ -87,6 +87,19 @@ def test_what_expands_late_follows_a_step_of_temperature_exponentially() -> None
     assert found == pytest.approx(stage.pretension_N * (1.0 + 0.01 * warm), rel=3e-3)
 
 
+def test_what_expands_late_lags_a_ramp_of_temperature_however_seldom_it_is_read() -> None:
+    """y = r (t - t_l (1 - e^(-t/t_l))) behind a ramp r t, read every second and the half."""
+    config = joint(free_length_m=LONG)
+    values = {"coefficient_per_K": 0.01, "reference_degC": 20.0, "lag_s": 1.5}
+    for every in (0.5, 1.0):
+        time = np.arange(0.0, 8.0, every)
+        columns = resting(time) | {"temperature_degC": 20.0 + 2.0 * time}
+        found = run(config, columns, ("thermal_pretension", values))["tension_h_N"]
+        warm = 2.0 * (time + 1.5 * np.expm1(-time / 1.5))
+        expected = config.drive.stage[0].pretension_N * (1.0 + 0.01 * warm)
+        assert found == pytest.approx(late_by_one(expected), rel=1e-9)
+
+
 def test_a_frame_that_sticks_follows_the_temperature_once_that_has_turned_by_enough() -> None:
     """From 20 to 26 degC and back, 2 K of it taken up by joints that stick, from their middle on."""
     config = joint(free_length_m=LONG)
