@@ -38,6 +38,8 @@ def _weigh(c: Any, p: Any, s: Any) -> None:
     if p.period > 0.0:
         since = (c.time - p.picked_up) % p.period
         taken = min(since / p.lift, 1.0) - min(max((since - p.held * p.period) / p.lift, 0.0), 1.0)
+        # and what of the time before is not set down yet
+        taken += max(1.0 - (since + (1.0 - p.held) * p.period) / p.lift, 0.0)
         moment *= p.always + (1.0 - p.always) * max(taken, 0.0)
     lever = moment * (1.0 + p.growth * c.joint)
     c.moment += lever * math.sin(angle)

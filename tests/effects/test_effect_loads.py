@@ -51,6 +51,21 @@ def test_a_payload_weighs_while_it_is_held(always: float) -> None:
     assert turned == pytest.approx(fed_with(config, columns, load), abs=1e-10)
 
 
+@pytest.mark.parametrize("held", [0.9, 1.0])
+def test_a_payload_that_is_hardly_set_down_still_weighs(held: float) -> None:
+    """Taken up again within less than the 0.4 s that it takes: what is not down yet goes on weighing."""
+    config = joint(JOINTS[0])
+    columns = excitation(config)
+    weight = 0.4 * unit(config)
+    cycle = {"period_s": 1.0, "picked_up_s": -9.5, "held": held, "lift_s": 0.4}
+    found = run(config, columns, ("gravity_load", {"moment_Nm": weight, "phase_rad": 0.7, **cycle}))
+    turned, least = found["joint_position_rad"], 1.0 - (1.0 - held) / 0.4
+    at = np.array([0.0, 0.4 - (1.0 - held), 0.4, held, 1.0])
+    there = np.interp((columns["time_s"] + 9.5) % 1.0, at, [least, least, 1.0, 1.0, least])
+    load = columns["joint_torque_Nm"] - weight * there * np.sin(turned + 0.7)
+    assert turned == pytest.approx(fed_with(config, columns, load), abs=1e-10)
+
+
 def test_gravity_turns_with_the_joint_that_carries_the_base() -> None:
     """As the same weight at the phase that the other joint's angle makes of it; where that is not read, as untilted."""
     config = joint(JOINTS[0])
