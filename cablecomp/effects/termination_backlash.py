@@ -33,10 +33,11 @@ def _cross(c: Any, p: Any, s: Any) -> None:
 @term(parameters=("gap", "impulse", "drag", "wedges"), state=("place", "time", "path", "pulley"))
 def _cross_slowly(c: Any, p: Any, s: Any) -> None:
     """p: gap [rad], impulse that crosses it [N m s], friction of the link, of a key in its taper [N m]; s: place in the
-    gap, over half of it, and the time, moment and pulley's angle of the sample before."""
+    gap, over half of it, and the time, moment and pulley's angle of the sample before. It begins on the flank that the
+    moment presses, without any amid the gap, unless it wedges."""
     path = c.load - c.moment
     flank = 1.0 if path > 0.0 else -1.0
-    place = flank
+    place = flank if path != 0.0 or p.wedges > 0.0 else 0.0
     if not c.first:
         if abs(path) < p.wedges:
             place = s.place
