@@ -10,9 +10,7 @@ from cablecomp.mechanics.jit import kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Ints, wrap_fill
 from cablecomp.mechanics.records import OUT
 from cablecomp.mechanics.tables import v_of_tau
-from cablecomp.mechanics.viscous import viscous_fill
-
-VISCOUS_TRAVEL = 4.0  # rotation [rad] beyond position zero that the viscous grid covers
+from cablecomp.mechanics.viscous import VISCOUS_TRAVEL, viscous_fill
 
 
 @kernel

@@ -18,6 +18,7 @@ from cablecomp.mechanics.records import WET_NODES
 STIFFEST = 1e7  # diffusion number per step at which slip on a grid of WET_NODES is over within it
 EVEN = 1e-13  # change of a node, over T0, up to which a step is balanced
 FLICKER = 6  # steps of Newton's method after which less will do, as far as a stiff step's own digits go
+VISCOUS_TRAVEL = 4.0  # rotation [rad] beyond the wrap that a grid covers when it is laid
 LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 
 
@@ -287,4 +288,25 @@ def _unbalanced(s: Slide, first: int) -> float:
 def viscous_commit(grid: Any) -> None:
     """Make the pending profile of a wrap its state."""
     grid.count, grid.angle, grid.end = grid.count_try, grid.angle_try, grid.end_try
+    copy_floats(grid.tau_try, 0, grid.tau, 0, int(grid.count))
+    if grid.angle > WET_NODES * grid.step:
+        _widen(grid)
+
+
+@inner_kernel
+def _widen(grid: Any) -> None:
+    """Lay the grid anew over a wrap that has outgrown it: linear between the nodes that there were."""
+    per_old, last = 1.0 / grid.step, int(grid.count) - 1
+    y_last = last * grid.step
+    grid.step = (grid.angle + VISCOUS_TRAVEL) / (WET_NODES - 1)
+    grid.count = _free_nodes(grid.angle, grid.step)
+    grid.time_try = -1e300  # what is pending is of the old nodes
+    for j in range(int(grid.count)):
+        y = j * grid.step
+        k = min(int(y * per_old), last)
+        a = grid.tau[k]
+        if k < last:
+            grid.tau_try[j] = a + (y * per_old - k) * (grid.tau[k + 1] - a)
+        else:
+            grid.tau_try[j] = a + (y - y_last) / (grid.angle - y_last) * (grid.end - a)
     copy_floats(grid.tau_try, 0, grid.tau, 0, int(grid.count))

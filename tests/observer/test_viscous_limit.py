@@ -1,4 +1,5 @@
-"""With hardly any viscosity what slides is the plain law, on wraps so long that all of a grid has to slide at once."""
+"""With hardly any viscosity what slides is the plain law, on wraps so long that all of a grid has to slide at once, and
+on drums that wind on many turns of cable."""
 
 from __future__ import annotations
 
@@ -24,4 +25,17 @@ def test_hardly_any_viscosity_is_none(circuit: str, drum: float) -> None:
     least = {"coefficient_Ns_per_m_rad": 1e-9 * stage.EA_N / stage.output_radius_m, "drum": drum}
     viscous = with_effects(config, (("viscous_slip", least),))
     found = run(Observer(viscous), load, np.zeros(count))["joint_position_rad"]
+    assert np.max(np.abs(found - plain)) < 1e-3 * np.ptp(plain)
+
+
+def test_hardly_any_viscosity_is_none_on_a_drum_that_winds_on_turn_after_turn() -> None:
+    """The motor's, of a tenth of the joint's radius, over 24 rad: no grid covers that from the start."""
+    config = joint("closed", {"output_radius_m": 0.05, "input_radius_m": 0.005, "wrap_input_rad": 14.0})
+    peak = pull_unit(config)
+    at = np.arange(500)
+    load = peak * np.interp(at, np.linspace(0, 500, 11), [0, 1, -1, 0.8, 0, 0.9, -0.5, 1, 0, 0.9, -0.8])
+    motor = np.interp(at, [0, 170, 400, 500], [0.0, 12.0, -12.0, 9.0])
+    plain = run(Observer(config), load, motor)["deflection_rad"]
+    viscous = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": 1e-3}),))
+    found = run(Observer(viscous), load, motor)["deflection_rad"]
     assert np.max(np.abs(found - plain)) < 1e-3 * np.ptp(plain)
