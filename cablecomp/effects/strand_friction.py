@@ -26,7 +26,7 @@ EFFECT = Effect(
     "less; the grip may grow with the tension, which presses the wires together.",
     equation="free span's stretch = L/EA (T - T0 + s p), p = P_y[T - T0], the play operator of radius y, or the mean "
     "of five with radii y (1 + u (2 z^k - 1)), z evenly from 0 to 1, each times 1 + m (T/T0 - 1); greased, it yields "
-    "in its own time: t_y dp/dt = P_y[T - T0] - p",
+    "in its own time: t_y dp/dt = min(max(p, T - T0 - y), T - T0 + y) - p",
     source="bending and axial hysteresis of spiral strands by interwire friction: K. O. Papailiou, On the "
     "bending stiffness of transmission line conductors, IEEE Trans. Power Delivery 12 (1997); play "
     "operator: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989; many of them: W. D. Iwan, "
