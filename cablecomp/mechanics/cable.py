@@ -23,6 +23,7 @@ class Stretch(NamedTuple):
     length: float  # m
     compliance: float  # its derivative by the tension, m/N
     by_shaft: float  # by the output shaft's angle, m/rad
+    by_shaft_in: float  # by the input shaft's, where a guide keeps its turn from the output side
 
 
 @inlined_kernel
@@ -64,14 +65,14 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
     dv = dv_dtau(laws, ELSEWHERE, tau, v)
     strain, strain_slope = strain_of_tau(laws, ELSEWHERE, tau)
     length = cable.length
-    total = by_shaft = slope = 0.0
+    total = by_shaft = by_shaft_in = slope = 0.0
     ends = 2
     state.tension = state.tension_in = tension
     if laws is not None:
         if cable.guide > 0.0:
             w_in = cable.wrap[IN] - cable.sign * x_in
             split = guide_split(d, laws, c, v, x_in, w_in)
-            total, slope = split.stretch, split.slope * dv
+            total, slope, by_shaft_in = split.stretch, split.slope * dv, split.by_shaft
             state.tension_in = split.tau_in * t0
             length *= cable.guide_place
             ends = 1
@@ -92,7 +93,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
         angle = -cable.sign * x_in
     state.stretch = total * unit
     state.compliance = slope * unit / t0
-    return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit)
+    return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit, by_shaft_in)
 
 
 @inlined_kernel

@@ -53,7 +53,7 @@ def chain_eval(
     The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their
     ratios (5-2).
     """
-    theta = compliance = by_shaft = 0.0
+    theta = compliance = by_shaft = turns = 0.0  # turns: of the shaft between two cables, by the tension
     x = x_in
     for j in range(count):
         cable, state = d.cables[first + j], d.states[first + j]
@@ -63,6 +63,10 @@ def chain_eval(
         theta += cable.weight * longer
         by_shaft = cable.weight * stretch.by_shaft
         compliance += cable.weight * stretch.compliance * cable.scale
+        if laws is not None:
+            compliance += cable.weight * stretch.by_shaft_in * turns
+            by_tension = stretch.compliance * cable.scale + stretch.by_shaft_in * turns
+            turns = cable.ratio * turns + cable.sign * by_tension / cable.radius[OUT]
         x = cable.ratio * x + cable.sign * longer / cable.radius[OUT]
         state.shaft = x
     return Chain(theta, compliance, by_shaft)

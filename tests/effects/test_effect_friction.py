@@ -313,3 +313,14 @@ def test_a_guide_where_friction_or_stiffness_depends_on_tension(
     expected = total * stage.pretension_N / stage.EA_N / stage.output_radius_m
     assert found["deflection_rad"][-1] == pytest.approx(expected, rel=1e-6)
     assert found["tension_h_input_N"][-1] == pytest.approx(tau_in * stage.pretension_N, rel=1e-7)
+
+
+@pytest.mark.parametrize("mu_angle", [0.5, 1.4, 3.0])
+def test_guides_of_cables_that_hang_one_behind_the_other_are_solved(mu_angle: float) -> None:
+    """What sticks keeps the turn of the shaft between the two from the joint: its cable's give is not the joint's."""
+    config = joint("two-stage-parallel")
+    columns = excitation(config, 200)
+    guides = ("routing_friction", {"mu_angle": mu_angle, "arc_length_m": 0.02, "place": 0.3})
+    found = run(config, columns, guides)
+    pull = columns["joint_torque_Nm"] / config.drive.stage[-1].output_radius_m
+    assert found["tension_h_N"] - found["tension_l_N"] == pytest.approx(pull, abs=1e-9)
