@@ -8,6 +8,7 @@ from plant_effect_course import LOAD, MOTOR, OTHER, T, carried, play
 from plant_joints import joint
 
 from firmware_sim.plant import EffectSpec, PlantRun, simulate
+from firmware_sim.plant.forms.courses import held
 
 
 def test_a_flexible_link_is_an_inertia_when_stiff_and_rings_by_its_own_frequency() -> None:
@@ -176,3 +177,13 @@ def test_loads_that_no_sensor_sees_are_carried_by_the_cables(plain: PlantRun) ->
         change = run.load_path_Nm - LOAD
         assert np.max(np.abs(change - expected)[2:]) < 0.01 * np.max(np.abs(expected)), name
         np.testing.assert_allclose(carried(run), run.load_path_Nm, atol=2e-5)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 1.0])
+def test_a_payload_is_lifted_and_set_down_no_faster_than_that_takes(share: float) -> None:
+    """Even where it is taken up again before it is down."""
+    time = np.linspace(-1.0, 4.0, 5001)
+    there = held(time, 0.3, 1.0, share, 0.4)
+    assert np.max(np.abs(np.diff(there))) <= 1e-3 / 0.4 + 1e-12
+    assert np.max(there) == pytest.approx(1.0)
+    assert np.min(there) == pytest.approx(max(1.0 - (1.0 - share) / 0.4, 0.0), abs=0.01)

@@ -91,7 +91,9 @@ def held(time_s: Floats, start_s: float, period_s: float, share: float, rise_s: 
     """1 for that share of every period, one of which begins at `start_s`, and 0 for the rest; from one to the other in
     `rise_s`."""
     since = np.mod(time_s - start_s, period_s)
-    return np.clip(since / rise_s, 0.0, 1.0) - np.clip((since - share * period_s) / rise_s, 0.0, 1.0)
+    falling = since + (1.0 - share) * period_s  # since what was held in the period before is let go of
+    now = np.clip(since / rise_s, 0.0, 1.0) - np.clip((since - share * period_s) / rise_s, 0.0, 1.0)
+    return np.asarray(now + np.clip(1.0 - falling / rise_s, 0.0, 1.0))
 
 
 def schedule(build: Build, column: int, size: float, course: Callable[[Floats], Floats]) -> None:
