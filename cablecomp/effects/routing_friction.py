@@ -8,6 +8,9 @@ from cablecomp.config import JointConfig
 from cablecomp.effects.base import Change, Effect, Parameter
 
 FRICTIONLESS = 1e-5  # below, a guide is nothing but more free cable
+LEAST_PLACE = (
+    1e-6  # share of the free cable on either side: a joint whose cable all sticks would be without any give
+)
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -18,7 +21,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
         guide_angle=angle,
         guide_length_m=arc,
         guide_skew=values["skew"],
-        guide_place=values["place"],
+        guide_place=max(values["place"], LEAST_PLACE),
         guide_spread=values["spread"],
     )
 

@@ -324,3 +324,15 @@ def test_guides_of_cables_that_hang_one_behind_the_other_are_solved(mu_angle: fl
     found = run(config, columns, guides)
     pull = columns["joint_torque_Nm"] / config.drive.stage[-1].output_radius_m
     assert found["tension_h_N"] - found["tension_l_N"] == pytest.approx(pull, abs=1e-9)
+
+
+def test_a_guide_may_lie_where_the_cable_leaves_the_joints_drum() -> None:
+    """As one that is a ten-thousandth of the free cable away."""
+    config = joint()
+    columns = excitation(config, 200)
+    at, near = (
+        run(config, columns, ("routing_friction", {"mu_angle": 0.3, "arc_length_m": 0.02, "place": place}))
+        for place in (0.0, 1e-4)
+    )
+    deflection = near["deflection_rad"]
+    assert at["deflection_rad"] == pytest.approx(deflection, abs=1e-3 * np.ptp(deflection))
