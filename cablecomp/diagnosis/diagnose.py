@@ -157,7 +157,7 @@ def _judged(
     if kept is not final or laws:
         again = [f.law for f in laws]
         augmented = errors_of(kept.fit, case.body.final, by, again) if kept.terms or laws else baseline
-    structured = structured or (not named and any(not_carried(augmented, drive.floor_rad)))
+    structured = structured or any(not_carried(augmented, drive.floor_rad))
     verdict = verdict_of(bool(named), structured, drive, kept)
     return Outcome(
         tuple(weighed), tuple(named), kept, tuple(laws), baseline, augmented, remainder, repeated_rad, structured,

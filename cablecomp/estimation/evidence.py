@@ -160,8 +160,8 @@ def noise_rms(evidence: Sequence[Evidence], channel: str) -> float:
 
 
 def load_channel(config: JointConfig, columns: Mapping[str, FloatArray]) -> str | None:
-    """Channel that holds the load: `joint_torque_Nm`, else the motor's torque where the configuration says so,
-    else none."""
+    """Channel that holds the load: the motor's torque where the configuration says so, else `joint_torque_Nm`, else
+    none."""
     if config.observer.load == "motor_torque" and MOTOR in columns:
         return MOTOR
     return "joint_torque_Nm" if "joint_torque_Nm" in columns else None

@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_drive import TOLERANT, recorded
 from turning import LIMITED, NOISE_RAD, after_a_history
 
 from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
+from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
+from firmware_sim.plant import EffectSpec
 
 
 def test_an_unrecorded_history_is_no_error_and_a_missing_law_is() -> None:
@@ -72,3 +75,13 @@ def test_a_recording_that_the_drive_cannot_follow_is_predicted_as_by_a_rigid_one
     )
     error = errors_of(drive.fit, [far], "recording").final_rmse_rad
     assert error == pytest.approx(0.01, rel=0.1)
+
+
+def test_what_does_not_carry_to_the_end_is_explained_in_part() -> None:
+    """A bearing that drags, and an encoder that is knocked in the stretch that is kept for the end."""
+    columns = recorded([EffectSpec("bearing_friction", {"torque_Nm": 0.03, "presliding_rad": 2e-4})], 20.0)
+    columns["joint_position_rad"][columns["time_s"] > 18.0] += 3e-4
+    found = diagnose(TOLERANT, {"small/1": columns})
+    assert [named.effect for named in found.named] == ["bearing_friction"]
+    assert found.augmented.final_rmse_rad > 10.0 * found.augmented.heldout_rmse_rad
+    assert found.verdict == "partly explained"
