@@ -51,6 +51,7 @@ class Instrument:
             return
         e, s, t = view.estimate, view.sample, loop.accounts.times
         events = loop.events.last
+        zero = joint.setup.config.sensors.joint_position_offset_rad
         vector = getattr(joint.setup.compensator.observer, "vector", None)
         scalars = {
             "time_s": tick.now_s,
@@ -63,7 +64,7 @@ class Instrument:
             "deflection_rad": e.deflection_rad,
             "deflection_low_rad": e.deflection_low_rad,
             "deflection_high_rad": e.deflection_high_rad,
-            "residual_rad": s.joint_position_rad - e.joint_position_rad,
+            "residual_rad": s.joint_position_rad - e.joint_position_rad - zero,
             "tension_h_N": e.tension_h_N,
             "tension_l_N": e.tension_l_N,
             "cycle_p99_s": t.cycle.quantile(0.99),

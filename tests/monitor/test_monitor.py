@@ -7,6 +7,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ import pytest
 from browser import PHONE, SIDEWAYS, browser, needs_browser, opened
 
 from cablecomp import load_joint
+from cablecomp.control.command import Reference
+from cablecomp.control.degrade import Phase
 from cablecomp.monitor.frames import Frame, frame, unpacked
 from cablecomp.monitor.instrument import Instrument, packed
 from cablecomp.monitor.played import played
@@ -23,6 +26,9 @@ from cablecomp.observer import Observer, WrapProfile
 from cablecomp.recording.reader import open_recording
 from cablecomp.recording.writer import write_canonical
 from cablecomp.report.page import CSS
+from cablecomp.runtime.loop import RunStage
+from cablecomp.runtime.tally import View
+from cablecomp.signals import NAN, Estimate, Sample
 
 WRAP = WrapProfile(
     "cable h, output pulley", np.linspace(0.0, 6.0, 200), 60.0 + np.sin(np.linspace(0.0, 6.0, 200))
@@ -87,6 +93,30 @@ def test_nobody_is_waited_for() -> None:
         instrument.send(b"x")
     assert instrument.dropped > before  # the port is closed: the system says so
     instrument.close()
+
+
+def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
+    sensors = SimpleNamespace(joint_position_offset_rad=0.02)
+    setup = SimpleNamespace(
+        config=SimpleNamespace(sensors=sensors), compensator=SimpleNamespace(observer=None)
+    )
+    seen = Estimate(1.0, 1e-3, NAN, NAN, 0.3, 0.5, 60.0, 60.0)
+    view = View("arm", 1.0, Phase.NORMAL, Sample(1.0, 0.9, 0.5, 0.321), seen, None, Reference(0.3), 0)  # type: ignore[arg-type]
+    histogram = SimpleNamespace(quantile=lambda share: 1e-4)
+    loop = SimpleNamespace(
+        joints=[SimpleNamespace(view=view, setup=setup)],
+        stage=RunStage.RUNNING,
+        accounts=SimpleNamespace(times=SimpleNamespace(cycle=histogram, jitter=histogram, misses=0)),
+        events=SimpleNamespace(last=[]),
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        instrument = Instrument(receiver.getsockname()[1])
+        instrument.watch(loop, SimpleNamespace(now_s=1.0))  # type: ignore[arg-type]
+        found = unpacked(receiver.recv(65_535), lambda vector: ())
+        instrument.close()
+    assert found["residual_rad"] == pytest.approx(0.001, abs=1e-12)
+    assert found["measured_rad"] == pytest.approx(0.002, abs=1e-12)
 
 
 def test_plotjuggler_gets_curves() -> None:
