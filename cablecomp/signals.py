@@ -29,8 +29,8 @@ class Estimate(NamedTuple):
 
     `deflection_rad` = predicted q_out - (product of r/R) q_in, `deflection_low_rad`/`deflection_high_rad`
     contain the true value for every admissible initial history (NaN where no guarantee exists);
-    `joint_position_rad` is what the joint encoder should read; tensions are those of the output stage's
-    cables at the output pulley (l is NaN in an open circuit);
+    `joint_position_rad` is what the joint encoder should read, its offset taken off; tensions are those of the
+    output stage's cables at the output pulley (l is NaN in an open circuit);
     `motor_torque_Nm` is what the motor's torque sensor should read.
     """
 

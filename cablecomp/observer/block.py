@@ -29,7 +29,7 @@ def block_of(config: JointConfig, channels: Sequence[str], columns: Mapping[str,
     elif source == "joint_torque":
         read.load[:] = _need(columns, "joint_torque_Nm")
     if "joint_position_rad" in columns:
-        read.joint[:] = _need(columns, "joint_position_rad")
+        read.joint[:] = _need(columns, "joint_position_rad") - sensors.joint_position_offset_rad
     if "temperature_degC" in columns:
         read.temperature[:] = _need(columns, "temperature_degC")
     for k, name in enumerate(channels):

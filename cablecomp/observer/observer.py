@@ -57,6 +57,7 @@ class Observer:
         self._inverts = self._source == "both_encoders"
         self._motor_zero = config.motor_zero_Nm
         self._zero_load = config.sensors.joint_torque_offset_Nm
+        self._joint_zero = config.sensors.joint_position_offset_rad
         self._bounds = self._bound_pair() if bounds and is_bounded(config) else None
 
     # --- the three ways to use it ---------------------------------------------------------------------------------
@@ -125,7 +126,8 @@ class Observer:
         return estimates(answer, interval[:, 0], interval[:, 1], self._ratio * read.motor)
 
     def inverse(self, sample: Sample) -> Estimate:
-        """Joint torque that explains both encoders (its sample's joint torque is not read); commits nothing."""
+        """Joint torque that explains both encoders, the joint's offset taken off (its sample's joint torque is not
+        read); commits nothing."""
         fresh = self._read(sample)
         return self._peeked(sample, self._joint.step_inverse(False)[1], fresh)
 
@@ -294,7 +296,7 @@ class Observer:
                 load = -(torque - self._motor_zero) / self._ratio
             elif self._source == "none":
                 load = self._zero_load
-            self._joint.put_sample(time, motor, load, joint, temperature)
+            self._joint.put_sample(time, motor, load, joint - self._joint_zero, temperature)
             if self.channels:
                 self._joint.put_other(other)
         except (AttributeError, TypeError, ValueError, StructError):

@@ -50,6 +50,21 @@ def test_the_motors_torque_tells_the_load_beside_what_holds_the_pretension(
     assert load_of(config, columns) == pytest.approx(LOAD, abs=0.01)
 
 
+def test_the_load_told_by_both_encoders_is_not_what_the_joints_reads_too_much() -> None:
+    more = {"observer": {"load": "both_encoders"}, "sensors": {"joint_position_offset_rad": 0.01}}
+    config = parse_joint({**drive("closed"), **more}, "both")
+    time, motor, load = TIME[:60], MOTOR[:60], LOAD[:60]
+    plant = simulate(PlantConfig.from_dict(drive("closed")), time, motor, load)
+    true = plant.channels()["joint_position_rad"]
+    columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": true + 0.01}
+    found = Observer(config).run(columns)
+    assert found["joint_torque_Nm"] == pytest.approx(load, abs=0.01)
+    assert found["joint_position_rad"] == pytest.approx(true, abs=1e-9)
+    one = Observer(config)
+    steps = [one.step(Sample(TIME[k], MOTOR[k], joint_position_rad=true[k] + 0.01)) for k in range(3)]
+    assert steps[2].joint_torque_Nm == pytest.approx(found["joint_torque_Nm"][2], abs=1e-9)
+
+
 @pytest.mark.parametrize("circuit", ["open", "closed"])
 def test_an_observer_of_the_motors_torque_is_made_ready_for_a_loop(circuit: str) -> None:
     """A motor without torque would let an open circuit's cable hang; what is compiled with is a joint at rest."""
