@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, Sensors
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer, SampleRefused
 from cablecomp.observer.refusal import REASONS
@@ -51,9 +51,9 @@ def greatest_load(config: JointConfig, load_max_Nm: float | None = None) -> floa
 
 
 def plain(config: JointConfig) -> JointConfig:
-    """The same joint, loaded by a known torque, without input filter: what the design looks at."""
+    """The same joint, loaded by a known torque, without input filter and sensors' errors: what the design looks at."""
     options = config.observer.model_copy(update={"load": "joint_torque", "input_filter_Hz": 0.0})
-    return config.model_copy(update={"observer": options})
+    return config.model_copy(update={"observer": options, "sensors": Sensors()})
 
 
 def stiffness_range(

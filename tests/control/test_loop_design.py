@@ -56,6 +56,14 @@ def test_the_stiffness_range_begins_at_the_free_spans_alone() -> None:
     assert sheet is not None
 
 
+def test_what_sensors_read_wrong_is_no_part_of_the_drive() -> None:
+    wrong = {"joint_torque_gain": 1.25, "joint_torque_offset_Nm": 0.3, "joint_position_offset_rad": 0.02}
+    joint = JOINT.model_copy(update={"sensors": JOINT.sensors.model_copy(update=wrong)})
+    found, true = stiffness_range(joint), stiffness_range(JOINT)
+    assert found.secant_Nm_per_rad == pytest.approx(true.secant_Nm_per_rad, rel=1e-9)
+    assert Hysteresis(joint).describing_function(1e-3) == Hysteresis(JOINT).describing_function(1e-3)
+
+
 def test_a_load_that_the_joint_cannot_bear_is_named_as_the_design_s() -> None:
     """A tenth above the pretension the cable breaks, before the limit's load; no sample of anybody's is to blame."""
     stage = JOINT.drive.stage[0]
