@@ -102,6 +102,7 @@ class Compensator:
         self.ratio = config.drive.ratio
         self.preload_Nm = config.drive.preload_Nm
         self.motor_zero_Nm = config.motor_zero_Nm
+        self.joint_zero_rad = config.sensors.joint_position_offset_rad
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = LeadFilter(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
@@ -187,7 +188,7 @@ class Compensator:
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
         n, now = self.ratio, self._reference
         if joint_ok and now is not None and self.gains.joint_feedback_per_s > 0.0 and not feed.held:
-            self._joint_feedback(now.joint_position_rad - sample.joint_position_rad)
+            self._joint_feedback(now.joint_position_rad - (sample.joint_position_rad - self.joint_zero_rad))
         wanted = (reference.joint_position_rad - used + self.joint_trim_rad) / n
         velocity = (reference.joint_velocity_rad_s - self.deflection_slope.step(used)) / n
         torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, load)
@@ -258,7 +259,7 @@ class Compensator:
         return self.observer.step(sample)
 
     def _force(self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate) -> Command:
-        measured = sample.joint_position_rad
+        measured = sample.joint_position_rad - self.joint_zero_rad
         joint = measured if isfinite(measured) else estimate.joint_position_rad
         followed = self.follow.step(joint)
         joint_velocity = self.follow.rate

@@ -1,0 +1,46 @@
+"""The compensator where it meets sensors and switches: zeros are taken off, and a switch is no motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cablecomp.config import JointConfig, load_joint
+from cablecomp.control.command import Reference
+from cablecomp.control.compensator import Compensator, Gains
+from cablecomp.control.options import CompensatorOptions
+from cablecomp.observer import Observer
+from cablecomp.signals import Sample
+
+JOINT = load_joint(Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml")
+N = JOINT.drive.ratio
+T = 1e-3
+GAINS = Gains(20.0, 0.0, 20.0, 0.0, 5.0, 5.0, 0.0)
+
+
+def controller(config: JointConfig, **options: object) -> Compensator:
+    chosen = CompensatorOptions.model_validate({"blend_s": 0.05, **options})
+    return Compensator(config, chosen, T, Observer(config), gains=GAINS)
+
+
+def reading(**wrong: float) -> JointConfig:
+    return JOINT.model_copy(update={"sensors": JOINT.sensors.model_copy(update=wrong)})
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"mode": "position", "joint_feedback_per_s": 5.0},
+        {"mode": "force", "torque_from": "sensor"},
+        {"mode": "force"},
+    ],
+)
+def test_what_the_joint_encoder_reads_too_much_is_taken_off(options: dict[str, object]) -> None:
+    asked = []
+    for config, joint in ((JOINT, 0.103), (reading(joint_position_offset_rad=0.02), 0.123)):
+        c = controller(config, **options)
+        for k in range(30):
+            command = c.step(Sample(k * T, 0.1 / N, 0.5, joint), Reference(0.1, 0.0, 0.5))
+        asked.append(command.motor_position_rad)
+    assert asked[1] == pytest.approx(asked[0], abs=1e-9)
