@@ -186,6 +186,8 @@ class Compensator:
         if not feed.held:
             self.deflection_used_rad = ahead if ahead == ahead else self._deflection(sample, reference, load)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
+        if self._switch:
+            self.deflection_slope.jump(used)
         n, now = self.ratio, self._reference
         if joint_ok and now is not None and self.gains.joint_feedback_per_s > 0.0 and not feed.held:
             self._joint_feedback(now.joint_position_rad - (sample.joint_position_rad - self.joint_zero_rad))
@@ -270,6 +272,8 @@ class Compensator:
             asked = wanted_Nm + self.force_trim_Nm
             self.deflection_used_rad = self._deflection(sample, reference, asked)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
+        if self._switch:
+            self.deflection_slope.jump(used)
         wanted = (followed - used) / self.ratio
         velocity = (joint_velocity - self.deflection_slope.step(used)) / self.ratio
         torque = self._torque(velocity, 0.0, wanted_Nm)

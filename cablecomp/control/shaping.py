@@ -65,6 +65,10 @@ class Slope:
         self.last = self.rate = 0.0
         self.started = False
 
+    def jump(self, value: float) -> None:
+        """Go on from another value at the rate of before: what leads there is no motion."""
+        self.last = value
+
     def step(self, value: float) -> float:
         """Take a value, give its rate per second."""
         if not self.started:

@@ -28,6 +28,19 @@ def reading(**wrong: float) -> JointConfig:
     return JOINT.model_copy(update={"sensors": JOINT.sensors.model_copy(update=wrong)})
 
 
+@pytest.mark.parametrize("mode", ["position", "force"])
+def test_a_switch_asks_for_no_more_velocity_than_its_blend_has(mode: str) -> None:
+    c = controller(JOINT, mode=mode, torque_from="sensor")
+    for k in range(300):
+        if k == 100:
+            c.disable()
+        if k == 200:
+            c.enable()
+        command = c.step(Sample(k * T, 0.1 / N, 1.5, 0.1), Reference(0.1, 0.0, 1.5))
+        if k > 60:
+            assert abs(command.motor_velocity_rad_s) < 1.6 * 0.01 / N / 0.05
+
+
 @pytest.mark.parametrize(
     "options",
     [
