@@ -10,7 +10,7 @@ from cablecomp.signals import NAN
 class Reference(NamedTuple):
     """What is wanted of the joint at one instant.
 
-    `joint_torque_Nm` is an external moment on the output pulley, positive along +q_out, as in `Sample`: in
+    `joint_torque_Nm` is the external moment on the output pulley, positive along +q_out, sensors' errors taken off: in
     position mode the load that is expected (NaN = unknown), in force mode the load that is wanted (the joint
     then pushes on its surroundings with the opposite torque), in impedance mode the load wanted at zero
     position error.

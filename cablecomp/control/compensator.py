@@ -103,6 +103,8 @@ class Compensator:
         self.preload_Nm = config.drive.preload_Nm
         self.motor_zero_Nm = config.motor_zero_Nm
         self.joint_zero_rad = config.sensors.joint_position_offset_rad
+        self.load_gain = config.sensors.joint_torque_gain
+        self.load_zero_Nm = config.sensors.joint_torque_offset_Nm
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = LeadFilter(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
@@ -193,7 +195,7 @@ class Compensator:
             self._joint_feedback(now.joint_position_rad - (sample.joint_position_rad - self.joint_zero_rad))
         wanted = (reference.joint_position_rad - used + self.joint_trim_rad) / n
         velocity = (reference.joint_velocity_rad_s - self.deflection_slope.step(used)) / n
-        torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, load)
+        torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, self.true_load(load))
         return self._command(sample, reference, wanted, velocity, torque, used, estimate)
 
     def _observe(self, sample: Sample, reference: Reference, feed: Feed) -> tuple[float, float]:
@@ -224,21 +226,22 @@ class Compensator:
         return feed.held and self._by_encoders
 
     def _expected_load(self, measured_Nm: float, reference: Reference) -> float:
-        """Load of the next instant; `measured_Nm`: the sensor's, or where there is none the observer's."""
+        """Load of the next instant as a sensor reads it; `measured_Nm`: the sensor's, or where there is none the
+        observer's."""
         stated = reference.joint_torque_Nm
         if not self._from_sensor:
-            return stated if isfinite(stated) else 0.0
+            return self._reading(stated if isfinite(stated) else 0.0)
         if self.options.load == "sensor" or not isfinite(stated):
             return self.load.step(measured_Nm)
         before = self._reference
         expected_now = stated if before is None else before.joint_torque_Nm
         if not isfinite(expected_now):
             expected_now = stated
-        return stated + self.load.step(measured_Nm - expected_now)
+        return self._reading(stated) + self.load.step(measured_Nm - self._reading(expected_now))
 
     def _deflection(self, sample: Sample, reference: Reference, load: float) -> float:
         if self._linear is not None and self.options.feed_forward is FeedForward.LINEAR:
-            return load / self._linear
+            return self.true_load(load) / self._linear
         period = self.period_s
         motor = sample.motor_position_rad + self._velocity * period
         return self.observer.peek_deflection(sample.time_s + period, motor, load)
@@ -257,7 +260,7 @@ class Compensator:
             return self.observer.step_inverse(sample)
         if source == "motor_torque":
             load_Nm = -(sample.motor_torque_Nm - self.motor_zero_Nm) / self.ratio
-            sample = sample._replace(joint_torque_Nm=load_Nm)
+            sample = sample._replace(joint_torque_Nm=self._reading(load_Nm))
         return self.observer.step(sample)
 
     def _force(self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate) -> Command:
@@ -268,8 +271,8 @@ class Compensator:
         wanted_Nm = self._wanted_torque(reference, joint, joint_velocity)
         if not feed.held:
             if self.active:  # else nothing of it would reach the motor
-                self._force_feedback(wanted_Nm - estimate.joint_torque_Nm)
-            asked = wanted_Nm + self.force_trim_Nm
+                self._force_feedback(wanted_Nm - self.true_load(estimate.joint_torque_Nm))
+            asked = self._reading(wanted_Nm + self.force_trim_Nm)
             self.deflection_used_rad = self._deflection(sample, reference, asked)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
         if self._switch:
@@ -294,6 +297,14 @@ class Compensator:
             self.force_trim_Nm = min(max(trim, -limit), limit)
 
     # ---- common ----------------------------------------------------------------------------------
+
+    def true_load(self, reading_Nm: float) -> float:
+        """The load behind a torque sensor's reading, as samples and estimates hold it."""
+        return (reading_Nm - self.load_zero_Nm) / self.load_gain
+
+    def _reading(self, load_Nm: float) -> float:
+        """What a torque sensor reads under a load."""
+        return self.load_gain * load_Nm + self.load_zero_Nm
 
     def _torque(self, velocity: float, acceleration: float, load: float) -> float:
         m = self._motor

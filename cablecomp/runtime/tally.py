@@ -37,8 +37,9 @@ class JointTally:
     deflection_square: float = 0.0
     phases: list[int] = field(default_factory=lambda: [0] * len(Phase))
 
-    def add(self, wanted: Reference, measured_rad: float, estimate: Estimate) -> None:
-        """One cycle under control: what was wanted of this instant, the joint encoder's angle (NaN = none)."""
+    def add(self, wanted: Reference, measured_rad: float, torque_Nm: float, estimate: Estimate) -> None:
+        """One cycle under control: what was wanted of this instant, the joint's angle and torque, sensors' errors taken
+        off (NaN = none)."""
         self.cycles += 1
         if measured_rad == measured_rad:
             error = measured_rad - wanted.joint_position_rad
@@ -47,7 +48,7 @@ class JointTally:
             self.position_count += 1
             self.residual_square += residual * residual
         self.deflection_square += estimate.deflection_rad * estimate.deflection_rad
-        torque_error = estimate.joint_torque_Nm - wanted.joint_torque_Nm
+        torque_error = torque_Nm - wanted.joint_torque_Nm
         if torque_error == torque_error:
             self.torque_square += torque_error * torque_error
             self.torque_count += 1

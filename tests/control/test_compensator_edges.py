@@ -57,3 +57,27 @@ def test_what_the_joint_encoder_reads_too_much_is_taken_off(options: dict[str, o
             command = c.step(Sample(k * T, 0.1 / N, 0.5, joint), Reference(0.1, 0.0, 0.5))
         asked.append(command.motor_position_rad)
     assert asked[1] == pytest.approx(asked[0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"load": "sensor"},
+        {"load": "both"},
+        {"load": "reference"},
+        {"feed_forward": "linear", "linear_stiffness_Nm_per_rad": 150.0},
+        {"mode": "force", "torque_from": "sensor"},
+        {"mode": "force", "torque_from": "encoders"},
+        {"mode": "force", "torque_from": "motor_torque"},
+        {"mode": "impedance", "torque_from": "sensor"},
+    ],
+)
+def test_a_load_is_wanted_and_met_as_it_is_and_not_as_a_sensor_reads_it(options: dict[str, object]) -> None:
+    asked = []
+    for config, load in ((JOINT, 0.5), (reading(joint_torque_gain=1.2, joint_torque_offset_Nm=0.3), 0.9)):
+        c = controller(config, **options)
+        for k in range(30):
+            seen = Sample(k * T, 0.1 / N, load, 0.103, -N * 0.5)
+            command = c.step(seen, Reference(0.1, 0.0, 0.8))
+        asked.append(command[:3])
+    assert asked[1] == pytest.approx(asked[0], abs=1e-9)
