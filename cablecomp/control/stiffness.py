@@ -18,11 +18,12 @@ Floats = NDArray[np.float64]
 
 
 class StiffnessRange(NamedTuple):
-    """Tangent stiffness dM/dtheta (Nm/rad) along the greatest load cycle: 0, +max, -max, 0.
+    """Tangent stiffness dM/dtheta (Nm/rad) along the greatest load cycle: 0, +max, -max, +max (open circuit: 0, +max,
+    0, +max).
 
     `zero_Nm_per_rad` at first touch, `low_Nm_per_rad` and `high_Nm_per_rad` the extremes, `secant_Nm_per_rad`
-    load over deflection at the peak, `width_rad` the greatest width of the loop; the arrays are the cycle
-    itself.
+    load over deflection at the peak, `width_rad` the greatest width of the loop, first touch left out; the arrays
+    are the cycle itself, a fifth of it first touch.
     """
 
     zero_Nm_per_rad: float
@@ -66,7 +67,7 @@ def stiffness_range(
         [
             np.linspace(0, most, samples // 4),
             np.linspace(most, lowest, samples // 2),
-            np.linspace(lowest, 0, samples // 4),
+            np.linspace(lowest, most, samples // 2),
         ]
     )
     observer = Observer(plain(config))
@@ -76,8 +77,8 @@ def stiffness_range(
         rows.append((found.deflection_rad, observer.stiffness()))
     deflection, stiffness = (np.array(c) for c in zip(*rows, strict=True))
     n = samples // 4
-    down = np.interp(way[:n], way[n : n + samples // 2][::-1], deflection[n : n + samples // 2][::-1])
-    width = float(np.max(np.abs(down - deflection[:n])))
+    down, up = deflection[n : n + samples // 2][::-1], deflection[n + samples // 2 :]
+    width = float(np.max(np.abs(down - up)))
     peak = float(deflection[n - 1])
     useful = stiffness[np.isfinite(stiffness) & (stiffness > 0)]
     return StiffnessRange(

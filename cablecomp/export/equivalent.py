@@ -14,10 +14,11 @@ from cablecomp.control.stiffness import greatest_load, stiffness_range
 class Equivalent(NamedTuple):
     """A joint as a spring with dry friction beside it, q_out = ratio q_in + deflection.
 
-    The load cycle 0, +most, −most, 0 Nm of the observer (history and effects in it, motor held) gives:
-    `backlash_rad` w = the loop's greatest width, what a joint whose play is that wide would show. Spring and friction
-    side by side go 2 (most - friction)/stiffness from end to end and are 2 friction/stiffness wide; so that this is the
-    loop's reach and its width, `stiffness_Nm_per_rad` = 2 most/(reach + w) and `friction_Nm` = stiffness w/2.
+    The loop +most, −most, +most Nm of the observer (history and effects in it, motor held; of an open circuit most, 0,
+    most) gives: `backlash_rad` w = its greatest width, what a joint whose play is that wide would show. Spring and
+    friction side by side go 2 (most - friction)/stiffness from end to end and are 2 friction/stiffness wide; so that
+    this is the loop's reach and its width, `stiffness_Nm_per_rad` = (span of loads)/(reach + w) and `friction_Nm` =
+    stiffness w/2.
     `rms_rad`: what this leaves of the loop, of `reach_rad` in all.
     """
 
@@ -51,11 +52,11 @@ def equivalent(config: JointConfig) -> Equivalent:
     """Find the equivalent of a joint at its greatest load; raises InputError where the drive carries none."""
     most = greatest_load(config)
     found = stiffness_range(config, most)
-    reach = float(np.ptp(found.deflection_rad))
+    n = len(found.load_Nm) // 5  # first touch, no part of the loop
+    reach = float(np.ptp(found.deflection_rad[n:]))
     span = float(np.ptp(found.load_Nm))
     stiffness = span / (reach + found.width_rad)
     friction = 0.5 * stiffness * found.width_rad
-    n = len(found.load_Nm) // 4
     down = slice(n, 3 * n)  # one whole branch: from the greatest load to the least
     middle = 0.5 * (found.deflection_rad[down].max() + found.deflection_rad[down].min())
     centre = 0.5 * (found.load_Nm[down].max() + found.load_Nm[down].min())

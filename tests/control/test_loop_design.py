@@ -27,10 +27,11 @@ from cablecomp.control.plant_model import (
 )
 from cablecomp.control.plays import fit_plays
 from cablecomp.control.shaping import LeadFilter, Slope
-from cablecomp.control.stiffness import stiffness_range
+from cablecomp.control.stiffness import held, plain, stiffness_range
 from cablecomp.control.synthesis import DesignWork
 from cablecomp.errors import InputError
 from cablecomp.links.load import load_link
+from cablecomp.observer import Observer
 from cablecomp.runtime.setup import stated_gains
 from cablecomp.thesis.design import design_sheet
 
@@ -54,6 +55,18 @@ def test_the_stiffness_range_begins_at_the_free_spans_alone() -> None:
     assert found.high_Nm_per_rad == pytest.approx(spans, rel=1e-6)
     assert found.low_Nm_per_rad < found.secant_Nm_per_rad < found.zero_Nm_per_rad
     assert sheet is not None
+
+
+@pytest.mark.parametrize("name", ["wrist-capstan", "snow-open-rig"])
+def test_the_loops_width_is_between_its_branches_and_not_from_first_touch(name: str) -> None:
+    joint = load_joint(CONFIGS / f"joints/{name}.toml")
+    found = stiffness_range(joint)
+    most, least = found.load_Nm.max(), found.load_Nm.min()
+    observer = Observer(plain(joint))
+    loads = np.concatenate([np.linspace(a, b, 90) for a, b in ((0.0, most), (most, least), (least, most))])
+    deflection = [held(observer, k, float(load), most).deflection_rad for k, load in enumerate(loads)]
+    down, up = deflection[90:180][::-1], deflection[180:]
+    assert found.width_rad == pytest.approx(np.max(np.abs(np.subtract(up, down))), rel=1e-2)
 
 
 def test_what_sensors_read_wrong_is_no_part_of_the_drive() -> None:
