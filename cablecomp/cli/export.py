@@ -23,7 +23,7 @@ from cablecomp.config import JointConfig
 from cablecomp.control.plays import fit_plays
 from cablecomp.errors import InputError
 from cablecomp.export.code import LEFT_OUT, c_source, identifier, write_fmu
-from cablecomp.export.equivalent import equivalent
+from cablecomp.export.equivalent import equivalent, loads
 from cablecomp.export.simulators import mujoco_model, urdf_model
 from cablecomp.recording.atomic import atomic_file
 
@@ -58,7 +58,7 @@ def export(
     if as_json:
         echo_json(result)
     else:
-        _say(result)
+        _say(joint, result)
 
 
 def _simulators(
@@ -89,7 +89,7 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _say(result: Mapping[str, Any]) -> None:
+def _say(joint: JointConfig, result: Mapping[str, Any]) -> None:
     for name in ("mujoco", "urdf", "c", "fmu"):
         if name in result:
             console.print(f"written: {result[name]}", soft_wrap=True)
@@ -97,7 +97,7 @@ def _say(result: Mapping[str, Any]) -> None:
         found = result["equivalent"]
         console.print(
             f"stiffness {found.stiffness_Nm_per_rad:.5g} Nm/rad, friction {found.friction_Nm:.4g} Nm, equivalent "
-            f"backlash {1e3 * found.backlash_rad:.4g} mrad at ±{found.most_Nm:.4g} Nm"
+            f"backlash {1e3 * found.backlash_rad:.4g} mrad at {loads(joint, found.most_Nm)}"
         )
     if "code_rms_rad" in result:
         console.print(

@@ -7,7 +7,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from cablecomp.config import JointConfig
 from cablecomp.control.options import MotorModel
-from cablecomp.export.equivalent import Equivalent
+from cablecomp.export.equivalent import Equivalent, loads
 
 
 def mujoco_model(config: JointConfig, found: Equivalent, motor: MotorModel) -> str:
@@ -101,7 +101,7 @@ def _remarks(config: JointConfig, found: Equivalent, *more: str) -> str:
     """Comment with the numbers in words and what is left out."""
     lines = [
         f"stiffness {found.stiffness_Nm_per_rad:.5g} Nm/rad, friction of the path {found.friction_Nm:.4g} Nm, "
-        f"equivalent backlash {1e3 * found.backlash_rad:.4g} mrad, at ±{found.most_Nm:.4g} Nm",
+        f"equivalent backlash {1e3 * found.backlash_rad:.4g} mrad, at {loads(config, found.most_Nm)}",
         "left out:",
         *(f"  {line}" for line in (*more, *found.lost(config))),
     ]

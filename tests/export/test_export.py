@@ -170,6 +170,13 @@ def test_what_is_written_and_what_is_said_write_loads_alike() -> None:
     assert "±2 Nm" in texts[0]
 
 
+def test_an_open_circuits_cable_is_said_to_pull_one_way_alone() -> None:
+    joint = load_joint(example("joints", "snow-open-rig"))
+    texts = (*SPRING.lost(joint), mujoco_model(joint, SPRING, MotorModel()), c_source(joint, PLAYS))
+    assert not any("±" in text or "either way" in text for text in texts)
+    assert all("0 to 2 Nm" in text for text in (texts[0], *texts[-2:]))
+
+
 def test_the_result_is_had_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "--config", "wrist-capstan", "--urdf", "--out", str(tmp_path), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
