@@ -18,8 +18,11 @@ from cablecomp.signal.smoothing import FloatArray
 Kind = Literal["offset up", "offset down", "wider", "from the start"]
 _KINDS: Final[tuple[Kind, ...]] = ("offset up", "offset down", "wider")
 _STRENGTHS: Final = (0.5, 1.0, 2.0)
+_NO_TAILS: Final = (0.0, 0.0, 0.0)
 _TAUS: Final = 8.0
 _FEWEST_BLOCKS: Final = 25
+_WIDEST: Final = 6.0
+"""Standard deviations that a block may always be wider by; more where learning has seen more."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,8 @@ class Alarm:
 class Usual:
     """What learning found: block length (samples), duration (s), mean, sd of block means, mean and sd
     of the cube root of the block's variance, allowances for not knowing them exactly, RMS, the threshold on
-    the log evidence, and what mean and cube root may move by without being of interest, in their sd.
+    the log evidence, and what mean and cube root may move by without being of interest, in their sd;
+    what a block's cube root counts for at most, and what each strength owes to tails heavier than normal ones.
     """
 
     block: int
@@ -88,6 +92,8 @@ class Usual:
     threshold: float
     idle_mean: float
     idle_root: float
+    widest: float
+    tails: tuple[float, ...]
 
 
 @dataclass
@@ -119,7 +125,8 @@ def step(state: WatchState, time_s: float, residual_rad: float) -> Alarm | None:
 
     Samples are gathered to blocks longer than the residual remembers. For each block and for each of
     nine alternatives (mean up, mean down, wider; three strengths lambda) e = exp(lambda (z - allowance)
-    - lambda^2 s^2/2) has expectation <= 1 as long as the residual is as it was; W <- max(W, 1) e, and
+    - lambda^2 s^2/2) has expectation <= 1 as long as the residual is as it was (how wide a block is has
+    heavier tails than its mean: it is cut off, and e divided by what learning found); W <- max(W, 1) e, and
     the alarm comes when the mean of the nine W passes A blocks. Then the mean time to a false alarm is
     at least A (W stays below the Shiryaev–Roberts sum, and that sum less the time is a supermartingale:
     Shin, Ramdas, Rinaldo, "E-detectors", 2022). After an alarm the evidence starts anew. A residual
@@ -183,6 +190,8 @@ def _usual(values: FloatArray, duration_s: float, config: WatchConfig) -> Usual:
     block_s = max(duration_s, 1e-9) * block / max(1, n - 1)
     rms = float(np.sqrt(np.mean((values - mean) ** 2)))
     mean_sd, root = max(sqrt(variance), 1e-300), float(roots.mean())
+    allowance, inflation = 2.5 / sqrt(blocks), 1.0 + 2.5 / sqrt(2.0 * blocks)
+    wider = (roots - root) / root_sd
     return Usual(
         block,
         block_s,
@@ -190,13 +199,23 @@ def _usual(values: FloatArray, duration_s: float, config: WatchConfig) -> Usual:
         mean_sd,
         root,
         root_sd,
-        2.5 / sqrt(blocks),
-        1.0 + 2.5 / sqrt(2.0 * blocks),
+        allowance,
+        inflation,
         rms,
         log(max(config.between_false_alarms_s / block_s, 2.0)),
         config.indifference * rms / mean_sd,
         float(np.cbrt(root**3 + (config.indifference * rms) ** 2) - root) / root_sd,
+        max(_WIDEST, float(wider.max())),
+        tuple(_tail(wider, strength, allowance, inflation) for strength in _STRENGTHS),
     )
+
+
+def _tail(wider: FloatArray, strength: float, allowance: float, inflation: float) -> float:
+    """By how much the logarithm of e's mean over the blocks learnt from exceeds 0, the widest one counted three times:
+    what is as rare may come more often."""
+    evidence = strength * (wider - allowance) - 0.5 * (strength * inflation) ** 2
+    most = float(evidence.max())
+    return max(0.0, most + log((float(np.sum(np.exp(evidence - most))) + 2.0) / len(wider)))
 
 
 def _close_block(state: WatchState, usual: Usual, time_s: float, mean: float, square: float) -> Alarm | None:
@@ -204,13 +223,13 @@ def _close_block(state: WatchState, usual: Usual, time_s: float, mean: float, sq
     spread = max(square - mean * mean, 0.0)
     wider = (float(np.cbrt(spread)) - usual.root) / usual.root_sd
     index = 0
-    for signal, idle, size in (
-        (z, usual.idle_mean, mean - usual.mean),
-        (-z, usual.idle_mean, mean - usual.mean),
-        (wider, usual.idle_root, spread),
+    for signal, tails, size in (
+        (z - usual.idle_mean, _NO_TAILS, mean - usual.mean),
+        (-z - usual.idle_mean, _NO_TAILS, mean - usual.mean),
+        (min(wider - usual.idle_root, usual.widest), usual.tails, spread),
     ):
-        for strength in _STRENGTHS:
-            gain = strength * (signal - idle - usual.allowance) - 0.5 * (strength * usual.inflation) ** 2
+        for strength, tail in zip(_STRENGTHS, tails, strict=True):
+            gain = strength * (signal - usual.allowance) - 0.5 * (strength * usual.inflation) ** 2 - tail
             if state.evidence[index] <= 0.0:
                 state.evidence[index], state.since[index] = 0.0, state.block_s
                 state.sums[index], state.blocks[index] = 0.0, 0

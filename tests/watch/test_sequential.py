@@ -30,6 +30,16 @@ def test_false_alarms_are_rarer_than_stated(memory: float) -> None:
     assert count <= expected
 
 
+def test_rare_large_residuals_keep_the_promise_of_the_width() -> None:
+    """Student's t of 5 degrees: its square has no variance of its own."""
+    count, length, between = 0, 60_000, 150.0
+    for trial in range(4):
+        residual = SIGMA * np.random.default_rng(trial).standard_t(5, length)
+        found = run(residual, WatchConfig(between, 4_000))[1]
+        count += sum(alarm.kind == "wider" for alarm in found)
+    assert count <= 4 * length * STEP_S / between  # 1.6
+
+
 @pytest.mark.parametrize(
     ("change", "kind"), [("up", "offset up"), ("down", "offset down"), ("wider", "wider")]
 )
