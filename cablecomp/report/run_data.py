@@ -55,9 +55,15 @@ class RunData:
         asked = self.cycles["reference_position_rad"]
         return np.asarray(np.where(self.cycles["controlled"] > 0.0, asked, np.nan), dtype=np.float64)
 
-    def error_rad(self, offset_rad: float = 0.0) -> Floats:
+    @property
+    def joint_rad(self) -> Floats:
+        """Where the joint encoder says that the joint is, its offset taken off."""
+        p = self.prediction
+        return np.asarray(p["joint_position_rad"] + p["residual_rad"], dtype=np.float64)
+
+    def error_rad(self) -> Floats:
         """Joint encoder less what was asked for."""
-        return np.asarray(self.column("joint_position_rad") - offset_rad - self.asked_rad, dtype=np.float64)
+        return self.joint_rad - self.asked_rad
 
 
 def load_run(folder: Path, points: int = 4000) -> RunData:

@@ -16,6 +16,7 @@ from cablecomp.recording.replay import PredictionCsv
 from cablecomp.report import page
 from cablecomp.report.design_page import design_page, design_rows, design_tables
 from cablecomp.report.run_data import RunData, load_run
+from cablecomp.report.run_page import position_figure
 from cablecomp.runtime.log import CYCLE
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -55,6 +56,17 @@ def test_a_short_run_is_not_all_beginning(duration_s: float, settled_s: float) -
 def test_what_stands_between_backticks_is_code_and_is_escaped() -> None:
     assert page.paragraph("say `a<b` & go") == "<p>say <code>a&lt;b</code> &amp; go</p>"
     assert page.bullets(["one ` alone"]) == "<ul><li>one ` alone</li></ul>"
+
+
+def test_what_the_joint_encoder_reads_too_much_is_no_error_of_position() -> None:
+    """A joint 1 mrad beside where it is wanted, its encoder 20 mrad off."""
+    time, on = np.arange(0.0, 1.0, 0.01), np.ones(100)
+    recording = {"time_s": time, "joint_position_rad": 0.321 * on, "joint_torque_Nm": 0.0 * on}
+    prediction = {"joint_position_rad": 0.3 * on, "residual_rad": 0.001 * on}
+    data = RunData(recording, prediction, {"controlled": on, "reference_position_rad": 0.3 * on})
+    assert data.error_rad() == pytest.approx(0.001 * on)
+    curves = {c.name: c.y for c in position_figure(data).data}
+    assert curves["measured"] - curves["asked"] == pytest.approx(curves["error"], abs=1e-4)
 
 
 TABLES = {
