@@ -300,10 +300,13 @@ def _show(report: RunReport) -> None:
         true = ""
         if joint.true_position_rad == joint.true_position_rad:
             true = f", true {1e3 * joint.true_position_rad:.4f}"
-        table.add_row(f"{joint.name}: position error, RMS", f"{_mrad(joint.position_rad)}{true}")
+        forced = joint.torque_Nm == joint.torque_Nm
+        if not forced:
+            table.add_row(f"{joint.name}: position error, RMS", f"{_mrad(joint.position_rad)}{true}")
         table.add_row(f"{joint.name}: deflection, RMS", _mrad(joint.deflection_rad))
-        table.add_row(f"{joint.name}: prediction residual, RMS", _mrad(joint.residual_rad))
-        if joint.torque_Nm == joint.torque_Nm:
+        if joint.residual_rad == joint.residual_rad:
+            table.add_row(f"{joint.name}: prediction residual, RMS", _mrad(joint.residual_rad))
+        if forced:
             table.add_row(
                 f"{joint.name}: torque error, RMS",
                 f"{joint.torque_Nm:.4f} Nm (true {joint.true_torque_Nm:.4f})",

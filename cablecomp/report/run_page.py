@@ -20,6 +20,7 @@ from cablecomp.runtime.results import JointResult, RunReport
 TIME = style.label("time", "s")
 _POINTS: Final = 4000
 """Rows that are drawn, of all joints together."""
+TOLD: Final = "The load was found from both encoders: the joint's is no test of the prediction."
 BAND = "The band holds the truth whatever went before the run; where it is wider than the curves it is cut."
 
 
@@ -40,15 +41,16 @@ def run_page(report: RunReport, config_text: str) -> str:
 
 def run_facts(joint: JointResult) -> list[Fact]:
     """Cards of one joint."""
-    true = "" if np.isnan(joint.true_position_rad) else f"true: {_angle(joint.true_position_rad)}"
-    facts = [
-        Fact("joint position error, RMS", _angle(joint.position_rad), true),
-        Fact("prediction residual, RMS", _angle(joint.residual_rad), "joint encoder less prediction"),
-        Fact("deflection, RMS", _angle(joint.deflection_rad), "what the motor has to make up for"),
-    ]
-    if not np.isnan(joint.torque_Nm):
+    if _forced(joint):
         true = "" if np.isnan(joint.true_torque_Nm) else f"true: {page.number(joint.true_torque_Nm, 'N·m')}"
-        facts.append(Fact("joint torque error, RMS", page.number(joint.torque_Nm, "N·m"), true))
+        facts = [Fact("joint torque error, RMS", page.number(joint.torque_Nm, "N·m"), true)]
+    else:
+        true = "" if np.isnan(joint.true_position_rad) else f"true: {_angle(joint.true_position_rad)}"
+        facts = [Fact("joint position error, RMS", _angle(joint.position_rad), true)]
+    if not np.isnan(joint.residual_rad):
+        what = "joint encoder less prediction"
+        facts.append(Fact("prediction residual, RMS", _angle(joint.residual_rad), what))
+    facts.append(Fact("deflection, RMS", _angle(joint.deflection_rad), "what the motor has to make up for"))
     trouble = sum(n for phase, n in joint.phases.items() if phase != "normal")
     tone: page.Tone = "bad" if joint.phases.get("stopped", 0) else "warn" if trouble else "good"
     facts.append(Fact("cycles with stale data", str(trouble), f"of {sum(joint.phases.values())}", tone))
@@ -73,9 +75,26 @@ def position_figure(data: RunData) -> Any:
     return fig
 
 
-def deflection_figure(data: RunData) -> Any:
-    """Predicted deflection with its bounds, what the motor made up for, residual."""
-    fig = stack([0.62, 0.38], 520)
+def torque_figure(data: RunData) -> Any:
+    """Asked and found load, error, joint position, over time: what force mode is about."""
+    fig = stack([0.45, 0.3, 0.25], 640)
+    time, found = data.time_s, data.cycles["load_estimate_Nm"]
+    asked = np.where(data.cycles["controlled"] > 0.0, data.cycles["reference_torque_Nm"], np.nan)
+    curve(fig, time, asked, "asked", style.BASELINE, 1, 3.0)
+    curve(fig, time, found, "found", style.LOAD, 1)
+    curve(fig, time, found - asked, "error", style.RESIDUAL, 2)
+    curve(fig, time, 1e3 * data.joint_rad, "joint position", style.PREDICTED, 3)
+    style.keep_range(fig, [(found - asked)[data.controlled]], row=2)
+    style.axes(fig, "", style.label("load", "N·m"), row=1, col=1)
+    style.axes(fig, "", style.label("error", "N·m"), row=2, col=1)
+    style.axes(fig, TIME, style.label("joint position", "mrad"), row=3, col=1)
+    return fig
+
+
+def deflection_figure(data: RunData, tested: bool = True) -> Any:
+    """Predicted deflection with its bounds, what the motor made up for, residual; `tested` False: the joint encoder
+    told the load, which leaves none."""
+    fig = stack([0.62, 0.38], 520) if tested else stack([1.0], 360)
     time, p = data.time_s, data.prediction
     low, high = 1e3 * p["deflection_low_rad"], 1e3 * p["deflection_high_rad"]
     if np.any(np.isfinite(low)):
@@ -93,14 +112,16 @@ def deflection_figure(data: RunData) -> Any:
         )
     measured = 1e3 * (p["deflection_rad"] + p["residual_rad"])
     pale = style.translucent(style.MEASURED, 0.45)
-    curve(fig, time, measured, "measured", pale, 1, 3.0)
+    if tested:
+        curve(fig, time, measured, "measured", pale, 1, 3.0)
     curve(fig, time, 1e3 * p["deflection_rad"], "predicted", style.PREDICTED, 1)
     curve(fig, time, 1e3 * data.cycles["deflection_ahead_rad"], "made up for", style.CABLE_L, 1)
-    curve(fig, time, 1e3 * p["residual_rad"], "residual", style.RESIDUAL, 2)
     style.keep_range(fig, [measured, 1e3 * p["deflection_rad"]], row=1)
-    style.keep_range(fig, [1e3 * p["residual_rad"][data.controlled]], row=2)
-    style.axes(fig, "", style.label("deflection", "mrad"), row=1, col=1)
-    style.axes(fig, TIME, style.label("residual", "mrad"), row=2, col=1)
+    style.axes(fig, "" if tested else TIME, style.label("deflection", "mrad"), row=1, col=1)
+    if tested:
+        curve(fig, time, 1e3 * p["residual_rad"], "residual", style.RESIDUAL, 2)
+        style.keep_range(fig, [1e3 * p["residual_rad"][data.controlled]], row=2)
+        style.axes(fig, TIME, style.label("residual", "mrad"), row=2, col=1)
     return fig
 
 
@@ -165,14 +186,24 @@ def _sections(report: RunReport, config_text: str) -> Iterator[Section]:
         data = load_run(folder, max(_POINTS // len(report.joints), 400))
         if data.rows == 0:  # a disk that was full from the beginning
             continue
-        yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
-        yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data)), BAND)
+        if _forced(joint):
+            yield Section(f"{joint.name}: load", page.figure(torque_figure(data)))
+        else:
+            yield Section(f"{joint.name}: position", page.figure(position_figure(data)))
+        tested = not np.isnan(joint.residual_rad)
+        lead = BAND if tested or np.all(np.isnan(data.joint_rad)) else f"{TOLD} {BAND}"
+        yield Section(f"{joint.name}: deflection", page.figure(deflection_figure(data, tested)), lead)
         yield Section(f"{joint.name}: cables", page.figure(tension_figure(data)))
     yield timing_section(report)
     if report.events:
         rows = [(round(t, 4), j, w) for t, j, w in report.events]
         yield Section("Events", page.table(("time / s", "joint", "what"), rows))
     yield Section("Configuration", page.fold("joint.toml", page.code(config_text)))
+
+
+def _forced(joint: JointResult) -> bool:
+    """Whether torque was asked for, and no position."""
+    return not np.isnan(joint.torque_Nm)
 
 
 def _angle(value: float) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cablecomp.control.compensator import Gains
+from cablecomp.control.options import ControlMode
 from cablecomp.runtime.joint_loop import JointLoop
 from cablecomp.runtime.loop import TIME_IS_OVER
 from cablecomp.runtime.timing import TimingReport
@@ -20,8 +21,9 @@ class JointResult:
     """How one joint did under control, root mean squares over the run.
 
     Position: joint encoder less reference; `true_position_rad` the same with the simulation's truth
-    (NaN on hardware). Torque: the observer's less the reference's; `true_torque_Nm` with the truth.
-    `residual_rad`: joint encoder less prediction.
+    (NaN on hardware); in force mode none is asked for, NaN. Torque: the observer's less the reference's, NaN but in
+    force mode; `true_torque_Nm` with the truth. `residual_rad`: joint encoder less prediction, NaN where the load was
+    found from both encoders: that leaves none.
     """
 
     name: str
@@ -94,14 +96,16 @@ def result_of(joint: JointLoop, truths: TruthTally) -> JointResult:
         return sqrt(square / count) if count else nan
 
     true_position, true_torque = truths.rms(joint.setup.name)
+    asked = joint.setup.compensator.options.mode is not ControlMode.FORCE
+    tested = joint.setup.config.observer.load != "both_encoders"
     return JointResult(
         joint.setup.name,
         t.cycles,
-        rms(t.position_square, t.position_count),
-        true_position,
+        rms(t.position_square, t.position_count) if asked else nan,
+        true_position if asked else nan,
         rms(t.torque_square, t.torque_count),
         true_torque,
-        rms(t.residual_square, t.position_count),
+        rms(t.residual_square, t.position_count) if tested else nan,
         rms(t.deflection_square, t.cycles),
         t.phases_by_name(),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,9 @@ from cablecomp.recording.replay import PredictionCsv
 from cablecomp.report import page
 from cablecomp.report.design_page import design_page, design_rows, design_tables
 from cablecomp.report.run_data import RunData, load_run
-from cablecomp.report.run_page import position_figure
+from cablecomp.report.run_page import deflection_figure, position_figure, run_facts, torque_figure
 from cablecomp.runtime.log import CYCLE
+from cablecomp.runtime.results import JointResult
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -67,6 +69,20 @@ def test_what_the_joint_encoder_reads_too_much_is_no_error_of_position() -> None
     assert data.error_rad() == pytest.approx(0.001 * on)
     curves = {c.name: c.y for c in position_figure(data).data}
     assert curves["measured"] - curves["asked"] == pytest.approx(curves["error"], abs=1e-4)
+
+
+def test_force_mode_is_shown_by_its_torque_and_encoders_that_tell_the_load_by_no_residual() -> None:
+    joint = JointResult("arm", 100, nan, nan, 0.02, 0.03, nan, 9e-3, {"normal": 100})
+    names = [fact.label for fact in run_facts(joint)]
+    assert names == ["joint torque error, RMS", "deflection, RMS", "cycles with stale data"]
+    time, on = np.arange(0.0, 1.0, 0.01), np.ones(100)
+    prediction = dict.fromkeys(PredictionCsv.COLUMNS, 0.01 * on)
+    cycles = dict.fromkeys(CYCLE, 0.5 * on)
+    data = RunData({"time_s": time, "joint_torque_Nm": on}, prediction, cycles)
+    assert [c.name for c in torque_figure(data).data] == ["asked", "found", "error", "joint position"]
+    drawn = {c.name for c in deflection_figure(data, tested=False).data}
+    assert {"predicted", "made up for"} <= drawn
+    assert not {"measured", "residual"} & drawn
 
 
 TABLES = {
