@@ -48,7 +48,9 @@ def replay_page(summary: ReplaySummary, display: Display, config_text: str = "")
 
 
 def _sections(summary: ReplaySummary, display: Display, config_text: str) -> Iterator[Section]:
-    yield Section("Summary", page.facts(_facts(summary)) + page.bullets(summary.notes))
+    yield Section(
+        "Summary", page.facts(_facts(summary, display.has("residual_rad"))) + page.bullets(summary.notes)
+    )
     yield Section(
         "Deflection over time",
         page.figure(replay_figures.over_time(display, summary)),
@@ -57,7 +59,7 @@ def _sections(summary: ReplaySummary, display: Display, config_text: str) -> Ite
     )
     if display.has("load_Nm"):
         yield Section("Load–deflection loop", page.figure(replay_figures.loop(display, summary)))
-    if display.has("residual_rad"):
+    if display.has("residual_rad") and summary.rmse_rad is not None:
         yield Section(
             "Residual",
             _residual(display, replay_figures.scale(summary.deflection_range_rad)),
@@ -99,11 +101,12 @@ def _residual(display: Display, unit: replay_figures.Scale) -> str:
     return page.figure(replay_figures.residual_over_time(display, unit)) + page.columns(*parts)
 
 
-def _facts(summary: ReplaySummary) -> Iterator[Fact]:
+def _facts(summary: ReplaySummary, measured: bool) -> Iterator[Fact]:
     reach = summary.deflection_range_rad
     unit = replay_figures.scale(reach)  # one for all of them, and that of the figures
     if summary.rmse_rad is None:
-        yield Fact("RMS error", "–", "no joint position was recorded", "warn")
+        why = "the joint's position told the load" if measured else "no joint position was recorded"
+        yield Fact("RMS error", "–", why, "warn")
     else:
         share = 100.0 * summary.rmse_rad / reach if reach > 0.0 else float("nan")
         yield Fact(
@@ -118,9 +121,7 @@ def _facts(summary: ReplaySummary) -> Iterator[Fact]:
         remark = f"{page.number(gain)} × the error of this prediction"
         tone: page.Tone = "good" if gain > 1.0 else "warn"
         yield Fact("Best straight line", _in(unit, summary.baseline_linear_rmse_rad), remark, tone)
-    yield Fact(
-        "Deflection's range", _in(unit, reach), "measured" if summary.rmse_rad is not None else "predicted"
-    )
+    yield Fact("Deflection's range", _in(unit, reach), "measured" if measured else "predicted")
     if summary.bounds_width_last_rad is not None:
         remark = f"{_in(unit, summary.bounds_width_first_rad)} at the start"
         yield Fact("Bounds at the end", _in(unit, summary.bounds_width_last_rad), remark)

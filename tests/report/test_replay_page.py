@@ -67,6 +67,18 @@ def _columns(count: int) -> dict[str, np.ndarray]:
     }
 
 
+def test_where_the_joints_position_told_the_load_no_error_is_told(tmp_path: Path) -> None:
+    """It would be 1e-14 rad, and a straight line 1e10 times worse."""
+    joint = parse_joint({**JOINT, "observer": {"load": "both_encoders"}}, "test")
+    write_canonical(tmp_path / "a.csv", _columns(1_000))
+    summary = write_replay(open_recording(tmp_path / "a.csv"), joint, Spring(), tmp_path / "out")
+    assert (summary.rmse_rad, summary.max_rad) == (None, None)
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "position told the load" in html
+    assert "measured minus predicted" not in html
+    assert "the error of this prediction" not in html
+
+
 def _replay(folder: Path, columns: dict[str, np.ndarray]) -> str:
     write_canonical(folder / "a.csv", columns)
     write_replay(open_recording(folder / "a.csv"), _joint(), Spring(), folder / "out", "name = '<&>'")
