@@ -9,6 +9,7 @@ frequency. So the filter is designed like a gain.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
 
@@ -69,7 +70,7 @@ def design_loop(config: JointConfig, rate_Hz: float, wanted: ControlConfig | Non
         tuple(float(f) for f in grid),
         tuple(float(e) for e in np.abs(1.0 - G)),
         (float(low), float(high)),
-        _warnings(gains, loops, limit, float(low)),
+        (*_unmet(gains, wanted), *_warnings(gains, loops, limit, float(low))),
         work.responses(gains),
     )
 
@@ -86,6 +87,16 @@ def _begun(config: JointConfig, rate_Hz: float, wanted: ControlConfig) -> tuple[
     work = DesignWork(config, 1.0 / rate_Hz, wanted, stiffness)
     work.check_drive()
     return stiffness, work
+
+
+def _unmet(gains: Gains, wanted: ControlConfig) -> Iterator[str]:
+    """Where a gain was to be designed and none keeps the margins."""
+    for name in ("motor_integral_per_s", "joint_feedback_per_s", "force_feedback_per_s"):
+        if getattr(wanted.compensator, name) is None and getattr(gains, name) == 0.0:
+            yield (
+                f"{name}: no gain keeps a gain margin of {wanted.gain_margin:g} and a phase margin of "
+                f"{wanted.phase_margin_deg:g} deg over all stiffnesses; it is 0: ask for less"
+            )
 
 
 def _warnings(gains: Gains, loops: tuple[Loop, ...], limit: LimitCycle, link_Hz: float) -> tuple[str, ...]:

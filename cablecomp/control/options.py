@@ -125,14 +125,17 @@ class HealthOptions(_Frozen):
 
 
 class ControlConfig(_Frozen):
-    """A control file: motor model, compensator, health, and what the gains are designed for."""
+    """A control file: motor model, compensator, health, and what the gains are designed for.
+
+    Both margins are kept as one distance from -1, which is 1 where a loop does nothing: `phase_margin_deg` below 60.
+    """
 
     schema_: Literal[1] = Field(alias="schema", default=1)
     motor: MotorModel = MotorModel()
     compensator: CompensatorOptions = CompensatorOptions()
     health: HealthOptions = HealthOptions()
     gain_margin: Annotated[float, Field(gt=1, allow_inf_nan=False)] = 2.0
-    phase_margin_deg: Positive = 35.0
+    phase_margin_deg: Annotated[float, Field(gt=0, lt=60)] = 35.0
     load_max_Nm: Positive | None = None
 
 

@@ -209,15 +209,13 @@ class DesignWork:
             "deflection compensated for the measured load, opened at the torque sensor",
             lambda k: self.load_loop(k, g.load_filter_Hz, g.load_lead_s),
         )
-        add(
-            "motor trim",
-            "integral on the motor encoder",
-            lambda k: self.motor_loop(k, g.motor_integral_per_s),
-        )
+        if g.motor_integral_per_s > 0.0:
+            gain = g.motor_integral_per_s
+            add("motor trim", "integral on the motor encoder", lambda k: self.motor_loop(k, gain))
         if g.joint_feedback_per_s > 0.0:
-            text, gain = "integral on the joint encoder, feed-forward ", g.joint_feedback_per_s
-            add("joint feedback", text + "acting", lambda k: self.joint_loop(k, gain, g, True))
-            add("joint feedback alone", text + "off", lambda k: self.joint_loop(k, gain, g, False))
+            text, joint = "integral on the joint encoder, feed-forward ", g.joint_feedback_per_s
+            add("joint feedback", text + "acting", lambda k: self.joint_loop(k, joint, g, True))
+            add("joint feedback alone", text + "off", lambda k: self.joint_loop(k, joint, g, False))
         if g.force_feedback_per_s > 0.0:
             text = "integral on the torque known from both encoders, against a contact as stiff as the drive"
             add("force feedback", text, lambda k: self.force_loop(k, g.force_feedback_per_s, g, 1.0))

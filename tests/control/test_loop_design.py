@@ -15,7 +15,7 @@ from cablecomp.control.design import LoopDesign, design_loop
 from cablecomp.control.limit_cycle import Hysteresis
 from cablecomp.control.margins import grid_for, highest_gain, modulus_for
 from cablecomp.control.motors import DriveGains, control_for
-from cablecomp.control.options import ControlConfig, MotorModel, load_control
+from cablecomp.control.options import ControlConfig, MotorModel, load_control, parse_control
 from cablecomp.control.plant_model import (
     integrator,
     joint_model,
@@ -67,6 +67,23 @@ def test_the_loops_width_is_between_its_branches_and_not_from_first_touch(name: 
     deflection = [held(observer, k, float(load), most).deflection_rad for k, load in enumerate(loads)]
     down, up = deflection[90:180][::-1], deflection[180:]
     assert found.width_rad == pytest.approx(np.max(np.abs(np.subtract(up, down))), rel=1e-2)
+
+
+def test_margins_that_no_loop_keeps_are_refused_or_said() -> None:
+    """2 sin(60 deg/2) = 1 is the distance from -1 of a loop that does nothing."""
+    with pytest.raises(InputError, match="phase_margin_deg"):
+        parse_control({"schema": 1, "phase_margin_deg": 60.0}, "control")
+    stated = {
+        "load_filter_Hz": 5.0,
+        "load_lead_s": 0.0,
+        "follow_filter_Hz": 20.0,
+        "force_feedback_per_s": 0.0,
+    }
+    options = WANTED.compensator.model_copy(update=stated)
+    found = design_loop(JOINT, 1000.0, WANTED.model_copy(update={"gain_margin": 1e9, "compensator": options}))
+    assert found.gains.motor_integral_per_s == 0.0
+    assert any("motor_integral_per_s: no gain keeps" in line for line in found.warnings)
+    assert not any("motor trim: unstable" in line for line in found.warnings)
 
 
 def test_what_sensors_read_wrong_is_no_part_of_the_drive() -> None:
