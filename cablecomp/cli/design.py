@@ -19,6 +19,7 @@ from cablecomp.cli.shared import (
     read_joint,
 )
 from cablecomp.control.design import design_loop
+from cablecomp.control.options import ControlConfig
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.report.design_page import design_page, design_tables
 
@@ -33,10 +34,7 @@ def design(
 ) -> None:
     """Design gains from the drive's stiffness range: margins, hysteresis as a describing function, plots."""
     joint = read_joint(config, effects)
-    wanted = control_of(control, joint)
-    free = {"load_filter_Hz": None, "load_lead_s": None, "joint_feedback_per_s": None}
-    wanted = wanted.model_copy(update={"compensator": wanted.compensator.model_copy(update=free)})
-    found = design_loop(joint, rate, wanted)
+    found = design_loop(joint, rate, to_design(control_of(control, joint)))
     if out is not None:
         with atomic_directory(out) as folder:
             (folder / "design.html").write_text(design_page(found), encoding="utf-8")
@@ -46,3 +44,12 @@ def design(
     console.print(design_tables(found))
     if out is not None:
         console.print(f"plots: {out / 'design.html'}")
+
+
+def to_design(wanted: ControlConfig) -> ControlConfig:
+    """What is designed for: gains that the file states stay; feedback on the joint encoder is shown where it says
+    nothing of it, though a run has none then."""
+    if "joint_feedback_per_s" in wanted.compensator.model_fields_set:
+        return wanted
+    options = wanted.compensator.model_copy(update={"joint_feedback_per_s": None})
+    return wanted.model_copy(update={"compensator": options})

@@ -10,6 +10,7 @@ import control
 import numpy as np
 import pytest
 
+from cablecomp.cli.design import to_design
 from cablecomp.config import load_joint
 from cablecomp.control.design import LoopDesign, design_loop
 from cablecomp.control.limit_cycle import Hysteresis
@@ -84,6 +85,13 @@ def test_margins_that_no_loop_keeps_are_refused_or_said() -> None:
     assert found.gains.motor_integral_per_s == 0.0
     assert any("motor_integral_per_s: no gain keeps" in line for line in found.warnings)
     assert not any("motor trim: unstable" in line for line in found.warnings)
+
+
+def test_the_gains_that_a_control_file_states_are_those_whose_margins_are_shown() -> None:
+    stated = {"load_filter_Hz": 200.0, "load_lead_s": 0.002, "joint_feedback_per_s": 5.0}
+    options = to_design(parse_control({"schema": 1, "compensator": stated}, "control")).compensator
+    assert {name: getattr(options, name) for name in stated} == stated
+    assert to_design(WANTED).compensator.joint_feedback_per_s is None
 
 
 def test_what_sensors_read_wrong_is_no_part_of_the_drive() -> None:
