@@ -43,7 +43,7 @@ from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, Watch, run_joint
-from cablecomp.runtime.setup import matched, same_joint, stated_gains
+from cablecomp.runtime.setup import matched, observed, same_joint, stated_gains
 from cablecomp.runtime.simulated import Simulation, SimulationWish
 from cablecomp.runtime.view import LiveView
 from cablecomp.runtime.ways_out import WaysOut
@@ -138,6 +138,8 @@ def run(
         compare_controllers(config, joint, bus, wanted, out, seed, length, as_json)
         return
     asked = _asked(protocol, joint, wanted.compensator.mode, seed, duration)
+    if live:
+        _check_watched(joint, wanted, asked)
     wish = SimulationWish(bus, wanted, 1, not nominal, seed, tuple(fault or ()))
     options = RunOptions(
         duration, fast, out, bounds, resume=resume, without_drive_timeout=without_drive_timeout
@@ -289,6 +291,17 @@ def _simulation(path: Path, wish: SimulationWish) -> Simulation:
     from cablecomp.cli.simulation import start_simulation  # compiled code: only where a plant is wanted
 
     return start_simulation(path, wish)
+
+
+def _check_watched(joint: JointConfig, wanted: ControlConfig, asked: Protocol) -> None:
+    """Raise InputError where --live would watch nothing: the joint encoder tells the load, and leaves no residual."""
+    mode = ControlMode.FORCE if asked.mode == "force" else wanted.compensator.mode
+    options = wanted.compensator.model_copy(update={"mode": mode})
+    if observed(joint, options).observer.load == "both_encoders":
+        raise InputError(
+            "--live: the load is found from both encoders, which leaves no residual to watch; leave it out, or let the "
+            "load come from elsewhere (torque_from, observer.load)"
+        )
 
 
 def _show(report: RunReport) -> None:

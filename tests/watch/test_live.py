@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cablecomp.cli import main
 from cablecomp.config import load_joint
 from cablecomp.config.options import Remainder
 from cablecomp.signals import Estimate, Sample
@@ -54,3 +55,12 @@ def test_whatever_goes_wrong_in_the_watch_is_news_and_ends_it_alone(
     assert news == ["the watch is off: FloatingPointError: out of nowhere"]
     assert len(asked) == 1
     assert watch.kept == []
+
+
+def test_a_watch_that_could_see_nothing_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Impedance mode finds the load from both encoders: no mismatch could ever show."""
+    words = ["run", "--config", "wrist-capstan", "--sim", "--fast", "--mode", "impedance", "--live"]
+    assert main([*words, "--out", str(tmp_path / "run")]) == 2
+    assert "--live: the load is found from both encoders" in " ".join(capsys.readouterr().err.split())
