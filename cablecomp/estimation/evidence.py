@@ -39,7 +39,8 @@ FEWEST: Final = 40
 SPARSE: Final = 0.6
 """Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
 DIED: Final = 10.0
-"""Usual steps of such a channel beyond which it was not read for a while, or no more."""
+"""Usual steps of such a channel beyond which it was not read for a while, or no more; those that a gap counts for in
+the time that rows stand for."""
 OVERFLOWN: Final = 1e15
 """From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 
@@ -199,9 +200,7 @@ def gather(
     means, read = _fine(raw, finite, noise, fine_rows, load)
     drivers = [means[k] for k in (INPUT, *([load] if load else []))]
     rows = thinned(means["time_s"], drivers, means[JOINT], judged_rows)
-    time = means["time_s"][rows]
-    share = np.gradient(time) if len(time) > 1 else np.ones(1)
-    weight = np.sqrt(share / share.mean())
+    weight = _weight(means["time_s"], rows)
     return Evidence(
         name, session, {}, means, rows, {k: v[rows] for k, v in read.items()}, weight, noise, set_aside,
         len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread, read=read,
@@ -288,6 +287,17 @@ def _fine(
     if load == MOTOR:
         read.pop(MOTOR)
     return means, read
+
+
+def _weight(time: FloatArray, rows: IntArray) -> FloatArray:
+    """Root of the time that each judged row stands for, over its mean: a gap, in which nothing was read, counts as
+    `DIED` usual steps, or the two rows beside a long one would outweigh all others."""
+    if len(rows) < 2:
+        return np.ones(len(rows))
+    steps = np.diff(time)
+    recorded = np.append(0.0, np.cumsum(np.minimum(steps, DIED * np.median(steps))))[rows]
+    share = np.gradient(recorded)
+    return np.asarray(np.sqrt(share / share.mean()), dtype=np.float64)
 
 
 def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]:

@@ -207,3 +207,10 @@ def test_motion_that_few_readings_do_not_resolve_is_no_noise() -> None:
     e = gathered({"time_s": time, "motor_position_rad": motor, "joint_position_rad": joint})
     assert e.noise["joint_position_rad"] == pytest.approx(1e-4, rel=0.2)
     assert e.noise["motor_position_rad"] == pytest.approx(1e-4 / JOINT.drive.ratio, rel=0.2)
+
+
+def test_the_rows_beside_a_gap_do_not_stand_for_the_time_in_which_nothing_was_read() -> None:
+    columns = recorded(duration_s=40.0)
+    time = columns["time_s"]
+    later = gathered({**columns, "time_s": np.where(time < 20.0, time, time + 600.0)})
+    assert later.weight.max() < 2.0 * gathered(columns).weight.max()
