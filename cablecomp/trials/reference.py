@@ -100,13 +100,14 @@ def _noise(
     evidence: Sequence[Evidence], places: Mapping[str, int], angles: Mapping[str, FloatArray]
 ) -> float:
     """RMS of recorded minus true angle on counted rows, weighed by the time that they stand for."""
-    parts = []
+    parts, weights = [], []
     for e in evidence:
         k, kept = places[e.name], e.counted[JOINT]
-        off = e.at_rows(JOINT) - _at(e, angles[f"time_s_{k}"], angles[f"joint_rad_{k}"])[e.rows]
-        parts.append((e.weight * (off - np.median(off[kept])))[kept])
-    joined = np.concatenate(parts)
-    return sqrt(float(np.mean(joined**2))) if len(joined) else nan
+        off = (e.at_rows(JOINT) - _at(e, angles[f"time_s_{k}"], angles[f"joint_rad_{k}"])[e.rows])[kept]
+        parts.append(off - np.median(off))
+        weights.append(e.weight[kept])
+    joined, weight = np.concatenate(parts), np.concatenate(weights)
+    return sqrt(float(np.average(joined**2, weights=weight**2))) if len(joined) else nan
 
 
 def _at(e: Evidence, time: FloatArray, values: FloatArray) -> FloatArray:

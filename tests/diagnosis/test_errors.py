@@ -6,14 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_drive import TOLERANT, recorded
-from turning import LIMITED, NOISE_RAD, after_a_history
+from small_drive import TOLERANT
+from small_drive import recorded as small_recorded
+from turning import JOINT as WRIST
+from turning import LIMITED, NOISE_RAD, after_a_history, recorded
 
 from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.evidence import JOINT, gather
+from cablecomp.estimation.least_squares import solve
+from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import EffectSpec
@@ -79,9 +84,28 @@ def test_a_recording_that_the_drive_cannot_follow_is_predicted_as_by_a_rigid_one
 
 def test_what_does_not_carry_to_the_end_is_explained_in_part() -> None:
     """A bearing that drags, and an encoder that is knocked in the stretch that is kept for the end."""
-    columns = recorded([EffectSpec("bearing_friction", {"torque_Nm": 0.03, "presliding_rad": 2e-4})], 20.0)
+    columns = small_recorded(
+        [EffectSpec("bearing_friction", {"torque_Nm": 0.03, "presliding_rad": 2e-4})], 20.0
+    )
     columns["joint_position_rad"][columns["time_s"] > 18.0] += 3e-4
     found = diagnose(TOLERANT, {"small/1": columns})
     assert [named.effect for named in found.named] == ["bearing_friction"]
     assert found.augmented.final_rmse_rad > 10.0 * found.augmented.heldout_rmse_rad
     assert found.verdict == "partly explained"
+
+
+def test_an_error_is_one_of_the_time_that_its_rows_stand_for_and_a_zero_of_its_own_is_none() -> None:
+    """Rows kept for the end that stand for more time than usual (a hold) make no larger error of the same misfit."""
+    joint = WRIST.model_copy(update={"tolerance": {"EA_N": 0.05}})
+    two = [
+        gather(joint, f"{k}", recorded(offset_rad=k * 5e-3, seed=k), "a", fine_rows=1000, judged_rows=80)
+        for k in range(2)
+    ]
+    weighing = Weighing({JOINT: NOISE_RAD}, {JOINT: 1e-2})
+    fit = solve(Problem(joint, of_drive(joint), tuple(two), weighing), evaluations=2)
+    misfit = np.where(np.arange(len(two[0].columns[JOINT])) % 2, 1e-3, -1e-3)
+    rough = replace(two[0], columns={**two[0].columns, JOINT: two[0].columns[JOINT] + misfit})
+    for rows in (rough.weight > 1.2, rough.weight < 0.8):
+        errors = errors_of(fit, [replace(rough, counted={JOINT: rows})], "recording")
+        assert errors.final_rmse_rad == pytest.approx(1e-3, rel=0.02)
+    assert errors.heldout_own_zero_rmse_rad < 2.0 * NOISE_RAD < 0.1 * errors.heldout_rmse_rad

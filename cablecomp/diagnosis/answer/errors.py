@@ -4,6 +4,7 @@ had seen."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,19 +21,35 @@ from cablecomp.estimation.parallel import in_processes
 from cablecomp.signal.smoothing import BoolArray, FloatArray
 
 
+class Left(NamedTuple):
+    """Misfit of the joint angle [rad] on some rows of a recording, and their weights."""
+
+    misfit: FloatArray
+    weight: FloatArray
+
+    def at(self, rows: BoolArray | slice) -> Left:
+        """The same on some of these rows."""
+        return Left(self.misfit[rows], self.weight[rows])
+
+    @property
+    def about_own_zero(self) -> Left:
+        """The same about its mean by time."""
+        return Left(self.misfit - np.average(self.misfit, weights=self.weight**2), self.weight)
+
+
 def errors_of(fit: Fit, final: Sequence[Evidence], by: str, laws: Sequence[Empirical] = ()) -> Errors:
     """The three errors of a model and its laws without a name; zeros are the recordings' where the fit has seen them,
     as far as their prior lets these depart (a history that nobody recorded moves them), else the sessions'; a
     recording's carry-over is estimated and taken off."""
     inside = _rms(_left(fit, fit.problem.evidence, laws))
 
-    def left_out(part: Part) -> list[FloatArray]:
+    def left_out(part: Part) -> list[Left]:
         again = fitted_to_part(fit, part.rest, 5)
         return _left(again, part.out, _again(again, laws))
 
     parts = [p for found in in_processes(left_out, left_out_in_turn(fit.problem.evidence, by)) for p in found]
-    own_zero = [p - np.mean(p) for p in parts]
-    return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)), _rms(own_zero))
+    own_zero = _rms([p.about_own_zero for p in parts])
+    return Errors(inside, _rms(parts), _rms(_left(fit, final, laws)), own_zero)
 
 
 def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
@@ -40,12 +57,11 @@ def _again(fit: Fit, laws: Sequence[Empirical]) -> list[Empirical]:
     if not laws:
         return []
     kept = [e for e in fit.problem.evidence if e.counted[JOINT].any()]
-    weighted = _left(fit, kept)
-    return refitted(laws, kept, [r / e.weight[e.counted[JOINT]] for r, e in zip(weighted, kept, strict=True)])
+    return refitted(laws, kept, [left.misfit for left in _left(fit, kept)])
 
 
-def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[FloatArray]:
-    """Weighted misfit of the joint angle [rad] on counted rows; laws, the zero and the recording's carry-over taken off
+def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()) -> list[Left]:
+    """What is left of the joint's angle on counted rows; laws, the zero and the recording's carry-over taken off
     (where the fit has not seen the recording: the session's; nor the session: as these rows, or the first of them,
     tell), without rows at which a carry-over comes back that the rows seen have not told. Of recordings that the drive
     cannot follow with what the fit tells: what a rigid one leaves."""
@@ -63,9 +79,10 @@ def _left(fit: Fit, evidence: Sequence[Evidence], laws: Sequence[Empirical] = ()
             continue
         left = (m - sum(value_of(law, e) for law in laws))[kept]
         own = e.name if e.name in zeros else e.session
-        left -= zeros[own][0] if own in zeros else float(np.mean(left))
+        weight = e.weight[kept]
+        left -= zeros[own][0] if own in zeros else float(np.average(left, weights=weight**2))
         if e.name in carryover:
-            parts.append((e.weight[kept] * (left - carryover[e.name][kept]))[_forgotten(fit, e)])
+            parts.append(Left(left - carryover[e.name][kept], weight).at(_forgotten(fit, e)))
         else:
             parts.append(_without_carryover(e, left, problem.weighing.sigma[JOINT]))
     return parts
@@ -87,19 +104,23 @@ def _forgotten(fit: Fit, e: Evidence) -> BoolArray:
     return known if known.any() else np.ones_like(known)
 
 
-def _without_carryover(e: Evidence, left: FloatArray, sigma: float) -> FloatArray:
-    """Weighted misfit without the recording's carry-over, as its first rows and its prior tell it; these are not
-    judged, or a law that is missing would be taken for a carry-over."""
+def _without_carryover(e: Evidence, left: FloatArray, sigma: float) -> Left:
+    """Misfit without the recording's carry-over, as its first rows and its prior tell it; these are not judged, or a
+    law that is missing would be taken for a carry-over."""
     kept = e.counted[JOINT]
-    weighted = e.weight[kept] * left
+    weight = e.weight[kept]
     if JOINT not in e.carryover:
-        return weighted
-    columns = e.weight[kept][:, None] * e.carryover[JOINT][kept]
+        return Left(left, weight)
+    columns = e.carryover[JOINT][kept]
     first = int(LIMITS.telling * len(left))
-    A = np.vstack([columns[:first] / sigma, np.eye(columns.shape[1]) / CARRYOVER_SD])
-    b = np.concatenate([weighted[:first] / sigma, np.zeros(columns.shape[1])])
-    return np.asarray((weighted - columns @ np.linalg.lstsq(A, b, rcond=None)[0])[first:], dtype=np.float64)
+    A = np.vstack([(weight[:, None] * columns)[:first] / sigma, np.eye(columns.shape[1]) / CARRYOVER_SD])
+    b = np.concatenate([(weight * left)[:first] / sigma, np.zeros(columns.shape[1])])
+    return Left(left - columns @ np.linalg.lstsq(A, b, rcond=None)[0], weight).at(slice(first, None))
 
 
-def _rms(parts: Sequence[FloatArray]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(list(parts)) ** 2))) if parts else float("nan")
+def _rms(parts: Sequence[Left]) -> float:
+    """RMS weighed by the time that these rows stand for, however much that is."""
+    if not parts:
+        return float("nan")
+    square, weight = (np.concatenate(p) ** 2 for p in zip(*parts, strict=True))
+    return float(np.sqrt(np.average(square, weights=weight)))
