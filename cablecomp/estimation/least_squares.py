@@ -229,8 +229,12 @@ def covariance(fit: Fit) -> FloatArray:
     if not J.shape[1]:
         return np.empty((0, 0))
     low, high = fit.problem.bounds()
-    normal = J.T @ J + np.diag(1.0 / np.maximum(high - low, 1e-9) ** 2)
-    return np.asarray(np.linalg.pinv(normal), dtype=np.float64)
+    A = np.vstack([J, np.diag(1.0 / np.maximum(high - low, 1e-9))])
+    size = np.linalg.norm(A, axis=0)
+    # of A and not of A'A, whose rounding takes what is little known for what is known exactly
+    _, s, vt = np.linalg.svd(np.linalg.qr(A / size, mode="r"))
+    root = vt.T / np.maximum(s, 1e-15 * s[0]) / size[:, None]
+    return np.asarray(root @ root.T, dtype=np.float64)
 
 
 def rms_left(fit: Fit, channel: str = JOINT) -> float:

@@ -12,7 +12,7 @@ from turning import JOINT, recorded
 from cablecomp.config import JointConfig, Limits, with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
-from cablecomp.estimation.least_squares import covariance, inside, solve, weighed
+from cablecomp.estimation.least_squares import Fit, covariance, inside, solve, weighed
 from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -299,3 +299,18 @@ def test_weights_of_another_channel_have_it_asked(three: tuple[Evidence, ...]) -
     assert set(p.misfits(p.start)) == {ANGLE}
     both = p.with_weighing(Weighing({ANGLE: SIGMA, torque: 1e-3}, {}))
     assert set(both.misfits(p.start)) == {ANGLE, torque}
+
+
+def test_what_nothing_shows_stays_as_wide_as_its_bounds_beside_what_is_well_known(
+    three: tuple[Evidence, ...],
+) -> None:
+    """A column of nothing, and two of the same, within bounds that lie 1e5 and 1e6 units apart."""
+    free = tuple(
+        Parameter(name, 0.0, -w, w, False) for name, w in (("a", 1.0), ("b", 5e5), ("c", 5e4), ("d", 5e4))
+    )
+    J = np.column_stack((np.full(9, 1e4), np.zeros(9), np.full(9, 0.0), np.full(9, 0.0)))
+    J[:5, 2:] = 1.0
+    J[:5, 0] = 0.0
+    p = Problem(JOINT, free, three, Weighing({ANGLE: SIGMA}, {}))
+    sd = np.sqrt(np.diag(covariance(Fit(p, np.zeros(4), np.zeros(9), J))))
+    assert sd == pytest.approx([0.5e-4, 1e6, 1e5 / 2**0.5, 1e5 / 2**0.5], rel=1e-3)
