@@ -74,7 +74,8 @@ def with_steady_readings(problem: Problem, x: FloatArray, evidence: Sequence[Evi
             misfit = misfits[c][k]
             average = steadied(misfit, e.read[c], e.rows, e.noise_of_fine(c))
             steady[c] = e.columns[c][e.rows] - misfit[e.rows] + average.values
-            quiet[c] = float(np.mean(e.weight**2 * average.part))
+            kept = e.counted[c] if e.counted[c].any() else slice(None)
+            quiet[c] = float(np.average(average.part[kept], weights=e.weight[kept] ** 2))
         found.append(replace(e, steady=steady, quiet=quiet))
     return found
 

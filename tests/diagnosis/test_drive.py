@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joints import SMALL, SMALL_NOISE, closed
@@ -13,6 +15,7 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.diagnose import diagnose
+from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
@@ -272,3 +275,16 @@ def mounted(pretension_N: float, seed: int = 5) -> dict[str, FloatArray]:
         "time_s": time,
         **{k: found[k] + sd * rng.standard_normal(len(time)) for k, sd in SMALL_NOISE.items()},
     }
+
+
+def test_a_calibration_hears_nothing_of_the_rows_that_are_kept_for_the_end() -> None:
+    joint = parse_joint(closed(SMALL, "small"), "small")
+    (used,) = gather_body(joint, {"a/1": recorded([], 24.0)}, rows=250).used
+    last = int(np.flatnonzero(used.counted[JOINT])[-1])
+    # a judged row's reading is averaged with those that are nearer to it than to the next one
+    kept = np.arange(len(used.columns["time_s"])) > (used.rows[last] + used.rows[last + 1]) // 2
+    angle = used.columns[JOINT] + 0.1 * np.sin(np.arange(len(kept))) * kept
+    other = replace(used, columns={**used.columns, JOINT: angle})
+    one, two = (calibrate_drive(joint, [e], np.random.default_rng(0)) for e in (used, other))
+    assert np.array_equal(one.fit.x, two.fit.x)
+    assert one.floor_rad == pytest.approx(two.floor_rad, rel=1e-9)

@@ -253,11 +253,12 @@ def _torque_gain(config: JointConfig, evidence: Sequence[Evidence]) -> dict[str,
 
 def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing:
     """Weights before anything is known: a third of what a straight line by motor angle leaves of each output
-    channel."""
+    channel on the rows that count."""
     sigma = {}
     for c in read_by_all(config, evidence):
-        y = np.concatenate([e.at_rows(c) - e.at_rows(c).mean() for e in evidence])
-        q = np.concatenate([e.at_rows("motor_position_rad") for e in evidence])
+        counts = [(e, e.counted[c]) for e in evidence if e.counted[c].any()]
+        y = np.concatenate([e.at_rows(c)[k] - e.at_rows(c)[k].mean() for e, k in counts])
+        q = np.concatenate([e.at_rows("motor_position_rad")[k] for e, k in counts])
         A = np.column_stack((np.ones_like(q), q - q.mean()))
         left = y - A @ np.linalg.lstsq(A, y, rcond=None)[0] if c == JOINT else y
         sigma[c] = 0.3 * float(np.std(left)) + 1e-9
