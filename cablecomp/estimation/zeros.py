@@ -30,6 +30,11 @@ class Zeros:
         padded = np.concatenate([rows, np.zeros(self.penalty_rows)])
         return np.asarray(np.linalg.lstsq(self.R, self.Q.T @ padded, rcond=None)[0], dtype=np.float64)
 
+    @property
+    def sd(self) -> FloatArray:
+        """1-sigma of each of them, all but the zeros as it is [the channel's unit]; 0 of what no row shows."""
+        return np.asarray(np.linalg.norm(np.linalg.pinv(self.R), axis=1), dtype=np.float64)
+
 
 def zeros_of(
     evidence: Sequence[Evidence],

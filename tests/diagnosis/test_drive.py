@@ -15,8 +15,10 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.estimation.evidence import JOINT
-from cablecomp.estimation.least_squares import Fit, rms_left
+from cablecomp.estimation.evidence import JOINT, gather
+from cablecomp.estimation.least_squares import Fit, rms_left, solve
+from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
 
@@ -288,3 +290,26 @@ def test_a_calibration_hears_nothing_of_the_rows_that_are_kept_for_the_end() -> 
     one, two = (calibrate_drive(joint, [e], np.random.default_rng(0)) for e in (used, other))
     assert np.array_equal(one.fit.x, two.fit.x)
     assert one.floor_rad == pytest.approx(two.floor_rad, rel=1e-9)
+
+
+def test_a_zero_is_known_no_better_than_what_it_goes_along_with_and_what_recordings_depart_by() -> None:
+    """Of a load to one side: as an explicit least squares fit of zero and parameters has it; of two recordings whose
+    zeros depart by chance: that over sqrt(2)."""
+    joint = parse_joint({**closed(SMALL, "small"), "tolerance": {"EA_N": 0.9}}, "small")
+    load = 0.5 + 0.1 * np.sin(np.arange(400.0))
+    rigid = {"time_s": 0.02 * np.arange(400.0), "motor_position_rad": np.zeros(400), "joint_torque_Nm": load}
+    fits = []
+    for names, departs in (("a", 0.0), ("ab", 1e-3)):
+        columns = {**rigid, JOINT: 1e-3 * load}
+        parts = [gather(joint, n, columns, "one", fine_rows=400, judged_rows=400) for n in names]
+        weighing = Weighing({JOINT: 1e-5}, {JOINT: departs})
+        fits.append(solve(Problem(joint, of_drive(joint), tuple(parts), weighing), evaluations=3))
+    one, two = (next(v.sd for v in drive_values(f, joint) if v.name == ANGLE) for f in fits)
+    assert two == pytest.approx(1e-3 / 2.0**0.5, rel=0.05)
+    problem, x = fits[0].problem, fits[0].x
+    weight = problem.evidence[0].weight / 1e-5
+    moved = [problem.misfits(x + s)[JOINT][0] - problem.misfits(x)[JOINT][0] for s in 1e-3 * np.eye(len(x))]
+    rows = np.column_stack([weight, *(weight * m / 1e-3 for m in moved)])
+    prior = np.diag([0.0, *(1.0 / p.sd for p in problem.parameters)])
+    assert one == pytest.approx(np.linalg.inv(rows.T @ rows + prior**2)[0, 0] ** 0.5, rel=0.01)
+    assert one > 5.0 * 1e-5 / 400.0**0.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +12,14 @@ from cablecomp.config import JointConfig, claimed_by
 from cablecomp.diagnosis.result import Value
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
+from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, covariance
+from cablecomp.estimation.limits import STEP
+from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.standing import JOINT_ZERO, ONE_CLAIM, in_its_place, value_of
 from cablecomp.signal.noise import reading_sigma
+from cablecomp.signal.smoothing import FloatArray
 
 
 def drive_values(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
@@ -83,13 +87,32 @@ def _zeros(fit: Fit, config: JointConfig) -> tuple[Value, ...]:
     zeros = problem.zeros(fit.x)[JOINT]
     many = len(problem.sessions) > 1
     found = []
-    for session in problem.sessions:
-        count = sum(int(e.counted[JOINT].sum()) for e in problem.evidence if e.session == session)
+    for session, sd in zip(problem.sessions, _sd_of_zeros(fit, zeros), strict=True):
         name = JOINT_ZERO + (f"@{session}" if many else "")
-        sd = problem.weighing.sigma[JOINT] / max(count, 1) ** 0.5
         nominal = _stated_zero(fit, config, session)
-        found.append(Value(name, float(zeros[session][0]), sd, nominal, session if many else None))
+        found.append(Value(name, float(zeros[session][0]), float(sd), nominal, session if many else None))
     return tuple(found)
+
+
+def _sd_of_zeros(fit: Fit, zeros: Mapping[str, FloatArray]) -> FloatArray:
+    """1-sigma of each session's zero [rad]: of its own, its recordings' departures in it, and of the parameters that it
+    goes along with (of a load to one side a softer cable and another zero do nearly the same)."""
+    problem, high = fit.problem, fit.problem.bounds()[1]
+    here = np.array([zeros[s][0] for s in problem.sessions])
+
+    def slope(k: int) -> FloatArray:
+        step = STEP if fit.x[k] + STEP <= high[k] else -STEP
+        moved = fit.x.copy()
+        moved[k] += step
+        try:
+            there = problem.zeros(moved)[JOINT]
+        except InputError:
+            return np.zeros(len(here))
+        return np.array([there[s][0] - z for s, z in zip(problem.sessions, here, strict=True)]) / step
+
+    slopes = np.reshape(list(side_by_side(slope, range(len(fit.x)))), (len(fit.x), len(here)))
+    own = problem.bases[JOINT].sd[: len(here)]
+    return np.asarray(np.sqrt(own**2 + np.einsum("ks,kl,ls->s", slopes, covariance(fit), slopes)))
 
 
 def _stated_zero(fit: Fit, config: JointConfig, session: str) -> float:
