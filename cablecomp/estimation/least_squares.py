@@ -238,10 +238,12 @@ def covariance(fit: Fit) -> FloatArray:
 
 
 def rms_left(fit: Fit, channel: str = JOINT) -> float:
-    """RMS of what the fit leaves of a channel, recordings' own zeros taken off, weighed by time."""
+    """RMS of what the fit leaves of a channel, recordings' own zeros taken off, weighed by the time that the rows which
+    count stand for."""
     parts = [
-        (r.weight * m)[r.counted[channel]]
+        (m[kept], r.weight[kept])
         for r, m in zip(fit.problem.evidence, fit.problem.left(fit.x, channel), strict=True)
-        if channel in r.counted
+        if (kept := r.counted.get(channel)) is not None
     ]
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+    left, weight = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return float(np.sqrt(np.sum((weight * left) ** 2) / np.sum(weight**2)))

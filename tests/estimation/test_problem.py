@@ -12,7 +12,7 @@ from turning import JOINT, recorded
 from cablecomp.config import JointConfig, Limits, with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
-from cablecomp.estimation.least_squares import Fit, covariance, inside, solve, weighed
+from cablecomp.estimation.least_squares import Fit, covariance, inside, rms_left, solve, weighed
 from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -314,3 +314,19 @@ def test_what_nothing_shows_stays_as_wide_as_its_bounds_beside_what_is_well_know
     p = Problem(JOINT, free, three, Weighing({ANGLE: SIGMA}, {}))
     sd = np.sqrt(np.diag(covariance(Fit(p, np.zeros(4), np.zeros(9), J))))
     assert sd == pytest.approx([0.5e-4, 1e6, 1e5 / 2**0.5, 1e5 / 2**0.5], rel=1e-3)
+
+
+def test_what_is_left_is_over_the_time_of_the_rows_that_count(three: tuple[Evidence, ...]) -> None:
+    rough = np.where(np.arange(2000) % 2, 1e-3, -1e-3)
+    for some in (lambda w: w > 1.2, lambda w: w < 0.8):
+        parts = [
+            replace(
+                e,
+                columns={**e.columns, ANGLE: e.columns[ANGLE] + rough[: len(e.columns[ANGLE])]},
+                counted={ANGLE: some(e.weight)},
+            )
+            for e in three
+        ]
+        p = problem(tuple(parts), spread=1e-2)
+        fit = Fit(p, p.start, np.zeros(0), np.zeros((0, len(p.start))))
+        assert rms_left(fit) == pytest.approx(1e-3, rel=0.05)
