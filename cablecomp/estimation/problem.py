@@ -134,8 +134,9 @@ class Problem:
         `known`: misfits of recordings that are not run again, by the recording's place and channel. What was asked last
         is kept: a fit's own point is asked for its residual, its zeros and what it leaves of each channel.
         """
-        if known is None and self._last is not None and self._last[0] == x.tobytes():
-            return self._last[1]
+        last = self._last  # once: another thread may ask for another x meanwhile
+        if known is None and last is not None and last[0] == x.tobytes():
+            return last[1]
         values = self.values(x)
         common = with_common(self.config, values)
         found: Misfits = {c: [] for c in self.channels}

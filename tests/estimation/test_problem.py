@@ -330,3 +330,18 @@ def test_what_is_left_is_over_the_time_of_the_rows_that_count(three: tuple[Evide
         p = problem(tuple(parts), spread=1e-2)
         fit = Fit(p, p.start, np.zeros(0), np.zeros((0, len(p.start))))
         assert rms_left(fit) == pytest.approx(1e-3, rel=0.05)
+
+
+def test_misfits_are_those_of_what_was_asked_while_another_thread_asks_for_others(
+    three: tuple[Evidence, ...],
+) -> None:
+    p = problem(three)
+    asked = p.misfits(p.start)
+
+    class Meanwhile(tuple[Any, ...]):
+        def __getitem__(self, k: Any) -> Any:
+            object.__setattr__(p, "_last", (b"elsewhere", {}))
+            return super().__getitem__(k)
+
+    object.__setattr__(p, "_last", Meanwhile((p.start.tobytes(), asked)))
+    assert p.misfits(p.start) is asked
