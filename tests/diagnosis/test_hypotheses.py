@@ -302,3 +302,9 @@ def test_that_warmth_quickens_creep_is_asked_where_a_temperature_moves(warm: boo
     asked = {name for further in creep.further for name in further}
     assert {"power", "steady"} <= asked
     assert ("quickening_per_K" in asked) is warm
+
+
+def test_of_a_joint_that_is_held_still_all_is_asked_too() -> None:
+    columns = {**recorded(), "joint_position_rad": np.full(1000, 0.1)}
+    held = gather(JOINT, "held", columns, "all", fine_rows=1000, judged_rows=100)
+    assert len(hypotheses(JOINT, [held])) == len(hypotheses(JOINT, gathered()))

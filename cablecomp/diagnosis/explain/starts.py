@@ -54,7 +54,8 @@ def grid(
     if p.role == "length":
         return (0.02 * high, 0.25 * high)
     if p.role == "presliding":
-        reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence]))
+        # of a joint that is held, and does not move by one count: what friction of its wraps makes
+        reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence])) or wrap_deflection(config)
         wide = np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
         # as good as none, beside what friction of the wraps makes; of a loose drive the path's friction is as much
         least = max(low, min(1e-3 * reach, 1e-3 * wrap_deflection(config)))
