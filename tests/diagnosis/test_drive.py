@@ -313,3 +313,11 @@ def test_a_zero_is_known_no_better_than_what_it_goes_along_with_and_what_recordi
     prior = np.diag([0.0, *(1.0 / p.sd for p in problem.parameters)])
     assert one == pytest.approx(np.linalg.inv(rows.T @ rows + prior**2)[0, 0] ** 0.5, rel=0.01)
     assert one > 5.0 * 1e-5 / 400.0**0.5
+
+
+def test_readings_without_any_noise_have_a_floor_to_be_told_in_units_of() -> None:
+    still = {c: np.zeros(400) for c in ("motor_position_rad", "joint_torque_Nm", JOINT)}
+    joint = parse_joint(closed(SMALL, "small"), "small")
+    used = gather_body(joint, {"a/1": {**still, "time_s": 0.02 * np.arange(400.0)}}).used
+    drive = calibrate_drive(joint, used, np.random.default_rng(0))
+    assert 0.0 < drive.floor_rad < 1e-11

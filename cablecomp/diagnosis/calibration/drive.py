@@ -29,6 +29,8 @@ from cablecomp.signal.smoothing import FloatArray, keep_corners
 TORQUE_ZERO, TORQUE_GAIN = "joint_torque_offset_Nm", "joint_torque_gain"
 REPLICAS = 2
 """Noise replicas of every recording: how far noisy inputs move the prediction is a mean over all rows."""
+NO_NOISE = 1e-12
+"""Least that noise leaves [rad]: a residual is told in units of it."""
 BESIDE = 1e3
 """Times its sigma that a further channel has where the joint's angle is followed first."""
 PASSES = 5
@@ -288,7 +290,8 @@ def noise_floors(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
     by_inputs = float(np.mean(moved)) if moved else 0.0
     judged = np.mean([e.noise_at_rows(JOINT) ** 2 for e in problem.evidence])
     fine = np.mean([e.noise_of_fine(JOINT) ** 2 for e in problem.evidence])
-    return float(np.sqrt(judged + by_inputs)), float(np.sqrt(fine + by_inputs))
+    # of readings without any noise: as good as none
+    return float(np.sqrt(judged + by_inputs + NO_NOISE**2)), float(np.sqrt(fine + by_inputs + NO_NOISE**2))
 
 
 def _noise_replica(e: Evidence, rng: np.random.Generator) -> Evidence:
