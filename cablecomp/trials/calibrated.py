@@ -28,16 +28,15 @@ def calibration_error(probability: Sequence[float], right: Sequence[bool], bins:
 
 def brier(probability: Sequence[float], right: Sequence[bool]) -> float:
     """Mean of (probability - right)^2; NaN for none."""
-    p, y = _sorted(probability, right)
+    p, y = np.asarray(probability, dtype=np.float64), np.asarray(right, dtype=np.float64)
     return float(np.mean((p - y) ** 2)) if len(p) else nan
 
 
 def risk_coverage(score: Sequence[float], right: Sequence[bool]) -> tuple[Floats, Floats]:
     """(coverage, risk): of the names with the highest score, that share of all, how many are wrong."""
-    s, y = np.asarray(score, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    order = np.argsort(-s, kind="stable")
-    count = np.arange(1, len(s) + 1)
-    return np.asarray(count / max(len(s), 1)), np.asarray(np.cumsum(1.0 - y[order]) / count)
+    y = _sorted(score, right)[1][::-1]
+    count = np.arange(1, len(y) + 1)
+    return np.asarray(count / max(len(y), 1)), np.asarray(np.cumsum(1.0 - y) / count)
 
 
 def risk_area(score: Sequence[float], right: Sequence[bool]) -> float:
@@ -46,7 +45,11 @@ def risk_area(score: Sequence[float], right: Sequence[bool]) -> float:
     return float(np.mean(risk_coverage(score, right)[1])) if len(score) else nan
 
 
-def _sorted(probability: Sequence[float], right: Sequence[bool]) -> tuple[Floats, Floats]:
-    p, y = np.asarray(probability, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    order = np.argsort(p, kind="stable")
-    return p[order], y[order]
+def _sorted(score: Sequence[float], right: Sequence[bool]) -> tuple[Floats, Floats]:
+    """Scores, least first, and the share right of those of the same score: caps make many alike, of which none comes
+    first."""
+    s, y = np.asarray(score, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    _, alike, count = np.unique(s, return_inverse=True, return_counts=True)
+    share = np.bincount(alike, y) / np.maximum(count, 1)
+    order = np.argsort(s, kind="stable")
+    return s[order], np.asarray(share[alike[order]], dtype=np.float64)

@@ -138,6 +138,15 @@ def test_calibration_error_and_risk_by_hand() -> None:
     assert risk_area([0.1, 0.9], [False, True]) < risk_area([0.9, 0.1], [False, True])
 
 
+def test_names_of_the_same_confidence_count_alike_in_whatever_order_they_come() -> None:
+    confidence = [0.45] * 8 + [0.9] * 4
+    right = [True] * 4 + [False] * 4 + [True] * 4
+    turned = confidence[::-1], right[::-1]
+    assert risk_area(confidence, right) == pytest.approx(risk_area(*turned))
+    assert calibration_error(confidence, right, 3) == pytest.approx(calibration_error(*turned, 3))
+    np.testing.assert_allclose(risk_coverage(confidence, right)[1][3:6], [0.0, 0.1, 1.0 / 6.0])
+
+
 def test_conformal_sets_hold_what_is_new_as_often_as_promised() -> None:
     rng = np.random.default_rng(3)
     held = []
