@@ -10,7 +10,7 @@ from turning import JOINT
 
 from cablecomp.config import JointConfig, with_values
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, hypotheses
-from cablecomp.diagnosis.explain.model import Model, amount_resolved, bears, ranked
+from cablecomp.diagnosis.explain.model import Model, amount_resolved, bears, moves_rad, ranked
 from cablecomp.diagnosis.explain.plausible import runs_away
 from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.screening import with_entry
@@ -174,3 +174,14 @@ def test_an_unseen_weight_may_be_as_large_as_the_loads_that_are_seen(share: floa
 )
 def test_coefficients_of_friction_alone_leave_a_drive_known(tolerance: dict[str, float], vague: bool) -> None:
     assert vague_drive(of_drive(JOINT.model_copy(update={"tolerance": tolerance}))) is vague
+
+
+def test_by_how_much_an_effect_moves_the_joint_hangs_on_no_scale_of_the_weights() -> None:
+    """Of rows that stand for more time than usual, as where rests are kept for the end, or for less."""
+    fit, term = beside("series_compliance", {"compliance_rad_per_Nm": 1e-3})
+    (e,) = fit.problem.evidence
+    moved = 1e-3 * e.at_rows("joint_torque_Nm")
+    for scale in (1.0, 1.5):
+        problem = fit.problem.with_evidence([replace(e, weight=scale * np.ones(len(e.rows)))])
+        found = moves_rad(Model((term,), replace(fit, problem=problem), fit.residual), term)
+        assert found == pytest.approx(np.std(moved), rel=0.02)

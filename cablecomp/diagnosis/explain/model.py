@@ -288,21 +288,22 @@ def stripped(problem: Problem, term: Term) -> Problem:
 
 
 def moves_rad(model: Model, term: Hypothesis) -> float | None:
-    """By how much an effect moves the joint's angle as it is fitted, RMS about each recording's mean [rad]; None where
-    the drive cannot follow the recordings without it."""
+    """By how much an effect moves the joint's angle as it is fitted, RMS by time about each recording's mean [rad];
+    None where the drive cannot follow the recordings without it."""
     fit = model.fit
     problem = stripped(fit.problem, term)
     try:
         less = problem.misfits(placed(fit, problem))[JOINT]
     except InputError:
         return None
-    parts = []
+    square, time = 0.0, 0.0
     for e, a, b in zip(problem.evidence, less, fit.problem.misfits(fit.x)[JOINT], strict=True):
         here = e.counted.get(JOINT)
         if here is not None and here.any():
-            weight, moved = e.weight[here], (a - b)[here]
-            parts.append(weight * (moved - np.average(moved, weights=weight**2)))
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+            stands, moved = e.weight[here] ** 2, (a - b)[here]
+            square += float(stands @ (moved - np.average(moved, weights=stands)) ** 2)
+            time += float(stands.sum())
+    return float(np.sqrt(square / time))
 
 
 def left_off(problem: Problem, keys: Collection[str]) -> Problem:
