@@ -109,10 +109,17 @@ class Evidence:
         """What the kernel reads, by the fine rows and the further channels that were asked for (`simulate.py`)."""
         return {}
 
+    @property
+    def before_the_end(self) -> slice:
+        """The fine rows up to the last judged one at which the joint's angle counts: what goes on beyond is kept for
+        the end, and nothing is chosen by it."""
+        counts = np.flatnonzero(self.counted[JOINT])
+        return slice(int(self.rows[counts[-1]]) + 1) if len(counts) else slice(None)
+
     @cached_property
     def deflection_rad(self) -> float:
         """How far the joint's angle goes beside a straight line over the motor's, from its 1 to its 99 % quantile."""
-        joint, motor = self.columns[JOINT], self.columns[INPUT]
+        joint, motor = self.columns[JOINT][self.before_the_end], self.columns[INPUT][self.before_the_end]
         seen = np.isfinite(joint) & np.isfinite(motor)
         line = np.stack([motor[seen], np.ones(int(np.sum(seen)))], axis=1)
         beside = joint[seen] - line @ np.linalg.lstsq(line, joint[seen], rcond=None)[0]

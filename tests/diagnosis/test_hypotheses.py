@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -308,3 +309,15 @@ def test_of_a_joint_that_is_held_still_all_is_asked_too() -> None:
     columns = {**recorded(), "joint_position_rad": np.full(1000, 0.1)}
     held = gather(JOINT, "held", columns, "all", fine_rows=1000, judged_rows=100)
     assert len(hypotheses(JOINT, [held])) == len(hypotheses(JOINT, gathered()))
+
+
+def test_where_shapes_start_hears_nothing_of_what_is_kept_for_the_end() -> None:
+    (used,) = gathered()
+    angle = used.columns["joint_position_rad"]
+    last = used.rows[np.flatnonzero(used.counted["joint_position_rad"])[-1]]
+    later = np.where(np.arange(len(angle)) > last, angle + 9.0, angle)
+    other = replace(used, columns={**used.columns, "joint_position_rad": later})
+    one, two = (hypotheses(JOINT, [e]) for e in (used, other))
+    assert last < len(angle) - 1
+    assert [h.starts for h in one] == [h.starts for h in two]
+    assert used.deflection_rad == other.deflection_rad

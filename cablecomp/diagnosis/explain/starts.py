@@ -36,7 +36,7 @@ def grid(
     """Where a shape starts, of an effect that reads this channel, if any: by what it says (`Parameter.role`)."""
     low, high = p.bounds(config)
     if p.role == "place":
-        stood = np.concatenate([e.columns[JOINT] for e in evidence])
+        stood = np.concatenate([e.columns[JOINT][e.before_the_end] for e in evidence])
         return tuple(float(v) for v in np.nanquantile(stood, (0.1, 0.3, 0.5, 0.7, 0.9)))
     if p.role == "tilt":
         return tuple(turn / width(evidence, channel) for turn in (-1.2, -0.4, 0.4, 1.2))
@@ -55,7 +55,8 @@ def grid(
         return (0.02 * high, 0.25 * high)
     if p.role == "presliding":
         # of a joint that is held, and does not move by one count: what friction of its wraps makes
-        reach = float(np.median([np.ptp(e.columns[JOINT]) for e in evidence])) or wrap_deflection(config)
+        turns = [np.ptp(e.columns[JOINT][e.before_the_end]) for e in evidence]
+        reach = float(np.median(turns)) or wrap_deflection(config)
         wide = np.geomspace(max(low, 1e-3 * reach), max(0.05 * reach, 3e-3 * reach), 3)
         # as good as none, beside what friction of the wraps makes; of a loose drive the path's friction is as much
         least = max(low, min(1e-3 * reach, 1e-3 * wrap_deflection(config)))
@@ -73,5 +74,6 @@ def width(evidence: Sequence[Evidence], channel: str) -> float:
 
 def _reach(evidence: Sequence[Evidence], channel: str) -> float:
     """Half of what a channel covers over all recordings."""
-    readings = np.concatenate([e.columns[channel] for e in evidence if channel in e.columns])
+    read = [e.columns[channel][e.before_the_end] for e in evidence if channel in e.columns]
+    readings = np.concatenate(read)
     return 0.5 * float(np.nanmax(readings) - np.nanmin(readings))
