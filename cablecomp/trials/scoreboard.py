@@ -198,7 +198,8 @@ def _share(what: str, r: Rate, least: float | None = None, most: float | None = 
 
 
 def _at(what: str, values: Sequence[float], q: float, most: float | None, unit: str) -> Target:
-    """The quantile q of values."""
+    """The quantile q of those values that are finite: a trial without a verdict has none."""
+    values = [v for v in values if isfinite(v)]
     span = bootstrapped(values, lambda v: quantile(v, q))
     return Target(what, quantile(values, q), span, len(values), None, most, unit)
 

@@ -204,6 +204,13 @@ def test_what_was_kept_for_the_end_is_held_against_what_was_promised() -> None:
     assert target(rows, "kept for the end") == pytest.approx(1.5)
 
 
+def test_a_trial_without_a_verdict_has_no_error_to_be_counted() -> None:
+    one = truth("single", effect("bearing_friction"))
+    rows = [row(one, verdict("bearing_friction")), failed_trial(one, SURE, "no luck")]
+    over_noise = [t for t in scoreboard(rows, "", WISH).targets if "left out over noise" in t.what]
+    assert [t.of for t in over_noise] == [1, 1]
+
+
 def test_a_pretension_at_another_reference_is_another_pretension() -> None:
     """T0 (1 + k (x - r)) is the same law for every r if T0 and k go with it."""
     k, r, other = 0.01, 20.0, 25.0
