@@ -240,10 +240,21 @@ def covariance(fit: Fit) -> FloatArray:
 def rms_left(fit: Fit, channel: str = JOINT) -> float:
     """RMS of what the fit leaves of a channel, recordings' own zeros taken off, weighed by the time that the rows which
     count stand for."""
+    left, weight = _left_with_weights(fit, channel)
+    return float(np.sqrt(np.sum((weight * left) ** 2) / np.sum(weight**2)))
+
+
+def rms_of_rows(fit: Fit, channel: str = JOINT) -> float:
+    """RMS of the same as rows of a residual have it, times their weights: what a sigma stands beside."""
+    left, weight = _left_with_weights(fit, channel)
+    return float(np.sqrt(np.mean((weight * left) ** 2)))
+
+
+def _left_with_weights(fit: Fit, channel: str) -> tuple[FloatArray, FloatArray]:
     parts = [
         (m[kept], r.weight[kept])
         for r, m in zip(fit.problem.evidence, fit.problem.left(fit.x, channel), strict=True)
         if (kept := r.counted.get(channel)) is not None
     ]
     left, weight = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    return float(np.sqrt(np.sum((weight * left) ** 2) / np.sum(weight**2)))
+    return left, weight

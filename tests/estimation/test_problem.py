@@ -12,7 +12,7 @@ from turning import JOINT, recorded
 from cablecomp.config import JointConfig, Limits, with_values
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
-from cablecomp.estimation.least_squares import Fit, covariance, inside, rms_left, solve, weighed
+from cablecomp.estimation.least_squares import Fit, covariance, inside, rms_left, rms_of_rows, solve, weighed
 from cablecomp.estimation.limits import MOVED_SD, STEP
 from cablecomp.estimation.parameter import Parameter, by_condition, of_drive, own_of
 from cablecomp.estimation.problem import Problem, Weighing
@@ -330,6 +330,7 @@ def test_what_is_left_is_over_the_time_of_the_rows_that_count(three: tuple[Evide
         p = problem(tuple(parts), spread=1e-2)
         fit = Fit(p, p.start, np.zeros(0), np.zeros((0, len(p.start))))
         assert rms_left(fit) == pytest.approx(1e-3, rel=0.05)
+        assert abs(np.log(rms_of_rows(fit) / 1e-3)) > 0.1
 
 
 def test_misfits_are_those_of_what_was_asked_while_another_thread_asks_for_others(

@@ -23,7 +23,7 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.departures import set_anew
 from cablecomp.estimation.evidence import JOINT, Evidence, load_channel, noise_rms
 from cablecomp.estimation.history import with_own_carryover
-from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_left, solve
+from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_of_rows, solve
 from cablecomp.estimation.limits import MOVED_SD
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -140,7 +140,7 @@ def searching(fit: Fit) -> Weighing:
     problem = fit.problem
     sigma = {}
     for c in problem.channels:
-        sigma[c] = max(LIMITS.search_weight * rms_left(fit, c), noise_rms(problem.evidence, c), 1e-12)
+        sigma[c] = max(LIMITS.search_weight * rms_of_rows(fit, c), noise_rms(problem.evidence, c), 1e-12)
     # zeros may not take up what an effect could explain: an offset that follows the load is a compliance. Where there
     # are recordings enough to tell, a zero keeps what it counts for among rows that remember each other
     told = len(problem.evidence) >= LIMITS.recordings
