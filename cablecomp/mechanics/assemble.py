@@ -116,7 +116,9 @@ def _places(circuits: int, cables: int, capacity: int, extra: Change) -> dict[st
     spans = cables if extra.play_spread > 0.0 else 0
     plays_at = grids_at + grids_room
     steps_at = plays_at + spans * records.PLAYS * floats(records.PLAY)
-    profiles_at = steps_at + 2 * cables * floats(records.STEP)
+    guides = cables if extra.guide_angle > 0.0 else 0
+    guides_at = steps_at + 2 * cables * floats(records.STEP)
+    profiles_at = guides_at + guides * floats(records.GUIDE)
     return {
         "circuits": circuits,
         "cables": cables,
@@ -125,6 +127,7 @@ def _places(circuits: int, cables: int, capacity: int, extra: Change) -> dict[st
         "capacity": capacity,
         "grids": grids,
         "spans": spans,
+        "guides": guides,
         "cables_at": cables_at,
         "sensor_at": parameters_at + sum(len(term.parameters) for term in extra.terms),
         "context_at": context_at,
@@ -132,6 +135,7 @@ def _places(circuits: int, cables: int, capacity: int, extra: Change) -> dict[st
         "grids_at": grids_at,
         "plays_at": plays_at,
         "steps_at": steps_at,
+        "guides_at": guides_at,
         "profiles_at": profiles_at,
         "spare_at": profiles_at + stacks * capacity * floats(records.POINT),
     }

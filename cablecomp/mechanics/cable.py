@@ -74,6 +74,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
             split = guide_split(d, laws, c, v, x_in, w_in)
             total, slope, by_shaft_in = split.stretch, split.slope * dv, split.by_shaft
             state.tension_in = split.tau_in * t0
+            d.guides[c].by_tension, d.guides[c].by_in = split.tau_by_end * dv, split.tau_by_shaft * t0
             length *= cable.guide_place
             ends = 1
         else:
@@ -93,6 +94,9 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
         angle = -cable.sign * x_in
     state.stretch = total * unit
     state.compliance = slope * unit / t0
+    if laws is not None:
+        if cable.guide > 0.0:
+            d.guides[c].stretch_by_in, d.guides[c].stretch_by_out = by_shaft_in, cable.sign * by_shaft * unit
     return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit, by_shaft_in)
 
 

@@ -8,6 +8,7 @@ the unknown joint angle; that coupling is weak (strain, about 1e-3), so the angl
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from cablecomp.mechanics.cable import cable_commit, cable_eval
@@ -16,6 +17,7 @@ from cablecomp.mechanics.jit import inlined_kernel, inner_kernel, leaf_kernel
 from cablecomp.mechanics.nudge import SMALL, cable_nudge
 from cablecomp.mechanics.profile import Floats
 from cablecomp.mechanics.records import OUT
+from cablecomp.mechanics.stages import SWEEPS, Turn, balance_cable, foresee, raise_chain, seat, step_pulls
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK, STATUS_SLACK
 
 SETTLED, SETTLED_VISCOUS = 1e-9, 1e-11
@@ -50,25 +52,46 @@ def chain_eval(
 ) -> Chain:
     """Rotation of the chain's output shaft at this tension [N] of its output cable and these shaft angles [rad].
 
-    The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9), rotations add with their
-    ratios (5-2).
+    The cables of a chain hang one behind the other: T_i = scale_i T (thesis 5-1, 5-9) or what their guides leave of it
+    (`stages.py`), rotations add with their ratios (5-2).
     """
-    theta = compliance = by_shaft = turns = 0.0  # turns: of the shaft between two cables, by the tension
-    x = x_in
-    for j in range(count):
-        cable, state = d.cables[first + j], d.states[first + j]
-        shaft = x_out if j == count - 1 else state.shaft
-        stretch = cable_eval(d, laws, first + j, tension * cable.scale, x, shaft)
-        longer = stretch.length - state.offset
-        theta += cable.weight * longer
-        by_shaft = cable.weight * stretch.by_shaft
-        compliance += cable.weight * stretch.compliance * cable.scale
+    theta = compliance = by_shaft = 0.0
+    shared = False
+    if laws is not None:
+        shared = count > 1 and d.size.guides > 0
+        if shared:
+            foresee(d, first + count - 1, 1, count, tension - d.states[first + count - 1].tension)
+    for sweep in range(SWEEPS):
+        theta = compliance = by_shaft = 0.0
+        turn = Turn(0.0, 0.0)
+        x = x_in
+        for j in range(count):
+            cable, state = d.cables[first + j], d.states[first + j]
+            shaft = x_out if j == count - 1 else state.shaft
+            pull = tension * cable.scale
+            if laws is not None:
+                if shared and j < count - 1:
+                    pull = d.guides[first + j].pull
+            stretch = cable_eval(d, laws, first + j, pull, x, shaft)
+            longer = stretch.length - state.offset
+            theta += cable.weight * longer
+            by_shaft = cable.weight * stretch.by_shaft
+            compliance += cable.weight * stretch.compliance * cable.scale
+            if laws is not None:
+                if shared:
+                    turn = balance_cable(d, first + j, j > 0, turn)
+            x = cable.ratio * x + cable.sign * longer / cable.radius[OUT]
+            state.shaft = x
+        if not shared:
+            break
         if laws is not None:
-            compliance += cable.weight * stretch.by_shaft_in * turns
-            by_tension = stretch.compliance * cable.scale + stretch.by_shaft_in * turns
-            turns = cable.ratio * turns + cable.sign * by_tension / cable.radius[OUT]
-        x = cable.ratio * x + cable.sign * longer / cable.radius[OUT]
-        state.shaft = x
+            theta += d.cables[first].sign * turn.owed
+            compliance = d.cables[first].sign * turn.by_pull
+            if step_pulls(d, first + count - 1, 1, count, sweep, settled_at(d)):
+                seat(d, first, count)
+                break
+            if sweep == SWEEPS - 1:
+                theta = math.nan
     return Chain(theta, compliance, by_shaft)
 
 
@@ -79,8 +102,12 @@ def settled_at(d: Drive) -> float:
 
 
 @inner_kernel
-def pass_on(d: Drive, first: int, count: int, step: float) -> None:
+def pass_on(d: Drive, laws: Floats, first: int, count: int, step: float) -> None:
     """Raise the pending tensions of a chain by what its output cable's rises by at the last, `step` [N]."""
+    if laws is not None:
+        if count > 1 and d.size.guides > 0:
+            raise_chain(d, first, count, step)
+            return
     for c in range(first, first + count):
         rise = step * d.cables[c].scale
         d.states[c].tension += rise
@@ -157,8 +184,8 @@ def circuit_solve(
         turn = (gap * on_h.compliance - off * by_tension) * scale
         by_h, by_l = weight_h * on_l.compliance * scale, -weight_l * on_h.compliance * scale
         if abs(step) <= settled * unit and abs(turn) <= settled:
-            pass_on(d, first_h, count, step)
-            pass_on(d, first_l, count, step)
+            pass_on(d, laws, first_h, count, step)
+            pass_on(d, laws, first_l, count, step)
             return Solved(x + turn, compliance, STATUS_OK, by_h, by_l)
         if laws is None and count == 1 and abs(turn) <= SMALL and tension + step > lowest:
             if abs(step) <= SMALL * min(tension, tension + pull):

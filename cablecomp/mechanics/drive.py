@@ -13,6 +13,7 @@ from cablecomp.mechanics.records import (
     CONTEXT,
     FILTER,
     GRID,
+    GUIDE,
     PLAY,
     PLAYS,
     POINT,
@@ -50,6 +51,7 @@ class Drive(NamedTuple):
     steps: Any  # by wrap: 2c is cable c's drum OUT, 2c + 1 its drum IN
     grids: Any  # by wrap, where slip is viscous
     plays: Any  # [cable, play], where wires yield one after the other
+    guides: Any  # by cable, where there are guides
     profiles: Points  # [stack, point] (`profile.py`): the wraps, then the guides
     heights: Ints  # points in use, by stack
 
@@ -81,6 +83,7 @@ def named(fixed: Floats, layout: Ints, memory: Floats, heights: Ints) -> Drive:
         records(memory, size.steps_at, (2 * size.cables,), STEP),
         records(memory, size.grids_at, (size.grids,), GRID),
         records(memory, size.plays_at, (size.spans, PLAYS), PLAY),
+        records(memory, size.guides_at, (size.guides,), GUIDE),
         records(memory, size.profiles_at, (size.stacks, size.capacity), POINT),
         heights,
     )

@@ -23,7 +23,9 @@ class Split(NamedTuple):
     stretch: float  # of guide, input side of the free span and input drum, m at strain T0/EA
     slope: float  # its derivative by the end value
     by_shaft: float  # by the input shaft's angle, m/rad: what sticks keeps the input drum's turn from the output side
-    tau_in: float  # T/T0 at the input drum
+    tau_in: float  # T/T0 at the input drum,
+    tau_by_end: float  # its derivative by the end value,
+    tau_by_shaft: float  # by the input shaft's angle
 
 
 @inner_kernel
@@ -81,15 +83,18 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
     state.guide_far = v_out
     state.shaft_in_try = x_in
     # how far the near end follows the far end: wholly while sliding, through the touching slip zones otherwise
-    follow, by_shaft = 1.0, 0.0
+    follow, by_shaft, end_by_shaft = 1.0, 0.0, 0.0
     near_side = by_v + per_turn * on_guide.by_near
     if not slides:
         follow = per_turn * on_guide.swap / (near_side + per_turn * on_guide.swap)
         by_shaft = -cable.sign * radius * near_side / (near_side + per_turn * on_guide.swap)
+        end_by_shaft = -cable.sign * radius / unit / (near_side + per_turn * on_guide.swap)
     state.guide_follow = follow
     total, by_far = arc_total(d.profiles[arc], laws, d.heights[arc], v_out, 1.0, on_guide)
     slope = per_turn * by_far + follow * near_side
-    return Split(side + per_turn * total, slope, by_shaft, tau_of_v(laws, ELSEWHERE, v_in))
+    tau_in = tau_of_v(laws, ELSEWHERE, v_in)
+    rise = 1.0 / dv_dtau(laws, ELSEWHERE, tau_in, v_in)
+    return Split(side + per_turn * total, slope, by_shaft, tau_in, follow * rise, end_by_shaft * rise)
 
 
 @inlined_kernel

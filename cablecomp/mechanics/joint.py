@@ -13,6 +13,7 @@ from cablecomp.mechanics.drive import Drive, Terms
 from cablecomp.mechanics.jit import constant, inlined_kernel, inner_kernel
 from cablecomp.mechanics.pretension import retension
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats
+from cablecomp.mechanics.stages import SWEEPS, Turn, balance_circuit, foresee, step_pulls
 from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK, STATUS_SLACK, STATUS_UNWOUND
 from cablecomp.mechanics.terms import balance, run_terms, show_tensions
 from cablecomp.mechanics.together import solve_together
@@ -22,6 +23,8 @@ UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
 farther off it is refused."""
 MOST_STRAIN = 1.0
 """Strain under the pretension alone above which no cable is one any more: what no effect may make of it."""
+SETTLED_PULL = 1e-11
+"""Last step of the pulls between circuits in series, as a share of T0, that is taken without a further look."""
 AFRESH = constant(False)
 """Nothing was solved just now that the next solution is near to (for a plain False circuits are compiled twice)."""
 
@@ -47,19 +50,45 @@ def _distribute(d: Drive) -> None:
 def _solve_all(d: Drive, laws: Floats, moment: float, again: bool) -> Solved:
     """The joint with `moment` [N m] on its output pulley, through all circuits from the motor outward; `again`: it is
     near what was solved just now."""
+    circuits = d.size.circuits
+    last = d.circuits[circuits - 1]
     angle = d.context.motor
     compliance = by_h = by_l = 0.0
-    for ic in range(d.size.circuits):
-        circuit = d.circuits[ic]
-        last = d.states[circuit.first[0] + circuit.count - 1]
-        guess = last.shaft if ic < d.size.circuits - 1 else d.context.joint
-        solved = circuit_solve(d, laws, ic, moment * circuit.share, angle, guess, again)
-        angle = solved.angle
-        if solved.status != STATUS_OK:
-            return Solved(angle, compliance, solved.status, by_h, by_l)
-        compliance = compliance * circuit.ratio * circuit.ratio + solved.compliance
-        by_h, by_l = solved.by_h, solved.by_l
-    return Solved(angle, compliance, STATUS_OK, by_h, by_l)
+    shared = False
+    if laws is not None:
+        shared = circuits > 1 and d.size.guides > 0
+        if shared:
+            pulled = d.states[last.first[0]].tension - d.states[last.first[1]].tension
+            foresee(d, last.first[0], 2, circuits, moment / last.radius - pulled)
+    for sweep in range(SWEEPS):
+        angle = d.context.motor
+        compliance = by_h = by_l = 0.0
+        turn = Turn(0.0, 0.0)
+        for ic in range(circuits):
+            circuit = d.circuits[ic]
+            state = d.states[circuit.first[0] + circuit.count - 1]
+            guess = state.shaft if ic < circuits - 1 else d.context.joint
+            bears = moment * circuit.share
+            if laws is not None:
+                if shared and ic < circuits - 1:
+                    bears = d.guides[circuit.first[0]].pull * circuit.radius
+            solved = circuit_solve(d, laws, ic, bears, angle, guess, again)
+            angle = solved.angle
+            if solved.status != STATUS_OK:
+                return Solved(angle, compliance, solved.status, by_h, by_l)
+            compliance = compliance * circuit.ratio * circuit.ratio + solved.compliance
+            by_h, by_l = solved.by_h, solved.by_l
+            if laws is not None:
+                if shared:
+                    turn = balance_circuit(d, ic, turn)
+        if not shared:
+            return Solved(angle, compliance, STATUS_OK, by_h, by_l)
+        if laws is not None:
+            compliance = turn.by_pull / last.radius
+            if step_pulls(d, last.first[0], 2, circuits, sweep, SETTLED_PULL):
+                return Solved(angle + turn.owed, compliance, STATUS_OK, by_h, by_l)
+        again = True
+    return Solved(angle, compliance, STATUS_DIVERGED, by_h, by_l)
 
 
 @inlined_kernel

@@ -35,6 +35,7 @@ SIZES = record(
         ("capacity", "i8"),  # points that a profile has room for
         ("grids", "i8"),  # drums with viscous slip: all or none
         ("spans", "i8"),  # cables whose wires yield one after the other: all or none
+        ("guides", "i8"),  # cables with a guide in their span: all or none
         # in `fixed`: circuits, then
         ("cables_at", "i8"),
         ("sensor_at", "i8"),  # behind the terms' parameters
@@ -44,6 +45,7 @@ SIZES = record(
         ("grids_at", "i8"),
         ("plays_at", "i8"),
         ("steps_at", "i8"),  # all that a refused sample puts back lies before
+        ("guides_at", "i8"),
         ("profiles_at", "i8"),
         ("spare_at", "i8"),  # room for an undo copy
     ]
@@ -128,7 +130,10 @@ STATE = record(
         ("offset", "f8"),  # length wound up between the drums
         ("error", "f8"),  # bound on the error of the stretch that merging made
         ("unloaded", "f8"),  # warm start of a closed circuit: T_l + share M/R, its tension without load,
-        ("share", "f8"),  # and the share of a load that eases it
+        (
+            "share",
+            "f8",
+        ),  # and the share of a load that eases it; before a stage with guides: of its rise what follows
         ("side", "f8"),  # with a guide: stretch of the input side,
         ("guide_end", "f8"),  # end values of the guide,
         ("guide_far", "f8"),
@@ -167,6 +172,20 @@ STEP = record(
         ("w", "f8"),  # wrap angle
         ("end_v", "f8"),  # v at the departure point
         ("end_tau", "f8"),
+    ]
+)
+
+# A cable's guide as it was last evaluated, and the pull that its stage is tried with (no state; `stages.py`).
+GUIDE = record(
+    [
+        ("by_tension", "f8"),  # derivative of the tension at the input drum by that at the output drum,
+        ("by_in", "f8"),  # by the input shaft's angle, N/rad
+        ("stretch_by_in", "f8"),  # of the cable's stretch by the input shaft's angle, m/rad,
+        ("stretch_by_out", "f8"),  # by the output shaft's
+        ("pull", "f8"),  # N, at the output drum
+        ("step", "f8"),  # of it, by what the next stage's does not change
+        ("low", "f8"),  # bracket of the pull
+        ("high", "f8"),
     ]
 )
 

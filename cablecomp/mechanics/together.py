@@ -85,9 +85,9 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
                 nudged = cable_nudge(d, first_h, pulled, turn)
                 nudged = nudged and (not closed or cable_nudge(d, first_l, step, turn))
         if done:
-            pass_on(d, first_h, count, pulled)
+            pass_on(d, laws, first_h, count, pulled)
             if closed:
-                pass_on(d, first_l, count, step)
+                pass_on(d, laws, first_l, count, step)
         angle += turn
         tension += step
         moment += raised
