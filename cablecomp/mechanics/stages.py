@@ -97,6 +97,7 @@ def step_pulls(d: Drive, last: int, stride: int, count: int, sweep: int, settled
             guide.pull = new
             worst = max(worst, abs(step) / d.cables[at].T0)
         return worst <= settled
+    lowest = 0.0 if stride == 1 else -FREE
     for place in range(count - 1, 0, -1):
         at = last - place * stride
         guide = d.guides[at]
@@ -106,19 +107,21 @@ def step_pulls(d: Drive, last: int, stride: int, count: int, sweep: int, settled
             guide.low = guide.pull
         else:
             guide.high = guide.pull
-        if guide.low > -FREE and guide.high < FREE:
-            if guide.high - guide.low <= least:
-                continue
-            if not guide.low < new < guide.high or (sweep % 4 == 3 and abs(step) > least):
-                new = 0.5 * (guide.low + guide.high)
         small = abs(step) <= least
+        if not small and guide.low > -FREE and guide.high < FREE:
+            if guide.high - guide.low <= least:  # an end was found while a drum's wrap was still off
+                guide.low, guide.high = lowest, FREE
+            elif not guide.low < new < guide.high or sweep % 4 == 3:
+                new = 0.5 * (guide.low + guide.high)
+        if stride == 1:
+            new = max(new, 0.1 * guide.pull)  # a chain's cable is taut
         change = new - guide.pull
         for before in range(place, count):
             one = d.guides[last - before * stride]
             if before > place:
                 change *= d.states[last - before * stride].share
                 if not small:
-                    one.low, one.high = (0.0 if stride == 1 else -FREE), FREE
+                    one.low, one.high = lowest, FREE
             one.pull += change
         if not small:
             return False

@@ -31,7 +31,7 @@ def test_every_number_of_the_state_has_one_name(
     joint = model(name, *effects)
     memory = np.arange(float(len(joint.memory)))
     d = joint.named(memory, joint.heights)
-    parts = [d.states, d.steps, d.grids, np.atleast_1d(d.context), np.atleast_1d(d.filter)]
+    parts = [d.states, d.steps, d.guides, d.grids, np.atleast_1d(d.context), np.atleast_1d(d.filter)]
     seen = np.concatenate([*(part.view("f8").ravel() for part in parts), d.profiles.view("f8").ravel()])
     assert len(np.unique(seen)) == len(seen)
     unnamed = np.setdiff1d(memory[: d.size.spare_at], seen)
