@@ -23,7 +23,6 @@ class Stretch(NamedTuple):
     length: float  # m
     compliance: float  # its derivative by the tension, m/N
     by_shaft: float  # by the output shaft's angle, m/rad
-    by_shaft_in: float  # by the input shaft's, where a guide keeps its turn from the output side
 
 
 @inlined_kernel
@@ -97,7 +96,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
     if laws is not None:
         if cable.guide > 0.0:
             d.guides[c].stretch_by_in, d.guides[c].stretch_by_out = by_shaft_in, cable.sign * by_shaft * unit
-    return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit, by_shaft_in)
+    return Stretch(total * unit, slope * unit / t0, cable.sign * by_shaft * unit)
 
 
 @inlined_kernel

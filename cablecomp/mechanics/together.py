@@ -50,9 +50,13 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
     for _ in range(MOST):
         if not (tension > floor and tension + pull > floor):
             return nowhere
-        on_h = chain_eval(d, laws, first_h, count, tension + pull, x.motor, angle)
-        if closed:
-            on_l = chain_eval(d, laws, first_l, count, tension, x.motor, angle)
+        for chain in range(circuit.chains):
+            first, here = (first_h, tension + pull) if chain == 0 else (first_l, tension)
+            evaluated = chain_eval(d, laws, first, count, here, x.motor, angle)
+            if chain == 0:
+                on_h = evaluated
+            else:
+                on_l = evaluated
         x.joint = angle
         if x.moment_slope != 0.0:
             x.moment_follows = 1.0
