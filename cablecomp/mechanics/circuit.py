@@ -156,6 +156,9 @@ def circuit_solve(
                 on_h = evaluated
             else:
                 on_l = evaluated
+            if laws is not None:
+                if math.isnan(evaluated.theta):  # shafts within the chain found no balance
+                    return Solved(x, 0.0, STATUS_DIVERGED, by_h, by_l)
         off = rigid + on_h.theta - x
         if not closed:
             turn = off / (1.0 - on_h.by_shaft)

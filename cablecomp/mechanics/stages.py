@@ -19,8 +19,12 @@ from cablecomp.mechanics.drive import Drive
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.records import IN, OUT
 
-SWEEPS = 600  # evaluations of all stages for one solution, at most
+SWEEPS = 1000  # evaluations of all stages for one solution, at most
 TOGETHER = 12  # of them that step all pulls together
+ROUNDED = (
+    20,
+    1e-9,
+)  # after so many a last step of so much of T0 will do: rounding may keep it from being smaller
 FREE = 1e300  # no bound on a pull
 
 
@@ -98,6 +102,8 @@ def step_pulls(d: Drive, last: int, stride: int, count: int, sweep: int, settled
             worst = max(worst, abs(step) / d.cables[at].T0)
         return worst <= settled
     lowest = 0.0 if stride == 1 else -FREE
+    if sweep >= ROUNDED[0]:
+        settled = max(settled, ROUNDED[1])
     for place in range(count - 1, 0, -1):
         at = last - place * stride
         guide = d.guides[at]
