@@ -25,8 +25,8 @@ EFFECT = Effect(
     statement="Where cable slides on a pulley, friction grows with slip speed, so "
     "that deflection lags the load, creeps on "
     "while the load holds, and the drive is stiffer the faster it is loaded.",
-    equation="|dT/dtheta| = mu T + c v while sliding at speed v: the stretch diffuses through the sliding zone; "
-    "c (1 + s) on output drums, c (1 - s) on input drums",
+    equation="|dT/dtheta| = mu T + c v while sliding at speed v, mu and the stretch by whatever laws they have: it "
+    "diffuses through the sliding zone, R d(eps)/dt = dv/dtheta; c (1 + s) on output drums, c (1 - s) on input drums",
     source="Snow 1993, sections 3.3 and 4.3 (observed, unexplained)",
     parameters=(
         Parameter(

@@ -11,8 +11,18 @@ from cablecomp.mechanics.guide import guide_commit, guide_split
 from cablecomp.mechanics.jit import inlined_kernel, kernel
 from cablecomp.mechanics.profile import LEAST_WRAP, Floats, Wound, set_pending, wrap_commit, wrap_eval
 from cablecomp.mechanics.records import IN, OUT, PLAYS
-from cablecomp.mechanics.tables import ELSEWHERE, dv_dtau, groove_slope, strain_of_tau, v_of_tau
+from cablecomp.mechanics.tables import (
+    ELSEWHERE,
+    HEAD,
+    MODE,
+    PLAIN,
+    dv_dtau,
+    groove_slope,
+    strain_of_tau,
+    v_of_tau,
+)
 from cablecomp.mechanics.viscous import viscous_commit, viscous_eval
+from cablecomp.mechanics.viscous_laws import lawful_eval
 
 STEEPEST_PLAY = 0.95  # growth of a play's radius with its input, at most: the output follows it still
 
@@ -39,7 +49,9 @@ def drum_eval(d: Drive, laws: Floats, c: int, end: int, tau: float, v: float, w:
     w = w if w > LEAST_WRAP else LEAST_WRAP
     if laws is not None:
         if cable.viscous > 0.0:
-            return viscous_eval(d, c, end, w, tau, mu)
+            if laws[cable.law[end], HEAD, MODE] == PLAIN:
+                return viscous_eval(d, c, end, w, tau, mu)
+            return lawful_eval(d, laws, c, end, w, tau, mu)
     meet = wrap_eval(d.profiles[wrap], laws, cable.law[end], d.heights[wrap], w, v, tau, mu)
     set_pending(step, meet)
     slope = meet.slope

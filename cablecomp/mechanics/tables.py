@@ -1,12 +1,12 @@
 """Changes of variable that keep the cone law exact: friction by tension, friction by place, stiffness by tension.
 
-`laws[law]` is a table of 6 rows: the head, whose places have names below, and five curves.
+`laws[law]` is a table of 7 rows: the head, whose places have names below, and six curves.
 Mode PLAIN is the plain cable: v = ln tau, e = tau - 1, groove coordinate y. `laws` is None for the plain drive without
 any change: the compiler then leaves out all code that a plain drive does not need. Mode STIFF is the plain friction of
 PLAIN with the stiffening law of the head. In mode TABLED row U_OF_V holds u = ln tau on an even grid of
 v = int du/m(e^u), row G_OF_Y the groove coordinate g(y) = int m_g dy on an even grid of y, row V_OF_U v on an even grid
 of u; e(tau) follows from u by the stiffening law in the head. Where friction goes by tension, row E_OF_V holds e and
-row AREA_OF_V its integral on the grid of v.
+row AREA_OF_V its integral on the grid of v, and row PULL_OF_ROOT tau m(tau) on an even grid of sqrt(tau).
 Here m(tau) = mu/mu0 as it depends on tension, m_g(y) = mu/mu0 as it depends on the place in the groove.
 """
 
@@ -29,14 +29,16 @@ LEAST_STIFFNESS = 0.05  # share of EA below which a cable does not soften furthe
 KNEE_HALF = 0.25  # half the tension over which a knee rises, over that amid it
 LN_TAU: Floats = np.linspace(-7.0, 2.5, SIZE)
 TAU: Floats = np.exp(LN_TAU)
+ROOT: Floats = np.linspace(0.0, math.sqrt(TAU[-1]), SIZE)
+ROOT_PER = (SIZE - 1) / math.sqrt(TAU[-1])
 ABOUT_T0 = slice(int(np.searchsorted(LN_TAU, 0.0)) - 1, int(np.searchsorted(LN_TAU, 0.0)) + 1)
 PLAIN, TABLED, STIFF = 0.0, 1.0, 2.0  # modes
 THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 # laws: of all places but those with a groove of their own, of the joint's own drum in chain h and l, of the motor's
 ELSEWHERE, ON_H, ON_L, IN_H, IN_L = (constant(k) for k in range(5))
 # rows
-HEAD, U_OF_V, G_OF_Y, V_OF_U, E_OF_V, AREA_OF_V = (constant(k) for k in range(6))
-ROWS = 6
+HEAD, U_OF_V, G_OF_Y, V_OF_U, E_OF_V, AREA_OF_V, PULL_OF_ROOT = (constant(k) for k in range(7))
+ROWS = 7
 (
     MODE,
     V_LOW, V_PER,  # grids: their first value, and how many there are per unit
@@ -103,6 +105,7 @@ def law_table(
         head[BY_TENSION] = 1.0
         head[V_LOW], head[V_PER] = v[0], 1.0 / (v_grid[1] - v_grid[0])
         head[U_LOW], head[U_PER] = LN_TAU[0], 1.0 / (LN_TAU[1] - LN_TAU[0])
+        table[PULL_OF_ROOT] = ROOT * ROOT * tension_factor(np.maximum(ROOT * ROOT, TAU[0]))
     by_place = None if groove_factor is None else groove_factor(np.linspace(0.0, wrap_max_rad, SIZE))
     if by_place is not None and np.any(by_place != 1.0):
         step = wrap_max_rad / (SIZE - 1)
@@ -247,6 +250,16 @@ def tau_of_v(laws: Floats, law: int, v: float) -> float:
     if laws[law, HEAD, BY_TENSION] == 0.0:
         return math.exp(v)
     return math.exp(look_up(laws, law, U_OF_V, laws[law, HEAD, V_LOW], laws[law, HEAD, V_PER], v))
+
+
+@inner_kernel
+def friction_of_tau(laws: Floats, law: int, tau: float) -> tuple[float, float]:
+    """tau m(tau), what friction takes per radian over mu0 T0, and its derivative; tau itself where m = 1."""
+    if laws[law, HEAD, BY_TENSION] == 0.0:
+        return tau, 1.0
+    root = math.sqrt(tau)
+    value, slope = look_up_slope(laws, law, PULL_OF_ROOT, 0.0, ROOT_PER, root)
+    return value, 0.5 * slope / root
 
 
 @leaf_kernel

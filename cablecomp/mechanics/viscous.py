@@ -3,7 +3,7 @@
 The stretch then diffuses through the sliding zone: with displacement rate v(y), conservation gives
 (R/EA) dT/dt = dv/dy and the slip law c v = shrink(dT/dy, mu T). Solved implicitly on a grid fixed to the drum
 by Newton's method on a tridiagonal system; only the part that can move is solved. c = 0 is the plain law (other
-code: `profile.py`).
+code: `profile.py`). Friction by tension or place and a strain law: `viscous_laws.py`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from cablecomp.mechanics.drive import Drive
-from cablecomp.mechanics.jit import inner_kernel
+from cablecomp.mechanics.jit import inlined_kernel, inner_kernel
 from cablecomp.mechanics.profile import Floats, Wound, copy_floats
 from cablecomp.mechanics.records import WET_NODES
 
@@ -26,7 +26,7 @@ LEAST_SHARE = 1e-9  # of the coefficient, on a drum that has none
 def viscous_fill(grid: Any, w: float, reach: float) -> None:
     """Start a wrap, a record `GRID`, at uniform tension T0 with wrap angle w; the grid covers `reach` [rad]."""
     grid.step = reach / (WET_NODES - 1)
-    grid.count = _free_nodes(w, grid.step)
+    grid.count = free_nodes(w, grid.step)
     grid.angle = w
     grid.end = 1.0
     grid.time_try = -1e300
@@ -37,7 +37,7 @@ def viscous_fill(grid: Any, w: float, reach: float) -> None:
 
 
 @inner_kernel
-def _free_nodes(w: float, h: float) -> int:
+def free_nodes(w: float, h: float) -> int:
     """Number of grid nodes well inside the wrap; the departure point itself is one node more."""
     return min(max(int((w - 0.3 * h) / h) + 1, 1), WET_NODES)
 
@@ -57,31 +57,46 @@ class Slide(NamedTuple):
     rate: float  # rad^2 that stretch diffuses in this step
 
 
-@inner_kernel
-def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> Wound:
-    """The cable on a drum at wrap angle w and end tension T/T0 = tau; kept as pending."""
-    cable, state, context, grid = d.cables[c], d.states[c], d.context, d.grids[2 * c + end]
-    old, new = grid.tau, grid.tau_try
-    h = grid.step
-    count = _free_nodes(w, h)
-    before = int(grid.count)
-    y_last = (before - 1) * h
+@inlined_kernel
+def diffusion(d: Drive, c: int, end: int) -> float:
+    """What stretch diffuses by on a drum in this step [rad^2]: dt EA/(R c)."""
+    cable, state, context = d.cables[c], d.states[c], d.context
+    h = d.grids[2 * c + end].step
     dt = 1e9 if context.first else context.dt
     viscous = max(cable.viscous_on[end], LEAST_SHARE) * cable.viscous
     rate = dt * cable.EA * state.stiffness / (cable.radius[end] * viscous)
-    rate = min(rate, STIFFEST * h * h)
-    # a further evaluation within the same step starts from the last one's answer
-    again = grid.time_try == context.time and int(grid.count_try) == count
-    alike = again and abs(grid.rate_try) == rate and count - before <= 1
-    sure = grid.rate_try > 0.0
-    grid.time_try = context.time
-    for j in range(before, count):  # cable that arrived since: linear in between
+    return min(rate, STIFFEST * h * h)
+
+
+@inlined_kernel
+def arrive(grid: Any, count: int, w: float, tau: float) -> None:
+    """Give the nodes whose cable has arrived since the last step its tension: linear in between."""
+    old, h, before = grid.tau, grid.step, int(grid.count)
+    y_last = (before - 1) * h
+    for j in range(before, count):
         y = j * h
         w_old, t_old = grid.angle, grid.end
         if y <= w_old:
             old[j] = old[before - 1] + (y - y_last) / (w_old - y_last) * (t_old - old[before - 1])
         else:
             old[j] = t_old + (y - w_old) / (w - w_old) * (tau - t_old)
+
+
+@inner_kernel
+def viscous_eval(d: Drive, c: int, end: int, w: float, tau: float, mu: float) -> Wound:
+    """The cable on a drum at wrap angle w and end tension T/T0 = tau; kept as pending."""
+    context, grid = d.context, d.grids[2 * c + end]
+    old, new = grid.tau, grid.tau_try
+    h = grid.step
+    count = free_nodes(w, h)
+    before = int(grid.count)
+    rate = diffusion(d, c, end)
+    # a further evaluation within the same step starts from the last one's answer
+    again = grid.time_try == context.time and int(grid.count_try) == count
+    alike = again and abs(grid.rate_try) == rate and count - before <= 1
+    sure = grid.rate_try > 0.0
+    grid.time_try = context.time
+    arrive(grid, count, w, tau)
     last = (count - 1) * h
     slide = Slide(old, new, grid.upper, grid.right, count, h, w - last, tau, mu, rate)
     moved, first = Moved(False, 0.0, 0.0), 0
@@ -124,7 +139,7 @@ def _follow(s: Slide, first: int) -> Moved:
     if first > last:  # nothing moved
         at_end = _side(s.new[last], s.tau, per_gap, s.mu)
         return Moved(at_end == 0 and s.new[last] == s.old[last], 0.5 * s.gap, 0.0)
-    share = _share(s, last)
+    share = share_of(s, last)
     outer = _face(s.new[last], s.tau, per_gap, s.mu)
     inner = Face(0.0, 0.0, 0.0)
     own = 1.0 - share * outer.by_a
@@ -210,7 +225,7 @@ def _outward(s: Slide, j: int, per_h: float, per_gap: float) -> Face:
 
 
 @inner_kernel
-def _share(s: Slide, j: int) -> float:
+def share_of(s: Slide, j: int) -> float:
     """What the slip's difference over node j changes there: diffusion in this step over the length it stands for."""
     if j < s.nodes - 1:
         return s.rate / (0.5 * s.h if j == 0 else s.h)
@@ -227,7 +242,7 @@ def _newton(s: Slide, first: int) -> Moved:
         inner = _face(s.new[first - 1], s.new[first], per_h, s.mu)
     for j in range(first, s.nodes):
         outer = _outward(s, j, per_h, per_gap)
-        share = inside if 0 < j < s.nodes - 1 else _share(s, j)
+        share = inside if 0 < j < s.nodes - 1 else share_of(s, j)
         own = 1.0 - share * (outer.by_a - inner.by_b)
         target = share * (outer.slip - inner.slip) - (s.new[j] - s.old[j])
         if j > first:
@@ -277,7 +292,7 @@ def _unbalanced(s: Slide, first: int) -> float:
     largest = 0.0
     for j in range(first, s.nodes):
         outer = _outward(s, j, per_h, per_gap).slip
-        share = inside if 0 < j < s.nodes - 1 else _share(s, j)
+        share = inside if 0 < j < s.nodes - 1 else share_of(s, j)
         own = 1.0 + share * (per_h + (per_gap if j == s.nodes - 1 else per_h))
         largest = max(largest, abs(s.new[j] - s.old[j] - share * (outer - inner)) / own)
         inner = outer
@@ -299,7 +314,7 @@ def _widen(grid: Any) -> None:
     per_old, last = 1.0 / grid.step, int(grid.count) - 1
     y_last = last * grid.step
     grid.step = (grid.angle + VISCOUS_TRAVEL) / (WET_NODES - 1)
-    grid.count = _free_nodes(grid.angle, grid.step)
+    grid.count = free_nodes(grid.angle, grid.step)
     grid.time_try = -1e300  # what is pending is of the old nodes
     for j in range(int(grid.count)):
         y = j * grid.step

@@ -101,6 +101,21 @@ def test_no_row_jumps_where_slip_is_viscous(coefficient: float) -> None:
     assert max(jump(wet, course(config, seed)) for seed in range(8)) < JUMP
 
 
+@pytest.mark.parametrize("coefficient", [3.0, 1000.0])
+@pytest.mark.parametrize("rig", ["snow-closed-rig", *OPEN])
+def test_no_row_jumps_where_slip_is_viscous_and_goes_by_tension_and_place(
+    rig: str, coefficient: float
+) -> None:
+    config = joint(rig, breaking_force_N=None)
+    laws = (
+        ("pressure_dependent_friction", {"exponent": 0.3, "lost": 0.6, "place": 0.8}),
+        ("position_dependent_friction", {"amplitude": -0.6, "order": 4.0, "input_amplitude": 0.5}),
+        ("nonlinear_cable", {"stiffening": 0.4}),
+    )
+    wet = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": coefficient}), *laws))
+    assert jump(wet, course(config, 1, 600)) < JUMP
+
+
 @pytest.mark.parametrize("delay", [-0.03, 0.004, 0.03])
 def test_no_row_jumps_where_speeds_are_read_in_steps(delay: float) -> None:
     """Of a speed that is read in steps the last digit says whether it bends evenly."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -26,14 +26,25 @@ class Balance(NamedTuple):
     same_nodes: bool
 
 
-def slip(inward: np.ndarray, outward: np.ndarray, apart: np.ndarray, mu: float) -> np.ndarray:
+class Laws(NamedTuple):
+    """What friction and strain go by beside mu T and T/EA."""
+
+    pressed: Callable[[np.ndarray], np.ndarray] = np.ones_like  # mu over mu0, by T/T0
+    rough: Callable[[int, np.ndarray], np.ndarray] = lambda _, y: y  # by wrap: its integral over the groove
+    strain: Callable[[np.ndarray], np.ndarray] = lambda tau: tau - 1.0
+
+
+PLAIN = Laws()
+
+
+def slip(inward: np.ndarray, outward: np.ndarray, apart: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """c v over T0 between neighbours: what of the slope is beyond mu T."""
     steep = (outward - inward) / apart
     return np.sign(steep) * np.maximum(np.abs(steep) - mu * 0.5 * (inward + outward), 0.0)
 
 
 def imbalances(
-    config: JointConfig, course: Iterable[tuple[float, float]], step_s: float
+    config: JointConfig, course: Iterable[tuple[float, float]], step_s: float, laws: Laws = PLAIN
 ) -> Iterator[Balance]:
     """A drum after a step of the course (motor angle [rad], load [N m]), by its profile before and after."""
     stage = config.drive.stage[-1]
@@ -56,7 +67,10 @@ def imbalances(
             h, gap = float(grid["step"]), float(grid["angle"]) - (now - 1) * float(grid["step"])
             new = grid["tau"][:now]
             apart = np.append(np.full(now - 1, h), gap)
-            flow = slip(new, np.append(new[1:], grid["end"]), apart, mu)
+            places = np.append(h * np.arange(now), grid["angle"])
+            outward = np.append(new[1:], grid["end"])
+            hold = mu * np.diff(laws.rough(wrap, places)) / apart * laws.pressed(0.5 * (new + outward))
+            flow = slip(new, outward, apart, hold)
             length = np.full(now, h)
             length[0] -= 0.5 * h
             length[-1] += 0.5 * (gap - h)
@@ -65,7 +79,7 @@ def imbalances(
             gained = rate / length * np.diff(flow, prepend=0.0)
             stiff = 1.0 + 2.0 * rate / (h * min(h, gap))
             known = min(count, now)  # cable that has just arrived was nowhere before
-            off = np.max(np.abs(new[:known] - old[:known] - gained[:known]))
+            off = np.max(np.abs(laws.strain(new[:known]) - laws.strain(old[:known]) - gained[:known]))
             yield Balance(float(off) / (now * stiff), bool(np.any(flow != 0.0)), count == now)
 
 
@@ -92,3 +106,48 @@ def test_a_face_that_only_rounding_has_slip_does_not_go_on_slipping_from_a_node_
     found = list(imbalances(config, course, 0.04))
     assert max(b.off for b in found) <= 2e-13
     assert sum(b.moved for b in found) > 1000
+
+
+PRESSED = ("pressure_dependent_friction", {"exponent": 0.6, "lost": 0.4, "place": 0.9})
+ROUGH = (
+    "position_dependent_friction",
+    {"amplitude": 0.6, "phase_rad": 0.3, "order": 3.0, "input_amplitude": -0.5},
+)
+STIFFENS = ("nonlinear_cable", {"stiffening": 0.4, "steady": 0.2})
+
+
+def pressed(tau: np.ndarray) -> np.ndarray:
+    return np.asarray(tau**-0.6 * (1.0 - 0.4 / (1.0 + (0.9 / tau) ** 10)))
+
+
+def rough(wrap: int, y: np.ndarray) -> np.ndarray:
+    """Integrals of 1 + a cos(k q - phi) over a groove of a wrap of 10 rad at q = 0 (12 rad on the motor's drum)."""
+    sign = 1.0 if wrap < 2 else -1.0
+    if wrap % 2 == OUT:
+        return np.asarray(y + 0.6 / 3.0 * sign * np.sin(3.0 * sign * (y - 10.0) - 0.3))
+    return np.asarray(y - 0.5 * np.sin(y - 12.0))
+
+
+def strain(tau: np.ndarray) -> np.ndarray:
+    return np.asarray(0.2 * (tau - 1.0) + 0.8 / 0.4 * np.log1p(0.4 * (tau - 1.0)))
+
+
+@pytest.mark.parametrize("coefficient", [0.5, 50.0, 5_000.0])
+@pytest.mark.parametrize(
+    ("effects", "laws", "rel"),
+    [
+        ((PRESSED,), Laws(pressed=pressed), 1e-12),
+        ((ROUGH,), Laws(rough=rough), 1e-9),  # tables of the groove
+        ((STIFFENS,), Laws(strain=strain), 2e-13),
+        ((PRESSED, ROUGH, STIFFENS), Laws(pressed, rough, strain), 1e-9),
+    ],
+)
+def test_what_slides_balances_under_every_law_of_friction_and_strain(
+    effects: tuple[tuple[str, dict[str, float]], ...], laws: Laws, rel: float, coefficient: float
+) -> None:
+    config = with_effects(joint(), (("viscous_slip", {"coefficient_Ns_per_m_rad": coefficient}), *effects))
+    peak = 0.6 * pull_unit(config)
+    loads = peak * np.interp(np.arange(200), [0, 30, 31, 100, 115, 199], [0, 1, -0.3, 0.9, 0.9, -0.8])
+    found = list(imbalances(config, ((0.0, load) for load in loads.tolist()), STEP_S, laws))
+    assert max(b.off for b in found) <= rel
+    assert sum(b.moved for b in found) > 100

@@ -39,3 +39,40 @@ def test_hardly_any_viscosity_is_none_on_a_drum_that_winds_on_turn_after_turn() 
     viscous = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": 1e-3}),))
     found = run(Observer(viscous), load, motor)["deflection_rad"]
     assert np.max(np.abs(found - plain)) < 1e-3 * np.ptp(plain)
+
+
+PRESSED = ("pressure_dependent_friction", {"exponent": 0.1, "lost": 0.6, "place": 0.9})
+ROUGH = (
+    "position_dependent_friction",
+    {"amplitude": 0.6, "phase_rad": 0.3, "order": 3.0, "input_amplitude": 0.4},
+)
+STIFFENS = ("nonlinear_cable", {"stiffening": 0.4, "knee": 1.1})
+
+
+@pytest.mark.parametrize("circuit", ["open", "closed"])
+@pytest.mark.parametrize("laws", [(PRESSED,), (ROUGH,), (STIFFENS,), (PRESSED, ROUGH, STIFFENS)])
+def test_hardly_any_viscosity_is_none_under_every_law(
+    laws: tuple[tuple[str, dict[str, float]], ...], circuit: str
+) -> None:
+    config = joint(circuit)
+    at = np.arange(400)
+    load = (0.5 if circuit == "open" else 0.9) * pull_unit(config)
+    load = load * np.interp(at, np.linspace(0, 400, 8), [0, 1, -0.5, 0.9, 0.2, 1, -1, 0.5])
+    motor = np.interp(at, np.linspace(0, 400, 6), [0.0, 0.5, -0.5, 0.8, 0.8, 0.0])
+    plain = run(Observer(with_effects(config, laws)), load, motor)["deflection_rad"]
+    viscous = with_effects(config, (("viscous_slip", {"coefficient_Ns_per_m_rad": 1e-3}), *laws))
+    found = run(Observer(viscous), load, motor)["deflection_rad"]
+    assert np.max(np.abs(found - plain)) < 1e-3 * np.ptp(plain)
+
+
+def test_friction_that_hardly_goes_by_tension_slips_as_that_which_does_not() -> None:
+    config = joint()
+    at = np.arange(400)
+    load = 0.9 * pull_unit(config) * np.interp(at, np.linspace(0, 400, 5), [0.0, 1.0, -0.5, 0.9, -1.0])
+    wet = ("viscous_slip", {"coefficient_Ns_per_m_rad": 5e3})
+    hardly = ("pressure_dependent_friction", {"exponent": 1e-9})
+    plain, found = (
+        run(Observer(with_effects(config, laws)), load, 0.5 * np.sin(0.02 * at))["deflection_rad"]
+        for laws in ((wet,), (wet, hardly))
+    )
+    assert np.max(np.abs(found - plain)) < 1e-8 * np.ptp(plain)
