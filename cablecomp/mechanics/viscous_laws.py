@@ -27,6 +27,7 @@ from cablecomp.mechanics.tables import (
 from cablecomp.mechanics.viscous import EVEN, Slide, arrive, diffusion, free_nodes, share_of
 
 TURNS = 9  # steps of Newton's method after which it may be going round in a circle,
+UNEVEN = 5  # steps then, of which each goes less far than the one before,
 PATIENCE = 30  # and after which less will do, as far as a stiff step's own digits go
 ROUNDED = 3e-16  # of the tension: what rounding leaves of a difference between nodes
 OVER = 1e-2  # of that, by which what is held to slip may lie beyond the limit of friction
@@ -59,8 +60,8 @@ def lawful_eval(d: Drive, laws: Floats, c: int, end: int, w: float, tau: float, 
             break
         # by conservation all of the stretch comes in at the departure point
         slope = s.rate * (weighed.by_tau - weighed.by_last * grid.upper[last])
-        # faces that begin and cease to slip in turn, on and on, are met half-way
-        _substitute(s, weighed.first, 0.5 if k >= TURNS and k % 3 == 0 else 1.0)
+        # faces that begin and cease to slip in turn, on and on, are met part of the way
+        _substitute(s, weighed.first, 1.0 / (1 + k % UNEVEN) if k >= TURNS else 1.0)
         enough = EVEN if k < PATIENCE else even
         if weighed.off <= enough and weighed.over <= OVER * enough:
             break
