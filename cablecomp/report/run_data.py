@@ -56,13 +56,20 @@ class RunData:
         return np.asarray(np.where(self.cycles["controlled"] > 0.0, asked, np.nan), dtype=np.float64)
 
     @property
+    def is_measured(self) -> bool:
+        """Whether a joint encoder was read."""
+        return bool(np.any(np.isfinite(self.prediction["residual_rad"])))
+
+    @property
     def joint_rad(self) -> Floats:
-        """Where the joint encoder says that the joint is, its offset taken off."""
+        """Where the joint encoder says that the joint is, its offset taken off; of a joint without one where it is
+        predicted."""
         p = self.prediction
-        return np.asarray(p["joint_position_rad"] + p["residual_rad"], dtype=np.float64)
+        off = p["residual_rad"] if self.is_measured else 0.0
+        return np.asarray(p["joint_position_rad"] + off, dtype=np.float64)
 
     def error_rad(self) -> Floats:
-        """Joint encoder less what was asked for."""
+        """Joint position, as measured or predicted, less what was asked for."""
         return self.joint_rad - self.asked_rad
 
 

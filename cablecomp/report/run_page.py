@@ -58,11 +58,11 @@ def run_facts(joint: JointResult) -> list[Fact]:
 
 
 def position_figure(data: RunData) -> Any:
-    """Asked and measured joint position, error, load, over time."""
+    """Asked and measured joint position (predicted, where no encoder is read), error, load, over time."""
     fig = stack([0.45, 0.3, 0.25], 640)
-    time = data.time_s
+    time, name = data.time_s, "measured" if data.is_measured else "predicted"
     curve(fig, time, 1e3 * data.asked_rad, "asked", style.BASELINE, 1, 3.0)
-    curve(fig, time, 1e3 * data.joint_rad, "measured", style.PREDICTED, 1)
+    curve(fig, time, 1e3 * data.joint_rad, name, style.PREDICTED, 1)
     curve(fig, time, 1e3 * data.error_rad(), "error", style.RESIDUAL, 2)
     curve(fig, time, data.column("joint_torque_Nm"), "load", style.LOAD, 3)
     style.axes(fig, "", style.label("joint position", "mrad"), row=1, col=1)

@@ -71,6 +71,16 @@ def test_what_the_joint_encoder_reads_too_much_is_no_error_of_position() -> None
     assert curves["measured"] - curves["asked"] == pytest.approx(curves["error"], abs=1e-4)
 
 
+def test_a_joint_without_an_encoder_is_shown_where_it_is_predicted() -> None:
+    time, on = np.arange(0.0, 1.0, 0.01), np.ones(100)
+    prediction = {"joint_position_rad": 0.301 * on, "residual_rad": np.nan * on}
+    cycles = {"controlled": on, "reference_position_rad": 0.3 * on}
+    data = RunData({"time_s": time, "joint_torque_Nm": 0.0 * on}, prediction, cycles)
+    curves = {c.name: c.y for c in position_figure(data).data}
+    assert curves["predicted"] == pytest.approx(301.0 * on)
+    assert curves["error"] == pytest.approx(on, abs=1e-3)
+
+
 def test_force_mode_is_shown_by_its_torque_and_encoders_that_tell_the_load_by_no_residual() -> None:
     joint = JointResult("arm", 100, nan, nan, 0.02, 0.03, nan, 9e-3, {"normal": 100})
     names = [fact.label for fact in run_facts(joint)]
