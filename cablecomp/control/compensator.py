@@ -15,6 +15,7 @@ from cablecomp.config import JointConfig
 from cablecomp.control.command import FULL, Command, Feed, Reference
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
 from cablecomp.control.shaping import BumplessTransfer, LeadFilter, Slope
+from cablecomp.control.torque_sensor import TorqueSensor
 from cablecomp.errors import InputError
 from cablecomp.signals import NAN, Estimate, Sample
 
@@ -103,8 +104,8 @@ class Compensator:
         self.preload_Nm = config.drive.preload_Nm
         self.motor_zero_Nm = config.motor_zero_Nm
         self.joint_zero_rad = config.sensors.joint_position_offset_rad
-        self.load_gain = config.sensors.joint_torque_gain
-        self.load_zero_Nm = config.sensors.joint_torque_offset_Nm
+        sensors = config.sensors
+        self.sensor = TorqueSensor(sensors.joint_torque_gain, sensors.joint_torque_offset_Nm)
         self.period_s = period_s
         self.active = options.feed_forward is not FeedForward.NONE
         self.load = LeadFilter(self.gains.load_filter_Hz, self.gains.load_lead_s, period_s)
@@ -164,12 +165,9 @@ class Compensator:
         """
         self.observed = False
         r = reference
-        if self._asks_for_motion and not isfinite(
-            r.joint_position_rad + r.joint_velocity_rad_s + r.joint_acceleration_rad_s2
-        ):
-            raise InputError(
-                f"reference: finite position, velocity and acceleration are accepted, not {reference}"
-            )
+        motion = r.joint_position_rad + r.joint_velocity_rad_s + r.joint_acceleration_rad_s2
+        if self._asks_for_motion and not isfinite(motion):
+            raise InputError(f"reference: finite position, velocity and acceleration are accepted, not {r}")
         if self._goes_to_position:
             return self._position(sample, reference, feed, joint_ok)
         before = self.estimate
@@ -195,7 +193,7 @@ class Compensator:
             self._joint_feedback(now.joint_position_rad - (sample.joint_position_rad - self.joint_zero_rad))
         wanted = (reference.joint_position_rad - used + self.joint_trim_rad) / n
         velocity = (reference.joint_velocity_rad_s - self.deflection_slope.step(used)) / n
-        torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, self.true_load(load))
+        torque = self._torque(velocity, reference.joint_acceleration_rad_s2 / n, self.sensor.load(load))
         return self._command(sample, reference, wanted, velocity, torque, used, estimate)
 
     def _observe(self, sample: Sample, reference: Reference, feed: Feed) -> tuple[float, float]:
@@ -230,18 +228,18 @@ class Compensator:
         observer's."""
         stated = reference.joint_torque_Nm
         if not self._from_sensor:
-            return self._reading(stated if isfinite(stated) else 0.0)
+            return self.sensor.reading(stated if isfinite(stated) else 0.0)
         if self.options.load == "sensor" or not isfinite(stated):
             return self.load.step(measured_Nm)
         before = self._reference
         expected_now = stated if before is None else before.joint_torque_Nm
         if not isfinite(expected_now):
             expected_now = stated
-        return self._reading(stated) + self.load.step(measured_Nm - self._reading(expected_now))
+        return self.sensor.reading(stated) + self.load.step(measured_Nm - self.sensor.reading(expected_now))
 
     def _deflection(self, sample: Sample, reference: Reference, load: float) -> float:
         if self._linear is not None and self.options.feed_forward is FeedForward.LINEAR:
-            return self.true_load(load) / self._linear
+            return self.sensor.load(load) / self._linear
         period = self.period_s
         motor = sample.motor_position_rad + self._velocity * period
         return self.observer.peek_deflection(sample.time_s + period, motor, load)
@@ -260,7 +258,7 @@ class Compensator:
             return self.observer.step_inverse(sample)
         if source == "motor_torque":
             load_Nm = -(sample.motor_torque_Nm - self.motor_zero_Nm) / self.ratio
-            sample = sample._replace(joint_torque_Nm=self._reading(load_Nm))
+            sample = sample._replace(joint_torque_Nm=self.sensor.reading(load_Nm))
         return self.observer.step(sample)
 
     def _force(self, sample: Sample, reference: Reference, feed: Feed, estimate: Estimate) -> Command:
@@ -271,8 +269,8 @@ class Compensator:
         wanted_Nm = self._wanted_torque(reference, joint, joint_velocity)
         if not feed.held:
             if self.active:  # else nothing of it would reach the motor
-                self._force_feedback(wanted_Nm - self.true_load(estimate.joint_torque_Nm))
-            asked = self._reading(wanted_Nm + self.force_trim_Nm)
+                self._force_feedback(wanted_Nm - self.sensor.load(estimate.joint_torque_Nm))
+            asked = self.sensor.reading(wanted_Nm + self.force_trim_Nm)
             self.deflection_used_rad = self._deflection(sample, reference, asked)
         used = feed.weight * self.deflection_used_rad if self.active else 0.0
         if self._switch:
@@ -297,14 +295,6 @@ class Compensator:
             self.force_trim_Nm = min(max(trim, -limit), limit)
 
     # ---- common ----------------------------------------------------------------------------------
-
-    def true_load(self, reading_Nm: float) -> float:
-        """The load behind a torque sensor's reading, as samples and estimates hold it."""
-        return (reading_Nm - self.load_zero_Nm) / self.load_gain
-
-    def _reading(self, load_Nm: float) -> float:
-        """What a torque sensor reads under a load."""
-        return self.load_gain * load_Nm + self.load_zero_Nm
 
     def _torque(self, velocity: float, acceleration: float, load: float) -> float:
         m = self._motor

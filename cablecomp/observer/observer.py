@@ -335,20 +335,8 @@ class Observer:
         rigid = self._ratio * float(sample.motor_position_rad)
         shift = joint - drive - rigid
         # made without Python's own call of its class, which took a third longer
-        return tuple.__new__(
-            Estimate,
-            (
-                sample.time_s,
-                joint - rigid,
-                low + shift,
-                high + shift,
-                joint,
-                load,
-                tension_h,
-                tension_l,
-                motor_torque,
-            ),
-        )
+        angles = (joint - rigid, low + shift, high + shift, joint)
+        return tuple.__new__(Estimate, (sample.time_s, *angles, load, tension_h, tension_l, motor_torque))
 
 
 def _restored(config: JointConfig, bounds: bool, snapshot: bytes) -> Observer:

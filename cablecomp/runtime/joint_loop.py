@@ -254,7 +254,7 @@ class JointLoop:
         sample = checked.sample
         self.tally.phases[self.degraded.phase] += 1
         if since_s is not None and not self._refused:
-            torque = self.setup.compensator.true_load(estimate.joint_torque_Nm)
+            torque = self.setup.compensator.sensor.load(estimate.joint_torque_Nm)
             self.tally.add(self._last_reference, sample.joint_position_rad - self._offset, torque, estimate)
         if self._folder is not None and self.setup.compensator.observed:
             self._record(self._folder, estimate, checked, since_s is not None)
