@@ -22,9 +22,14 @@ CONFIG = Path(__file__).parents[2] / "configs" / "joints" / "snow-closed-rig.tom
 SAMPLES = 20_000
 
 
+BESIDE_VISCOUS_SLIP = ("nonlinear_cable", "position_dependent_friction", "pressure_dependent_friction")
+
+
 def richer(name: str) -> JointConfig:
+    """The joint with an effect, or with several ("+" between)."""
     config = load_joint(CONFIG)
-    return config if name == "plain" else with_effects(config, [(name, sizeable(name, config))])
+    names = [] if name == "plain" else name.split("+")
+    return with_effects(config, [(n, sizeable(n, config)) for n in names])
 
 
 def sizeable(name: str, config: JointConfig) -> dict[str, Any]:
@@ -44,7 +49,9 @@ def sizeable(name: str, config: JointConfig) -> dict[str, Any]:
 
 
 @pytest.mark.benchmark(group="replay of 20 000 samples, both pulleys turning")
-@pytest.mark.parametrize("name", ["plain", *sorted(catalogue())])
+@pytest.mark.parametrize(
+    "name", ["plain", *sorted(catalogue()), *(f"viscous_slip+{n}" for n in BESIDE_VISCOUS_SLIP)]
+)
 def test_replay(benchmark: Any, name: str) -> None:
     config = richer(name)
     time = 1e-3 * np.arange(SAMPLES)
