@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 import os
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from threading import Thread
 from time import sleep
+
+
+def parsed(parser: ArgumentParser, given: Sequence[str] | None) -> Namespace:
+    """The arguments of a command that may be told by which process it was started, with which it ends then."""
+    parser.add_argument("--starter", type=int, help="number of the process with which this one ends")
+    found = parser.parse_args(given)
+    if found.starter is not None:
+        end_with(found.starter)
+    return found
 
 
 def end_with(starter: int) -> None:

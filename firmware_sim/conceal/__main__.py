@@ -18,7 +18,7 @@ import numpy as np
 from firmware_sim.conceal.physics import Table
 from firmware_sim.conceal.plan import Trial, trials_of, usable
 from firmware_sim.errors import SimError
-from firmware_sim.starter import end_with
+from firmware_sim.starter import parsed
 from firmware_sim.trials.seal import SEALED, TRUTH, digest, truth_text, write_seal
 
 JOINT_FILE = "joint.toml"
@@ -67,10 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--physics", default="", help="these alone, by their ids, with commas between")
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--starter", type=int, help="number of the process with which this one ends")
-    a = parser.parse_args(arguments)
-    if a.starter is not None:
-        end_with(a.starter)
+    a = parsed(parser, arguments)
     only = [name.strip() for name in a.physics.split(",") if name.strip()]
     try:
         print(f"sha256 {conceal(a.pieces, a.seed, a.out, only)}", flush=True)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from firmware_sim.plant import PlantError
-from firmware_sim.starter import end_with
+from firmware_sim.starter import parsed
 from firmware_sim.trials.experiment import run_experiment
 from firmware_sim.trials.generate import generate
 from firmware_sim.trials.order import IMPERFECTIONS, KINDS, LAWS, Wanted
@@ -38,10 +38,7 @@ def _trials(given: Sequence[str]) -> int:
     parser.add_argument("--laws", default="mixed", help=", ".join(LAWS))
     parser.add_argument("--imperfections", default="some", help=", ".join(IMPERFECTIONS))
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--starter", type=int, help="number of the process with which this one ends")
-    a = parser.parse_args(given)
-    if a.starter is not None:
-        end_with(a.starter)
+    a = parsed(parser, given)
 
     def tell(done: int, total: int) -> None:
         print(f"written {done} of {total}", flush=True)
@@ -57,10 +54,7 @@ def _experiment(given: Sequence[str]) -> int:
     parser.add_argument("--protocol", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--starter", type=int, help="number of the process with which this one ends")
-    a = parser.parse_args(given)
-    if a.starter is not None:
-        end_with(a.starter)
+    a = parsed(parser, given)
     print(run_experiment(a.sealed, a.protocol, a.out, a.seed))
     return 0
 
