@@ -12,12 +12,13 @@ from typing import Final
 from cablecomp.config import JointConfig
 from cablecomp.control.plays import Plays
 from cablecomp.errors import InputError
+from cablecomp.export.equivalent import loads
 from cablecomp.recording.atomic import atomic_directory
 
 _C: Final = Template("""\
 /* Load and deflection of the joint $name: $count play operators (Prandtl-Ishlinskii) fitted to its observer.
  * deflection = a M + b M^2 + sum w_i z_i,  z_i <- min(max(z_i, M - r_i), M + r_i),  q_out = ratio q_in + deflection.
- * Fit: $rms rad RMS on loops $most. Left out:
+ * Fit: $rms rad RMS on loops from $loads. Left out:
 $lost
  * C99, no library but <math.h>'s fmin and fmax, no allocation; all state is the caller's. SI units. */
 #include <math.h>
@@ -48,7 +49,7 @@ double ${prefix}_step(${prefix}_state *s, double motor, double load) {
 """)
 
 _SLAVE: Final = Template('''\
-"""$name: joint angle from motor angle and load. $rms rad RMS on loops $most. Left out:
+"""$name: joint angle from motor angle and load. $rms rad RMS on loops from $loads. Left out:
 $lost"""
 
 from $package import Fmi${version}Causality, Fmi${version}Slave, $real
@@ -133,9 +134,7 @@ def _words(config: JointConfig, found: Plays) -> dict[str, str]:
         "name": identifier(config.name),  # what ends a comment or a string cannot stand in one
         "count": str(len(found.radii_Nm)),
         "rms": f"{found.rms_rad:.3g}",
-        "most": f"from 0 to {found.most_Nm:.4g} Nm"
-        if config.drive.circuit == "open"
-        else f"up to {found.most_Nm:.4g} Nm either way",
+        "loads": loads(config, found.most_Nm),
         "ratio": repr(float(config.drive.ratio)),
         "linear": _numbers(found.weights[:2]),
         "weights": _numbers(found.weights[2:]),

@@ -34,7 +34,7 @@ class Equivalent(NamedTuple):
         """What these numbers leave out, one line each."""
         effects = ", ".join(effect.id for effect in config.effect)
         return (
-            f"of the loop at {loads(config, self.most_Nm)} the equivalent leaves {1e3 * self.rms_rad:.3g} mrad RMS of "
+            f"of the loop, {loads(config, self.most_Nm)}, the equivalent leaves {1e3 * self.rms_rad:.3g} mrad RMS of "
             f"{1e3 * self.reach_rad:.3g} mrad",
             "smaller loads: their loops are narrower than those of one dry "
             "friction; the drive is stiffer at each reversal",
@@ -49,8 +49,8 @@ class Equivalent(NamedTuple):
 
 
 def loads(config: JointConfig, most_Nm: float) -> str:
-    """The loads of a joint's loop in words: an open circuit's cable only pulls."""
-    return f"0 to {most_Nm:.4g} Nm" if config.drive.circuit == "open" else f"±{most_Nm:.4g} Nm"
+    """From which to which load a joint's loop goes: an open circuit's cable only pulls."""
+    return f"{0.0 if config.drive.circuit == 'open' else -most_Nm:.4g} to {most_Nm:.4g} Nm"
 
 
 def equivalent(config: JointConfig) -> Equivalent:

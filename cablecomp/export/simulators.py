@@ -101,7 +101,7 @@ def _remarks(config: JointConfig, found: Equivalent, *more: str) -> str:
     """Comment with the numbers in words and what is left out."""
     lines = [
         f"stiffness {found.stiffness_Nm_per_rad:.5g} Nm/rad, friction of the path {found.friction_Nm:.4g} Nm, "
-        f"equivalent backlash {1e3 * found.backlash_rad:.4g} mrad, at {loads(config, found.most_Nm)}",
+        f"equivalent backlash {1e3 * found.backlash_rad:.4g} mrad, from {loads(config, found.most_Nm)}",
         "left out:",
         *(f"  {line}" for line in (*more, *found.lost(config))),
     ]
