@@ -157,6 +157,11 @@ def varies(evidence: Sequence[Evidence], channel: str) -> bool:
     )
 
 
+def rms_by_time(left: FloatArray, weight: FloatArray) -> float:
+    """RMS of what is left on rows of these weights, by the time that they stand for; NaN for none."""
+    return float(np.sqrt(np.average(left**2, weights=weight**2))) if len(left) else float("nan")
+
+
 def noise_mean(evidence: Sequence[Evidence], channel: str) -> float:
     """1-sigma of a channel's reading, mean over the recordings; 0 where none shows any."""
     return float(np.mean([e.noise.get(channel, 0.0) for e in evidence]))

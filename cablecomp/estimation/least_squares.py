@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from cablecomp.estimation.departures import FEWEST, departures, set_anew
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import JOINT, Evidence, rms_by_time
 from cablecomp.estimation.limits import HOPELESS, MOVED_SD, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
@@ -240,8 +240,7 @@ def covariance(fit: Fit) -> FloatArray:
 def rms_left(fit: Fit, channel: str = JOINT) -> float:
     """RMS of what the fit leaves of a channel, recordings' own zeros taken off, weighed by the time that the rows which
     count stand for."""
-    left, weight = _left_with_weights(fit, channel)
-    return float(np.sqrt(np.sum((weight * left) ** 2) / np.sum(weight**2)))
+    return rms_by_time(*_left_with_weights(fit, channel))
 
 
 def rms_of_rows(fit: Fit, channel: str = JOINT) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import nan, sqrt
+from math import nan
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, left_out, score_
 from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
+from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, rms_by_time
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.problem import Weighing
 from cablecomp.estimation.steadying import as_read
@@ -106,8 +106,7 @@ def _noise(
         off = (e.at_rows(JOINT) - _at(e, angles[f"time_s_{k}"], angles[f"joint_rad_{k}"])[e.rows])[kept]
         parts.append(off - np.median(off))
         weights.append(e.weight[kept])
-    joined, weight = np.concatenate(parts), np.concatenate(weights)
-    return sqrt(float(np.average(joined**2, weights=weight**2))) if len(joined) else nan
+    return rms_by_time(np.concatenate(parts), np.concatenate(weights))
 
 
 def _at(e: Evidence, time: FloatArray, values: FloatArray) -> FloatArray:

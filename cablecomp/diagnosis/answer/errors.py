@@ -14,7 +14,7 @@ from cablecomp.diagnosis.folds import Part, left_out_in_turn
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import INPUT, JOINT, Evidence
+from cablecomp.estimation.evidence import INPUT, JOINT, Evidence, rms_by_time
 from cablecomp.estimation.least_squares import Fit, fitted_to_part, rms_left
 from cablecomp.estimation.limits import CARRYOVER_SD
 from cablecomp.estimation.parallel import in_processes
@@ -119,8 +119,4 @@ def _without_carryover(e: Evidence, left: FloatArray, sigma: float) -> Left:
 
 
 def _rms(parts: Sequence[Left]) -> float:
-    """RMS weighed by the time that these rows stand for, however much that is."""
-    if not parts:
-        return float("nan")
-    square, weight = (np.concatenate(p) ** 2 for p in zip(*parts, strict=True))
-    return float(np.sqrt(np.average(square, weights=weight)))
+    return rms_by_time(*map(np.concatenate, zip(*parts, strict=True))) if parts else float("nan")

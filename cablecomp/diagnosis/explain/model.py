@@ -21,7 +21,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import Parameter
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.departures import set_anew
-from cablecomp.estimation.evidence import JOINT, Evidence, load_channel, noise_rms
+from cablecomp.estimation.evidence import JOINT, Evidence, load_channel, noise_rms, rms_by_time
 from cablecomp.estimation.history import with_own_carryover
 from cablecomp.estimation.least_squares import Fit, derivative_of_rest, refit, rms_of_rows, solve
 from cablecomp.estimation.limits import MOVED_SD
@@ -296,14 +296,14 @@ def moves_rad(model: Model, term: Hypothesis) -> float | None:
         less = problem.misfits(placed(fit, problem))[JOINT]
     except InputError:
         return None
-    square, time = 0.0, 0.0
+    moves, weights = [], []
     for e, a, b in zip(problem.evidence, less, fit.problem.misfits(fit.x)[JOINT], strict=True):
         here = e.counted.get(JOINT)
         if here is not None and here.any():
-            stands, moved = e.weight[here] ** 2, (a - b)[here]
-            square += float(stands @ (moved - np.average(moved, weights=stands)) ** 2)
-            time += float(stands.sum())
-    return float(np.sqrt(square / time))
+            weight, moved = e.weight[here], (a - b)[here]
+            moves.append(moved - np.average(moved, weights=weight**2))
+            weights.append(weight)
+    return rms_by_time(np.concatenate(moves), np.concatenate(weights))
 
 
 def left_off(problem: Problem, keys: Collection[str]) -> Problem:
