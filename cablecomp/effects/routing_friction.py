@@ -9,7 +9,7 @@ from cablecomp.effects.base import Change, Effect, Parameter
 
 FRICTIONLESS = 1e-5  # below, a guide is nothing but more free cable
 LEAST_PLACE = (
-    1e-6  # share of the free cable on either side: a joint whose cable all sticks would be without any give
+    1e-6  # share of the free cable beside the joint's drum: all of it stuck, the joint would not give
 )
 
 

@@ -133,7 +133,7 @@ STATE = record(
         (
             "share",
             "f8",
-        ),  # and the share of a load that eases it; before a stage with guides: of its rise what follows
+        ),  # and the share of a load that eases it; with guides: of a stage's pull what follows before
         ("side", "f8"),  # with a guide: stretch of the input side,
         ("guide_end", "f8"),  # end values of the guide,
         ("guide_far", "f8"),

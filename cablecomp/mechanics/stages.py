@@ -21,10 +21,8 @@ from cablecomp.mechanics.records import IN, OUT
 
 SWEEPS = 1000  # evaluations of all stages for one solution, at most
 TOGETHER = 12  # of them that step all pulls together
-ROUNDED = (
-    20,
-    1e-9,
-)  # after so many a last step of so much of T0 will do: rounding may keep it from being smaller
+PATIENCE = 20  # after which a last step of ROUNDED will do: rounding may keep it from being smaller
+ROUNDED = 1e-9  # of T0
 FREE = 1e300  # no bound on a pull
 
 
@@ -102,8 +100,8 @@ def step_pulls(d: Drive, last: int, stride: int, count: int, sweep: int, settled
             worst = max(worst, abs(step) / d.cables[at].T0)
         return worst <= settled
     lowest = 0.0 if stride == 1 else -FREE
-    if sweep >= ROUNDED[0]:
-        settled = max(settled, ROUNDED[1])
+    if sweep >= PATIENCE:
+        settled = max(settled, ROUNDED)
     for place in range(count - 1, 0, -1):
         at = last - place * stride
         guide = d.guides[at]

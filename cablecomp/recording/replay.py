@@ -141,10 +141,8 @@ class _Run:
 
     def summary(self, elapsed_s: float) -> ReplaySummary:
         """Return the numbers of the rows so far."""
-        told = (
-            self._config.observer.load == "both_encoders"
-        )  # the joint's angle told the load: nothing is left of it
-        compared = self._residual.count > 0 and not told
+        # where the joint's angle told the load nothing is left of it
+        compared = self._residual.count > 0 and self._config.observer.load != "both_encoders"
         line = self._fit.line()
         channels = self._recording.channels
         return ReplaySummary(
