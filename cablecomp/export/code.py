@@ -67,19 +67,28 @@ class $cls(Fmi${version}Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.motor_position_rad = self.joint_torque_Nm = 0.0
-        self.joint_position_rad = self.deflection_rad = 0.0
         self.z = [0.0] * len(RADIUS)
         for name in ("motor_position_rad", "joint_torque_Nm"):
             self.register_variable($real(name, causality=Fmi${version}Causality.input))
         for name in ("joint_position_rad", "deflection_rad"):
             self.register_variable($real(name, causality=Fmi${version}Causality.output))
 
-    def do_step(self, current_time, step_size):
+    def plays(self):
         load = self.joint_torque_Nm
-        self.z = [min(max(z, load - r), load + r) for z, r in zip(self.z, RADIUS)]
-        held = sum(w * z for w, z in zip(WEIGHT, self.z))
-        self.deflection_rad = LINEAR[0] * load + LINEAR[1] * load * load + held
-        self.joint_position_rad = RATIO * self.motor_position_rad + self.deflection_rad
+        return [min(max(z, load - r), load + r) for z, r in zip(self.z, RADIUS)]
+
+    @property
+    def deflection_rad(self):  # asked before the first step too, while a simulation is initialised
+        load = self.joint_torque_Nm
+        held = sum(w * z for w, z in zip(WEIGHT, self.plays()))
+        return LINEAR[0] * load + LINEAR[1] * load * load + held
+
+    @property
+    def joint_position_rad(self):
+        return RATIO * self.motor_position_rad + self.deflection_rad
+
+    def do_step(self, current_time, step_size):
+        self.z = self.plays()
         return True
 ''')
 LEFT_OUT: Final = (

@@ -94,6 +94,13 @@ def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "unit", module)
     spec.loader.exec_module(module)
     slave = module.WristCapstan(instance_name="one", resources=str(tmp_path))
+    slave.motor_position_rad, slave.joint_torque_Nm = (
+        0.3,
+        0.1,
+    )  # initialised: below all radii, so no play moves
+    begins = [slave.get_real([vr])[0] for vr, v in slave.vars.items() if v.causality.name == "output"]
+    bends = 1e-3 * 0.1 + 1e-6 * 0.1**2
+    assert begins == pytest.approx([RATIO * 0.3 + bends, bends], abs=1e-15)
     found = []
     for load in LOADS:
         slave.joint_torque_Nm = float(load)
