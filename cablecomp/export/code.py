@@ -52,6 +52,9 @@ _SLAVE: Final = Template('''\
 """$name: joint angle from motor angle and load. $rms rad RMS on loops from $loads. Left out:
 $lost"""
 
+from copy import copy
+from xml.etree.ElementTree import SubElement
+
 from $package import Fmi${version}Causality, Fmi${version}Slave, $real
 
 RATIO = $ratio
@@ -72,6 +75,12 @@ class $cls(Fmi${version}Slave):
             self.register_variable($real(name, causality=Fmi${version}Causality.input))
         for name in ("joint_position_rad", "deflection_rad"):
             self.register_variable($real(name, causality=Fmi${version}Causality.output))
+
+    def to_xml(self, *options):  # FMI 2.0, 2.2.8: calculated outputs are unknowns of the initialisation too
+        root = super().to_xml(*options)
+        structure = root.find("ModelStructure")
+        SubElement(structure, "InitialUnknowns").extend(map(copy, structure.find("Outputs")))
+        return root
 
     def plays(self):
         load = self.joint_torque_Nm

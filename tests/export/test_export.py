@@ -87,6 +87,11 @@ def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.Monk
         "motor_position_rad": "input", "joint_torque_Nm": "input",
         "joint_position_rad": "output", "deflection_rad": "output",
     }  # fmt: skip
+    unknown = description.findall("ModelStructure/InitialUnknowns/Unknown")
+    assert [v.get("index") for v in unknown] == [
+        "3",
+        "4",
+    ]  # FMI 2.0, 2.2.8: the outputs, as they have no start
     spec = importlib.util.spec_from_file_location("unit", tmp_path / "unit/resources/wristcapstan.py")
     assert spec is not None
     assert spec.loader is not None
