@@ -12,6 +12,7 @@ from cablecomp.cli.folders import out_option
 from cablecomp.cli.shared import (
     Config,
     Control,
+    EffectsOption,
     JsonOption,
     announce_compilation,
     console,
@@ -42,12 +43,13 @@ def export(
     fmu: Annotated[bool, typer.Option("--fmu", help="NAME.fmu: the same for co-simulation, FMI 2.0")] = False,
     control: Control = None,
     out: Annotated[Path, out_option("folder to write into")] = Path("export"),
+    effects: EffectsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """A joint for simulators and other programs: what was identified, and what each format loses."""
     if not (mujoco or urdf or c or fmu):
         raise InputError("nothing to write: give one or more of --mujoco, --urdf, --c, --fmu")
-    joint = read_joint(config)
+    joint = read_joint(config, effects)
     announce_compilation()
     out.mkdir(parents=True, exist_ok=True)
     result: dict[str, object] = {"name": joint.name}

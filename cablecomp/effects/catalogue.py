@@ -148,7 +148,11 @@ def _look_up(name: str) -> Effect:
     known = catalogue()
     if name not in known:
         close = difflib.get_close_matches(name, known, 1)
-        hint = f"did you mean `{close[0]}`?" if close else f"known are {', '.join(sorted(known))}"
+        hint = (
+            f"did you mean `{close[0]}`?"
+            if close
+            else f"known are {', '.join(sorted(known))} (one of your own: --effects FILE)"
+        )
         raise InputError(f"key `effect.id` is '{name}', which is no known effect; {hint}")
     return known[name]
 

@@ -196,6 +196,21 @@ def test_the_result_is_had_as_json(tmp_path: Path, capsys: pytest.CaptureFixture
     assert told["equivalent"]["friction_Nm"] == pytest.approx(equivalent(JOINT).friction_Nm)
 
 
+def test_a_joint_with_an_effect_of_the_users_own_is_exported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.import_module("cablecomp.effects.catalogue"), "_registered", {})
+    text = example("joints", "wrist-capstan").read_text(encoding="utf-8")
+    joint = tmp_path / "joint.toml"
+    joint.write_text(f'{text}\n[[effect]]\nid = "seal_drag"\ndrag_Nms_per_rad = 0.5\n', encoding="utf-8")
+    command = ["export", "--config", str(joint), "--urdf", "--out", str(tmp_path / "out")]
+    assert main(command) == 2
+    assert "--effects" in capsys.readouterr().err  # what to do
+    own = Path(__file__).parents[1] / "effects/user_effect_example.py"
+    assert main([*command, "--effects", str(own)]) == 0
+    assert "by the width of the loop alone: seal_drag" in (tmp_path / "out/wrist_capstan.urdf").read_text()
+
+
 def test_what_is_lost_is_said_with_the_formats_that_lose_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
