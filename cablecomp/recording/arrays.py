@@ -47,7 +47,13 @@ def as_recording(source: Any, mapping: ColumnMap | None = None, name: str = "rec
 
 def _numbers(name: str, column: str, values: Any) -> FloatArray:
     try:
-        found = np.asarray(values, dtype=np.float64)
+        kept = values if hasattr(getattr(values, "dtype", None), "kind") else np.asarray(values)
+        if kept.dtype.kind in "mM":  # as numbers they would be ticks of whatever unit they are kept in
+            raise InputError(
+                f"{name}: column {column!r} holds dates or durations; numbers in the unit of its name are accepted, "
+                "such as (t - t[0]) / np.timedelta64(1, 's')"
+            )
+        found = np.asarray(kept, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(f"{name}: column {column!r} does not hold numbers") from None
     if found.ndim != 1 or not len(found):

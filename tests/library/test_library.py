@@ -77,3 +77,16 @@ def test_an_option_that_makes_no_sense_is_told_by_name(
     (name,) = wrong
     with pytest.raises(InputError, match=f"`{name}` is {wrong[name]!r}; "):
         call(COLUMNS, JOINT, **wrong)
+
+
+@pytest.mark.parametrize("kept", ["numpy", "pandas", "polars"])
+@pytest.mark.parametrize("of", ["dates", "durations"])
+def test_dates_and_durations_are_no_numbers_of_seconds(kept: str, of: str) -> None:
+    """Their ticks are: 2 ms as 2e6 s, of nanoseconds."""
+    times = np.array([0, 1, 2], dtype="timedelta64[ms]").astype("timedelta64[ns]")
+    times = times if of == "durations" else np.datetime64("2026-01-01", "ns") + times
+    if kept != "numpy":
+        times = pytest.importorskip(kept).Series(times)
+    columns = {"time_s": times, "motor_position_rad": np.zeros(3), "joint_torque_Nm": np.zeros(3)}
+    with pytest.raises(InputError, match=r"'time_s' holds dates or durations.*timedelta64"):
+        cablecomp.replay(columns, "capstan-arm")
