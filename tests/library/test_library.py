@@ -90,3 +90,11 @@ def test_dates_and_durations_are_no_numbers_of_seconds(kept: str, of: str) -> No
     columns = {"time_s": times, "motor_position_rad": np.zeros(3), "joint_torque_Nm": np.zeros(3)}
     with pytest.raises(InputError, match=r"'time_s' holds dates or durations.*timedelta64"):
         cablecomp.replay(columns, "capstan-arm")
+
+
+def test_a_masked_reading_is_none() -> None:
+    """What stands behind a mask is whatever its file calls missing."""
+    columns = {"time_s": np.arange(3.0), "motor_position_rad": np.zeros(3)}
+    load = np.ma.masked_equal([0.0, -9.0, 0.0], -9.0)
+    with pytest.raises(InputError, match="row 2: column 'joint_torque_Nm' is empty"):
+        cablecomp.replay({**columns, "joint_torque_Nm": load}, "capstan-arm")
