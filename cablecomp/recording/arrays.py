@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from cablecomp.errors import InputError
 from cablecomp.recording.channels import parse_header
@@ -27,6 +28,8 @@ def as_recording(source: Any, mapping: ColumnMap | None = None, name: str = "rec
     """
     if isinstance(source, str | Path):
         return open_recording(source, mapping)
+    if isinstance(source, pl.LazyFrame):
+        source = source.collect()
     names = list(source) if isinstance(source, Mapping) else list(getattr(source, "columns", ()))
     if not names or not all(isinstance(n, str) for n in names):
         raise InputError(
@@ -95,6 +98,6 @@ def _several(sources: Any) -> dict[str, Any]:
 
 def _is_recording(value: Any) -> bool:
     """Whether a value is a recording by itself: a path, arrays by name, a frame."""
-    return isinstance(value, str | Path | Mapping) or (
+    return isinstance(value, str | Path | Mapping | pl.LazyFrame) or (
         hasattr(value, "columns") and not hasattr(value, "dtype")
     )

@@ -32,7 +32,7 @@ def test_a_path_arrays_and_frames_are_the_same_recording(tmp_path: Path) -> None
     other = {"time_ms": 1e3 * COLUMNS["time_s"], "joint_torque_mNm": 1e3 * COLUMNS["joint_torque_Nm"]}
     other |= {n: COLUMNS[n] for n in ("motor_position_rad", "joint_position_rad")}
     first = cablecomp.replay(COLUMNS, JOINT)
-    for given in (tmp_path / "r.csv", pl.DataFrame(COLUMNS), Frame(COLUMNS), other):
+    for given in (tmp_path / "r.csv", pl.DataFrame(COLUMNS), pl.LazyFrame(COLUMNS), Frame(COLUMNS), other):
         again = cablecomp.replay(given, JOINT)
         np.testing.assert_allclose(
             again.columns["deflection_rad"], first.columns["deflection_rad"], atol=1e-9
