@@ -14,7 +14,7 @@ TOOLS = Path(sys.executable).parent  # of the virtual environment that runs this
 CHECKS = (
     ("ruff", "format", "--check", "."),
     ("ruff", "check", "."),
-    ("mypy",),
+    ("mypy", "-n", "2"),
     ("lint-imports",),
     ("pytest", "-n", "2", "--durations=15"),
 )
