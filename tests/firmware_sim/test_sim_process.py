@@ -16,7 +16,9 @@ import can
 import pytest
 import serial
 from sim_process import SimProcess
+from sim_two_mass import TwoMass
 
+from firmware_sim.cli import main
 from firmware_sim.errors import SimError
 from firmware_sim.wire.frame import Frame
 from firmware_sim.wire.serial_records import RecordReader, encode_record
@@ -91,20 +93,36 @@ def test_stepped_slcan_across_processes() -> None:
         assert sequences == list(range(30))
 
 
-def test_wrong_arguments_are_one_line_and_exit_2() -> None:
-    for arguments, said in (
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
         (["--bus", "virtual", "--fault", "fly"], "unknown name 'fly'"),
         (["--bus", "virtual", "--joints", "0"], "1 to 32 is accepted"),
         (["--bus", "virtual", "--drive-rate", "1500"], "whole multiple"),
         (["--bus", "virtual", "--protocol", "smoke"], "invalid choice"),
-        (["--bus", "carrier_pigeon:1"], "cannot be opened"),
-    ):
-        with light(*arguments) as child:
-            out, error = child.communicate(timeout=20.0)
-            assert child.returncode == 2
-            assert out == ""
-            assert said in error
-            assert error.strip().count("\n") == 0
+    ],
+    ids=["fault", "joints", "rate", "protocol"],
+)
+def test_wrong_arguments_are_one_line_and_exit_2(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["--config", CONFIG, "--until-stdin-closes"]  # taken by mistake, it would end by itself
+    with pytest.raises(SystemExit) as ended:
+        sys.exit(main([*given, *arguments], make_plant=lambda _: TwoMass()))
+    out, error = capsys.readouterr()
+    assert ended.value.code == 2
+    assert out == ""
+    assert said in error
+    assert error.strip().count("\n") == 0
+
+
+def test_a_process_with_a_bus_that_cannot_be_opened_says_one_line_and_ends_with_2() -> None:
+    with light("--bus", "carrier_pigeon:1") as child:
+        out, error = child.communicate(timeout=20.0)
+        assert child.returncode == 2
+        assert out == ""
+        assert "cannot be opened" in error
+        assert error.strip().count("\n") == 0
 
 
 def test_the_real_plant_in_a_process_of_its_own(tmp_path: Path) -> None:
