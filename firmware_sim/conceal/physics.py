@@ -178,7 +178,7 @@ def _play(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
 
 def _pressed(time: Floats, load: Floats, lag_s: float, drag: float) -> Floats:
     """−1 … 1: which flank the link lies at; it stays where the load is below `drag`."""
-    place, found = float(np.sign(load[0])), np.empty_like(time)
+    place, found = float(np.sign(next(iter(load[np.isfinite(load)]), 0.0))), np.empty_like(time)
     steps = np.diff(time, prepend=time[0])
     for k, (torque, dt) in enumerate(zip(load, steps, strict=True)):
         if abs(torque) > drag:

@@ -122,6 +122,25 @@ def test_acceleration_of_a_sine_and_dahls_limits() -> None:
     assert abs(z[500 + round(0.05 * np.log(2.0) * 500)]) < 0.03
 
 
+def with_gaps(channel: str, *rows: slice) -> Table:
+    found = table()
+    for here in rows:
+        found[channel][here] = np.nan
+    return found
+
+
+def test_play_leaves_the_joint_as_it_was_read_where_the_load_is_not_known_from_the_first_row() -> None:
+    whole, late = table(), with_gaps(TORQUE, slice(0, 3))
+    found, missing = trials_of([[late], [whole, late], [whole, with_gaps(TORQUE, slice(None))]], 5, ("play",))
+    assert missing == {}
+    for trial in (t for t in found if t.physics is not None):
+        assert all(np.all(np.isfinite(r[JOINT])) for r in trial.recordings)
+    # the first load that is known presses the joint to its flank: until then it lies there already
+    alone = next(t for t in found if t.physics is not None)
+    step = added(alone, found[0], JOINT)
+    np.testing.assert_allclose(step[:3], step[3], rtol=1e-9)
+
+
 def test_without_a_torque_channel_what_needs_one_is_left_out_and_said() -> None:
     found, missing = trials(torque=False, rounds=1)
     assert {t.physics.id for t in found if t.physics is not None} == {"late", "slip", "frame", "drift"}
