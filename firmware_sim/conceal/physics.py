@@ -123,7 +123,15 @@ def _weight(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
     angles = np.concatenate([t[JOINT] for t in tables])
     upright = float(rng.uniform(np.nanmin(angles), np.nanmax(angles)))
     way = float(rng.choice((-1.0, 1.0)))
-    return _unseen_torque(tables, [way * np.sin(t[JOINT] - upright) for t in tables], share)
+    return _unseen_torque(
+        tables, [way * np.sin(_bridged(t[TIME], t[TIME], t[JOINT]) - upright) for t in tables], share
+    )
+
+
+def _bridged(at: Floats, time: Floats, angle: Floats) -> Floats:
+    """The angle at instants `at`, also where it was not read: what pulls at the joint shows in other channels too."""
+    known = np.isfinite(angle)
+    return np.asarray(np.interp(at, time[known], angle[known]))
 
 
 def _inertia(rng: Rng, tables: Sequence[Table], share: float) -> Change | None:
@@ -139,8 +147,7 @@ def acceleration(time: Floats, angle: Floats, over_s: float = 0.15) -> Floats:
     window = max(2 * round(0.5 * over_s / step) + 1, 7)
     if len(even) <= window:
         return np.zeros_like(time)
-    known = np.isfinite(angle)
-    smooth = savgol_filter(np.interp(even, time[known], angle[known]), window, 3, deriv=2, delta=step)
+    smooth = savgol_filter(_bridged(even, time, angle), window, 3, deriv=2, delta=step)
     return np.asarray(np.interp(time, even, smooth))
 
 

@@ -141,6 +141,16 @@ def test_play_leaves_the_joint_as_it_was_read_where_the_load_is_not_known_from_t
     np.testing.assert_allclose(step[:3], step[3], rtol=1e-9)
 
 
+def test_a_weight_pulls_also_where_the_angle_is_not_read_and_takes_no_torque_away() -> None:
+    every_other = slice(1, None, 2)
+    found, _ = trials_of([[with_gaps(JOINT, every_other)]], 5, ("weight",))
+    whole, _ = trials_of([[with_gaps(JOINT)]], 5, ("weight",))
+    torque = found[1].recordings[0][TORQUE]
+    assert np.all(np.isfinite(torque))
+    # an angle that turns by 3 mrad from row to row, bridged: as if it were known
+    np.testing.assert_allclose(torque, whole[1].recordings[0][TORQUE], atol=2e-3)
+
+
 def test_without_a_torque_channel_what_needs_one_is_left_out_and_said() -> None:
     found, missing = trials(torque=False, rounds=1)
     assert {t.physics.id for t in found if t.physics is not None} == {"late", "slip", "frame", "drift"}
