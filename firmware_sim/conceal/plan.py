@@ -86,7 +86,7 @@ def trials_of(
 
 _WHY = {
     "drift": "a temperature that stands still moves nothing",
-    "play": "the load never changes its sign: play does not show",
+    "play": "it would need a joint torque that changes its sign",
 }
 
 

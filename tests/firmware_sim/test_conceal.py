@@ -155,6 +155,7 @@ def test_without_a_torque_channel_what_needs_one_is_left_out_and_said() -> None:
     found, missing = trials(torque=False, rounds=1)
     assert {t.physics.id for t in found if t.physics is not None} == {"late", "slip", "frame", "drift"}
     assert set(missing) == {"neighbour", "weight", "inertia", "friction", "play", "gain"}
+    assert all("need a joint torque" in why for why in missing.values())
     assert all(NEIGHBOUR in r for t in found for r in t.recordings)
 
 
