@@ -192,7 +192,7 @@ def _names(curve: Mapping[str, Any]) -> str:
 
 def _from(curve: Mapping[str, Any]) -> str:
     if curve["found_from"] is None:
-        return "not even the largest" if curve["points"] else "–"
+        return f"not up to {_size(curve['points'][-1]['size'], curve['unit'])}"
     return _size(curve["found_from"], curve["unit"])
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from blind_joint import JOINT, recording
+from rich.text import Text
 
 from cablecomp.cli import main
 from cablecomp.cluster import Workers
@@ -124,6 +125,15 @@ def test_page_table_and_section_hold_it() -> None:
     nameless = concealed_table({**answer, "names_in_twins": {}})
     assert str(nameless.caption).endswith("any name in twins: none")
     assert "2 ms" in concealed_section(answer).body
+
+
+def test_what_was_not_found_says_up_to_which_size_it_was_put() -> None:
+    """A first answer holds one size of each, and seldom the largest."""
+    twin = said()
+    rows = [score_concealed(put("late", share), Verdict(said(), 3.0, ""), twin) for share in (0.1, 0.2)]
+    answer = answered().as_json() | {"curves": curves(rows, 40, {}).as_json()["curves"]}
+    assert "not up to 2 ms" in concealed_section(answer).body
+    assert list(concealed_table(answer).columns[2].cells) == [Text("not up to 2 ms", "dim")]
 
 
 def test_pieces_are_stretches_of_one_session_and_the_same_again() -> None:
