@@ -81,7 +81,7 @@ def concealed_page(answer: Mapping[str, Any]) -> str:
     names = (
         page.table(("named in twins", "twins"), given)
         if given
-        else page.paragraph("No twin was given a name.")
+        else page.paragraph("No twin was given a name." if answer["twins"] else "No twin came to a verdict.")
     )
     sections = [
         concealed_section(answer, facts),
@@ -164,13 +164,14 @@ def _trials(answer: Mapping[str, Any]) -> str:
         "time / s",
         "remark",
     )
+    alone = {r["round"] for r in answer["rows"] if r["physics"] == "twin" and r["failed"]}
     rows = [
         (
             r["number"],
             r["round"],
             r["words"],
             "" if r["size"] is None else _size(r["size"], r["unit"]),
-            "" if r["physics"] == "twin" else "yes" if r["found"] else "no",
+            "" if r["physics"] == "twin" or r["round"] in alone else "yes" if r["found"] else "no",
             ", ".join(r["new"]),
             ", ".join(r["named"]),
             r["confidence"],

@@ -58,9 +58,12 @@ class Concealed:
         return any(n not in self.accepted for n in self.new)
 
 
-def score_concealed(truth: Mapping[str, Any], verdict: Verdict, twin: Mapping[str, Any]) -> Concealed:
-    """Score one trial's verdict beside its twin's `diagnosis.json`."""
-    said = verdict.said or {"missing_physics": [], "candidates": [], "mismatch": [], "calibration": {}}
+_NOTHING: Mapping[str, Any] = {"missing_physics": [], "candidates": [], "mismatch": [], "calibration": {}}
+
+
+def score_concealed(truth: Mapping[str, Any], verdict: Verdict, twin: Mapping[str, Any] | None) -> Concealed:
+    """Score one trial's verdict beside its twin's `diagnosis.json`, None where that one failed."""
+    said, twin = verdict.said or _NOTHING, twin or _NOTHING
     accepted = tuple(truth["named"])
     names = tuple(m["effect"] for m in said["missing_physics"])
     before = {m["effect"]: m["parameters"] for m in twin["missing_physics"]}
@@ -169,9 +172,10 @@ class Curves:
 
 
 def curves(rows: Sequence[Concealed], of: int, wish: Mapping[str, Any]) -> Curves:
-    """Put all trials that were done together."""
-    twins = [r for r in rows if r.physics == "twin"]
-    put = [r for r in rows if r.physics != "twin"]
+    """Put all trials that were done together; those of a piece whose twin failed count as done alone."""
+    twins = [r for r in rows if r.physics == "twin" and not r.failed]
+    alone = {r.round for r in rows if r.physics == "twin" and r.failed}
+    put = [r for r in rows if r.physics != "twin" and r.round not in alone]
     given: dict[str, int] = {}
     for twin in twins:
         for name in twin.named:

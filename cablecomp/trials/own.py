@@ -32,6 +32,7 @@ from cablecomp.trials.run import (
     Job,
     Place,
     Tell,
+    Verdict,
     committed,
     diagnose_all,
     diagnose_folder,
@@ -163,7 +164,7 @@ def _stretch(rng: np.random.Generator, columns: Columns, seconds: float) -> dict
 
 
 def _scored(places: Sequence[Place], truths: Sequence[Mapping[str, Any]]) -> list[Concealed]:
-    """Every trial that has a verdict and whose twin has one."""
+    """Every trial that was diagnosed and whose twin was; where the twin failed, it is said of each."""
     twins = {
         t["round"]: verdict_of(p.verdict)
         for p, t in zip(places, truths, strict=True)
@@ -172,10 +173,10 @@ def _scored(places: Sequence[Place], truths: Sequence[Mapping[str, Any]]) -> lis
     found = []
     for p, t in zip(places, truths, strict=True):
         twin, mine = twins[t["round"]], verdict_of(p.verdict)
-        if mine.said is None and mine.failed == NOT_DIAGNOSED:
+        if NOT_DIAGNOSED in (mine.failed, twin.failed):
             continue
-        if twin.said is None:
-            continue
+        if twin.said is None and t["physics"] != "twin":
+            mine = Verdict(None, mine.seconds, f"nothing to compare with, its twin failed: {twin.failed}")
         found.append(score_concealed(t, mine, twin.said))
     return found
 

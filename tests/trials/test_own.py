@@ -209,6 +209,20 @@ def test_a_run_stops_at_its_time_and_goes_on_where_it_stopped(tmp_path: Path) ->
     assert concealed_beside(tmp_path / "trials") is None
 
 
+def test_where_a_twin_failed_its_trials_are_done_compared_with_nothing_and_say_so(tmp_path: Path) -> None:
+    def diagnose(folder: Path, further: Sequence[Path], out: Path) -> None:
+        if folder.name == "00000":
+            raise MemoryError("too large")
+        (out / "diagnosis.json").write_text(json.dumps(said("clock_skew")))
+
+    own = Own(tmp_path, {"a.csv": recording(JOINT, 0)}, JOINT, _conceal, Workers(0), diagnose)
+    found = prove_in(own, OwnWish(1, 1, 20.0), lambda what, done, of: None, lambda sha256: None)
+    assert (found.done, found.of, found.twins, found.curves, found.wrong.of) == (3, 3, 0, (), 0)
+    text = concealed_page(json.loads((tmp_path / SCORED).read_text()))
+    assert text.count("nothing to compare with, its twin failed: MemoryError: too large") == 2
+    assert "No twin was given a name." not in text
+
+
 @pytest.mark.parametrize("beside", [False, True])
 def test_what_cannot_be_concealed_leaves_nothing(tmp_path: Path, beside: bool) -> None:
     def unknown(pieces: Path, wish: OwnWish, out: Path, told: Callable[[int, int], None]) -> str:
