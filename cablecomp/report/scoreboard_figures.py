@@ -53,7 +53,7 @@ def reliability(board: Scoreboard) -> Any:
         mode="markers",
         marker={"size": 10, "color": _DECIDABLE},
         name="effects weighed",
-        hovertext=[f"{r.hits} of {r.of}" for r in rates],
+        hovertext=[f"{r.hits:.3g} of {r.of}" for r in rates],
     )
     fig.update_xaxes(range=[0, 103])
     fig.update_yaxes(range=[0, 103])

@@ -85,7 +85,10 @@ def _confidence(board: Scoreboard) -> Section:
     return Section(
         "Confidence",
         page.columns(
-            page.figure(figures.reliability(board), "All effects that were weighed, named or not, in bins."),
+            page.figure(
+                figures.reliability(board),
+                "All effects that were weighed, named or not, in bins of equal counts.",
+            ),
             page.figure(figures.risk(board), "Of the surest share of them, how many are wrong."),
         ),
         f"Expected calibration error {page.number(board.trust.error)}, Brier "

@@ -19,11 +19,22 @@ def calibration_error(probability: Sequence[float], right: Sequence[bool], bins:
     Equal counts because names cluster near 0 and 1 (M. Naeini, G. Cooper, M. Hauskrecht, AAAI 2015, with the
     adaptive bins of K. Nguyen and B. O'Connor, EMNLP 2015). NaN for none.
     """
-    p, y = _sorted(probability, right)
-    if not len(p):
+    if not len(probability):
         return nan
-    parts = np.array_split(np.arange(len(p)), min(bins, len(p)))
-    return float(sum(len(k) * abs(float(np.mean(y[k])) - float(np.mean(p[k]))) for k in parts) / len(p))
+    parts = equal_counts(probability, right, bins)
+    return float(
+        sum(len(p) * abs(float(np.mean(y)) - float(np.mean(p))) for p, y in parts) / len(probability)
+    )
+
+
+def equal_counts(
+    probability: Sequence[float], right: Sequence[bool], bins: int = BINS
+) -> list[tuple[Floats, Floats]]:
+    """Bins of equal counts by rising probability, each as (probabilities, right as 0 to 1); where an edge falls among
+    equal probabilities, each of these is right by the share of all of them."""
+    p, y = _sorted(probability, right)
+    parts = np.array_split(np.arange(len(p)), max(min(bins, len(p)), 1))
+    return [(p[k], y[k]) for k in parts if len(k)]
 
 
 def brier(probability: Sequence[float], right: Sequence[bool]) -> float:

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.trials.calibrated import brier, calibration_error, risk_area, risk_coverage
+from cablecomp.trials.calibrated import brier, calibration_error, equal_counts, risk_area, risk_coverage
 from cablecomp.trials.row import Named, Row
 from cablecomp.trials.shares import Rate, bootstrapped, finite, quantile, rate
 
 SIZE_EDGES = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.6001)
-CONFIDENCE_EDGES = (0.0, 0.2, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0001)
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,8 @@ class Part:
 @dataclass(frozen=True)
 class Trust:
     """Whether confidence can be trusted, over all effects that were weighed: expected calibration error, Brier
-    score, area under risk against coverage by confidence and by z alone, the curve itself, and by bins (low,
-    high, mean confidence, true)."""
+    score, area under risk against coverage by confidence and by z alone, the curve itself, and the bins that the
+    calibration error counts (lowest, highest, mean confidence, true)."""
 
     of: int
     error: float
@@ -266,16 +265,11 @@ def _trust(weighed: Sequence[Named]) -> Trust:
         tuple(coverage.tolist()),
         tuple(risk.tolist()),
         tuple(risk_coverage(by_z, right)[1].tolist()),
-        tuple(_bins(known)),
+        tuple(
+            (float(c[0]), float(c[-1]), float(np.mean(c)), Rate(float(np.sum(y)), len(y)))
+            for c, y in equal_counts(p, right)
+        ),
     )
-
-
-def _bins(names: Sequence[Named]) -> Iterable[tuple[float, float, float, Rate]]:
-    for low, high in pairwise(CONFIDENCE_EDGES):
-        here = [n for n in names if low <= n.confidence < high]
-        if here:
-            mean = float(np.mean([n.confidence for n in here]))
-            yield low, min(high, 1.0), mean, rate(here, lambda n: n.right)
 
 
 def _confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:

@@ -16,9 +16,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Rate:
-    """A share of trials with its 95 % interval (Wilson); NaN where there is none."""
+    """A share of trials with its 95 % interval (Wilson); NaN where there is none.
 
-    hits: int
+    `hits` is whole but where some of several that count alike are taken, each then by their share."""
+
+    hits: float
     of: int
 
     @property

@@ -236,8 +236,11 @@ def test_trust_compares_confidence_with_truth() -> None:
     one = truth("single", effect("clock_skew"))
     rows = [row(one, verdict("clock_skew")) for _ in range(3)] + [row(one, verdict("crosstalk"))]
     trust = scoreboard(rows, "", WISH).trust
-    ((_, _, mean, share),) = trust.bins
-    assert (mean, share.hits, share.of) == (pytest.approx(0.97), 3, 4)
+    assert [mean for _, _, mean, _ in trust.bins] == pytest.approx([0.97] * 4)
+    assert sum(share.hits for *_, share in trust.bins) == pytest.approx(3)
+    assert sum(share.of for *_, share in trust.bins) == 4
+    shown = sum(share.of * abs(share.value - mean) for _, _, mean, share in trust.bins) / trust.of
+    assert trust.error == pytest.approx(shown) == pytest.approx(0.97 - 0.75)
     assert trust.brier == pytest.approx((3 * 0.03**2 + 0.97**2) / 4)
     assert trust.risk[-1] == 0.25
 
