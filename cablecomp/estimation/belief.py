@@ -35,6 +35,8 @@ MOVED: Final = 0.05
 """Share of its range that a channel has to have moved across a gap for the gap to matter."""
 LEAST_STEPS: Final = 2.0
 """Times what it moves by from row to row (95 % less) that it has to have moved across it as well."""
+LOST: Final = 0.1
+"""Share of the work at both ends that sensors of force that do not quite agree do not make."""
 
 _ANGLES: Final = {
     180.0 / pi: "joint_position_rad seems to be in degrees",
@@ -75,8 +77,9 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
         return (*found, *odd, *fits)
     fits += _torques(view)
     found += fits if found else _delays(view, fits, columns)  # over a gap no delay can be told
-    if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR:
-        rows = _rows(columns, (INPUT, MOTOR, "joint_torque_Nm"))
+    turned = any((s.kind, s.channel) == ("sign", "joint_torque_Nm") for s in found)
+    if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR and not turned:
+        rows = _rows(columns, (INPUT, JOINT, MOTOR, "joint_torque_Nm"))
         found += _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
     return (*odd, *found)
 
@@ -203,17 +206,28 @@ def _torques(view: View) -> list[Suspicion]:
 
 
 def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[Suspicion]:
-    """The motor holds against the load: tau = -(r/R) M at rest."""
+    """The motor holds against the load: tau = -(r/R) M at rest. Where it seems not to, that torque is turned with which
+    the right one's work at both ends would be taken out of friction."""
     wanted = -config.drive.ratio * rows["joint_torque_Nm"]
     torque = rows[MOTOR]
     slope, sure = partial(torque, wanted, np.gradient(rows[INPUT]))
     if sure > -0.7:
         return []
+    motor_J, load_J = _work_J(torque, rows[INPUT]), _work_J(rows["joint_torque_Nm"], rows[JOINT])
+    lost = (load_J - motor_J) / max(abs(load_J) + abs(motor_J), 1e-300)  # with the motor's torque turned
+    turned = MOTOR if lost > -LOST else "joint_torque_Nm"
+    either = " (or joint_torque_Nm: the work of both does not tell which)" if abs(lost) < LOST else ""
     words = (
-        f"motor_torque_Nm seems to have the opposite sign: it would help the load instead of holding it (correlation "
-        f"{sure:.2f}); RMS {rms(torque - wanted):.3g} Nm as it is, {rms(torque + wanted):.3g} Nm with it turned"
+        f"{turned} seems to have the opposite sign{either}: the motor's torque would help the load instead of holding "
+        f"it (correlation {sure:.2f}); they differ by {rms(torque - wanted):.3g} Nm RMS at the motor as they are, by "
+        f"{rms(torque + wanted):.3g} Nm with one of them turned"
     )
-    return [Suspicion("sign", MOTOR, words, {"slope": slope, "correlation": sure})]
+    return [Suspicion("sign", turned, words, {"slope": slope, "correlation": sure})]
+
+
+def _work_J(torque: FloatArray, angle: FloatArray) -> float:
+    """Work that a torque [N m] puts in at an angle [rad]."""
+    return float(np.trapezoid(torque, angle))
 
 
 def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:

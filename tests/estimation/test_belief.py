@@ -116,6 +116,31 @@ def test_a_motor_torque_of_the_other_sign_is_said_across_a_gap_too(gap: bool, si
     assert [(s.kind, s.channel) for s in said if s.kind != "gap"] == turned
 
 
+@pytest.mark.parametrize("turned", ["motor_torque_Nm", "joint_torque_Nm"])
+@pytest.mark.parametrize("driven", [-1.0, 1.0])
+def test_of_two_torques_that_disagree_the_one_is_named_without_which_friction_would_do_work(
+    turned: str, driven: float
+) -> None:
+    """A joint that turns a brake, or is turned by its load: of 1 N m at the joint the motor's side has 1.4 or 0.7."""
+    angle = np.sin(0.5 * TIME)
+    speed = np.cos(0.5 * TIME)
+    load = driven * np.tanh(speed / 0.1)  # < 0 along the motion: a brake
+    columns = {"time_s": TIME, "motor_position_rad": angle / JOINT.drive.ratio, "joint_position_rad": angle}
+    columns["joint_torque_Nm"] = load
+    columns["motor_torque_Nm"] = -(1.4 if driven < 0.0 else 0.7) * JOINT.drive.ratio * load
+    assert [s for s in suspicions(JOINT, columns) if s.kind == "sign"] == []
+    columns[turned] = -columns[turned]
+    (said,) = (s for s in suspicions(JOINT, columns) if s.kind == "sign")
+    assert said.channel == turned
+    assert "does not tell" not in said.text
+
+
+def test_a_load_of_the_other_sign_does_not_bring_the_motor_torque_under_suspicion() -> None:
+    torque = -JOINT.drive.ratio * COLUMNS["joint_torque_Nm"]
+    said = kinds(joint_torque_Nm=-COLUMNS["joint_torque_Nm"], motor_torque_Nm=torque)
+    assert said == [("sign", "joint_torque_Nm")]
+
+
 def test_a_copy_under_another_name_is_said() -> None:
     other = {**COLUMNS, "joint_position_rad": 1.0001 * COLUMNS["joint_position_rad"]}
     copy = {name: values.copy() for name, values in reversed(COLUMNS.items())}
