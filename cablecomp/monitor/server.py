@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
 import threading
 from collections import deque
-from contextlib import suppress
 from html import escape
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -15,6 +15,15 @@ from cablecomp.monitor.frames import Frame
 
 _KEPT: Final = 3_000
 _PAGE: Final = Path(__file__).parent / "page.html"
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that has gone, at whatever moment, is no error; all else is told as ever."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class PageServer:
@@ -31,8 +40,7 @@ class PageServer:
             _PAGE.read_text(encoding="utf-8").replace("TITLE", escape(title)).replace("/* STYLES */", styles)
         )
         self._html = html.encode()
-        self._server = ThreadingHTTPServer(("127.0.0.1", port), self._handler())
-        self._server.daemon_threads = True
+        self._server = _Server(("127.0.0.1", port), self._handler())
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(0.1,), name="page", daemon=True
         )
@@ -81,8 +89,7 @@ class PageServer:
                     self.wfile.write(server._html)
                 elif self.path == "/events":
                     self._head("text/event-stream")
-                    with suppress(OSError):  # the browser has gone
-                        self._stream()
+                    self._stream()
                 else:
                     self.send_error(404)
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import socket
+import struct
 import threading
 from collections.abc import Iterator
+from http.server import ThreadingHTTPServer
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -117,6 +120,35 @@ def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
         instrument.close()
     assert found["residual_rad"] == pytest.approx(0.001, abs=1e-12)
     assert found["measured_rad"] == pytest.approx(0.002, abs=1e-12)
+
+
+@pytest.mark.parametrize("asked", [b"", b"GET / HT", b"GET /events HTTP/1.1\r\n\r\n"])
+def test_a_browser_that_breaks_off_says_nothing_on_the_terminal(
+    asked: bytes, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A connection that is reset (SO_LINGER of 0 s) before, within, or after a request; the next one is served."""
+    over = threading.Event()
+    shut = ThreadingHTTPServer.shutdown_request
+
+    def shutdown_request(server: Any, request: Any) -> None:
+        shut(server, request)
+        over.set()
+
+    monkeypatch.setattr(ThreadingHTTPServer, "shutdown_request", shutdown_request)
+    server = PageServer("arm", CSS)
+    port = int(server.address.rstrip("/").rpartition(":")[2])
+    gone = socket.create_connection(("127.0.0.1", port))
+    gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    gone.send(asked)
+    gone.close()
+    for k in range(10):
+        server.take(made_up(k))
+    server.finish()
+    assert over.wait(10.0)
+    with urlopen(server.address) as page:
+        assert page.status == 200
+    server.close()
+    assert capsys.readouterr().err == ""
 
 
 def test_plotjuggler_gets_curves() -> None:
