@@ -99,6 +99,8 @@ def render(loop: Loop) -> RenderableType:
 def _row(joint: JointLoop, view: View) -> tuple[RenderableType, ...]:
     e, s, r = view.estimate, view.sample, view.reference
     words = ", ".join(health_names(view.flags)) or joint.stop_reason
+    residual = s.joint_position_rad - e.joint_position_rad
+    residual -= joint.setup.config.sensors.joint_position_offset_rad
     return (
         view.name,
         Text(view.phase.name.lower(), style=_COLOURS[view.phase]),
@@ -109,7 +111,7 @@ def _row(joint: JointLoop, view: View) -> tuple[RenderableType, ...]:
         _number(e.tension_l_N, "N", 1),
         _number(e.deflection_rad * 1e3, "mrad", 3),
         f"{_number(e.deflection_low_rad * 1e3, '', 3)} … {_number(e.deflection_high_rad * 1e3, '', 3)}",
-        _number((s.joint_position_rad - e.joint_position_rad) * 1e3, "mrad", 3),
+        _number(residual * 1e3, "mrad", 3),
         Text(words, style="red"),
     )
 

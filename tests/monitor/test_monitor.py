@@ -8,6 +8,7 @@ import struct
 import threading
 from collections.abc import Iterator
 from http.server import ThreadingHTTPServer
+from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ from urllib.request import urlopen
 import numpy as np
 import pytest
 from browser import PHONE, SIDEWAYS, browser, needs_browser, opened
+from rich.console import Console
 
 from cablecomp import load_joint
 from cablecomp.control.command import Reference
@@ -31,6 +33,7 @@ from cablecomp.recording.writer import write_canonical
 from cablecomp.report.page import CSS
 from cablecomp.runtime.loop import RunStage
 from cablecomp.runtime.tally import View
+from cablecomp.runtime.view import render
 from cablecomp.signals import NAN, Estimate, Sample
 
 WRAP = WrapProfile(
@@ -105,12 +108,15 @@ def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
     )
     seen = Estimate(1.0, 1e-3, NAN, NAN, 0.3, 0.5, 60.0, 60.0)
     view = View("arm", 1.0, Phase.NORMAL, Sample(1.0, 0.9, 0.5, 0.321), seen, None, Reference(0.3), 0)  # type: ignore[arg-type]
-    histogram = SimpleNamespace(quantile=lambda share: 1e-4)
+    histogram = SimpleNamespace(quantile=lambda share: 1e-4, count=1)
     loop = SimpleNamespace(
-        joints=[SimpleNamespace(view=view, setup=setup)],
+        joints=[SimpleNamespace(view=view, setup=setup, stop_reason="")],
         stage=RunStage.RUNNING,
-        accounts=SimpleNamespace(times=SimpleNamespace(cycle=histogram, jitter=histogram, misses=0)),
+        accounts=SimpleNamespace(
+            times=SimpleNamespace(cycle=histogram, jitter=histogram, step=histogram, misses=0)
+        ),
         events=SimpleNamespace(last=[]),
+        since_s=1.0,
     )
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
@@ -120,6 +126,10 @@ def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
         instrument.close()
     assert found["residual_rad"] == pytest.approx(0.001, abs=1e-12)
     assert found["measured_rad"] == pytest.approx(0.002, abs=1e-12)
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(render(loop))  # type: ignore[arg-type]
+    drawn = console.export_text()
+    assert drawn.count(" 1.000 mrad") == 2  # the deflection, and 0.321 - 0.02 - 0.3 rad
 
 
 @pytest.mark.parametrize("asked", [b"", b"GET / HT", b"GET /events HTTP/1.1\r\n\r\n"])
