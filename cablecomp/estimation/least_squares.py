@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from cablecomp.estimation.departures import FEWEST, departures, set_anew
 from cablecomp.estimation.evidence import JOINT, Evidence, rms_by_time
-from cablecomp.estimation.limits import HOPELESS, MOVED_SD, ZERO
+from cablecomp.estimation.limits import MOVED_SD, ZERO
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
 from cablecomp.signal.smoothing import FloatArray
@@ -80,7 +80,7 @@ def solve(
         better = found if won > 0.0 else fit
         fit = replace(better, J=problem.jacobian(better.x, better.residual))
         rough = False
-    if np.all(fit.residual[: len(fit.residual) - len(fit.x)] == HOPELESS):
+    if problem.refused(fit.residual):
         problem.misfits(fit.x)
     return fit
 
@@ -101,7 +101,7 @@ def approach(
     found, _ = _steps(
         Fit(problem, x, residual, problem.jacobian(x, residual, beside)), evaluations, tolerance
     )
-    if np.all(found.residual[: len(found.residual) - len(found.x)] == HOPELESS):
+    if problem.refused(found.residual):
         problem.misfits(found.x)
     return found
 

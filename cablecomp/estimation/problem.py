@@ -174,6 +174,10 @@ class Problem:
         found = self.followed(x)
         return np.concatenate([np.full(self._length(), HOPELESS), self.prior(x)]) if found is None else found
 
+    def refused(self, residual: FloatArray) -> bool:
+        """Whether a residual is that of a drive that cannot follow the recordings."""
+        return bool(np.all(residual[: len(residual) - len(self.parameters)] == HOPELESS))
+
     def followed(self, x: FloatArray) -> FloatArray | None:
         """As `residual`; None where the drive cannot follow."""
         try:
@@ -200,19 +204,25 @@ class Problem:
     def jacobian(
         self, x: FloatArray, base: FloatArray | None = None, beside: Mapping[int, FloatArray] | None = None
     ) -> FloatArray:
-        """d residual / d x by differences, inward at a bound; `beside`: columns that are known already."""
+        """d residual / d x by differences, inward at a bound, to the other side where the drive cannot follow, none of
+        the data's where it can follow to neither side. `beside`: columns that are known already."""
         here = self.residual(x) if base is None else base
-        high = self.bounds()[1]
+        low, high = self.bounds()
+        refused_here = self.refused(here)
         columns = np.empty((len(here), len(x)))
         told = {} if beside is None else beside
         known = self._known(x) if len(told) < len(x) else None
 
         def column(k: int) -> FloatArray:
-            step = STEP if x[k] + STEP <= high[k] else -STEP
-            moved = x.copy()
-            moved[k] += step
-            there = self._beside(moved, known, self.parameters[k].session)
-            return np.asarray((there - here) / step, dtype=np.float64)
+            inward = STEP if x[k] + STEP <= high[k] else -STEP
+            for step in (inward, -inward):
+                moved = x.copy()
+                moved[k] += step
+                if step == inward or low[k] <= moved[k] <= high[k]:
+                    there = self._beside(moved, known, self.parameters[k].session)
+                    if refused_here or not self.refused(there):
+                        return np.asarray((there - here) / step, dtype=np.float64)
+            return np.concatenate([np.zeros(len(here) - len(x)), (self.prior(moved) - self.prior(x)) / step])
 
         asked = [k for k in range(len(x)) if k not in told]
         for k, found in (*told.items(), *zip(asked, side_by_side(column, asked), strict=True)):

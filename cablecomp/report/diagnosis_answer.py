@@ -116,7 +116,10 @@ def _nameless(result: Mapping[str, Any]) -> str:
         f"{law['law'].replace('_', ' ')} {100.0 * known(law['heldout_gain']):.0f} %"
         for law in result["empirical"]
     )
-    return f"Of that, laws without a name take off {', then '.join(laws)}; they run in the augmented joint."
+    return (
+        f"Of that one's square, laws without a name take off {', then '.join(laws)}; they run in the augmented joint "
+        "and in the errors after."
+    )
 
 
 def _left(result: Mapping[str, Any], unit: Scale) -> str:

@@ -89,7 +89,8 @@ def _rest(result: Mapping[str, Any]) -> Iterator[str]:
         yield f"what remains: {_shown(remainder['rmse_rad'], unit)} {unit.unit} RMS; {remainder['description']}"
     yield from (f"not the same everywhere: {depends(law)}" for law in dependences(result))
     for law in result["empirical"]:
-        yield f"law without a name: {law['law']} by {law['of']}, {100 * law['heldout_gain']:.0f} % of what is left"
+        gain = f"{100 * law['heldout_gain']:.0f} % of the square of what remains"
+        yield f"law without a name: {law['law']} by {law['of']}, {gain}; the errors after are with it"
     for c in result["candidates"][:_MOST]:
         yield f"candidate: {c['effect']} ({100 * c['confidence']:.0f} %); {c['why_not_named']}"
     for tied in result["not_excluded"]:

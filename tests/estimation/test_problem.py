@@ -10,6 +10,7 @@ import pytest
 from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig, Limits, with_values
+from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Evidence, gather
 from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.least_squares import Fit, covariance, inside, rms_left, rms_of_rows, solve, weighed
@@ -244,6 +245,35 @@ def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
         moved = x.copy()
         moved[k] += STEP
         np.testing.assert_allclose(J[:, k], (p.residual(moved) - p.residual(x)) / STEP, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("sides", [(STEP,), (STEP, -STEP)])
+def test_a_step_to_where_the_drive_cannot_follow_tells_no_slope(
+    three: tuple[Evidence, ...], monkeypatch: pytest.MonkeyPatch, sides: tuple[float, ...]
+) -> None:
+    """One unsolvable sample beside the fit made a value known to a millionth: the other side tells the slope, or the
+    prior alone."""
+    p = problem(three)
+    x, k = p.start, 1
+    plain, run = p.jacobian(x), Problem.misfits
+    moved = x.copy()
+    moved[k] -= STEP
+    backward = (p.residual(moved) - p.residual(x)) / -STEP
+
+    def refusing(self: Problem, at: Any, *args: Any) -> Any:
+        if any(abs(at[k] - x[k] - side) < 1e-9 for side in sides):
+            raise InputError("unsolvable")
+        return run(self, at, *args)
+
+    monkeypatch.setattr(Problem, "misfits", refusing)
+    J = p.jacobian(x)
+    if len(sides) == 1:
+        np.testing.assert_allclose(J[:, k], backward)
+    else:
+        assert not J[: len(J) - len(x), k].any()
+        np.testing.assert_allclose(J[len(J) - len(x) :, k], plain[len(J) - len(x) :, k], atol=1e-9)
+    others = [j for j in range(len(x)) if j != k]
+    np.testing.assert_allclose(J[:, others], plain[:, others])
 
 
 def test_an_amount_is_begun_where_it_was_seen_however_far_its_bounds(three: tuple[Evidence, ...]) -> None:
