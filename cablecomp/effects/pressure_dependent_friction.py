@@ -21,7 +21,8 @@ NEUTRAL_POWER: Final = 1.0
 GROWS: Final = -0.1
 """Exponent below which it grows with the pressure."""
 LEAST_PRESSED: Final = 0.1
-"""Tension over T0 below which what sticks holds no more of each newton: no table of the law would resolve it."""
+"""Tension over T0 below which the coefficient goes on neither by its power nor by what sticks: no table of the law
+would resolve it."""
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -30,7 +31,7 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 
 def _factor(tau: Floats, exponent: float, lost: float, place: float, adhesion: float, power: float) -> Floats:
-    by_power = tau**-exponent
+    by_power = np.maximum(tau, LEAST_PRESSED) ** -exponent
     stuck = 1.0 + adhesion * (np.maximum(tau, LEAST_PRESSED) ** -power - 1.0)
     return np.asarray(by_power * stuck * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
 
@@ -57,8 +58,8 @@ EFFECT = Effect(
     statement="The coefficient of friction falls (or rises) with the pressure between cable and pulley, as "
     "polymer coats do; or to a floor, where part of it sticks and does not grow with the pressure; or it is another "
     "one beyond a pressure at which a coat or a film of grease is pressed through.",
-    equation="mu = mu0 (T/T0)^-n (1 - a + a (T/T0)^-k) (1 - w/(1 + (T0 u/T)^10)) at every place, of a: from T = T0/10 "
-    "on; pressure goes with T/R",
+    equation="mu = mu0 (T/T0)^-n (1 - a + a (T/T0)^-k) (1 - w/(1 + (T0 u/T)^10)) at every place, of n and a: from "
+    "T = T0/10 on; pressure goes with T/R",
     source="n = 1/3 for elastic contact of a soft coat (F. P. Bowden and D. Tabor, The Friction and "
     "Lubrication of Solids, 1950); capstans with mu as a power of pressure: H. G. Howell, J. "
     "Textile Inst. 44 (1953); friction beside adhesion, F = mu (N + A): B. V. Derjaguin, Z. Phys. 88 (1934)",

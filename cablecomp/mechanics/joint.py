@@ -18,9 +18,9 @@ from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_EFFECT, STATUS_OK
 from cablecomp.mechanics.terms import balance, run_terms, show_tensions
 from cablecomp.mechanics.together import solve_together
 
-UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-9
-"""Share of the moments by which a row may miss its balance after all iterations, and how far its angle may still turn;
-farther off it is refused."""
+UNSETTLED, UNSETTLED_RAD = 1e-6, 1e-8
+"""Share of the moments by which a row may miss its balance after all iterations, and how far its angle may still turn:
+laws in tables jump by some 1e-9 rad where a bump is erased, and their moments never meet. Farther off it is refused."""
 MOST_STRAIN = 1.0
 """Strain under the pretension alone above which no cable is one any more: what no effect may make of it."""
 SETTLED_PULL = 1e-11

@@ -106,7 +106,9 @@ def test_the_answer_says_what_a_law_without_a_name_takes_off_the_rest(found: Dia
         replace(without_a_name(found, "unexplained"), empirical=(law,)),
     ):
         first = text_of(diagnosis_page(d).split("</section>")[0])
-        assert "Of that one's square, laws without a name take off wave by motor angle 91 %" in " ".join(first.split())
+        assert "Of that one's square, laws without a name take off wave by motor angle 91 %" in " ".join(
+            first.split()
+        )
 
 
 @pytest.mark.parametrize(
