@@ -66,7 +66,7 @@ def with_parameters(entry: EffectEntry, values: Mapping[str, Any]) -> EffectEntr
 
 def _stage(name: str, stage: Stage, new: Mapping[str, float]) -> Stage:
     try:
-        return Stage(**{**dict(stage), **new}) if new else stage
+        return Stage(**{**vars(stage), **new}) if new else stage
     except ValidationError as error:
         first = error.errors()[0]
         where, value = first["loc"][0], first["input"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import exp, inf, log
 from types import MappingProxyType
 
@@ -20,7 +21,11 @@ from cablecomp.estimation.limits import DECADES, EXACT, INSTANT_REACH_S, INSTANT
 DECADE = log(10.0)
 """Prior sd, in the logarithm, of what is known by order of magnitude."""
 
+NAMES = 1024
+"""Names whose parts are at hand: every run of a drive asks for those of all that is free."""
 
+
+@lru_cache(NAMES)
 def parts_of(name: str) -> tuple[str, str, str]:
     """A parameter's name without session or condition, then the one or the other, or "": `@` and `~` may stand in a
     session's own name, which is a folder's."""
