@@ -19,6 +19,7 @@ from cablecomp.estimation.evidence import load_channel as channel_of_load
 from cablecomp.estimation.lateness import accounted_for, borne_out, delays, rather_late
 from cablecomp.estimation.sensors import odd_sensors
 from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
+from cablecomp.recording.suggest import LOST, lost_share
 from cablecomp.signal.smoothing import FloatArray
 
 ROWS: Final = 20_000
@@ -35,8 +36,6 @@ MOVED: Final = 0.05
 """Share of its range that a channel has to have moved across a gap for the gap to matter."""
 LEAST_STEPS: Final = 2.0
 """Times what it moves by from row to row (95 % less) that it has to have moved across it as well."""
-LOST: Final = 0.1
-"""Share of the work at both ends that sensors of force that do not quite agree do not make."""
 
 _ANGLES: Final = {
     180.0 / pi: "joint_position_rad seems to be in degrees",
@@ -213,8 +212,7 @@ def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[S
     slope, sure = partial(torque, wanted, np.gradient(rows[INPUT]))
     if sure > -0.7:
         return []
-    motor_J, load_J = _work_J(torque, rows[INPUT]), _work_J(rows["joint_torque_Nm"], rows[JOINT])
-    lost = (load_J - motor_J) / max(abs(load_J) + abs(motor_J), 1e-300)  # with the motor's torque turned
+    lost = lost_share(torque, rows[INPUT], rows["joint_torque_Nm"], rows[JOINT])
     turned = MOTOR if lost > -LOST else "joint_torque_Nm"
     either = " (or joint_torque_Nm: the work of both does not tell which)" if abs(lost) < LOST else ""
     words = (
@@ -223,11 +221,6 @@ def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[S
         f"{rms(torque + wanted):.3g} Nm with one of them turned"
     )
     return [Suspicion("sign", turned, words, {"slope": slope, "correlation": sure})]
-
-
-def _work_J(torque: FloatArray, angle: FloatArray) -> float:
-    """Work that a torque [N m] puts in at an angle [rad]."""
-    return float(np.trapezoid(torque, angle))
 
 
 def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:

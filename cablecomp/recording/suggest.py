@@ -38,6 +38,8 @@ _STILL: Final = 0.3
 _NEEDED: Final = ("time_s", "motor_position_rad", "joint_position_rad", "joint_torque_Nm")
 _SURE: Final = 0.3
 """Least correlation from which on a sign is read off."""
+LOST: Final = 0.1
+"""Share of the work at both ends that sensors of force that do not quite agree do not make."""
 
 
 @dataclass
@@ -69,6 +71,16 @@ def suggest(
     _angles(found, values, ratio)
     _torques(found, values, ratio)
     return [found[name] for name in (*CANONICAL, *(n for n in found if n not in CANONICAL)) if name in found]
+
+
+def lost_share(
+    motor_torque_Nm: FloatArray, motor_rad: FloatArray, load_Nm: FloatArray, joint_rad: FloatArray
+) -> float:
+    """Share (-1..1) of the work at both ends, int M dq - int tau dq, that friction takes if of two torques that
+    disagree in sign the motor's is turned; what it does (< 0) if so, it takes with the load turned."""
+    motor_J = float(np.trapezoid(motor_torque_Nm, motor_rad))
+    load_J = float(np.trapezoid(load_Nm, joint_rad))
+    return (load_J - motor_J) / max(abs(load_J) + abs(motor_J), 1e-300)
 
 
 def as_mapping(suggestions: list[Suggestion], known: ColumnMap | None = None) -> ColumnMap:
@@ -240,7 +252,7 @@ def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rat
     motor, joint = found.get("motor_position_rad"), found.get("joint_position_rad")
     load, effort = found.get("joint_torque_Nm"), found.get("motor_torque_Nm")
     q = None if motor is None else _in_si(motor, values[motor.source.column])
-    bent = None
+    bent = angle = None
     if q is not None and joint is not None:
         angle = _in_si(joint, values[joint.source.column])
         slope = _slope(q, angle)[0] if ratio is None else ratio
@@ -248,6 +260,7 @@ def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rat
     if load is not None and bent is not None:
         _axis(found, values, bent)
     M = None if load is None else values[load.source.column]
+    strength = 0.0
     if load is not None and M is not None and bent is not None:
         strength = _slope(bent, M)[1]
         if abs(strength) > _SURE:
@@ -259,6 +272,13 @@ def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rat
     against = None if M is None or load is None else _slope(load.source.sign * M, torque)[1]
     if against is not None and abs(against) > 2.0 * _SURE:
         words = "holds against the load" if against < 0.0 else "would help the load"
+        if load is not None and angle is not None and against > 0.0 and abs(strength) <= _SURE:
+            loaded = _in_si(load, values[load.source.column])
+            if lost_share(_in_si(effort, torque), q, loaded, angle) < -LOST:
+                _change(
+                    load, f"else the motor {words} (correlation {against:.2f}) and friction do work", sign=-1
+                )
+                return
         _change(effort, f"{words} (correlation {against:.2f})", sign=1 if against < 0.0 else -1)
         return
     power = float(np.sum(0.5 * (torque[1:] + torque[:-1]) * np.diff(q)))

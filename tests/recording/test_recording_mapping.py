@@ -201,6 +201,27 @@ def test_a_disguised_joint_is_seen_through(
         np.testing.assert_allclose(found, values, atol=1e-3 if channel == "time_s" else 1e-9, err_msg=channel)
 
 
+@pytest.mark.parametrize("turned", ["", "joint_torque_Nm", "motor_torque_Nm"])
+def test_of_two_torques_that_disagree_the_one_is_turned_without_which_friction_would_do_work(
+    turned: str,
+) -> None:
+    """A joint on a spring of 1 N m/rad: what it gives way follows its angle, and is no other than a ratio not known. Of
+    the work that the motor puts in, 0.2 N m of friction on the way keeps all."""
+    angle = np.sin(0.1 * np.arange(600.0))
+    motion = np.sign(np.cos(0.1 * np.arange(600.0)))
+    columns = {
+        "time_s": 0.02 * np.arange(600.0),
+        "motor_position_rad": (angle + 0.02 * angle + 0.001 * motion) / RATIO,
+        "joint_position_rad": angle,
+        "joint_torque_Nm": -angle,
+        "motor_torque_Nm": RATIO * (angle + 0.2 * motion),
+    }
+    if turned:
+        columns[turned] = -columns[turned]
+    said = {s.channel for s in suggest(columns) if s.source.sign < 0}
+    assert said == ({turned} if turned else set())
+
+
 def test_counts_per_turn_follow_from_the_other_encoder() -> None:
     true = joint()
     counts = np.round(true["motor_position_rad"] * 8192 / (2.0 * math.pi)) + 5000
