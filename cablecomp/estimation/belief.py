@@ -133,11 +133,10 @@ def _angles(view: View) -> list[Suspicion]:
         unit = next((words for f, words in _ANGLES.items() if abs(log(off / f)) < 0.1), None)
         words = unit or "a gear between encoder and pulley, or a radius that is off"
         kind = "unit" if unit else "ratio"
-        left = rms(view.y - view.slope * view.q)
         said = (
             f"{words}: the joint moves {off:.4g} times as far as the drive's "
             f"ratio allows; RMS {mrad(view.left())} as "
-            f"it is, {mrad(left)} with the ratio seen"
+            f"it is, {mrad(view.left(ratio=view.slope))} with the ratio seen"
         )
         found.append(Suspicion(kind, JOINT, said, {"slope_over_ratio": factor}))
     return found or list(_reach(view))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from turning import JOINT, course, recorded
 
 from cablecomp.config import JointConfig, load_joint
+from cablecomp.control.stiffness import stiffness_range
 from cablecomp.effects import with_effects
 from cablecomp.estimation.belief import same_readings, suspicions
 from cablecomp.estimation.view import Suspicion
@@ -65,6 +67,23 @@ def test_units_and_gears() -> None:
     (gear,) = suspicions(JOINT, {**COLUMNS, "motor_position_rad": 8.0 * COLUMNS["motor_position_rad"]})
     assert (gear.kind, gear.numbers["slope_over_ratio"]) == ("ratio", pytest.approx(1.0 / 8.0, rel=1e-2))
     assert ("scale", "joint_torque_Nm") in kinds(joint_torque_Nm=1e3 * COLUMNS["joint_torque_Nm"])
+
+
+def test_a_ratio_that_is_off_is_held_against_the_one_seen_with_the_load_on_both_sides() -> None:
+    """What is left with the ratio seen is of a drive that bears the load, too: here next to nothing."""
+    motor, load = np.sin(0.3 * TIME), 1.5 * np.sin(0.7 * TIME)
+    softness = 1.0 / stiffness_range(JOINT).secant_Nm_per_rad
+    angle = 1.1 * JOINT.drive.ratio * motor + softness * load
+    columns = {
+        "time_s": TIME,
+        "motor_position_rad": motor,
+        "joint_position_rad": angle,
+        "joint_torque_Nm": load,
+    }
+    (said,) = suspicions(JOINT, columns)
+    as_it_is, seen = (float(v) for v in re.findall(r"(\S+) mrad", said.text))
+    assert as_it_is == pytest.approx(1e3 * np.std(0.1 * JOINT.drive.ratio * motor), rel=0.01)
+    assert seen < 1e-6 * as_it_is
 
 
 def test_both_angles_in_degrees() -> None:
