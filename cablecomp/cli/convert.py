@@ -42,11 +42,12 @@ def convert_recording(
         raise InputError(
             f"--from {begin:g} --to {end:g}: a time, and none before it, in seconds are accepted"
         )
-    source = reading(None if config is None else load_joint(config)).open(recording)
+    joint = None if config is None else load_joint(config)
+    source = reading(joint).open(recording)
     late_s = each_once("--late", map(_late, late or ()))
     with progress_bar(f"convert {recording.name}") as progress:
         rows = convert(source, to, (begin, end), progress, late_s, ros)
-    warn(missing_channels(source.channels))
+    warn(missing_channels(source.channels, joint))
     if as_json:
         echo_json({"written": to, "rows": rows, "channels": source.channels, "notes": source.notes})
         return

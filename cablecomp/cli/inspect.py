@@ -53,12 +53,12 @@ def inspect_recording(
     if known is None and saved is not None:
         found_there = load_mapping(saved)
         known = found_there if foreign_column(found_there, names) is None else None
-    ratio = None if config is None else load_joint(config).drive.ratio
-    found = suggest(raw.columns, ratio, raw.units)
+    joint = None if config is None else load_joint(config)
+    found = suggest(raw.columns, None if joint is None else joint.drive.ratio, raw.units)
     needed, left_out = unknown_units(found, known)
     mapping = as_mapping(found, known)
     seen, notes, why = (None, (), "; ".join(needed)) if needed else _looked_at(recording, mapping, given)
-    looked = Looked(recording, raw, found, mapping, seen, (*notes, *left_out), why)
+    looked = Looked(recording, raw, found, mapping, seen, (*notes, *left_out), why, joint)
     save = save and not needed
     if save:  # before it is shown: a pager may be left early
         save_mapping(

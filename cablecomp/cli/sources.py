@@ -34,7 +34,10 @@ MapOption = Annotated[
     ),
 ]
 RatioOption = Annotated[
-    Path | None, typer.Option("--config", help="joint configuration: its ratio helps to tell units")
+    Path | None,
+    typer.Option(
+        "--config", help="joint configuration: its ratio helps to tell units, its load what is missing"
+    ),
 ]
 LinkOption = Annotated[
     Path | None, typer.Option("--link", help="for a CAN log: the link file of its devices")

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from cablecomp.config import JointConfig
 from cablecomp.counting import counted
 from cablecomp.errors import path_text
 from cablecomp.recording.channels import CANONICAL
 from cablecomp.recording.inspection import ChannelQuality, Inspection, clipped_words, stuck_words, turns_words
 from cablecomp.recording.mapping import ColumnMap, mapping_text
 from cablecomp.recording.raw_columns import RawColumns
+from cablecomp.recording.replay import required_channels
 from cablecomp.recording.suggest import Suggestion
-
-_NEEDED: Final = ("motor_position_rad", "joint_torque_Nm", "joint_position_rad")
-"""Channels without which nothing can be compared."""
 
 
 class Looked(NamedTuple):
     """A recording looked at: its columns, what they may mean and are taken for; the quality of its channels and the
-    reader's remarks, or why there are none."""
+    reader's remarks, or why there are none; the joint, if it is known."""
 
     recording: Path
     raw: RawColumns
@@ -33,12 +32,21 @@ class Looked(NamedTuple):
     seen: Inspection | None
     notes: tuple[str, ...]
     why: str
+    config: JointConfig | None = None
 
 
-def missing_channels(channels: Sequence[str]) -> list[str]:
-    """A line that names the channels without which nothing can be compared, if any are missing."""
-    missing = [name for name in _NEEDED if name not in channels]
-    return [f"missing: {', '.join(missing)}; which columns are they?"] if missing else []
+def missing_channels(channels: Sequence[str], config: JointConfig | None = None) -> list[str]:
+    """A line that names the channels without which nothing can be compared, if any are missing: of a joint that is not
+    known its load is taken to be measured."""
+    read = ("motor_position_rad", "joint_torque_Nm") if config is None else required_channels(config)
+    needed = dict.fromkeys((*read, "joint_position_rad"))
+    missing = [name for name in needed if name not in channels]
+    if not missing:
+        return []
+    current = ""
+    if "motor_torque_Nm" in missing and "motor_current_A" in channels:
+        current = " (the current's: --map 'motor_torque_Nm=COLUMN,torque_constant_Nm_per_A=..')"
+    return [f"missing: {', '.join(missing)}; which columns are they?{current}"]
 
 
 def show(looked: Looked, console: Console) -> None:
@@ -59,7 +67,7 @@ def show(looked: Looked, console: Console) -> None:
         console.print(f"not yet a recording: {looked.why}", style="yellow")
     else:
         _show_quality(seen, console)
-        for line in missing_channels([c.name for c in seen.channels]):
+        for line in missing_channels([c.name for c in seen.channels], looked.config):
             console.print(line, style="yellow")
     for note in looked.notes:
         console.print(f"note: {note}")

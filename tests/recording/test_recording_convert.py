@@ -148,6 +148,39 @@ def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize(
+    ("load", "says"),
+    [
+        (
+            "motor_torque",
+            "missing: motor_torque_Nm; which columns are they? "
+            "(the current's: --map 'motor_torque_Nm=COLUMN,torque_constant_Nm_per_A=..')",
+        ),
+        ("joint_torque", "missing: joint_torque_Nm; which columns are they?"),
+        ("both_encoders", ""),
+        ("none", ""),
+    ],
+)
+def test_missing_is_what_the_joint_takes_its_load_from(
+    load: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, config = tmp_path / "a.csv", tmp_path / "joint.toml"
+    config.write_text(
+        f"{example('joints', 'wrist-capstan').read_text('utf-8')}\n[observer]\nload = '{load}'\n", "utf-8"
+    )
+    columns = {n: joint(10)[n] for n in ("time_s", "motor_position_rad", "joint_position_rad")}
+    columns["motor_current_A"] = joint(10)["motor_torque_Nm"]
+    pl.DataFrame(columns).write_csv(log)
+    assert main(["inspect", str(log), "--config", str(config)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert says in shown
+    assert says or "missing:" not in shown
+    assert main(["convert", str(log), str(tmp_path / "b.csv"), "--config", str(config)]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert says in said
+    assert says or "missing:" not in said
+
+
+@pytest.mark.parametrize(
     ("words", "says"),
     [
         (["--late", "time_s=0.04"], "--late time_s=0.04: time_s is the clock"),
