@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_drive import TOLERANT, recorded
 
-from cablecomp.diagnosis.answer.notes import notes
+from cablecomp.diagnosis.answer.notes import load_said, notes
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.outcome import Case
@@ -41,3 +41,32 @@ def test_rows_that_have_a_reading_s_noise_are_not_said_to_be_averaged(
     found = [n for n in said({"a/1": recorded((), 10.0)}, quiet) if "averaged" in n]
     assert len(found) == (words is not None)
     assert all(str(words) in n for n in found)
+
+
+@pytest.mark.parametrize(
+    ("stated", "channel", "says"),
+    [
+        ("joint_torque", "joint_torque_Nm", "load from joint_torque_Nm"),
+        ("motor_torque", "motor_torque_Nm", "load from motor_torque_Nm"),
+        ("none", None, "no load channel: the joint is taken as free"),
+        (
+            "motor_torque",
+            None,
+            "motor_torque_Nm, which [observer] load = 'motor_torque' reads, is not recorded",
+        ),
+        ("none", "joint_torque_Nm", "load from joint_torque_Nm; [observer] load = 'none' does not read it"),
+        (
+            "both_encoders",
+            "joint_torque_Nm",
+            "load from joint_torque_Nm; [observer] load = 'both_encoders' does not read it",
+        ),
+        (
+            "motor_torque",
+            "joint_torque_Nm",
+            "load from joint_torque_Nm; [observer] load = 'motor_torque' does not read it",
+        ),
+    ],
+)
+def test_a_load_that_the_observer_does_not_read_is_said(stated: str, channel: str | None, says: str) -> None:
+    observer = TOLERANT.observer.model_copy(update={"load": stated})
+    assert load_said(TOLERANT.model_copy(update={"observer": observer}), channel).startswith(says)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cablecomp.config import JointConfig
 from cablecomp.diagnosis.body import read_by_some, short
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model
@@ -12,7 +13,8 @@ from cablecomp.diagnosis.explain.turned import stands_still
 from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.outcome import Case
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import JOINT, load_channel
+from cablecomp.estimation.evidence import JOINT, MOTOR, load_channel
+from cablecomp.recording.replay import required_channels
 
 SAID = 4
 """Recordings that a note names, or tells the clock of; of more, it says how many."""
@@ -22,7 +24,7 @@ def notes(case: Case) -> tuple[str, ...]:
     """What was assumed and what was left out."""
     body, drive = case.body, case.drive
     load = load_channel(case.config, body.used[0].columns)
-    found = [f"load from {load}" if load else "no load channel: the joint is taken as free"]
+    found = [load_said(case.config, load)]
     usual = usual_of(case.config, JOINT)
     if usual:
         found.append(
@@ -68,6 +70,23 @@ def notes(case: Case) -> tuple[str, ...]:
             f"{', '.join(begun[:SAID])}{more}"
         )
     return tuple(found)
+
+
+def load_said(config: JointConfig, load: str | None) -> str:
+    """Where the load was taken from (`load`: its channel), and whether the joint as it runs has it from elsewhere."""
+    stated = config.observer.load
+    if load is None and stated == "motor_torque":
+        return (
+            f"{MOTOR}, which [observer] load = '{stated}' reads, is not recorded: the joint is taken as free"
+        )
+    if load is None:
+        return "no load channel: the joint is taken as free"
+    if load in required_channels(config):
+        return f"load from {load}"
+    return (
+        f"load from {load}; [observer] load = '{stated}' does not read it, and errors of replay and of the joint as it "
+        "runs are others: set load = 'joint_torque' to compare"
+    )
 
 
 def by_the_clock(model: Model) -> tuple[str, ...]:
