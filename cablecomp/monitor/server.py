@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import threading
 from collections import deque
@@ -14,6 +15,8 @@ from typing import Any, Final
 from cablecomp.monitor.frames import Frame
 
 _KEPT: Final = 3_000
+_HERE: Final = ("127.0.0.1", "localhost", "[::1]")
+"""Names of this machine: a page from elsewhere whose name was bent to it (DNS rebinding) asks by its own."""
 _PAGE: Final = Path(__file__).parent / "page.html"
 
 
@@ -84,7 +87,10 @@ class PageServer:
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
-                if self.path == "/":
+                host = self.headers.get("Host", _HERE[0])
+                if re.sub(r":\d*$", "", host).lower() not in _HERE:
+                    self.send_error(403, f"only for {', '.join(_HERE)}")
+                elif self.path == "/":
                     self._head("text/html; charset=utf-8", len(server._html))
                     self.wfile.write(server._html)
                 elif self.path == "/events":

@@ -7,6 +7,7 @@ import socket
 import struct
 import threading
 from collections.abc import Iterator
+from http.client import HTTPConnection
 from http.server import ThreadingHTTPServer
 from io import StringIO
 from pathlib import Path
@@ -159,6 +160,30 @@ def test_a_browser_that_breaks_off_says_nothing_on_the_terminal(
         assert page.status == 200
     server.close()
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("127.0.0.1:{}", 200), ("localhost:{}", 200), ("LocalHost", 200), ("[::1]:{}", 200),
+        ("evil.example:{}", 403), ("127.0.0.1.evil.example:{}", 403), ("[::2]:{}", 403), ("", 403),
+    ],
+)  # fmt: skip
+def test_a_page_from_elsewhere_does_not_read_the_joint(host: str, status: int) -> None:
+    """A browser says by which name it asks; a foreign one that leads here (DNS rebinding) gets neither page nor
+    frames."""
+    server = PageServer("arm", CSS)
+    server.take(made_up(1))
+    server.finish()
+    port = int(server.address.rstrip("/").rpartition(":")[2])
+    for path in ("/", "/events"):
+        asked = HTTPConnection("127.0.0.1", port, timeout=5.0)
+        asked.request("GET", path, headers={"Host": host.format(port)})
+        answer = asked.getresponse()
+        assert answer.status == status
+        assert (b"load_Nm" in answer.read()) == (status == 200)
+        asked.close()
+    server.close()
 
 
 def test_plotjuggler_gets_curves() -> None:
