@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
@@ -154,11 +155,13 @@ def run(
                 if asked.mode == "force":
                     simulation.set_wall(1, 0.0)
             shown = last.enter_context(LiveView(said))
-            watch = last.enter_context(_onlookers(joint, out, shown.watch, view, plotjuggler, said))
+            failures: list[str] = []
+            watch = last.enter_context(_onlookers(joint, out, shown.watch, view, plotjuggler, said, failures))
             beside = LiveRun(joint, bus.rate_Hz, out, watch, stepped=fast) if live else None
             watch = watch if beside is None else beside.watch
             with _named(resume):
                 report = run_joint(joint, bus, wanted, asked, options, simulation, watch, ways_out)
+        report = replace(report, failures=(*report.failures, *failures))
         _finish(report, joint, config, beside, as_json)
 
 
@@ -226,9 +229,16 @@ def _asked(
 
 @contextmanager
 def _onlookers(
-    joint: JointConfig, out: Path, shown: Watch, view: bool, plotjuggler: bool, said: Console
+    joint: JointConfig,
+    out: Path,
+    shown: Watch,
+    view: bool,
+    plotjuggler: bool,
+    said: Console,
+    failures: list[str],
 ) -> Iterator[Watch]:
-    """What is called once a tick: the terminal's view, and the instrument where someone looks on."""
+    """What is called once a tick: the terminal's view, and the instrument where someone looks on; `failures` gets why
+    what was written for them is incomplete."""
     if not (view or plotjuggler):
         yield shown
         return
@@ -239,8 +249,9 @@ def _onlookers(
     who = Onlookers(
         view, view and _installed("foxglove"), plotjuggler, next(free) if _installed("mcap") else None
     )
-    with watched(joint, who, CSS) as (instrument, words):
-        for line in words:
+    with watched(joint, who, CSS) as viewer:
+        instrument = viewer.instrument
+        for line in viewer.words:
             said.print(line, soft_wrap=True)
 
         def both(loop: Loop, tick: Tick) -> None:
@@ -249,6 +260,7 @@ def _onlookers(
 
         yield both
     said.print(f"onlookers: {instrument.sent} frames sent, {instrument.dropped} dropped")
+    failures += viewer.failures
 
 
 def _installed(package: str) -> bool:

@@ -8,7 +8,7 @@ import socket
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from cablecomp.errors import InputError
+from cablecomp.errors import DeviceError, InputError
 from cablecomp.monitor.frames import Frame
 
 PLOTJUGGLER: Final = ("127.0.0.1", 9870)
@@ -31,7 +31,7 @@ class Sink(Protocol):
         """Take in a frame."""
 
     def close(self) -> None:
-        """No more will come."""
+        """No more will come; DeviceError where what was kept is incomplete."""
 
 
 class PlotJuggler:
@@ -82,14 +82,16 @@ class Foxglove:
 
 
 class Mcap:
-    """Frames as JSON messages in an MCAP file; on disk once a second, so that a crash costs no more than that."""
+    """Frames as JSON messages in an MCAP file; on disk once a second, so that a crash costs no more than that. A disk
+    that fills ends the file; `close` says so."""
 
     def __init__(self, path: Path, every_s: float = 1.0) -> None:
         try:
             from mcap.writer import Writer
         except ImportError:
             raise InputError(f"{path}: MCAP needs a package: pip install 'cablecomp[mcap]'") from None
-        self._stream = path.open("wb")
+        self._path, self._stream = path, path.open("wb")
+        self._failure: OSError | None = None
         self._writer: Any = Writer(self._stream, enable_data_crcs=True, use_chunking=False)
         self._writer.start(profile="", library="cablecomp")
         self._channel: int | None = None
@@ -97,6 +99,14 @@ class Mcap:
 
     def take(self, found: Frame) -> None:
         """See `Sink.take`."""
+        if self._failure is not None:
+            return
+        try:
+            self._put(found)
+        except OSError as error:
+            self._failure = error
+
+    def _put(self, found: Frame) -> None:
         if self._channel is None:
             schema = self._writer.register_schema(_SCHEMA, "jsonschema", schema_of(found))
             self._channel = self._writer.register_channel(_TOPIC, "json", schema)
@@ -110,6 +120,12 @@ class Mcap:
             self._saved_s = found["time_s"]
 
     def close(self) -> None:
-        """See `Sink.close`: index and footer."""
-        self._writer.finish()
-        self._stream.close()
+        """See `Sink.close`: index and footer; DeviceError if the disk refused something."""
+        try:
+            with self._stream:
+                if self._failure is None:
+                    self._writer.finish()
+        except OSError as error:
+            self._failure = self._failure or error
+        if self._failure is not None:
+            raise DeviceError(f"{self._path}: is incomplete ({self._failure.strerror}); free some space")

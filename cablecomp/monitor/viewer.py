@@ -21,6 +21,8 @@ from cablecomp.monitor.sinks import Foxglove, Mcap, PlotJuggler, Sink
 
 READY_S: Final = 120.0
 """How long the process may take to be there: it loads compiled code."""
+END_S: Final = 5.0
+"""How long it may take to be gone."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,19 @@ class Onlookers:
         return self.page or self.foxglove or self.plotjuggler or self.mcap is not None
 
 
-@contextmanager
-def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[tuple[Instrument, tuple[str, ...]]]:
-    """A viewer for the time of a run: the instrument to hand to it, and a line about each place to look.
+@dataclass
+class Viewer:
+    """What a run has of its viewer: the instrument to hand to it, a line about each place to look, and, once it is
+    over, why what was written is incomplete."""
 
-    Raises InputError if the viewer cannot serve, such as for a file that cannot be written.
-    """
+    instrument: Instrument
+    words: tuple[str, ...]
+    failures: tuple[str, ...] = ()
+
+
+@contextmanager
+def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[Viewer]:
+    """A viewer for the time of a run. Raises InputError if it cannot serve, as for a file that cannot be written."""
     context = get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(
@@ -53,12 +62,13 @@ def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[tuple[
     there.close()
     try:
         port, words = _answer(here)
-        instrument = Instrument(port)
+        viewer = Viewer(Instrument(port), words)
         try:
-            yield instrument, words
+            yield viewer
         finally:
-            instrument.close()
-            process.join(timeout=5.0)
+            viewer.instrument.close()
+            viewer.failures = _last_words(here)
+            process.join(END_S)
     finally:
         if process.is_alive():
             process.terminate()
@@ -75,6 +85,14 @@ def _answer(here: Connection) -> tuple[int, tuple[str, ...]]:
     return found
 
 
+def _last_words(here: Connection) -> tuple[str, ...]:
+    with suppress(EOFError):
+        if here.poll(END_S):
+            found: tuple[str, ...] = here.recv()
+            return found
+    return ("viewer: it ended without a word; what it wrote may be incomplete",)
+
+
 def serve(there: Connection, config: JointConfig, who: Onlookers, styles: str, parent: int) -> None:
     """The process's whole life: open, say where, pass frames on, close."""
     sinks: list[Sink] = []
@@ -88,9 +106,18 @@ def serve(there: Connection, config: JointConfig, who: Onlookers, styles: str, p
     there.send((receiver.getsockname()[1], words))
     with suppress(KeyboardInterrupt):  # the run gets it too, and ends this
         pass_on(receiver, config, sinks, parent)
-    for sink in sinks:
-        sink.close()
     receiver.close()
+    with suppress(BrokenPipeError):  # the run has gone
+        there.send(tuple(_closed(sinks)))
+
+
+def _closed(sinks: Sequence[Sink]) -> Iterator[str]:
+    """Close every one of them; why what one kept is incomplete."""
+    for sink in sinks:
+        try:
+            sink.close()
+        except CablecompError as error:
+            yield str(error)
 
 
 def _open(config: JointConfig, who: Onlookers, styles: str, sinks: list[Sink]) -> tuple[str, ...]:

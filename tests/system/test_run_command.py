@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
@@ -14,6 +15,7 @@ from cablecomp.cli.simulation import start_simulation
 from cablecomp.config import load_joint
 from cablecomp.control.motors import control_for
 from cablecomp.links.load import load_link
+from cablecomp.monitor import viewer
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.simulated import SimulationWish
 
@@ -45,6 +47,23 @@ def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
     )
     asked = cycles["reference_position_rad"].to_numpy()[-1]
     assert asked == pytest.approx(REACH.reference(0.3).joint_position_rad, abs=1e-3)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device stands for a full disk here")
+def test_a_file_for_onlookers_that_the_disk_refuses_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mcap", reason="mcap is not installed")
+    watched = viewer.watched
+    monkeypatch.setattr(
+        viewer, "watched", lambda joint, who, css: watched(joint, replace(who, mcap=Path("/dev/full")), css)
+    )
+    assert cli.main([*simulated(out=tmp_path, duration=0.3), "--plotjuggler", "--json"]) == 3
+    said = capsys.readouterr()
+    failure = "/dev/full: is incomplete (No space left on device); free some space"
+    assert json.loads(said.out)["failures"] == [failure]
+    assert said.err.splitlines()[-1] == f"cablecomp: {failure}"
+    assert "Traceback" not in said.err
 
 
 @pytest.mark.parametrize(
