@@ -39,22 +39,29 @@ class Instrument:
         self._socket.connect(("127.0.0.1", port))
         self._period_s, self._next_s = 1.0 / per_second, 0.0
         self.sent = self.dropped = 0
+        self._loop: Loop | None = None
 
     def watch(self, loop: Loop, tick: Tick) -> None:
         """Called once a tick; sends every `1 / per_second` of the loop's own time."""
+        self._loop = loop
         if tick.now_s < self._next_s:
             return
         self._next_s = tick.now_s + self._period_s
+        if loop.stage is RunStage.RUNNING:
+            self._show(loop, tick.now_s)
+
+    def _show(self, loop: Loop, now_s: float) -> None:
         joint = loop.joints[0]
         view = joint.view
-        if view is None or loop.stage is not RunStage.RUNNING:
+        if view is None:
             return
         e, s, t = view.estimate, view.sample, loop.accounts.times
         events = loop.events.last
+        event = " ".join(events[-1][1:]).strip() if events else ""
         zero = joint.setup.config.sensors.joint_position_offset_rad
         vector = getattr(joint.setup.compensator.observer, "vector", None)
         scalars = {
-            "time_s": tick.now_s,
+            "time_s": now_s,
             "joint": view.name,
             "phase": view.phase.name.lower(),
             "asked_rad": view.reference.joint_position_rad,
@@ -71,7 +78,7 @@ class Instrument:
             "late_p99_s": t.jitter.quantile(0.99),
             "misses": t.misses,
             "alarms": list(health_names(view.flags)),
-            "event": " ".join(events[-1][1:]).strip() if events else "",
+            "event": f"stop: {loop.stop_reason}" if loop.stop_reason else event,
             "dropped": self.dropped,
         }
         self.send(packed(scalars, None if vector is None else vector()))
@@ -85,6 +92,8 @@ class Instrument:
             self.dropped += 1
 
     def close(self) -> None:
-        """Say that it is over."""
+        """Show how the run ended, and say that it is over."""
+        if self._loop is not None:
+            self._show(self._loop, self._loop.accounts.last_s)
         self.send(END)
         self._socket.close()

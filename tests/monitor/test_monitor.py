@@ -24,7 +24,7 @@ from cablecomp import load_joint
 from cablecomp.control.command import Reference
 from cablecomp.control.degrade import Phase
 from cablecomp.monitor.frames import Frame, frame, unpacked
-from cablecomp.monitor.instrument import Instrument, packed
+from cablecomp.monitor.instrument import END, Instrument, packed
 from cablecomp.monitor.played import played
 from cablecomp.monitor.server import PageServer
 from cablecomp.monitor.sinks import Foxglove, Mcap, PlotJuggler
@@ -102,7 +102,8 @@ def test_nobody_is_waited_for() -> None:
     instrument.close()
 
 
-def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
+def a_loop() -> SimpleNamespace:
+    """A loop with one joint at 1 s, as far as onlookers see it; its encoder reads 0.02 rad too much."""
     sensors = SimpleNamespace(joint_position_offset_rad=0.02)
     setup = SimpleNamespace(
         config=SimpleNamespace(sensors=sensors), compensator=SimpleNamespace(observer=None)
@@ -110,15 +111,20 @@ def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
     seen = Estimate(1.0, 1e-3, NAN, NAN, 0.3, 0.5, 60.0, 60.0)
     view = View("arm", 1.0, Phase.NORMAL, Sample(1.0, 0.9, 0.5, 0.321), seen, None, Reference(0.3), 0)  # type: ignore[arg-type]
     histogram = SimpleNamespace(quantile=lambda share: 1e-4, count=1)
-    loop = SimpleNamespace(
+    return SimpleNamespace(
         joints=[SimpleNamespace(view=view, setup=setup, stop_reason="")],
         stage=RunStage.RUNNING,
+        stop_reason="",
         accounts=SimpleNamespace(
-            times=SimpleNamespace(cycle=histogram, jitter=histogram, step=histogram, misses=0)
+            times=SimpleNamespace(cycle=histogram, jitter=histogram, step=histogram, misses=0), last_s=1.0
         ),
         events=SimpleNamespace(last=[]),
         since_s=1.0,
     )
+
+
+def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
+    loop = a_loop()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         instrument = Instrument(receiver.getsockname()[1])
@@ -131,6 +137,31 @@ def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
     console.print(render(loop))  # type: ignore[arg-type]
     drawn = console.export_text()
     assert drawn.count(" 1.000 mrad") == 2  # the deflection, and 0.321 - 0.02 - 0.3 rad
+
+
+def test_the_last_frame_says_why_the_run_ended() -> None:
+    """Whatever else was the last event, and however soon after the frame before."""
+    loop = a_loop()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5.0)
+        instrument = Instrument(receiver.getsockname()[1])
+        loop.events.last.append((0.9, "", "enabling -> running"))
+        instrument.watch(loop, SimpleNamespace(now_s=1.0))  # type: ignore[arg-type]
+        loop.stage, loop.stop_reason, loop.accounts.last_s = (
+            RunStage.STOPPING,
+            "arm: drive reports fault",
+            1.001,
+        )
+        loop.events.last.append((1.001, "", "running -> stopping"))
+        instrument.watch(loop, SimpleNamespace(now_s=1.001))  # type: ignore[arg-type]
+        instrument.close()
+        found = [unpacked(receiver.recv(65_535), lambda vector: ()) for _ in range(2)]
+        assert receiver.recv(65_535) == END
+    assert [(f["time_s"], f["event"]) for f in found] == [
+        (1.0, "enabling -> running"),
+        (1.001, "stop: arm: drive reports fault"),
+    ]
 
 
 @pytest.mark.parametrize("asked", [b"", b"GET / HT", b"GET /events HTTP/1.1\r\n\r\n"])
