@@ -10,6 +10,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.observer import Observer, WrapProfile
+from cablecomp.signals import Sample
 
 Frame = dict[str, Any]
 Profiles = Callable[[Any], Sequence[WrapProfile]]
@@ -18,13 +19,16 @@ _POINTS: Final = 60
 
 
 def profiles_of(config: JointConfig) -> Profiles:
-    """Function from an observer's state vector to its profiles, by an observer of its own."""
+    """Function from an observer's state vector to its profiles, by an observer of its own, whose compiled code is
+    loaded by now: that may take a second, and frames would come meanwhile."""
     twin = Observer(config)
 
     def found(vector: Any) -> Sequence[WrapProfile]:
         twin.set_vector(vector)
         return twin.profiles()
 
+    twin.step(Sample(0.0, 0.0, 0.0, 0.0, config.motor_zero_Nm, 0.0, (0.0,) * len(twin.channels)))
+    twin.profiles()
     return found
 
 

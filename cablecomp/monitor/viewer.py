@@ -14,7 +14,7 @@ from typing import Final
 
 from cablecomp.config import JointConfig
 from cablecomp.errors import CablecompError, InputError
-from cablecomp.monitor.frames import profiles_of, unpacked
+from cablecomp.monitor.frames import Profiles, profiles_of, unpacked
 from cablecomp.monitor.instrument import END, Instrument
 from cablecomp.monitor.server import PageServer
 from cablecomp.monitor.sinks import Foxglove, Mcap, PlotJuggler, Sink
@@ -100,12 +100,13 @@ def serve(there: Connection, config: JointConfig, who: Onlookers, styles: str, p
         words = _open(config, who, styles, sinks)
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         receiver.bind(("127.0.0.1", 0))
+        profiles = profiles_of(config)
     except (CablecompError, OSError, RuntimeError) as error:
         there.send(str(error).partition("\n")[0])
         return
     there.send((receiver.getsockname()[1], words))
     with suppress(KeyboardInterrupt):  # the run gets it too, and ends this
-        pass_on(receiver, config, sinks, parent)
+        pass_on(receiver, profiles, sinks, parent)
     receiver.close()
     with suppress(BrokenPipeError):  # the run has gone
         there.send(tuple(_closed(sinks)))
@@ -138,9 +139,8 @@ def _open(config: JointConfig, who: Onlookers, styles: str, sinks: list[Sink]) -
     return tuple(words)
 
 
-def pass_on(receiver: socket.socket, config: JointConfig, sinks: Sequence[Sink], parent: int) -> None:
+def pass_on(receiver: socket.socket, profiles: Profiles, sinks: Sequence[Sink], parent: int) -> None:
     """Give every datagram's frame to every sink until END, or until the run's process is gone."""
-    profiles = profiles_of(config)
     receiver.settimeout(0.5)
     while True:
         try:

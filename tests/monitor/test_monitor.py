@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import socket
 import struct
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -121,6 +123,34 @@ def a_loop() -> SimpleNamespace:
         events=SimpleNamespace(last=[]),
         since_s=1.0,
     )
+
+
+def test_frames_come_from_the_first_second_on(tmp_path: Path) -> None:
+    """Once the viewer says that it is there, the first frame's profiles load no code: at 25 Hz it would still be at it
+    when its socket is full. A process of its own, as the viewer is one, so that nothing is loaded before."""
+    observer = Observer(load_joint("wrist-capstan"))
+    observer.run({"time_s": [0.0, 1.0], "motor_position_rad": [0.0, 0.1], "joint_torque_Nm": [0.0, 0.5]})
+    np.save(tmp_path / "state.npy", observer.vector())
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_FRAME, str(tmp_path / "state.npy")],
+        capture_output=True, text=True, timeout=300, check=True,
+    )  # fmt: skip
+    wraps, loaded = done.stdout.split()
+    assert (wraps, loaded) == ("4", "0")
+
+
+FIRST_FRAME = """
+import sys
+import numpy as np
+from cablecomp import load_joint
+from cablecomp.monitor.frames import profiles_of, unpacked
+from cablecomp.monitor.instrument import packed
+datagram = packed({"time_s": 0.0}, np.load(sys.argv[1]))
+profiles = profiles_of(load_joint("wrist-capstan"))
+before = set(sys.modules)
+found = unpacked(datagram, profiles)
+print(len(found["wraps"]), len({m for m in set(sys.modules) - before if m.startswith("numba")}))
+"""
 
 
 def test_what_the_joint_encoder_reads_too_much_is_no_residual() -> None:
