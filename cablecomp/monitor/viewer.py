@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
@@ -58,7 +59,8 @@ def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[Viewer
     process = context.Process(
         target=serve, args=(there, config, who, styles, os.getpid()), name="viewer", daemon=True
     )
-    process.start()
+    with _keys_held():
+        process.start()
     there.close()
     try:
         port, words = _answer(here)
@@ -74,6 +76,23 @@ def watched(config: JointConfig, who: Onlookers, styles: str) -> Iterator[Viewer
             process.terminate()
             process.join()
         here.close()
+
+
+@contextmanager
+def _keys_held() -> Iterator[None]:
+    """A process that is started inside never gets the signals of a terminal's keys, which are for the run: at no
+    moment, not even while it imports, does it end by a traceback, or halt so that nothing ends it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # starting it would let SIGINT through again
+    before = signal.pthread_sigmask(
+        signal.SIG_BLOCK, (signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP, signal.SIGHUP)
+    )
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _answer(here: Connection) -> tuple[int, tuple[str, ...]]:
@@ -105,7 +124,7 @@ def serve(there: Connection, config: JointConfig, who: Onlookers, styles: str, p
         there.send(str(error).partition("\n")[0])
         return
     there.send((receiver.getsockname()[1], words))
-    with suppress(KeyboardInterrupt):  # the run gets it too, and ends this
+    with suppress(KeyboardInterrupt):  # where it could not be held back: the run gets it too, and ends this
         pass_on(receiver, profiles, sinks, parent)
     receiver.close()
     with suppress(BrokenPipeError):  # the run has gone

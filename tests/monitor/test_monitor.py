@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import socket
 import struct
 import subprocess
@@ -12,6 +14,7 @@ from collections.abc import Iterator
 from http.client import HTTPConnection
 from http.server import ThreadingHTTPServer
 from io import StringIO
+from multiprocessing import active_children
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,6 +28,7 @@ from rich.console import Console
 from cablecomp import load_joint
 from cablecomp.control.command import Reference
 from cablecomp.control.degrade import Phase
+from cablecomp.monitor import viewer
 from cablecomp.monitor.frames import Frame, frame, unpacked
 from cablecomp.monitor.instrument import END, Instrument, packed
 from cablecomp.monitor.played import played
@@ -245,6 +249,30 @@ def test_a_page_from_elsewhere_does_not_read_the_joint(host: str, status: int) -
         assert (b"load_Nm" in answer.read()) == (status == 200)
         asked.close()
     server.close()
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no signals can be held back here")
+def test_a_terminal_s_keys_do_not_reach_the_viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SIGINT, SIGQUIT, SIGTSTP and SIGHUP, while it starts and while it serves, are for the run alone."""
+    pytest.importorskip("mcap", reason="mcap is not installed")
+
+    def press_them() -> None:
+        for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP, signal.SIGHUP):
+            os.kill(active_children()[0].pid or 0, number)
+
+    answer = viewer._answer
+
+    def answer_meanwhile(here: Any) -> Any:
+        press_them()
+        return answer(here)
+
+    monkeypatch.setattr(viewer, "_answer", answer_meanwhile)
+    who = viewer.Onlookers(mcap=tmp_path / "live.mcap")
+    with viewer.watched(load_joint("wrist-capstan"), who, CSS) as found:
+        press_them()
+        found.instrument.send(packed(made_up(1), None))
+    assert found.failures == ()
+    assert b"load_Nm" in (tmp_path / "live.mcap").read_bytes()
 
 
 def test_plotjuggler_gets_curves() -> None:
