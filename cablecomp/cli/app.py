@@ -10,12 +10,15 @@ import ast
 import difflib
 import os
 import re
+import signal
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
+from types import FrameType
 from typing import Annotated, Any, Final
 
 import typer
@@ -72,13 +75,39 @@ class Commands(TyperGroup):
             return None
         module, function = COMMANDS[cmd_name].split(".")
         single = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        single.command(cmd_name, cls=Once)(getattr(import_module(f"cablecomp.cli.{module}"), function))
+        with _interruptible():
+            loaded = import_module(f"cablecomp.cli.{module}")
+        single.command(cmd_name, cls=Once)(getattr(loaded, function))
         return typer.main.get_command(single)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """One line for each command: the first of its docstring, read without importing it."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, first_line(place)) for name, place in COMMANDS.items()])
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Ctrl-C within ends the program, even where a package that is being imported takes the KeyboardInterrupt for a
+    sign that something else is not there."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed = False
+
+    def heard(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, heard)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if pressed:
+            raise KeyboardInterrupt
 
 
 def first_line(place: str) -> str:

@@ -6,9 +6,13 @@ import gzip
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import polars as pl
 import pytest
@@ -41,6 +45,26 @@ def test_help_imports_no_solver_and_no_compiler() -> None:
     code = "import sys; from cablecomp.cli import main; main(['--help']); print(*sys.modules)"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not HEAVY & set(said.splitlines()[-1].split())
+
+
+def test_ctrl_c_is_heard_though_what_is_imported_swallows_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As extension modules of packages do that others can do without: the joint of a run would have moved."""
+
+    def swallowing(name: str) -> ModuleType:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return import_module(name)
+
+    monkeypatch.setattr(app, "import_module", swallowing)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # else ignored, in the background
+    try:
+        assert main(["info", "nothing.toml"]) == app.INTERRUPTED
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert capsys.readouterr().err == "cablecomp: stopped by the user\n"
 
 
 def test_a_bare_call_shows_help_and_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
