@@ -183,11 +183,18 @@ class Loop:
             joint.listen(now)
         if self._asked_to_stop:
             self._stop(self._asked_to_stop, now)
-        elif all(j.taking_up.known_s(now) >= self.options.settle_s for j in self.joints):
+            return
+        over = now - self._stage_s > self.options.listen_s
+        unheard = [(j, channel) for j in self.joints for channel in j.unheard]
+        if all(j.taking_up.known_s(now) >= self.options.settle_s for j in self.joints) and (
+            over or not unheard
+        ):
+            for joint, channel in unheard:
+                self.events.add(now, joint.setup.name, f"{channel} has not come; the recording is without it")
             self._go(RunStage.ENABLING, now)
             for joint in self.joints:
                 joint.first(now)
-        elif now - self._stage_s > self.options.listen_s:
+        elif over:
             raise DeviceError(f"link `{self.link.config.name}`: {self._what_is_missing(now)}")
 
     def _what_is_missing(self, now: float) -> str:

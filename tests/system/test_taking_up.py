@@ -18,9 +18,10 @@ from mit_joint import POSITION_STEP, TORQUE_STEP, MitJoint, reply
 
 from cablecomp.config import load_joint
 from cablecomp.control.options import load_control
-from cablecomp.control.protocol import Protocol
+from cablecomp.control.protocol import Protocol, parse_protocol
 from cablecomp.errors import DeviceError
 from cablecomp.links.load import load_link
+from cablecomp.recording.reader import open_recording
 from cablecomp.runtime.clock import Tick
 from cablecomp.runtime.loop import Loop, RunStage
 from cablecomp.runtime.results import RunReport
@@ -61,6 +62,50 @@ class Rig:
 
         options = RunOptions(duration_s, True)
         return run_joint(load_joint(JOINT), self.link, self.control, protocol, options, self.joint, each)
+
+
+@pytest.mark.parametrize(("speaks_s", "recorded"), [(0.7, True), (2.5, False)])
+def test_a_recording_waits_for_a_joint_encoder_that_speaks_late(
+    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, speaks_s: float, recorded: bool
+) -> None:
+    """A node that is still booting, where control does not need it: what it tells is what `diagnose` lives on. Control
+    begins without it once listening is over, and the run says so."""
+    say = rig.joint.say
+
+    def say_late(identifier: int, data: bytes, **kind: bool) -> None:
+        if identifier == 0 or rig.joint.tick > 1e3 * speaks_s:
+            say(identifier, data, **kind)
+
+    monkeypatch.setattr(rig.joint, "say", say_late)
+    joint = load_joint(JOINT)
+    joint = joint.model_copy(
+        update={"observer": joint.observer.model_copy(update={"load": "motor_torque"}), "effect": ()}
+    )
+    report = run_joint(
+        joint,
+        rig.link,
+        rig.control,
+        STAND,
+        RunOptions(0.7, True, tmp_path),
+        rig.joint,
+        lambda loop, tick: None,
+    )
+    assert report.stop_reason == "time is over"
+    columns = open_recording(tmp_path / "recording.csv").channels
+    assert ("joint_position_rad" in columns) == recorded
+    said = [what for _, _, what in report.events if "has not come" in what]
+    assert said == ([] if recorded else [f"{c} has not come; the recording is without it" for c in TOLD])
+
+
+TOLD = ("joint_position_rad", "joint_torque_Nm")
+STAND = parse_protocol(
+    {
+        "schema": 1,
+        "name": "stand",
+        "segment": [{"kind": "ramp", "position_rad": 0.0, "load_Nm": 0.0, "duration_s": 1.0}],
+    },
+    "test",
+)
 
 
 def test_a_drive_left_enabled_far_away_is_taken_up_without_a_pull(rig: Rig) -> None:
