@@ -130,7 +130,7 @@ class DynamixelDrive:
         self._stats = MessageStats(f"{readings.name}: {device.id} status")
         readings.messages.append(self._stats)
         self._steps = (
-            (STATUS_RETURN_LEVEL, b"\x01"),
+            (STATUS_RETURN_LEVEL, bytes((dynamixel.ANSWER_READS,))),
             (TORQUE_ENABLE, b"\x00"),
             (BUS_WATCHDOG, b"\x00"),
             (OPERATING_MODE, bytes((self._kind.mode,))),
@@ -191,8 +191,8 @@ class DynamixelDrive:
         if len(data) != 1 + TOLD.size:
             stats.invalid += len(data) != 1  # an answer to a write says nothing
             return 0
-        node, protocol, torque, hardware, watchdog, current, *values = TOLD.unpack_from(data, 1)
-        if (node, protocol) != (self._node, dynamixel.PROTOCOL_2):
+        level, torque, hardware, watchdog, current, *values = TOLD.unpack_from(data, 1)
+        if level != dynamixel.ANSWER_READS:
             readings.state, readings.error = DriveState.FAULT, RESTARTED
             self._begin()
             return 0

@@ -39,9 +39,7 @@ class Item(NamedTuple):
     size: int
 
 
-ID: Final = Item(7, 1)
 OPERATING_MODE: Final = Item(11, 1)
-PROTOCOL: Final = Item(13, 1)
 TORQUE_ENABLE: Final = Item(64, 1)
 STATUS_RETURN_LEVEL: Final = Item(68, 1)
 HARDWARE_ERROR: Final = Item(70, 1)
@@ -65,15 +63,16 @@ VOLT: Final = 0.1
 WATCHDOG_S: Final = 0.02
 WATCHDOG_ERROR: Final = 0xFF
 POSITION_TOP: Final = 1_048_575
-PROTOCOL_2: Final = 2
+ANSWER_READS: Final = 1
+"""Status return level: reads are answered, writes are not."""
 
 GATHERED: Final = (
-    ID, PROTOCOL, TORQUE_ENABLE, HARDWARE_ERROR, BUS_WATCHDOG,
+    STATUS_RETURN_LEVEL, TORQUE_ENABLE, HARDWARE_ERROR, BUS_WATCHDOG,
     PRESENT_CURRENT, PRESENT_VELOCITY, PRESENT_POSITION, PRESENT_VOLTAGE, PRESENT_TEMPERATURE,
 )  # fmt: skip
-"""What indirect addresses put side by side, so that one read tells everything; ID and protocol come first since after
-a restart the indirect data are 0 instead."""
-TOLD: Final = Struct("<BBBBBhiiHB")
+"""What indirect addresses put side by side, so that one read tells everything: of the RAM (64 to 661), since they take
+no others. The status return level is first since after a restart the indirect data are 0 instead."""
+TOLD: Final = Struct("<BBBBhiiHB")
 
 HARDWARE_ERRORS: Final[dict[int, str]] = {
     1 << 0: "input voltage",

@@ -1,10 +1,10 @@
 """A Dynamixel of the X series, device side: instructions and control table of an XM430-W350.
 
 Items are written whole, those of the EEPROM (below 64) only without torque, goals within their limits and not after
-a bus watchdog error; indirect data stand for what their addresses name. The bus watchdog (20 ms a count) stops the
-drive when no instruction comes, and then reads -1. A hardware error takes torque away until a reboot. Status return
-level: 0 answers ping alone, 1 reads too, 2 everything. Sources: Robotis e-Manual, "DYNAMIXEL Protocol 2.0",
-"XM430-W350".
+a bus watchdog error; indirect data stand for what their addresses name, which lies in the RAM (64 to 661). The bus
+watchdog (20 ms a count) stops the drive when no instruction comes, and then reads -1. A hardware error takes torque
+away until a reboot. Status return level: 0 answers ping alone, 1 reads too, 2 everything. Sources: Robotis e-Manual,
+"DYNAMIXEL Protocol 2.0", "XM430-W350".
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class DynamixelWire:
         self._drive: Drive | None = None
         self._heard_s = self._now_s = 0.0
         self._registered: bytes | None = None
-        u8, u16 = 0xFF, 0xFFFF
+        u8 = 0xFF
         self.items: dict[int, Item] = {
             0: Item(2, 1020), 2: Item(4), 6: Item(1, 46), 7: Item(1, self.node), 8: Item(1, 1, 0, 7),
             9: Item(1, 0, 0, 254), 10: Item(1, 0, 0, 5), 11: Item(1, self._kept[11], 0, 16), 12: Item(1, u8, 0, u8),
@@ -88,7 +88,7 @@ class DynamixelWire:
             144: Item(2, 120), 146: Item(1, tell=lambda: self._of(lambda d: d.report().temperature_degC)),
         }  # fmt: skip
         for k in range(INDIRECT):
-            self.items[ADDRESSES + 2 * k] = Item(2, DATA + k, EEPROM_END - 64, u16)
+            self.items[ADDRESSES + 2 * k] = Item(2, DATA + k, EEPROM_END, TABLE_END - 1)
 
     # ---- the control table -----------------------------------------------------------------------
 

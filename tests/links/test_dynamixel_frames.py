@@ -99,12 +99,11 @@ def drives() -> Iterator[Any]:
 
 
 def told(
-    position: int = 0, velocity: int = 0, current: int = 0, *, node: int = 1, torque: int = 0, hardware: int = 0,
-    watchdog: int = 0,
+    position: int = 0, velocity: int = 0, current: int = 0, *, torque: int = 0, hardware: int = 0, watchdog: int = 0,
 ) -> bytes:  # fmt: skip
-    """Laid out by hand: id, protocol, torque enable, hardware error, watchdog; current, velocity, position; 12.1 V,
-    36 degC."""
-    head = bytes([node, 2, torque, hardware, watchdog])
+    """Laid out by hand: status return level, torque enable, hardware error, watchdog; current, velocity, position;
+    12.1 V, 36 degC."""
+    head = bytes([1, torque, hardware, watchdog])
     return head + struct.pack("<hii", current, velocity, position) + struct.pack("<HB", 121, 36)
 
 
@@ -113,9 +112,10 @@ def test_set_up_step_by_step(drives: Any) -> None:
     line.set_up()
     table = line.table[1]
     assert (table[68], table[64], table[98], table[11]) == (b"\x01", b"\x00", b"\x00", b"\x04")
-    wanted = [7, 13, 64, 70, 98, 126, 127, *range(128, 136), 144, 145, 146]
+    wanted = [68, 64, 70, 98, 126, 127, *range(128, 136), 144, 145, 146]
+    assert all(64 <= a <= 661 for a in wanted)  # e-Manual, "Indirect Address": limited to the RAM area
     assert table[168] == b"".join(a.to_bytes(2, "little") for a in wanted)
-    assert line.sent[-1] == (0xFE, bytes.fromhex("82 e000 1200 01"))
+    assert line.sent[-1] == (0xFE, bytes.fromhex("82 e000 1100 01"))
 
 
 @pytest.mark.parametrize(("mode", "number"), [("velocity", 1), ("torque", 0)])
@@ -147,7 +147,7 @@ def test_what_a_drive_tells_in_its_units(drives: Any) -> None:
         (told(hardware=0x20), "overload"),
         (told(hardware=0x04 | 0x01), "input voltage, overheating"),
         (told(watchdog=0xFF), "watchdog"),
-        (bytes(18), "afresh"),  # indirect data after a restart
+        (bytes(17), "afresh"),  # indirect data after a restart
     ],
 )
 def test_what_ends_in_a_fault(drives: Any, status_: bytes, says: str) -> None:
@@ -169,7 +169,7 @@ def test_errors_and_other_lengths_are_counted_and_not_taken(drives: Any) -> None
     line.tell(1, 0x07, told(1))
     line.tell(1, 0, told(1)[:-1])
     assert (joint.updates[MOTOR_POSITION], line.link.status().invalid) == (0, 2)
-    line.tell(9, 0, told(1, node=9))
+    line.tell(9, 0, told(1))
     assert (joint.updates[MOTOR_POSITION], line.link.status().ignored) == (0, 1)
 
 
@@ -187,7 +187,7 @@ def test_a_cycle_enabling_and_stopping(drives: Any) -> None:
     assert link.send(0, MotorCommand(-TURN / 2)) == 0
     assert line.listen() == [
         (0xFE, bytes.fromhex("83 7400 0400 01 00f8ffff")),
-        (0xFE, bytes.fromhex("82 e000 1200 01")),
+        (0xFE, bytes.fromhex("82 e000 1100 01")),
     ]
     assert link.send(0, MotorCommand(TURN * 1000)) == CLIP_POSITION
     assert line.listen()[0][1].endswith(struct.pack("<i", 1_048_575))
@@ -226,7 +226,7 @@ def test_two_drives_share_one_write_and_one_read(drives: Any, mode: str, goals: 
         line.listen()
         line.link.send(0, MotorCommand(TURN / 4))
         line.link.send(1, MotorCommand(TURN / 2))
-    assert line.listen() == [(0xFE, bytes.fromhex(goals)), (0xFE, bytes.fromhex("82 e000 1200 02 01"))]
+    assert line.listen() == [(0xFE, bytes.fromhex(goals)), (0xFE, bytes.fromhex("82 e000 1100 02 01"))]
 
 
 def test_drives_are_set_up_one_after_the_other(drives: Any) -> None:
