@@ -8,7 +8,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from cablecomp.config.base import Frozen, Positive, listed
+from cablecomp.config.base import Frozen, listed
+
+Length = Annotated[float, Field(gt=0, le=1e4)]
+Force = Annotated[float, Field(gt=0, le=1e8)]
+Friction = Annotated[float, Field(gt=0, le=1e3)]
+Angle = Annotated[float, Field(gt=0, le=1e5)]
+Stiffness = Annotated[float, Field(gt=0, le=1e12)]
+"""Each up to what the equations can carry: far beyond any drive; further up they lose their digits or overflow."""
 
 
 class Stage(Frozen):
@@ -19,18 +26,18 @@ class Stage(Frozen):
     cable that only passes is none. In a closed circuit both cables have the same wraps.
     """
 
-    output_radius_m: Positive = Field(description="effective radius of the output pulley, R")
-    input_radius_m: Positive = Field(description="effective radius of the input pulley, r")
-    free_length_m: Positive = Field(
+    output_radius_m: Length = Field(description="effective radius of the output pulley, R")
+    input_radius_m: Length = Field(description="effective radius of the input pulley, r")
+    free_length_m: Length = Field(
         description="cable between the pulleys that touches nothing, tangent to tangent"
     )
-    EA_N: Positive = Field(description="axial stiffness of the cable: load per strain")
-    pretension_N: Positive = Field(description="tension T0 of each cable at rest without load")
-    mu_output: Positive = Field(description="friction coefficient cable on output pulley")
-    mu_input: Positive = Field(description="friction coefficient cable on input pulley")
-    wrap_output_rad: Positive = Field(description="wrap on the output pulley at position zero")
-    wrap_input_rad: Positive = Field(description="wrap on the input pulley at position zero")
-    breaking_force_N: Positive | None = Field(
+    EA_N: Stiffness = Field(description="axial stiffness of the cable: load per strain")
+    pretension_N: Force = Field(description="tension T0 of each cable at rest without load")
+    mu_output: Friction = Field(description="friction coefficient cable on output pulley")
+    mu_input: Friction = Field(description="friction coefficient cable on input pulley")
+    wrap_output_rad: Angle = Field(description="wrap on the output pulley at position zero")
+    wrap_input_rad: Angle = Field(description="wrap on the input pulley at position zero")
+    breaking_force_N: Force | None = Field(
         None, description="where the cable breaks; above it a sample is refused"
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from cablecomp.cli.app import main
 from cablecomp.config import load_joint, parse_joint
+from cablecomp.config.drive import Stage
 from cablecomp.control.options import load_control
 from cablecomp.control.protocol import load_protocol
 from cablecomp.errors import ConfigError, InputError
@@ -90,6 +92,14 @@ def test_a_near_miss_is_guessed_and_not_called_missing_as_well(
     lines = said(changed(("output_radius_m = 0.008", f"{key} = {value}")), tmp_path)
     assert len(lines) == 1
     assert f"did you mean {meant}?" in lines[0]
+
+
+@pytest.mark.parametrize("key", [key for key, field in Stage.model_fields.items() if field.is_required()])
+def test_what_no_number_can_carry_is_said_by_its_line(key: str, tmp_path: Path) -> None:
+    """Else a command ends in a division by zero or an overflow, a running joint in a state that breaks its own laws."""
+    for value in ("1e308", "1e13"):
+        (line,) = said(re.sub(f"(?m)^{key} = .*$", f"{key} = {value}", GOOD), tmp_path)
+        assert f"key `drive.stage.1.{key}` is {float(value)}; a number of at most " in line
 
 
 def test_a_mark_at_the_head_of_the_file_is_no_error(tmp_path: Path) -> None:

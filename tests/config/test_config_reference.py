@@ -50,7 +50,10 @@ def test_every_key_of_the_shipped_files_is_in_the_reference(model: type[BaseMode
 
 def test_units_and_what_is_accepted_are_stated() -> None:
     text = reference(JointConfig)
-    assert "output_radius_m [m]: effective radius of the output pulley, R; number, > 0; required" in text
+    assert (
+        "output_radius_m [m]: effective radius of the output pulley, R; number, > 0, <= 10000; required"
+        in text
+    )
     assert "motor_velocity_max_rad_s [rad/s]" in text
     assert "'joint_torque' | 'motor_torque' | 'both_encoders' | 'none'; default 'joint_torque'" in text
     assert "stiffness_Nm_per_rad [Nm/rad]" in reference(LinkConfig)
