@@ -33,14 +33,17 @@ def example(kind: str, name: str) -> Path:
 
 
 def resolve(path: Path | str, kind: str) -> Path:
-    """The path itself, or the example that a bare name (no suffix, no such file here) stands for; raises InputError for
-    a bare name of neither."""
+    """The path itself, or the example that NAME or KIND/NAME (no suffix, no such file here) stands for; raises
+    InputError for a name of neither."""
     path = Path(path)
-    bare = path.name == str(path) and not path.suffix and not path.is_file()
-    if not bare or (path.name not in names(kind) and path.exists()):
+    named = not path.suffix and str(path.parent) in (".", *KINDS) and not path.is_file()
+    known = path.name in names(kind) and str(path.parent) in (".", kind)
+    if not named or (not known and path.exists()):
         return path
-    if path.name not in names(kind):
-        raise InputError(f"{path}: no such file here, and no example; examples are {', '.join(names(kind))}")
+    if not known:
+        raise InputError(
+            f"{path}: no such file here, and no example of {kind}; those are {', '.join(names(kind))}"
+        )
     return example(kind, path.name)
 
 

@@ -59,7 +59,8 @@ FleetConfig = Annotated[
     ),
 ]
 Control = Annotated[
-    Path | None, typer.Option("--control", help="control file (TOML); made up from the joint if absent")
+    Path | None,
+    typer.Option("--control", help="control file (TOML), or the name of an example; made up if absent"),
 ]
 
 

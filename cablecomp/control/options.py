@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cablecomp.config import NonNegative, Positive, read_toml, validated
+from cablecomp.examples import resolve
 
 
 class ControlMode(StrEnum):
@@ -139,9 +140,11 @@ class ControlConfig(_Frozen):
     load_max_Nm: Positive | None = None
 
 
-def load_control(path: Path) -> ControlConfig:
-    """Read a control file; raises InputError with one line that names file, key, what was found, what is
-    accepted."""
+def load_control(path: Path | str) -> ControlConfig:
+    """Read a control file; a bare name such as `wrist-capstan` stands for an example that comes with the project.
+
+    Raises InputError with one line that names file, key, what was found, what is accepted."""
+    path = resolve(path, "control")
     return parse_control(read_toml(path), str(path))
 
 

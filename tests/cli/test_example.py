@@ -37,7 +37,7 @@ def test_a_name_that_is_no_example_is_told_which_are(
     assert main([*command.split(), "--config", "capstan-am"]) == 2
     said = capsys.readouterr().err
     assert said.startswith(
-        "cablecomp: capstan-am: no such file here, and no example; examples are capstan-arm, "
+        "cablecomp: capstan-am: no such file here, and no example of joints; those are capstan-arm, "
     )
 
 
@@ -51,6 +51,24 @@ def test_a_bare_name_stands_for_an_example_unless_such_a_file_is_here(
     Path("capstan-arm").write_text("schema = 2\n", encoding="utf-8")
     with pytest.raises(InputError, match="schema"):
         load_joint("capstan-arm")
+
+
+def test_a_name_stands_for_an_example_as_the_list_of_examples_writes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert load_joint("joints/capstan-arm") == load_joint("capstan-arm")
+    assert load_link("links/mit-udp") == load_link("mit-udp")
+    assert load_control("control/wrist-capstan") == load_control("wrist-capstan")
+    assert load_control("wrist-capstan") == load_control(examples.example("control", "wrist-capstan"))
+    with pytest.raises(
+        InputError, match=r"^links/mit-udp: no such file here, and no example of joints; those are "
+    ):
+        load_joint("links/mit-udp")
+    Path("links").mkdir()
+    Path("links/mit-udp").write_text("schema = 2\n", encoding="utf-8")
+    with pytest.raises(InputError, match="schema"):
+        load_link("links/mit-udp")
 
 
 def test_a_name_of_two_kinds_is_asked_about(capsys: pytest.CaptureFixture[str]) -> None:
