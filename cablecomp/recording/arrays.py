@@ -56,6 +56,10 @@ def _numbers(name: str, column: str, values: Any) -> FloatArray:
                 f"{name}: column {column!r} holds dates or durations; numbers in the unit of its name are accepted, "
                 "such as (t - t[0]) / np.timedelta64(1, 's')"
             )
+        if kept.dtype.kind == "c":
+            raise InputError(
+                f"{name}: column {column!r} holds complex numbers; real ones are accepted, such as z.real"
+            )
         found = np.ma.filled(np.ma.asanyarray(kept, dtype=np.float64), np.nan)  # masked: no reading
     except (TypeError, ValueError):
         raise InputError(f"{name}: column {column!r} does not hold numbers") from None

@@ -12,6 +12,7 @@ from turning import JOINT, recorded
 
 import cablecomp
 from cablecomp.errors import InputError
+from cablecomp.recording.arrays import as_recording
 from cablecomp.recording.writer import write_canonical
 
 COLUMNS = recorded(duration_s=8.0, step_s=0.05)
@@ -90,6 +91,14 @@ def test_dates_and_durations_are_no_numbers_of_seconds(kept: str, of: str) -> No
     columns = {"time_s": times, "motor_position_rad": np.zeros(3), "joint_torque_Nm": np.zeros(3)}
     with pytest.raises(InputError, match=r"'time_s' holds dates or durations.*timedelta64"):
         cablecomp.replay(columns, "capstan-arm")
+
+
+def test_complex_numbers_are_no_readings() -> None:
+    """Taken as numbers, their imaginary part would be dropped, and the real one read as if it were all."""
+    load = np.array([0.0, 1.0 + 3.0j, 0.0])
+    for column in (load, load.tolist()):
+        with pytest.raises(InputError, match=r"'joint_torque_Nm' holds complex numbers"):
+            as_recording({"time_s": [0.0, 1.0, 2.0], "joint_torque_Nm": column})
 
 
 def test_a_masked_reading_is_none() -> None:
