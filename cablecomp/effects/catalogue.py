@@ -44,7 +44,7 @@ def load_effects(path: Path) -> tuple[str, ...]:
         spec.loader.exec_module(module)
     except InputError:
         raise
-    except Exception as error:  # whatever a user's file may raise
+    except (Exception, SystemExit) as error:  # whatever a user's file may raise
         raise InputError(f"{path}: does not run ({type(error).__name__}: {error}); mend it") from None
     found = {v.id: v for v in vars(module).values() if isinstance(v, Effect)}
     if not found:

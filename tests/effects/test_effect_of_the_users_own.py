@@ -88,6 +88,7 @@ def test_an_id_that_exists_is_refused(tmp_path: Path) -> None:
     [
         ("x = 1\n", "defines no effect"),
         ("1/0\n", "does not run .ZeroDivisionError"),
+        ("raise SystemExit\n", "does not run .SystemExit"),
         ("def f(:\n", "does not run .SyntaxError"),
         ("import no_such_module_anywhere\n", "does not run .ModuleNotFoundError"),
     ],
