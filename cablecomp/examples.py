@@ -34,7 +34,9 @@ def example(kind: str, name: str) -> Path:
 
 def resolve(path: Path | str, kind: str) -> Path:
     """The path itself, or the example that NAME or KIND/NAME (no suffix, no such file here) stands for; raises
-    InputError for a name of neither."""
+    InputError for a name of neither, and for what is no path."""
+    if not isinstance(path, str | Path):
+        raise InputError(f"a {type(path).__name__} is no path; give a file's path or an example's name")
     path = Path(path)
     named = not path.suffix and str(path.parent) in (".", *KINDS) and not path.is_file()
     known = path.name in names(kind) and str(path.parent) in (".", kind)

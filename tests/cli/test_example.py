@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,7 +16,7 @@ from cablecomp.errors import InputError
 from cablecomp.links import load_link
 from firmware_sim.scenario import load_scenario
 
-LOADERS = {"joints": load_joint, "links": load_link, "control": load_control}
+LOADERS: dict[str, Callable[[Any], Any]] = {"joints": load_joint, "links": load_link, "control": load_control}
 
 
 @pytest.mark.parametrize(
@@ -69,6 +71,15 @@ def test_a_name_stands_for_an_example_as_the_list_of_examples_writes_it(
     Path("links/mit-udp").write_text("schema = 2\n", encoding="utf-8")
     with pytest.raises(InputError, match="schema"):
         load_link("links/mit-udp")
+
+
+@pytest.mark.parametrize("load", LOADERS.values())
+def test_what_is_no_path_is_said(load: Callable[[Any], object]) -> None:
+    for given, shown in ((None, "a NoneType"), (3, "a int"), ([], "a list")):
+        with pytest.raises(
+            InputError, match=f"^{shown} is no path; give a file's path or an example's name$"
+        ):
+            load(given)
 
 
 def test_a_name_of_two_kinds_is_asked_about(capsys: pytest.CaptureFixture[str]) -> None:
