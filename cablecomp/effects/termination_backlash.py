@@ -179,6 +179,8 @@ EFFECT = Effect(
     in_series=True,
     change=_change,
     tries=(
+        # asked for from three times that moment, a narrow one seems worse than one that closes at once
+        {"closes_Nm": 0.015, "preload_Nm": 0.0},
         *({"closes_Nm": c, "preload_Nm": m} for c in (0.05, 0.15) for m in (-0.15, 0.0, 0.15)),
         # where a gap opens at once, or a key lets go, is found by looking there
         *({"wedges_Nm": m} for m in (0.02, 0.04, 0.07, 0.11, 0.17, 0.25)),

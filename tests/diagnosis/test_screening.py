@@ -107,6 +107,19 @@ def test_shapes_are_asked_for_at_a_further_anchor_only_where_it_comes_below_the_
         assert [a.plain is not None for a in answers] == [True, shaped]
 
 
+def test_a_gap_that_closes_within_a_narrow_moment_is_told_from_one_that_closes_at_once() -> None:
+    """Springs that hold a key up to 2 % of R T0: the plant's law is a straight line up to there. tanh is 3/4 at M_c."""
+    sprung = EffectSpec("termination_backlash:sprung", {"gap_rad": 2e-3, "closes_Nm": 0.04})
+    body, drive = calibrated(recorded([sprung], 40.0, 0.4))
+    gap = next(h for h in hypotheses(TOLERANT, body.used) if h.name == "termination_backlash")
+    answer = ask(anchor(drive.fit), gap)
+    assert answer is not None
+    (shaped, *_), (sudden, *_) = rough([answer], 8), rough([answer.plain or answer], 8)
+    assert shaped.cost < 0.25 * sudden.cost
+    assert shaped.values["effect.termination_backlash.gap_rad"] == pytest.approx(2e-3, rel=0.05)
+    assert shaped.values["effect.termination_backlash.closes_Nm"] == pytest.approx(0.03, rel=0.25)
+
+
 def test_an_event_of_a_law_that_knows_no_duration_is_asked_at_once_alone() -> None:
     """A user's own event may have an instant and nothing of a course."""
     body, drive = calibrated(recorded([EffectSpec("clamp_slip", {"slip_m": 1e-4, "time_s": EVENT_S})], 20.0))
