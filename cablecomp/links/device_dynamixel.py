@@ -60,15 +60,26 @@ _VELOCITY_TOP: Final = (1 << 31) - 1
 
 
 class _Kind(NamedTuple):
+    """`limit`: the drive's own, beyond which it takes no goal but keeps the last one."""
+
     mode: int
     goal: Item
     clip: int
     top: int
+    limit: Item | None = None
 
 
 _KINDS: Final = {
-    Mode.TORQUE: _Kind(dynamixel.CURRENT_MODE, dynamixel.GOAL_CURRENT, CLIP_TORQUE, _TORQUE_TOP),
-    Mode.VELOCITY: _Kind(dynamixel.VELOCITY_MODE, dynamixel.GOAL_VELOCITY, CLIP_VELOCITY, _VELOCITY_TOP),
+    Mode.TORQUE: _Kind(
+        dynamixel.CURRENT_MODE, dynamixel.GOAL_CURRENT, CLIP_TORQUE, _TORQUE_TOP, dynamixel.CURRENT_LIMIT
+    ),
+    Mode.VELOCITY: _Kind(
+        dynamixel.VELOCITY_MODE,
+        dynamixel.GOAL_VELOCITY,
+        CLIP_VELOCITY,
+        _VELOCITY_TOP,
+        dynamixel.VELOCITY_LIMIT,
+    ),
     Mode.POSITION: _Kind(
         dynamixel.EXTENDED_POSITION_MODE, dynamixel.GOAL_POSITION, CLIP_POSITION, dynamixel.POSITION_TOP
     ),
@@ -129,12 +140,14 @@ class DynamixelDrive:
         }
         self._stats = MessageStats(f"{readings.name}: {device.id} status")
         readings.messages.append(self._stats)
-        self._steps = (
+        self._top = self._kind.top
+        self._steps: tuple[tuple[Item, bytes | None], ...] = (
             (STATUS_RETURN_LEVEL, bytes((dynamixel.ANSWER_READS,))),
             (TORQUE_ENABLE, b"\x00"),
             (BUS_WATCHDOG, b"\x00"),
             (OPERATING_MODE, bytes((self._kind.mode,))),
             (Item(INDIRECT_ADDRESS, 2 * TOLD.size), dynamixel.gathering()),
+            *([(self._kind.limit, None)] if self._kind.limit else []),
         )
         self._begin()
 
@@ -150,7 +163,7 @@ class DynamixelDrive:
         return self._at == len(self._steps)
 
     def _next(self) -> tuple[Frame, ...]:
-        """Of each step the write, which is not answered, then the read that shows it."""
+        """Of each step the write, which is not answered, then the read that shows it; of a limit the read alone."""
         if self._line.owner not in (None, self._node):
             return ()
         self._line.owner = self._node
@@ -158,11 +171,15 @@ class DynamixelDrive:
         self._asked = self._asked % _ASK_AGAIN + 1
         if self._asked == 1:
             self._tries += 1
-            return (self._frame(dynamixel.write_bytes(item.address, data)),)
+            return () if data is None else (self._frame(dynamixel.write_bytes(item.address, data)),)
         return (self._frame(dynamixel.read(item)),) if self._asked == 3 else ()
 
     def _take_step(self, data: bytes) -> None:
-        if self._asked >= 3 and data == self._steps[self._at][1]:
+        item, set_to = self._steps[self._at]
+        told = set_to is None and len(data) == item.size
+        if self._asked >= 3 and (told or data == set_to):
+            if told:
+                self._top = min(self._kind.top, int.from_bytes(data, "little"))
             self._at += 1
             self._asked = self._tries = 0
             if self._ready:
@@ -225,7 +242,7 @@ class DynamixelDrive:
             )
         kind, line = self._kind, self._to[self._mode]
         n = round(line.gain * wanted[self._mode] + line.offset)
-        held = min(max(n, -kind.top), kind.top)
+        held = min(max(n, -self._top), self._top)
         data = held.to_bytes(kind.goal.size, "little", signed=True)
         return Outgoing(self._round((kind.goal, data)), kind.clip if held != n else 0)
 

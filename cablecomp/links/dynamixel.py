@@ -40,6 +40,8 @@ class Item(NamedTuple):
 
 
 OPERATING_MODE: Final = Item(11, 1)
+CURRENT_LIMIT: Final = Item(38, 2)
+VELOCITY_LIMIT: Final = Item(44, 4)
 TORQUE_ENABLE: Final = Item(64, 1)
 STATUS_RETURN_LEVEL: Final = Item(68, 1)
 HARDWARE_ERROR: Final = Item(70, 1)

@@ -17,10 +17,22 @@ from link_rig import CONFIGS
 
 from cablecomp.errors import InputError
 from cablecomp.links import BusLink, DriveState, Mode, MotorCommand, Request, parse_link
-from cablecomp.links.records import CLIP_POSITION, MOTOR_CURRENT, MOTOR_POSITION, MOTOR_TORQUE, MOTOR_VELOCITY
+from cablecomp.links.records import (
+    CLIP_POSITION,
+    CLIP_TORQUE,
+    CLIP_VELOCITY,
+    MOTOR_CURRENT,
+    MOTOR_POSITION,
+    MOTOR_TORQUE,
+    MOTOR_VELOCITY,
+)
 
 TURN = 2 * math.pi
 FILE = "dynamixel-serial.toml"
+
+
+LIMITS = {38: struct.pack("<H", 1193), 44: struct.pack("<I", 350)}
+"""What an XM430-W350 comes with (e-Manual, control table)."""
 
 
 class Drives:
@@ -63,7 +75,7 @@ class Drives:
         raise AssertionError("nothing came")
 
     def set_up(self, node: int = 1, joint: int = 0) -> None:
-        table = self.table.setdefault(node, {})
+        table = self.table.setdefault(node, dict(LIMITS))
         for _ in range(200):
             self.link.request(joint, Request.REPORT)
             for to, body in self.listen():
@@ -123,6 +135,27 @@ def test_each_mode_is_set(drives: Any, mode: str, number: int) -> None:
     line: Drives = drives({'mode = "position"': f'mode = "{mode}"'})
     line.set_up()
     assert line.table[1][11] == bytes([number])
+
+
+@pytest.mark.parametrize(
+    ("mode", "goal", "clips"),
+    [
+        ("torque", "83 6600 0200 01 6400", CLIP_TORQUE),
+        ("velocity", "83 6800 0400 01 c8000000", CLIP_VELOCITY),
+    ],
+)
+def test_no_goal_goes_beyond_the_drives_own_limit(drives: Any, mode: str, goal: str, clips: int) -> None:
+    """e-Manual, "Goal Current(102)", "Goal Velocity(104)": within current limit (38) and velocity limit (44); a drive
+    refuses a goal beyond and goes on with the last one, and no sync write is answered."""
+    line: Drives = drives({'mode = "position"': f'mode = "{mode}"'})
+    line.table[1] = {38: struct.pack("<H", 100), 44: struct.pack("<I", 200)}
+    line.set_up()
+    line.listen()
+    assert line.link.send(0, MotorCommand(0.0, 1e3, 1e3)) == clips
+    assert line.listen()[0] == (0xFE, bytes.fromhex(goal))
+    assert line.link.send(0, MotorCommand(0.0, -1e3, -1e3)) == clips
+    counts = {"torque": struct.pack("<h", -100), "velocity": struct.pack("<i", -200)}
+    assert line.listen()[0][1].endswith(counts[mode])
 
 
 def test_what_a_drive_tells_in_its_units(drives: Any) -> None:
