@@ -6,15 +6,18 @@ nominal, and its tolerance, and it is said why and which motion would tell it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import hypot, inf
+from pathlib import Path
 from time import monotonic
 
 import numpy as np
 
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, claiming
+from cablecomp.config.sessions import ZEROS
 from cablecomp.diagnosis.answer.augmented import augmented_joint, with_tolerances
+from cablecomp.diagnosis.answer.notes import SAID
 from cablecomp.diagnosis.answer.values import drive_values
 from cablecomp.diagnosis.body import Body, Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.counts import count_rad
@@ -29,9 +32,12 @@ from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel, 
 from cablecomp.estimation.least_squares import Fit, covariance, refit, rms_left, solve
 from cablecomp.estimation.parallel import algebra_in_one_thread
 from cablecomp.estimation.parameter import Parameter
+from cablecomp.estimation.standing import value_of
 
 LOAD_BY_MOTOR = 0.05
 """Share to which a load read off the motor's torque is trusted: its gear and bearings take a few per cent."""
+MOVED = 0.05
+"""Share by which a value of a session changes without being said."""
 OUT_OF_TIME = "the {:g} s were over before all steps were done: values are the best so far, less sure"
 
 
@@ -106,9 +112,27 @@ def calibrate(
         rms_left(fit),
         rms_left(replace(fit, x=fit.problem.start)),
         noise_mean(fit.problem.evidence, JOINT),
-        (*cut, *_warnings(drive, fit, recordings)),
+        (*cut, *_warnings(drive, fit, recordings), *_gone_along(config, joint, recordings)),
         fit,
     )
+
+
+def _gone_along(config: JointConfig, joint: JointConfig, recordings: Iterable[str]) -> Iterator[str]:
+    """A line for each parameter that stated sessions have as their own, where those that none of the recordings is of
+    went along with the joint's."""
+    now = {s.name: s.values for s in joint.sessions}
+    claimed = {s.name for r in recordings for s in claiming(config, Path(r))}
+    others = [s for s in config.sessions if s.name in now and s.name not in claimed]
+    for name in dict.fromkeys(n for s in config.sessions for n in s.values if n not in ZEROS):
+        was, new = value_of(config, name), value_of(joint, name)
+        pairs = [(s.name, s.values.get(name, was), now[s.name].get(name, new)) for s in others]
+        moved = [f"`{n}` {a:.4g} -> {b:.4g}" for n, a, b in pairs if abs(b - a) > MOVED * abs(a)]
+        if moved:
+            more = f" and {len(moved) - SAID} more" if len(moved) > SAID else ""
+            yield (
+                f"{name} of sessions that these recordings are not of went along: {', '.join(moved[:SAID])}{more}; if "
+                "it changed in this mounting alone, keep the old file for those, or calibrate all in one call"
+            )
 
 
 def _everything(body: Body) -> list[Evidence]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from turning import LIMITED, NOISE_RAD, after_a_history
 
-from cablecomp.config import JointConfig, load_joint, with_values
+from cablecomp.config import JointConfig, Session, load_joint, with_values
 from cablecomp.diagnosis.calibrate import Calibration, calibrate
 from cablecomp.diagnosis.calibration.drive import _drums_exchanged
 from cablecomp.errors import InputError
@@ -75,6 +76,27 @@ def test_each_session_has_its_own_zero() -> None:
     assert apart == pytest.approx(5e-3, abs=5e-5)
     own = {s.name: s.values["joint_position_offset_rad"] for s in found.config.sessions}
     assert own["a"] - own["b"] == pytest.approx(apart)
+
+
+def test_sessions_whose_own_values_go_along_with_those_of_another_are_said() -> None:
+    """Wednesday's cables are a fifth tighter than the joint's: so would be those of the days before."""
+    nominal_N = NOMINAL.drive.stage[0].pretension_N
+    days = (
+        Session(name="mon", recordings=("mon",)),
+        Session(name="tue", recordings=("tue",), values={"pretension_N": 0.8 * nominal_N}),
+    )
+    joint = NOMINAL.model_copy(
+        update={"session": days, "tolerance": {**NOMINAL.tolerance, "pretension_N": 0.3}}
+    )
+    columns = recording(with_values(NOMINAL, {"pretension_N": 1.2 * nominal_N}), 1)
+    found = calibrate(joint, {"wed/0": columns})
+    (said,) = (w for w in found.warnings if "went along" in w)
+    assert said.startswith("pretension_N of sessions that these recordings are not of")
+    tighter = (nominal_N, found["pretension_N"].value)
+    numbers = [float(v) for v in re.findall(r"`(?:mon|tue)` (\S+) -> (\S+?)[,;]", said) for v in v]
+    assert numbers == pytest.approx([*tighter, *(0.8 * v for v in tighter)], rel=1e-3)
+    same = recording(with_values(NOMINAL, {"pretension_N": 0.8 * nominal_N}), 1)
+    assert not [w for w in calibrate(joint, {"tue/0": same}).warnings if "went along" in w]
 
 
 def test_two_recordings_know_more_than_one(fitted: Calibration) -> None:
