@@ -184,8 +184,11 @@ def _torques(view: View) -> list[Suspicion]:
     turned = view.left(-1.0, ratio)
     if factor < 0.0 and turned < view.left(ratio=ratio):
         line = rms(view.y - ratio * view.q - seen * view.M)
+        which = (
+            f" if {INPUT} is what is turned, and is right if {JOINT} is" if ratio * view.ratio < 0.0 else ""
+        )
         words = (
-            f"{view.channel} seems to have the opposite sign: RMS {mrad(view.left(ratio=ratio))}, "
+            f"{view.channel} seems to have the opposite sign{which}: RMS {mrad(view.left(ratio=ratio))}, "
             f"{mrad(turned)} with it turned; a straight line leaves {mrad(line)}"
         )
         found.append(Suspicion("sign", view.channel, words, {"compliance_over_nominal": factor}))

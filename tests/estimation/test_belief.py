@@ -60,6 +60,15 @@ def test_signs() -> None:
     assert ("sign", "joint_position_rad") in kinds(joint_position_rad=-COLUMNS["joint_position_rad"])
 
 
+def test_a_load_beside_a_joint_angle_that_is_turned_is_right_once_that_is_turned_back() -> None:
+    turned = {**COLUMNS, "joint_position_rad": -COLUMNS["joint_position_rad"]}
+    (load,) = (s for s in suspicions(JOINT, turned) if s.channel == "joint_torque_Nm")
+    assert "if motor_position_rad is what is turned, and is right if joint_position_rad is" in load.text
+    both = {**turned, "motor_position_rad": -COLUMNS["motor_position_rad"]}
+    (load,) = suspicions(JOINT, both)
+    assert (load.channel, "what is turned" in load.text) == ("joint_torque_Nm", False)
+
+
 def test_units_and_gears() -> None:
     for name in ("joint_position_rad", "motor_position_rad"):
         (said,) = suspicions(JOINT, {**COLUMNS, name: np.degrees(COLUMNS[name])})
