@@ -51,7 +51,10 @@ def joint_model(
     B = np.zeros((6, 3))
     B[4] = w * np.array([m.stiffness_Nm_per_rad, m.damping_Nms_per_rad, 1.0])
     C = np.vstack([F, np.eye(6)[2], np.eye(6)[0]])
-    sampled = control.c2d(control.ss(A, B, C, np.zeros((3, 3))), period_s, method="zoh")
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # what grows beyond all numbers in one period: `is_stable`
+        sampled = control.c2d(control.ss(A, B, C, np.zeros((3, 3))), period_s, method="zoh")
     return delayed(sampled, round(m.delay_s / period_s))
 
 
@@ -152,7 +155,10 @@ def response(system: Any, z: Complex) -> Complex:
 
 def is_stable(system: Any, but: int = 0) -> bool:
     """Whether every pole lies inside of the unit circle; `but`: so many may lie on it (free integrators)."""
-    size = np.sort(np.abs(np.linalg.eigvals(np.asarray(system.A))))
+    A = np.asarray(system.A)
+    if not np.all(np.isfinite(A)):  # it grew beyond all numbers within one period
+        return False
+    size = np.sort(np.abs(np.linalg.eigvals(A)))
     inside = size[: len(size) - but] if but else size
     return bool(np.all(inside < 1.0 - 1e-9) and np.all(size < 1.0 + 1e-7))
 

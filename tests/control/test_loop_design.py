@@ -48,6 +48,13 @@ def design() -> LoopDesign:
     return design_loop(JOINT, 1000.0, WANTED.model_copy(update={"compensator": free}))
 
 
+@pytest.mark.parametrize("gain", ["stiffness_Nm_per_rad", "damping_Nms_per_rad", "velocity_bandwidth_Hz"])
+def test_a_drive_that_outgrows_all_numbers_within_a_period_is_unstable(gain: str) -> None:
+    motor = WANTED.motor.model_copy(update={gain: 1e300})
+    with pytest.raises(InputError, match=r"the drive's own loop .* is unstable on a cable of"):
+        design_loop(JOINT, 1000.0, WANTED.model_copy(update={"motor": motor}))
+
+
 def test_the_stiffness_range_begins_at_the_free_spans_alone() -> None:
     found = stiffness_range(JOINT)
     sheet = design_sheet(JOINT)
