@@ -40,6 +40,9 @@ class Observer:
 
     A sample that the joint cannot take raises SampleRefused (an InputError that carries the reason), and then leaves no
     trace: the state is what it was before, bit for bit. What `step` takes `run` takes, and the other way round.
+
+    One thread at a time: `peek` and `step` write the same row, and what another thread peeks at meanwhile would be
+    committed. A thread of its own asks a `copy`, taken between two steps.
     """
 
     def __init__(self, config: JointConfig, *, bounds: bool = False) -> None:
