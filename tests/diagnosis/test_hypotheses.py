@@ -194,6 +194,9 @@ def test_a_weight_is_asked_for_on_a_base_that_each_further_channel_turns() -> No
         assert leak.effect.parameter("slack_units").high == pytest.approx(0.9 * most)
     assert "other:roll_rad" in tilted.acts_through
     assert not any(name.startswith("other") for name in plain.acts_through)
+    # without a unit it may be a neighbour's load, and turns nothing
+    body = gather_body(JOINT, {"a/1": {**columns, "other_1": rolled["other_roll_rad"]}})
+    assert {h.name for h in hypotheses(JOINT, body.used) if h.effect.id == "gravity_load"} == {"gravity_load"}
 
 
 def test_where_the_load_is_read_at_the_motor_its_friction_is_asked_for_and_what_it_feels_is_not() -> None:
