@@ -109,9 +109,12 @@ def in_a_sentence(result: Mapping[str, Any]) -> str:
 
 def repeats_limit(result: Mapping[str, Any]) -> bool:
     """Whether the scatter between repeats limits a model: one that leaves less has seen that they differ (in what
-    went before them), and then their scatter says nothing of the machine."""
+    went before them), and then their scatter says nothing of the machine. Nor does one below the sensors' noise, as of
+    readings that stand on one step of an encoder."""
     scatter, left = result["repeatability_rad"], result["augmented"]["rmse_rad"]
-    return scatter is not None and (left is None or scatter < 1.5 * left)
+    if scatter is None or scatter < result["noise_floor_rad"]:
+        return False
+    return left is None or scatter < 1.5 * left
 
 
 def base_value(result: Mapping[str, Any], parameter: str) -> float | None:
