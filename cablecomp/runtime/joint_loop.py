@@ -15,16 +15,7 @@ from cablecomp.control.degrade import NORMAL, DegradeState, DegradeTimes, Phase,
 from cablecomp.control.gate import MUST_STOP, GateLimits, SafeCommand, gate, gate_names
 from cablecomp.errors import InputError
 from cablecomp.links.link import Link
-from cablecomp.links.protocols import tells
-from cablecomp.links.records import (
-    CHANNELS,
-    JOINT_POSITION,
-    JOINT_TORQUE,
-    NOT_TAKEN,
-    DriveState,
-    Mode,
-    MotorCommand,
-)
+from cablecomp.links.records import CHANNELS, NOT_TAKEN, DriveState, Mode, MotorCommand
 from cablecomp.runtime.folder import SNAPSHOT
 from cablecomp.runtime.health import Checked, Health, health_names
 from cablecomp.runtime.keeper import Keeper
@@ -39,8 +30,6 @@ References = Callable[[float], Reference]
 
 ROWS_EVERY_S = 0.1
 """Of the loop's own time, between two times that rows are handed over: what a process that is killed loses of them."""
-_RECORDED = (JOINT_POSITION, JOINT_TORQUE)
-"""What the recording holds if it has come by the time that it begins."""
 _NOTHING_NEW = Feed(0.0, True)
 _ENABLED = DriveState.ENABLED  # looked up in its class anew it would take ten times as long
 _NONE_YET = Command(nan, nan, nan)
@@ -91,8 +80,6 @@ class JointLoop:
         self._fresh_s = setup.times.fresh_s
         self._offset = setup.config.sensors.joint_position_offset_rad
         self._reference = self._last_reference = setup.reference(0.0)
-        ends = link.config.joint[setup.place]
-        self._told = tuple(p for p in _RECORDED if tells(link.config, ends, CHANNELS[p]))
         preload = setup.compensator.preload_Nm
         self.taking_up = TakingUp(
             link, setup.place, setup.limits, setup.times.fresh_s, preload, self._period_s
@@ -113,15 +100,6 @@ class JointLoop:
     def enabled(self) -> bool:
         """Whether the drive says that it is enabled."""
         return self.readings.state is DriveState.ENABLED
-
-    @property
-    def unheard(self) -> tuple[str, ...]:
-        """Channels that the link tells and that have not come yet, where a message has not either (one that has may say
-        that its sensor is absent): a recording that begins now is without them."""
-        if all(message.received for message in self.readings.messages):
-            return ()
-        values = self.readings.values
-        return tuple(CHANNELS[p] for p in self._told if values[p] != values[p])
 
     @property
     def drive_words(self) -> str:

@@ -185,7 +185,7 @@ class Loop:
             self._stop(self._asked_to_stop, now)
             return
         over = now - self._stage_s > self.options.listen_s
-        unheard = [(j, channel) for j in self.joints for channel in j.unheard]
+        unheard = [(j, channel) for j in self.joints for channel in j.taking_up.unheard(j.readings)]
         if all(j.taking_up.known_s(now) >= self.options.settle_s for j in self.joints) and (
             over or not unheard
         ):

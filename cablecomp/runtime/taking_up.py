@@ -8,15 +8,24 @@ the target follows the motor; once it is enabled the target stays, and stiffness
 
 from __future__ import annotations
 
-from math import nan
+from math import isnan, nan
 from typing import Final, NamedTuple
 
 from cablecomp.control.command import Command
 from cablecomp.control.gate import GateLimits, SafeCommand, first_command
 from cablecomp.errors import InputError
 from cablecomp.links.link import Link
+from cablecomp.links.protocols import tells
 from cablecomp.links.readings import JointReadings
-from cablecomp.links.records import CLIP_POSITION, DriveState, Mode, Request
+from cablecomp.links.records import (
+    CHANNELS,
+    CLIP_POSITION,
+    JOINT_POSITION,
+    JOINT_TORQUE,
+    DriveState,
+    Mode,
+    Request,
+)
 from cablecomp.runtime.health import MOTOR_JUMP, Checked, health_names
 
 TORQUE_S: Final = 0.02
@@ -24,6 +33,8 @@ TORQUE_S: Final = 0.02
 EASE_S: Final = 0.03
 """How long stiffness grows once the drive is enabled: short, since a brake has let go by then."""
 ASK_AGAIN_S: Final = 0.05
+_RECORDED: Final = (JOINT_POSITION, JOINT_TORQUE)
+"""What a recording holds if it has come by the time that it begins."""
 
 
 class _Shares(NamedTuple):
@@ -39,6 +50,8 @@ class TakingUp:
     ) -> None:
         self.why = "nothing has come yet"
         self._link, self._place, self._limits = link, place, limits
+        ends = link.config.joint[place]
+        self._told = tuple(p for p in _RECORDED if tells(link.config, ends, CHANNELS[p]))
         self._fresh_s = fresh_s
         self._preload_Nm = preload_Nm
         self._period_s = period_s
@@ -66,6 +79,13 @@ class TakingUp:
     def known_s(self, now_s: float) -> float:
         """For how long the drive has been known (NaN = it is not)."""
         return now_s - self._known_s
+
+    def unheard(self, readings: JointReadings) -> tuple[str, ...]:
+        """Channels that the link tells and that have not come yet, where a message has not either (one that has may say
+        that its sensor is absent): a recording that begins now is without them."""
+        if all(message.received for message in readings.messages):
+            return ()
+        return tuple(CHANNELS[p] for p in self._told if isnan(readings.values[p]))
 
     def listen(self, readings: JointReadings, checked: Checked, now_s: float) -> None:
         """One cycle of listening: a drive left enabled is let go, one that says nothing by itself is asked."""
