@@ -4,6 +4,7 @@ this module.
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 from typing import Final
 
@@ -35,7 +36,7 @@ def example(kind: str, name: str) -> Path:
 def resolve(path: Path | str, kind: str) -> Path:
     """The path itself, or the example that NAME or KIND/NAME (no suffix, no such file here) stands for; raises
     InputError for a name of neither, and for what is no path."""
-    if not isinstance(path, str | Path):
+    if not isinstance(path, str | PathLike):
         raise InputError(f"a {type(path).__name__} is no path; give a file's path or an example's name")
     path = Path(path)
     named = not path.suffix and str(path.parent) in (".", *KINDS) and not path.is_file()

@@ -51,9 +51,7 @@ def joint_model(
     B = np.zeros((6, 3))
     B[4] = w * np.array([m.stiffness_Nm_per_rad, m.damping_Nms_per_rad, 1.0])
     C = np.vstack([F, np.eye(6)[2], np.eye(6)[0]])
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # what grows beyond all numbers in one period: `is_stable`
+    with np.errstate(over="ignore", invalid="ignore"):  # a loop that outgrows all numbers: `is_stable`
         sampled = control.c2d(control.ss(A, B, C, np.zeros((3, 3))), period_s, method="zoh")
     return delayed(sampled, round(m.delay_s / period_s))
 

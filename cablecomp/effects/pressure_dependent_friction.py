@@ -31,8 +31,9 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
 
 
 def _factor(tau: Floats, exponent: float, lost: float, place: float, adhesion: float, power: float) -> Floats:
-    by_power = np.maximum(tau, LEAST_PRESSED) ** -exponent
-    stuck = 1.0 + adhesion * (np.maximum(tau, LEAST_PRESSED) ** -power - 1.0)
+    pressed = np.maximum(tau, LEAST_PRESSED)
+    by_power = pressed**-exponent
+    stuck = 1.0 + adhesion * (pressed**-power - 1.0)
     return np.asarray(by_power * stuck * (1.0 - lost / (1.0 + (place / tau) ** SUDDEN)), dtype=np.float64)
 
 
