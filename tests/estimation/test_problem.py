@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_problem import ANGLE, SIGMA, SPREAD, evidence, problem, three_recordings
 from turning import JOINT, recorded
 
-from cablecomp.config import JointConfig, Limits, with_values
-from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.config import Limits, with_values
+from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.history import forgotten
 from cablecomp.estimation.least_squares import Fit, covariance, inside, rms_left, rms_of_rows, solve, weighed
 from cablecomp.estimation.limits import MOVED_SD, STEP
@@ -21,26 +21,12 @@ from cablecomp.estimation.simulate import Simulator
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 
-SIGMA, SPREAD = 2e-5, 1e-4
 UNLIMITED = JOINT.model_copy(update={"limits": Limits()})
-ANGLE = "joint_position_rad"
-
-
-def evidence(columns: dict[str, FloatArray], name: str, session: str) -> Evidence:
-    return gather(JOINT, name, columns, session, fine_rows=2000, judged_rows=160)
 
 
 @pytest.fixture(scope="module")
 def three() -> tuple[Evidence, ...]:
-    """Two recordings of one session, one of another, each with a zero of its own."""
-    return tuple(
-        evidence(recorded(offset_rad=zero, seed=k), f"{k}", s)
-        for k, (zero, s) in enumerate(((1e-3, "a"), (1.2e-3, "a"), (-4e-3, "b")))
-    )
-
-
-def problem(parts: tuple[Evidence, ...], spread: float = SPREAD, joint: JointConfig = JOINT) -> Problem:
-    return Problem(joint, of_drive(joint), parts, Weighing({ANGLE: SIGMA}, {ANGLE: spread} if spread else {}))
+    return three_recordings()
 
 
 @pytest.mark.parametrize("moved", [(), ("1",)])
@@ -230,50 +216,6 @@ def test_a_drive_that_was_wound_under_load_is_not_taken_for_a_fresh_one() -> Non
     unknown, limited, seen = left
     assert limited < 0.1 * unknown
     assert seen < 0.1 * unknown
-
-
-def test_what_one_session_alone_owns_is_differenced_on_its_recordings_alone(
-    three: tuple[Evidence, ...],
-) -> None:
-    """The derivative by a session's own pretension is that of running every recording again."""
-    free = tuple(
-        q for p in of_drive(JOINT) for q in (own_of(p, ("a", "b")) if p.name == "pretension_N" else (p,))
-    )
-    p = Problem(JOINT, free, three, Weighing({ANGLE: SIGMA}, {ANGLE: SPREAD}))
-    x, J = p.start, p.jacobian(p.start)
-    for k in range(len(free)):
-        moved = x.copy()
-        moved[k] += STEP
-        np.testing.assert_allclose(J[:, k], (p.residual(moved) - p.residual(x)) / STEP, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("sides", [(STEP,), (STEP, -STEP)])
-def test_a_step_to_where_the_drive_cannot_follow_tells_no_slope(
-    three: tuple[Evidence, ...], monkeypatch: pytest.MonkeyPatch, sides: tuple[float, ...]
-) -> None:
-    """One unsolvable sample beside the fit made a value known to a millionth: the other side tells the slope, or the
-    prior alone."""
-    p = problem(three)
-    x, k = p.start, 1
-    plain, run = p.jacobian(x), Problem.misfits
-    moved = x.copy()
-    moved[k] -= STEP
-    backward = (p.residual(moved) - p.residual(x)) / -STEP
-
-    def refusing(self: Problem, at: Any, *args: Any) -> Any:
-        if any(abs(at[k] - x[k] - side) < 1e-9 for side in sides):
-            raise InputError("unsolvable")
-        return run(self, at, *args)
-
-    monkeypatch.setattr(Problem, "misfits", refusing)
-    J = p.jacobian(x)
-    if len(sides) == 1:
-        np.testing.assert_allclose(J[:, k], backward)
-    else:
-        assert not J[: len(J) - len(x), k].any()
-        np.testing.assert_allclose(J[len(J) - len(x) :, k], plain[len(J) - len(x) :, k], atol=1e-9)
-    others = [j for j in range(len(x)) if j != k]
-    np.testing.assert_allclose(J[:, others], plain[:, others])
 
 
 def test_an_amount_is_begun_where_it_was_seen_however_far_its_bounds(three: tuple[Evidence, ...]) -> None:
