@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from effect_cases import CONFIGS, excitation, joint, run, still
+from effect_cases import excitation, joint, run, still
 from scipy.integrate import quad, solve_ivp
 
-from cablecomp import Sample
-from cablecomp.config import JointConfig, load_joint
+from cablecomp.config import JointConfig
 from cablecomp.effects import with_effects
 from cablecomp.observer import Observer
 
@@ -337,22 +336,3 @@ def test_a_guide_may_lie_where_the_cable_leaves_the_joints_drum() -> None:
     )
     deflection = near["deflection_rad"]
     assert at["deflection_rad"] == pytest.approx(deflection, abs=1e-3 * np.ptp(deflection))
-
-
-def test_no_row_of_friction_that_grows_with_pressure_beside_a_weight_is_refused() -> None:
-    """An instrument's jaw by orders of magnitude, 34 drawn joints (seed 0): of five, a row's moments could not be
-    balanced, as the law's table was coarse where the cable is all but slack and jumped where bumps are erased."""
-    config = load_joint(CONFIGS.parent / "hardware" / "davinci-jaw.toml")
-    rng = np.random.default_rng(0)
-    time = 0.05 * np.arange(400)
-    motor = np.sin(0.2 * np.pi * time) * (1.0 + 0.3 * np.sin(0.37 * time))
-    for _ in range(34):
-        exponent, moment = rng.uniform(-0.8, -0.5), rng.uniform(0.02, 0.14)
-        effects = (
-            ("gravity_load", {"moment_Nm": moment, "phase_rad": 3.0}),
-            ("pressure_dependent_friction", {"exponent": exponent}),
-            ("routing_friction", {"mu_angle": 0.05, "arc_length_m": 0.2}),
-        )
-        observer = Observer(with_effects(config, effects))
-        for t, q in zip(time, motor, strict=True):
-            observer.step(Sample(float(t), float(q), 0.0))  # raises where it refuses
