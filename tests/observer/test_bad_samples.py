@@ -140,9 +140,9 @@ def test_a_stiffness_before_the_first_sample_is_of_no_direction() -> None:
 @pytest.mark.parametrize(
     ("bad", "words"),
     [
-        (Sample(0.1, 0.0, None), "joint_torque_Nm is None"),  # type: ignore[arg-type]
-        (Sample(0.1, "0.0", 0.0), "motor_position_rad is '0.0'"),  # type: ignore[arg-type]
-        (Sample(0.1, 0.0, 0.0, other=None), "other is None"),  # type: ignore[arg-type]
+        (Sample(0.1, 0.0, None), "joint_torque_Nm is None"),  # type: ignore[arg-type]  # wrong on purpose
+        (Sample(0.1, "0.0", 0.0), "motor_position_rad is '0.0'"),  # type: ignore[arg-type]  # wrong on purpose
+        (Sample(0.1, 0.0, 0.0, other=None), "other is None"),  # type: ignore[arg-type]  # wrong on purpose
         ([*Sample(0.1, 0.0, 0.0)], "not list"),
         ((0.1, 0.0, 0.0), "not tuple"),
     ],
@@ -164,11 +164,11 @@ def test_a_look_ahead_at_no_number_leaves_no_trace() -> None:
     observer = Observer(joint("closed"))
     unknown = observer.snapshot()
     with pytest.raises(InputError, match="joint_torque_Nm is None"):
-        observer.step_ahead(Sample(0.0, 0.0, 0.0), 0.1, 0.0, None)  # type: ignore[arg-type]
+        observer.step_ahead(Sample(0.0, 0.0, 0.0), 0.1, 0.0, None)  # type: ignore[arg-type]  # wrong on purpose
     assert observer.snapshot() == unknown
     observer.step(Sample(0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="time_s is None"):
-        observer.peek_deflection(None, 0.0, 0.0)  # type: ignore[arg-type]
+        observer.peek_deflection(None, 0.0, 0.0)  # type: ignore[arg-type]  # wrong on purpose
 
 
 @pytest.mark.parametrize("kind", [np.int16, np.float32, np.array])
@@ -211,4 +211,4 @@ def test_a_block_holds_one_number_of_each_channel_for_each_time(
 
 def test_a_joint_is_a_configuration() -> None:
     with pytest.raises(InputError, match="`config` is a str; give a JointConfig"):
-        Observer("capstan-arm")  # type: ignore[arg-type]
+        Observer("capstan-arm")  # type: ignore[arg-type]  # wrong on purpose

@@ -120,7 +120,7 @@ def test_a_snapshot_is_bytes_of_any_kind_and_its_file_a_path_of_any_kind(tmp_pat
     assert other.snapshot() == observer.snapshot()
     for none in (None, "joint.snapshot"):
         with pytest.raises(InputError, match="the bytes of"):
-            other.restore(none)  # type: ignore[arg-type]
+            other.restore(none)  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_the_planned_swing_erases_and_a_smaller_one_does_not() -> None:

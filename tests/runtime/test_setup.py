@@ -89,7 +89,7 @@ def test_a_comparison_that_is_stopped_by_a_signal_is_no_fault_of_the_input(
             joint,
             link,
             control_for(joint),
-            lambda wish: simulation,  # type: ignore[arg-type, return-value]
+            lambda wish: simulation,  # type: ignore[arg-type, return-value]  # a stand-in
             lambda config, columns: pytest.fail("goes on"),
             compare.CompareOptions(tmp_path),
             lambda: 0.0,
