@@ -10,6 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from cablecomp.recording.reader import read_all
+from cablecomp.recording.thinning import RowThinner
 
 Floats = NDArray[np.float64]
 
@@ -75,14 +76,25 @@ class RunData:
 
 def load_run(folder: Path, points: int = 4000) -> RunData:
     """Read what a run left in a joint's folder: the rows that all three tables hold (a disk that filled up may have
-    taken more of one than of another).
+    taken more of one than of another); of more than `points` those that hold the extremes of load, errors and residual,
+    so that a long run shows what lasted one row, and no slow wave in place of a quick one.
     """
     recording = read_all(folder / "recording.csv").columns
     prediction, cycles = _columns(folder / "prediction.csv"), _columns(folder / "cycles.csv")
     rows = min(_rows(table) for table in (recording, prediction, cycles))
-    step = max(1, -(-rows // points))
+    run = RunData(*({k: v[:rows] for k, v in table.items()} for table in (recording, prediction, cycles)))
+    if rows <= points:
+        return run
+    extremes = {
+        "load": run.column("joint_torque_Nm"), "found": run.column("load_estimate_Nm"), "error": run.error_rad(),
+        "residual": run.prediction["residual_rad"],
+    }  # fmt: skip
+    names = tuple(extremes)
+    thinner = RowThinner(names, names, buckets=max(1, points // (2 * (1 + 2 * len(names))) - 1))
+    thinner.add(extremes)
+    chosen = thinner.rows()["row"].astype(np.intp)
     return RunData(
-        *({k: v[:rows:step] for k, v in table.items()} for table in (recording, prediction, cycles))
+        *({k: v[chosen] for k, v in table.items()} for table in (run.recording, run.prediction, run.cycles))
     )
 
 

@@ -6,6 +6,7 @@ from math import nan
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from rendering import as_text
 
@@ -120,3 +121,31 @@ def test_tables_that_a_full_disk_cut_short_are_drawn_as_far_as_all_of_them_go(
     assert data.rows == (rows or 0)
     if data.rows:
         assert len(data.error_rad()) == len(data.time_s) == len(data.controlled) == data.rows
+
+
+def test_a_long_run_shows_an_error_of_one_row_and_no_wave_that_there_was_not(tmp_path: Path) -> None:
+    """A minute at 1 kHz; the load turns every 15 rows, by chance how many a page leaves out for each that it draws."""
+    rows, spike = 60_000, 31_337
+    time, on = 1e-3 * np.arange(rows), np.ones(rows)
+    load = np.sin(2.0 * np.pi * np.arange(rows) / 15.0)
+    late = np.where(np.arange(rows) == spike, 0.005, 0.0)
+    nothing = np.zeros(rows)
+    tables = {
+        "recording.csv": {"joint_torque_Nm": load},
+        "prediction.csv": {"joint_position_rad": nothing, "residual_rad": late},
+        "cycles.csv": {"controlled": on, "reference_position_rad": nothing},
+    }
+    for name, columns in tables.items():
+        held = pl.DataFrame(
+            {key: columns.get(key, nothing) for key in TABLES[name].split(",")} | {"time_s": time}
+        )
+        held.write_csv(tmp_path / name)
+    data = load_run(tmp_path, 4000)
+    assert 500 < data.rows <= 4000
+    assert np.all(np.diff(data.time_s) > 0.0)
+    assert data.time_s[np.argmax(data.error_rad())] == pytest.approx(time[spike])
+    assert data.error_rad().max() == pytest.approx(0.005)
+    drawn = data.column("joint_torque_Nm")
+    for part in range(20):  # its full reach in every stretch
+        there = drawn[(data.time_s >= 3.0 * part) & (data.time_s < 3.0 * (part + 1))]
+        assert np.ptp(there) > 1.9
