@@ -27,14 +27,14 @@ class DriveGains(NamedTuple):
 
 
 def control_for(config: JointConfig, stated: DriveGains | None = None) -> ControlConfig:
-    """A control file made up: a link that swings at 110 Hz on the unloaded cable, a drive whose own
-    loop has 95 Hz, or a motor that `stated` gains move well damped.
+    """A control file made up: a link that swings at 110 Hz on the cable under a twentieth of the greatest load, a
+    drive whose own loop has 95 Hz, or a motor that `stated` gains move well damped.
 
     Good for simulation and for a first look at a design; for hardware, state the real values.
     """
     ratio, load = config.drive.ratio, greatest_load(config)
     stiffness = stiffness_range(config, samples=80)
-    inertia = stiffness.zero_Nm_per_rad / (2.0 * pi * _LINK_HZ) ** 2
+    inertia = float(stiffness.stiffness_Nm_per_rad[1]) / (2.0 * pi * _LINK_HZ) ** 2
     limit = config.limits.motor_torque_max_Nm
     torque = 3.0 * ratio * load if limit is None else limit
     rotor, swing = _rotor(2.0 * inertia * ratio**2, torque, config.sensors.motor_position_resolution_rad)

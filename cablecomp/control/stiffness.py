@@ -21,7 +21,7 @@ class StiffnessRange(NamedTuple):
     """Tangent stiffness dM/dtheta (Nm/rad) along the greatest load cycle: 0, +max, -max, +max (open circuit: 0, +max,
     0, +max).
 
-    `zero_Nm_per_rad` at first touch, `low_Nm_per_rad` and `high_Nm_per_rad` the extremes, `secant_Nm_per_rad`
+    `zero_Nm_per_rad` before any load, `low_Nm_per_rad` and `high_Nm_per_rad` the extremes, `secant_Nm_per_rad`
     load over deflection at the peak, `width_rad` the greatest width of the loop, first touch left out; the arrays
     are the cycle itself, a fifth of it first touch.
     """
@@ -82,7 +82,7 @@ def stiffness_range(
     peak = float(deflection[n - 1])
     useful = stiffness[np.isfinite(stiffness) & (stiffness > 0)]
     return StiffnessRange(
-        float(stiffness[1]),
+        float(useful[0]),
         float(useful.min()),
         float(useful.max()),
         most / peak,

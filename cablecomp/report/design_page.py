@@ -139,8 +139,8 @@ def _stiffness(design: LoopDesign) -> Any:
     s = design.stiffness
     fig = style.figure(400)
     fig.add_scatter(
-        x=s.load_Nm[1:],
-        y=s.stiffness_Nm_per_rad[1:],
+        x=s.load_Nm,
+        y=s.stiffness_Nm_per_rad,
         mode="lines",
         line={"color": style.LOAD},
         name="tangent",
