@@ -57,6 +57,12 @@ def test_a_square_of_the_load_is_read_off() -> None:
     assert "rad/(N·m)² M²" in found.law.equation
 
 
+@pytest.mark.parametrize("cause", ["square", "wave"])
+def test_how_large_a_remainder_is_is_said_once_and_not_by_its_description(cause: str) -> None:
+    """Errors are weighed by the time that rows stand for; the description looks at rows."""
+    assert "RMS" not in described("sweep", cause).text
+
+
 @pytest.mark.parametrize(("cause", "path"), [("friction", "load"), ("turn", "displacement")])
 def test_what_is_odd_in_direction_is_called_odd_and_its_path_told(cause: str, path: str) -> None:
     found = described("sweep", cause)

@@ -30,14 +30,13 @@ _LEAST: Final = 0.04
 class Description:
     """What a residual looks like.
 
-    `rms`: beyond noise, in rad; `memory`: whether present values account for it, or what went before;
+    `memory`: whether present values account for it, or what went before;
     `parity` in the direction of motion; `path`: whether its size grows with the load ("load") or not
     ("displacement"); `period`: strongest period in an angle if it is beyond chance, `period_in`: which
     angle; `events_s`: instants at which it changes; `law`: a sparse equation if one holds on held-out
     blocks; `text`: all of it in plain words.
     """
 
-    rms: float
     memory: Memory
     parity: Parity
     path: Path
@@ -57,7 +56,7 @@ class _Gain:
 def describe(
     series: Series, rng: np.random.Generator, nuisance: FloatArray | None = None, ratio: float | None = None
 ) -> Description:
-    """Describe the residual of a series: memory, period, parity, path, events, size, and a sparse law
+    """Describe the residual of a series: memory, period, parity, path, events, and a sparse law
     if one holds.
 
     `nuisance` (n x p): sensitivities to the calibration parameters, fitted along and not counted.
@@ -91,11 +90,10 @@ def describe(
     layout = alternate_blocks(ask.series.covariates.starts, ask.series.samples, directions)
     law = sparse_law(ask.series, list(terms(ask.series, period, changes)), layout, rng)
     law = law if law is not None and law.supported else None
-    rms = float(np.sqrt(max(0.0, float(np.mean(series.residual**2 - series.sigma**2)))))
     alike = [entry for entry in found if period is not None and entry.with_load == period.with_load]
     where = which_angle(alike, ratio)
-    text = _text(rms, memory, parity, path, period, where, events, law)
-    return Description(rms, memory, parity, path, period, where, events, law, text)
+    text = _text(memory, parity, path, period, where, events, law)
+    return Description(memory, parity, path, period, where, events, law, text)
 
 
 class _Questions:
@@ -215,7 +213,6 @@ def _path(ask: _Questions) -> Path:
 
 
 def _text(
-    rms: float,
     memory: Memory,
     parity: Parity,
     path: Path,
@@ -226,15 +223,14 @@ def _text(
 ) -> str:
     if memory == "undecided" and period is None and law is None and not events and parity == "undecided":
         return "beyond the stated noise, without a pattern that could be described"
-    words = [f"a structured remainder of {1e3 * rms:.3g} mrad RMS"]
-    words.append(
+    words = [
         {
             "memoryless": "it follows present values alone",
             "remembers time": "it depends on the past and forgets in time",
             "remembers motion": "it depends on the past and forgets by motion, not by time",
             "undecided": "whether it has memory cannot be told",
         }[memory]
-    )
+    ]
     if period is not None:
         names = {"motor_angle": "motor", "joint_angle": "joint", "either": "motor or joint"}
         words.append(
