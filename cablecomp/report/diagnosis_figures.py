@@ -234,7 +234,8 @@ def tried(entries: Sequence[Tested], rounds: Mapping[str, int]) -> Any:
 
 
 def dependence(points: Mapping[str, float], parameter: str, on: str) -> Any:
-    """Values of a parameter by session, or over a condition whose values are the keys, with the law that ties them."""
+    """Values of a parameter by session as dots; over a condition, whose values are the keys, the law as a line: no
+    recording has a value of its own there."""
     fig = style.figure(320)
     if on == "session":
         fig.add_scatter(
@@ -244,13 +245,7 @@ def dependence(points: Mapping[str, float], parameter: str, on: str) -> Any:
         x = np.array([float(k) for k in points])
         order = np.argsort(x)
         y = np.array(list(points.values()))
-        fig.add_scatter(
-            x=x[order],
-            y=y[order],
-            mode="lines+markers",
-            marker={"size": 8},
-            line={"color": AFTER, "width": 2},
-        )
+        fig.add_scatter(x=x[order], y=y[order], mode="lines", line={"color": AFTER, "width": 2})
     return style.axes(fig, on, parameter)
 
 

@@ -133,8 +133,9 @@ def _sessions(d: Diagnosis, result: Mapping[str, Any], laws: Sequence[Mapping[st
     for law in laws:
         points = _points(d, result, law)
         words = f"{depends(law)}."
+        line = "" if "values" in law else f" The line is that law, as far as {law['on']} was recorded."
         drawn.append(
-            page.figure(figures.dependence(points, law["parameter"], law["on"]), words)
+            page.figure(figures.dependence(points, law["parameter"], law["on"]), words + line)
             if len(points) > 1
             else page.paragraph(words)
         )
