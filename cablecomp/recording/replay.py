@@ -6,7 +6,7 @@ import dataclasses
 import math
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -18,7 +18,7 @@ from cablecomp.recording.assumptions import assumptions
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.replay_summary import ReplaySummary
 from cablecomp.recording.snapshots import END, Instants, Snapshot, WrapProfile, in_order
-from cablecomp.recording.streams import LineFit, Moments
+from cablecomp.recording.streams import Line, LineFit, Moments
 from cablecomp.recording.table import Block, FloatArray, RemarkLog
 
 COMPARED: Final = frozenset({"joint_position_rad", "tension_h_N", "tension_l_N"})
@@ -164,10 +164,25 @@ class _Run:
             samples_per_s=self.samples / max(elapsed_s, 1e-9),
             observer_samples_per_s=self.samples / max(self._busy, 1e-9),
             gaps=tuple({"line": gap.line, "gap_s": gap.size} for gap in self._log.gaps),
-            notes=(*self._recording.notes, *self._log.notes()),
+            notes=(
+                *self._recording.notes,
+                *self._log.notes(),
+                *self._of_the_zeros(line if compared else None),
+            ),
             assumptions=assumptions(self._config, channels),
             snapshots=in_order([*self._snapshots.values(), self._snapshot(END)]),
         )
+
+    def _of_the_zeros(self, line: Line | None) -> Iterator[str]:
+        """Where a straight line, which has a zero of its own, does better than the prediction by that zero."""
+        left = self._residual
+        if line is not None and abs(left.mean) > left.sd and left.rms > line.rmse:
+            zero = self._config.sensors.joint_position_offset_rad + left.mean
+            yield (
+                f"{1e3 * left.mean:.4g} mrad of the error is constant, {1e3 * left.sd:.4g} mrad RMS stand beside it: "
+                "the prediction takes the encoders' zeros as configured, the straight line has one of its own; "
+                f"[sensors] joint_position_offset_rad = {zero:.6g} would take it off, `calibrate` finds it"
+            )
 
     def _predict(self, block: Block, load: FloatArray | None) -> dict[str, FloatArray]:
         """Run the observer over the block, stopping where a snapshot is due: the state carries over."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
@@ -103,6 +104,21 @@ def test_numbers_equal_an_independent_calculation(tmp_path: Path) -> None:
     assert summary.baseline_linear_slope_rad_per_Nm == pytest.approx(slope, rel=1e-9)
     assert summary.deflection_range_rad == pytest.approx(np.ptp(deflection), rel=1e-9)
     assert summary.bounds_width_last_rad == pytest.approx(2e-3)
+
+
+def test_a_zero_that_loses_to_a_straight_line_is_said_with_its_value(tmp_path: Path) -> None:
+    columns = _columns()
+    columns["joint_position_rad"] += 0.25
+    off = joint(sensors={"joint_position_offset_rad": 0.05})
+    (note,) = replay(_recording(tmp_path, columns), PlayObserver(), [], config=off).notes
+    told = re.search(r"joint_position_offset_rad = (\S+) ", note)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.2502, abs=1e-5)
+    assert note.startswith("200.2 mrad of the error is constant, 0.1")
+    right = joint(sensors={"joint_position_offset_rad": float(told[1])})
+    summary = replay(_recording(tmp_path, columns), PlayObserver(), [], config=right)
+    assert not summary.notes
+    assert summary.rmse_rad == pytest.approx(1e-4, rel=0.1)  # the noise
 
 
 def test_rows_without_the_joints_angle_are_predicted_and_not_compared(tmp_path: Path) -> None:
