@@ -206,11 +206,14 @@ def along(traces: Sequence[Traces], covariate: str, floor_rad: float, unit: Scal
 
 
 def tried(entries: Sequence[Tested], rounds: Mapping[str, int]) -> Any:
-    """Share of what was left that each hypothesis takes off data left out, none where it adds to it.
+    """Share of what was left that each hypothesis takes off data left out, none where it adds to it; of one that was
+    fitted twice beside the same model the better fit.
 
     `rounds`: number of the model that it stood beside.
     """
-    shown = sorted(entries, key=lambda t: (rounds[t.beside], -t.heldout_gain))[:_MOST_TRIED][::-1]
+    ranked = sorted(entries, key=lambda t: (rounds[t.beside], t.heldout_gain))
+    best = {(rounds[t.beside], t.name): t for t in ranked}
+    shown = sorted(best.values(), key=lambda t: (rounds[t.beside], -t.heldout_gain))[:_MOST_TRIED][::-1]
     fig = style.figure(96 + 24 * len(shown), margin={"l": 270, "r": 50, "t": 50, "b": 46})
     for outcome, colour in _OUTCOMES.items():
         own = [t for t in shown if t.outcome == outcome]

@@ -285,6 +285,18 @@ def test_the_mean_error_is_that_of_what_was_fitted(found: Diagnosis) -> None:
     assert all(np.max(np.abs(line.y)) == 0.0 for line in lines)
 
 
+def test_a_hypothesis_fitted_twice_beside_one_model_has_one_bar(found: Diagnosis) -> None:
+    """Two bars in one place would lie on each other, and make all bars thin."""
+    first = found.tested[0]
+    again = (replace(first, heldout_gain=0.5 * first.heldout_gain), *found.tested)
+    rounds = {name: k + 1 for k, name in enumerate(dict.fromkeys(t.beside for t in again))}
+    bars = [
+        (y, x) for trace in figures.tried(again, rounds).data for x, y in zip(trace.x, trace.y, strict=True)
+    ]
+    assert len({y for y, _ in bars}) == len(bars) == len(found.tested)
+    assert pytest.approx(100.0 * first.heldout_gain) in [x for _, x in bars]
+
+
 def test_the_law_that_ties_sessions_is_drawn_at_their_values(found: Diagnosis) -> None:
     """A parameter that grows with a condition: base + rate times the condition, at each value of it."""
     by_bend = {"parameter": "mu_output", "on": "bend", "per_unit": 0.2}
