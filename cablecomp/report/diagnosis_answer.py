@@ -83,8 +83,9 @@ def _missing(m: Mapping[str, Any], several: bool, others: bool, unit: Scale) -> 
 
 
 def _law(law: Mapping[str, Any]) -> str:
-    head = f"{law['parameter']} differs between sessions" if law["on"] == "session" else depends(law)
-    return f'<div class="missing"><h3>{escape(head)}</h3></div>'
+    head, _, values = depends(law).partition(": ")
+    under = f'<p class="values">{escape(values)}</p>' if values else ""
+    return f'<div class="missing"><h3>{escape(head)}</h3>{under}</div>'
 
 
 def _of_a_name(law: Mapping[str, Any], result: Mapping[str, Any]) -> bool:

@@ -316,6 +316,8 @@ def test_a_sessions_own_value_is_said_to_differ_between_sessions_whatever_their_
     d = replace(found, calibration=(*found.calibration, *own))
     text = text_of(diagnosis_page(d))
     assert "mu_output differs between sessions: run~1 0.1, run~2 0.2" in text
+    first_screen = text[: text.index("RMS error of the joint angle, before → after")]
+    assert "mu_output differs between sessions run~1 0.1, run~2 0.2" in first_screen
     assert "per unit of" not in text
 
 
