@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from joints import SMALL, SMALL_NOISE, closed
@@ -47,6 +48,37 @@ def recorded(
     for name, noise in SMALL_NOISE.items():
         turned = 0.0 if locked and name == "motor_position_rad" else noise
         columns[name] = found[name] + turned * rng.standard_normal(len(time))
+    return columns
+
+
+class Case(NamedTuple):
+    """An effect's values in the plant, and what its recording needs beyond the common one; `form`: the law that the
+    plant has it with, where that is not the usual one."""
+
+    values: dict[str, float]
+    channels: tuple[str, ...] = ()
+    seconds: float = 20.0
+    loads: float = 1.0
+    form: str = ""
+    plant: str = ""  # what the plant calls it, if not the effect's name and form
+
+
+def recording(effect: str, case: Case) -> dict[str, FloatArray]:
+    """25 Hz of the plant with the effect: both pulleys turning, load of two frequencies, noise on all channels."""
+    rng = np.random.default_rng(3)
+    time, motor, load = course(case.seconds, case.loads)
+    given: dict[str, Any] = {
+        "temperature_degC": 20.0 + 4.0 * np.sin(0.9 * time),
+        "other_1": np.sin(1.3 * time),
+    }
+    specs = [EffectSpec(case.plant or effect + case.form, case.values)]
+    found = simulate(
+        PlantConfig.from_dict(closed(SMALL)), time, motor, load, effects=specs, **given
+    ).channels()
+    noise = {**SMALL_NOISE, "motor_torque_Nm": 1e-3, "temperature_degC": 0.02, "other_1": 1e-3}
+    columns = {"time_s": time}
+    for name in (*SMALL_NOISE, *case.channels):
+        columns[name] = found[name] + noise[name] * rng.standard_normal(len(time))
     return columns
 
 
