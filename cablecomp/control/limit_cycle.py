@@ -15,7 +15,7 @@ from cablecomp.control.options import MotorModel
 from cablecomp.control.plant_model import (
     Complex,
 )
-from cablecomp.control.stiffness import full, plain
+from cablecomp.control.stiffness import at_start, full
 from cablecomp.control.synthesis import DesignWork
 from cablecomp.observer import Observer
 from cablecomp.signals import Sample
@@ -91,7 +91,7 @@ class Hysteresis(control.DescribingFunctionNonlinearity):  # type: ignore[misc] 
 
     def __init__(self, config: JointConfig, bias_Nm: float = 0.0, samples: int = 120) -> None:
         super().__init__()
-        self._config = plain(config)
+        self._config = at_start(config)
         self._samples = samples
         self._bias_Nm = bias_Nm
         self._cache: dict[float, complex] = {}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from cablecomp.config import JointConfig
-from cablecomp.control.stiffness import greatest_load, held, plain
+from cablecomp.control.stiffness import at_start, greatest_load, held
 from cablecomp.observer import Observer
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None =
     most_Nm = greatest_load(config, load_max_Nm)
     radii = most_Nm * (np.arange(states) + 0.5) / states
     loads = _loops(most_Nm, config.drive.circuit == "closed")
-    observer = Observer(plain(config))
+    observer = Observer(at_start(config))
     rows, wanted, z = [], [], np.zeros(states)
     for k, load in enumerate(loads):
         z = play(z, load, radii)

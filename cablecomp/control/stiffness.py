@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cablecomp.config import JointConfig, Sensors
+from cablecomp.config import EffectEntry, Empirical, JointConfig, Sensors
+from cablecomp.effects.catalogue import acts_through
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer, SampleRefused
 from cablecomp.observer.refusal import REASONS
@@ -57,6 +58,21 @@ def plain(config: JointConfig) -> JointConfig:
     return config.model_copy(update={"observer": options, "sensors": Sensors()})
 
 
+def at_start(config: JointConfig) -> JointConfig:
+    """`plain`, and as the joint is when it starts: without what goes by the time itself (relaxation, creep, events,
+    empirical laws of time). A load cycle here takes 1000 s a step, so that all that flows or lags comes to rest."""
+    effects = tuple(entry for entry in config.effect if not is_of_time(entry))
+    laws = tuple(law for law in config.empirical if not is_of_time(law))
+    return plain(config).model_copy(update={"effect": effects, "empirical": laws})
+
+
+def is_of_time(entry: EffectEntry | Empirical) -> bool:
+    """Whether an effect, or an empirical law, goes by the time above all."""
+    if isinstance(entry, Empirical):
+        return entry.of == "time_s"
+    return acts_through(entry)[:1] == ("time",)
+
+
 def stiffness_range(
     config: JointConfig, load_max_Nm: float | None = None, samples: int = 400
 ) -> StiffnessRange:
@@ -70,7 +86,7 @@ def stiffness_range(
             np.linspace(lowest, most, samples // 2),
         ]
     )
-    observer = Observer(plain(config))
+    observer = Observer(at_start(config))
     rows: list[tuple[float, float]] = []
     for k, load in enumerate(way):
         found = held(observer, k, float(load), most)

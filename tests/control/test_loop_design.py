@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cablecomp.cli.design import to_design
-from cablecomp.config import load_joint
+from cablecomp.config import Empirical, load_joint
 from cablecomp.control.design import LoopDesign, design_loop
 from cablecomp.control.limit_cycle import Hysteresis
 from cablecomp.control.margins import grid_for, highest_gain, modulus_for
@@ -30,6 +30,7 @@ from cablecomp.control.plays import fit_plays
 from cablecomp.control.shaping import LeadFilter, Slope
 from cablecomp.control.stiffness import held, plain, stiffness_range
 from cablecomp.control.synthesis import DesignWork
+from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
 from cablecomp.links.load import load_link
 from cablecomp.observer import Observer
@@ -124,6 +125,37 @@ def test_a_load_that_the_joint_cannot_bear_is_named_as_the_design_s() -> None:
             InputError, match=rf"of the \+-{most:.4g} Nm that are designed for .*breaking_force_N"
         ):
             of(joint)
+
+
+OF_TIME = {
+    "pretension_relaxation": {"fraction": 0.02, "time_constant_s": 30.0, "steady": 0.05},
+    "clamp_slip": {"slip_m": 0.0, "time_s": 10.0, "creep_m_per_Ns": 1e-9, "holds_N": 80.0},
+    "strand_break": {"fraction": 0.3, "time_s": 30.0},
+}
+
+
+@pytest.mark.parametrize("name", OF_TIME)
+def test_a_joint_is_looked_at_as_it_is_when_it_starts_not_days_into_its_creep(name: str) -> None:
+    joint, law = with_effects(JOINT, [(name, OF_TIME[name])]), fit_plays(JOINT)
+    assert stiffness_range(joint).deflection_rad == pytest.approx(stiffness_range(JOINT).deflection_rad)
+    assert fit_plays(joint).weights == pytest.approx(law.weights)
+    assert Hysteresis(joint).describing_function(1e-3) == Hysteresis(JOINT).describing_function(1e-3)
+
+
+def test_a_law_of_the_time_is_no_part_of_the_load_s_loops() -> None:
+    law = Empirical(id="drift", law="chebyshev", of="time_s", half_width=1e6, coefficients_rad=(0.0, 0.01))
+    bent = law.model_copy(update={"of": "joint_torque_Nm", "half_width": 4.0})
+    width = stiffness_range(JOINT).width_rad
+    drifts, bends = (JOINT.model_copy(update={"empirical": (of,)}) for of in (law, bent))
+    assert stiffness_range(drifts).width_rad == pytest.approx(width)
+    reach = [np.ptp(stiffness_range(of).deflection_rad) for of in (JOINT, bends)]
+    assert reach[1] - reach[0] == pytest.approx(0.01 * 2.0 * 2.0 / 4.0)  # slope 0.01/4 over -2 to 2 Nm
+
+
+def test_what_flows_is_at_rest_in_the_load_s_loops() -> None:
+    """Infinitely slow, viscous slip is no friction of its own."""
+    joint = with_effects(JOINT, [("viscous_slip", {"coefficient_Ns_per_m_rad": 1e5})])
+    assert stiffness_range(joint).width_rad == pytest.approx(stiffness_range(JOINT).width_rad, rel=1e-3)
 
 
 def test_filter_and_path_of_the_model_are_the_compensator_s_own() -> None:
