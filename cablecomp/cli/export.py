@@ -23,7 +23,7 @@ from cablecomp.cli.shared import (
 from cablecomp.config import JointConfig
 from cablecomp.control.plays import fit_plays
 from cablecomp.errors import InputError
-from cablecomp.export.code import LEFT_OUT, c_source, identifier, write_fmu
+from cablecomp.export.code import c_source, identifier, left_out, write_fmu
 from cablecomp.export.equivalent import equivalent, loads
 from cablecomp.export.simulators import mujoco_model, urdf_model
 from cablecomp.recording.atomic import atomic_file
@@ -77,7 +77,7 @@ def _simulators(
 
 def _code(joint: JointConfig, out: Path, c: bool, fmu: bool) -> dict[str, object]:
     found = fit_plays(joint)
-    result: dict[str, object] = {"code_rms_rad": found.rms_rad, "code_leaves_out": LEFT_OUT}
+    result: dict[str, object] = {"code_rms_rad": found.rms_rad, "code_leaves_out": left_out(joint)}
     if c:
         result["c"] = _write(out / f"{identifier(joint.name)}.c", c_source(joint, found))
     if fmu:

@@ -12,7 +12,7 @@ from typing import Final
 from cablecomp.config import JointConfig
 from cablecomp.control.plays import Plays
 from cablecomp.errors import InputError
-from cablecomp.export.equivalent import loads
+from cablecomp.export.equivalent import beyond_loops, loads
 from cablecomp.recording.atomic import atomic_directory
 
 _C: Final = Template("""\
@@ -100,19 +100,21 @@ class $cls(Fmi${version}Slave):
         self.z = self.plays()
         return True
 ''')
-LEFT_OUT: Final = (
-    "what turning of the pulleys does to the history",
-    "the order of what time does: creep, relaxation, speed",
-    "bounds for what came before, cable tensions",
-)
+
+
+def left_out(config: JointConfig) -> tuple[str, ...]:
+    """What the play operators of a joint leave out, one line each."""
+    return (
+        "what turning of the pulleys does to the history",
+        "what time does: creep, relaxation, speed",
+        "bounds for what came before, cable tensions",
+        *beyond_loops(config),
+    )
 
 
 def c_source(config: JointConfig, found: Plays) -> str:
     """C99 source of `PREFIX_step(state, motor, load)`, PREFIX being the joint's name as an identifier."""
-    words = _words(config, found)
-    return _C.substitute(
-        words, lost="\n".join(f" *   {line}" for line in LEFT_OUT), prefix=identifier(config.name)
-    )
+    return _C.substitute(_words(config, found, " *   "), prefix=identifier(config.name))
 
 
 def write_fmu(config: JointConfig, found: Plays, out: Path) -> Path:
@@ -124,8 +126,7 @@ def write_fmu(config: JointConfig, found: Plays, out: Path) -> Path:
         raise InputError("--fmu needs a package: pip install 'cablecomp[fmu]'") from None
     cls = "".join(part.capitalize() for part in identifier(config.name).split("_"))
     source = _SLAVE.substitute(
-        _words(config, found),
-        lost="\n".join(LEFT_OUT),
+        _words(config, found, ""),
         cls=cls,
         version="2",
         package="pythonfmu",
@@ -147,9 +148,12 @@ def identifier(name: str) -> str:
     return found if found and not found[0].isdigit() else f"joint_{found}".rstrip("_")
 
 
-def _words(config: JointConfig, found: Plays) -> dict[str, str]:
+def _words(config: JointConfig, found: Plays, indent: str) -> dict[str, str]:
+    # what ends a comment or a string cannot stand in one
+    lost = "\n".join(indent + re.sub(r'[*"\\]', "_", line) for line in left_out(config))
     return {
-        "name": identifier(config.name),  # what ends a comment or a string cannot stand in one
+        "name": identifier(config.name),
+        "lost": lost,
         "count": str(len(found.radii_Nm)),
         "rms": f"{found.rms_rad:.3g}",
         "loads": loads(config, found.most_Nm),

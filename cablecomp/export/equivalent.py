@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cablecomp.config import JointConfig
-from cablecomp.control.stiffness import greatest_load, stiffness_range
+from cablecomp.config import EffectEntry, Empirical, JointConfig, Sensors
+from cablecomp.control.stiffness import greatest_load, is_of_time, stiffness_range
+from cablecomp.effects.catalogue import acts_through
 
 
 class Equivalent(NamedTuple):
@@ -32,7 +33,6 @@ class Equivalent(NamedTuple):
 
     def lost(self, config: JointConfig) -> tuple[str, ...]:
         """What these numbers leave out, one line each."""
-        effects = ", ".join(effect.id for effect in config.effect)
         return (
             f"of the loop, {loads(config, self.most_Nm)}, the equivalent leaves {1e3 * self.rms_rad:.3g} mrad RMS of "
             f"{1e3 * self.reach_rad:.3g} mrad",
@@ -40,12 +40,35 @@ class Equivalent(NamedTuple):
             "friction; the drive is stiffer at each reversal",
             "the memory of the wraps: turning either pulley moves what earlier loads have left",
             "bounds for what came before",
-            *(
-                (f"effects beyond the cable enter by the width of the loop alone: {effects}",)
-                if effects
-                else ()
-            ),
+            *beyond_loops(config),
         )
+
+
+def beyond_loops(config: JointConfig) -> tuple[str, ...]:
+    """What a joint's own effects, empirical laws and sensors do that is in no loop of the load with the motor held, one
+    line each."""
+    entries = (*config.effect, *config.empirical)
+    of_time = [entry.id for entry in entries if is_of_time(entry)]
+    of_more = [entry.id for entry in entries if _is_of_more(entry) and not is_of_time(entry)]
+    right = Sensors()
+    wrong = [
+        f"{name} = {getattr(config.sensors, name):.6g}"
+        for name in ("joint_position_offset_rad", "joint_torque_gain", "joint_torque_offset_Nm")
+        if getattr(config.sensors, name) != getattr(right, name)
+    ]
+    lines = {
+        "what goes by the time": of_time,
+        "what goes by more than the load enters by its loops alone, motor held at 0 rad": of_more,
+        "what sensors read wrong; angles and loads are the true ones": wrong,
+    }
+    return tuple(f"{line}: {', '.join(names)}" for line, names in lines.items() if names)
+
+
+def _is_of_more(entry: EffectEntry | Empirical) -> bool:
+    """Whether an effect, or an empirical law, goes by anything but the load."""
+    if isinstance(entry, Empirical):
+        return entry.of != "joint_torque_Nm"
+    return not set(acts_through(entry)) <= {"load", "load_direction", "reversal"}
 
 
 def loads(config: JointConfig, most_Nm: float) -> str:

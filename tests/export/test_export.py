@@ -17,11 +17,12 @@ import numpy as np
 import pytest
 
 from cablecomp.cli import main
-from cablecomp.config import load_joint
+from cablecomp.config import Empirical, load_joint
 from cablecomp.control.options import MotorModel
 from cablecomp.control.plays import Plays
+from cablecomp.effects import with_effects
 from cablecomp.examples import example
-from cablecomp.export.code import c_source, identifier, write_fmu
+from cablecomp.export.code import c_source, identifier, left_out, write_fmu
 from cablecomp.export.equivalent import Equivalent, equivalent
 from cablecomp.export.simulators import mujoco_model, urdf_model
 
@@ -208,7 +209,41 @@ def test_a_joint_with_an_effect_of_the_users_own_is_exported(
     assert "--effects" in capsys.readouterr().err  # what to do
     own = Path(__file__).parents[1] / "effects/user_effect_example.py"
     assert main([*command, "--effects", str(own)]) == 0
-    assert "by the width of the loop alone: seal_drag" in (tmp_path / "out/wrist_capstan.urdf").read_text()
+    assert (
+        "enters by its loops alone, motor held at 0 rad: seal_drag"
+        in (tmp_path / "out/wrist_capstan.urdf").read_text()
+    )
+
+
+def test_every_format_names_what_of_the_joint_s_own_it_leaves_out() -> None:
+    """Creep and a law of time wholly; a weight but for the load's loops; what the sensors read wrong. Not what goes by
+    the load alone, which is in the loops; no name ends the comment or the text that it stands in."""
+    sensors = JOINT.sensors.model_copy(update={"joint_torque_gain": 1.25})
+    laws = tuple(
+        Empirical(id=f'{name}*/"""\\', law="chebyshev", of=of, coefficients_rad=(0.0, 0.01))
+        for name, of in (("drift", "time_s"), ("bend", "joint_torque_Nm"), ("wave", "motor_position_rad"))
+    )
+    effects = [
+        ("gravity_load", {"moment_Nm": 0.5, "phase_rad": 0.0}),
+        ("pretension_relaxation", {"fraction": 0.02, "time_constant_s": 30.0}),
+        ("nonlinear_cable", {"stiffening": 0.1}),
+    ]
+    joint = with_effects(JOINT.model_copy(update={"sensors": sensors, "empirical": laws}), effects)
+    code = c_source(joint, PLAYS)
+    assert code.count("*/") == c_source(JOINT, PLAYS).count("*/")
+    for text in (code, "\n".join(SPRING.lost(joint)), "\n".join(left_out(joint))):
+        said = {line.strip(" *").partition(": ")[0]: line for line in text.splitlines()}
+        time, more, read = (
+            said["what goes by the time"],
+            said["what goes by more than the load enters by its loops alone, motor held at 0 rad"],
+            said["what sensors read wrong; angles and loads are the true ones"],
+        )
+        assert "pretension_relaxation, drift" in time
+        assert "gravity_load, wave" in more
+        assert "joint_torque_gain = 1.25" in read
+        assert "nonlinear_cable" not in text
+        assert "bend" not in text
+    assert not any("what goes" in line or "sensors" in line for line in left_out(JOINT))
 
 
 def test_what_is_lost_is_said_with_the_formats_that_lose_it(
