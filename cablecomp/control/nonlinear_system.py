@@ -100,7 +100,7 @@ def _reduced(config: JointConfig, period_s: float, name: str, found: Plays) -> A
 
     def output(t: float, x: Floats, u: Floats, params: Any) -> Floats:
         load = float(u[1])
-        deflection = float(weights @ [load, load * load, *play(x, load, radii)])
+        deflection = found.rest_rad + float(weights @ [load, load * load, *play(x, load, radii)])
         return np.array([ratio * float(u[0]) + deflection, deflection])
 
     return control.nlsys(

@@ -17,17 +17,19 @@ Floats = NDArray[np.float64]
 
 
 class Plays(NamedTuple):
-    """The drive with its motor held, in few states: deflection = a M + b M² + sum w_i z_i, z_i+ = min(max(z_i,
+    """The drive with its motor held, in few states: deflection = c + a M + b M² + sum w_i z_i, z_i+ = min(max(z_i,
     M − r_i), M + r_i).
 
     `weights`: a [rad/Nm], b [rad/Nm²], then w_i [rad/Nm]; `radii_Nm`: r_i; `rms_rad`: error on the loops that
-    it was fitted to; `most_Nm`: the greatest load of those.
+    it was fitted to; `most_Nm`: the greatest load of those; `rest_rad`: c, the deflection before any load (none in a
+    plain drive; a weight, or a law of another channel, gives one).
     """
 
     weights: Floats
     radii_Nm: Floats
     rms_rad: float
     most_Nm: float
+    rest_rad: float = 0.0
 
 
 def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None = None) -> Plays:
@@ -42,7 +44,8 @@ def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None =
         z = play(z, load, radii)
         rows.append([load, load * load, *z])
         wanted.append(held(observer, k, float(load), most_Nm).deflection_rad)
-    A, b = np.array(rows), np.array(wanted)
+    rest = wanted[0]  # nothing loads it yet
+    A, b = np.array(rows), np.array(wanted) - rest
     size = np.maximum(np.abs(A).max(axis=0), 1e-300)
     least = np.zeros(states + 2)
     least[1] = -np.inf
@@ -51,7 +54,7 @@ def fit_plays(config: JointConfig, states: int = 16, load_max_Nm: float | None =
         * np.abs(b).max()
         / size
     )
-    return Plays(weights, radii, float(np.sqrt(np.mean((A @ weights - b) ** 2))), most_Nm)
+    return Plays(weights, radii, float(np.sqrt(np.mean((A @ weights - b) ** 2))), most_Nm, rest)
 
 
 def play(z: Floats, load: float, radii: Floats) -> Floats:

@@ -17,7 +17,8 @@ from cablecomp.recording.atomic import atomic_directory
 
 _C: Final = Template("""\
 /* Load and deflection of the joint $name: $count play operators (Prandtl-Ishlinskii) fitted to its observer.
- * deflection = a M + b M^2 + sum w_i z_i,  z_i <- min(max(z_i, M - r_i), M + r_i),  q_out = ratio q_in + deflection.
+ * q_out = ratio q_in + deflection,  deflection = c + a M + b M^2 + sum w_i z_i,
+ * z_i <- min(max(z_i, M - r_i), M + r_i).
  * Fit: $rms rad RMS on loops from $loads. Left out:
 $lost
  * C99, no library but <math.h>'s fmin and fmax, no allocation; all state is the caller's. SI units. */
@@ -28,13 +29,14 @@ enum { ${prefix}_STATES = $count };
 typedef struct { double z[$count]; } ${prefix}_state; /* zeros: uniform pretension, no load */
 
 static const double ${prefix}_ratio = $ratio;
+static const double ${prefix}_rest = $rest;
 static const double ${prefix}_linear[2] = {$linear};
 static const double ${prefix}_weight[$count] = {$weights};
 static const double ${prefix}_radius[$count] = {$radii};
 
 /* Deflection [rad] at a load [Nm]; the state moves along. */
 double ${prefix}_deflection(${prefix}_state *s, double load) {
-    double sum = ${prefix}_linear[0] * load + ${prefix}_linear[1] * load * load;
+    double sum = ${prefix}_rest + ${prefix}_linear[0] * load + ${prefix}_linear[1] * load * load;
     for (size_t i = 0; i < $count; ++i) {
         s->z[i] = fmin(fmax(s->z[i], load - ${prefix}_radius[i]), load + ${prefix}_radius[i]);
         sum += ${prefix}_weight[i] * s->z[i];
@@ -58,6 +60,7 @@ from xml.etree.ElementTree import SubElement
 from $package import Fmi${version}Causality, Fmi${version}Slave, $real
 
 RATIO = $ratio
+REST = $rest
 LINEAR = ($linear)
 WEIGHT = ($weights,)
 RADIUS = ($radii,)
@@ -90,7 +93,7 @@ class $cls(Fmi${version}Slave):
     def deflection_rad(self):  # asked before the first step too, while a simulation is initialised
         load = self.joint_torque_Nm
         held = sum(w * z for w, z in zip(WEIGHT, self.plays()))
-        return LINEAR[0] * load + LINEAR[1] * load * load + held
+        return REST + LINEAR[0] * load + LINEAR[1] * load * load + held
 
     @property
     def joint_position_rad(self):
@@ -158,6 +161,7 @@ def _words(config: JointConfig, found: Plays, indent: str) -> dict[str, str]:
         "rms": f"{found.rms_rad:.3g}",
         "loads": loads(config, found.most_Nm),
         "ratio": repr(float(config.drive.ratio)),
+        "rest": repr(found.rest_rad),
         "linear": _numbers(found.weights[:2]),
         "weights": _numbers(found.weights[2:]),
         "radii": _numbers(found.radii_Nm),

@@ -152,6 +152,15 @@ def test_a_law_of_the_time_is_no_part_of_the_load_s_loops() -> None:
     assert reach[1] - reach[0] == pytest.approx(0.01 * 2.0 * 2.0 / 4.0)  # slope 0.01/4 over -2 to 2 Nm
 
 
+def test_what_turns_the_joint_at_any_load_is_no_error_of_the_load_s_loops() -> None:
+    """A law of the motor's angle turns the joint by 4 mrad where the motor is held: all else is as without it."""
+    law = Empirical(id="wave", law="chebyshev", of="motor_position_rad", coefficients_rad=(0.004, 0.01))
+    found, without = fit_plays(JOINT.model_copy(update={"empirical": (law,)})), fit_plays(JOINT)
+    assert found.rest_rad - without.rest_rad == pytest.approx(0.004, abs=1e-9)
+    assert found.weights == pytest.approx(without.weights, rel=1e-6, abs=1e-9)
+    assert found.rms_rad == pytest.approx(without.rms_rad, rel=1e-6)
+
+
 def test_what_flows_is_at_rest_in_the_load_s_loops() -> None:
     """Infinitely slow, viscous slip is no friction of its own."""
     joint = with_effects(JOINT, [("viscous_slip", {"coefficient_Ns_per_m_rad": 1e5})])

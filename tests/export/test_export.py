@@ -29,7 +29,7 @@ from cablecomp.export.simulators import mujoco_model, urdf_model
 JOINT = load_joint(example("joints", "wrist-capstan"))
 RATIO = JOINT.drive.ratio
 SPRING = Equivalent(RATIO, 500.0, 0.2, 2 * 0.2 / 500.0, 2.0, 1e-5, 8e-3)
-PLAYS = Plays(np.array([1e-3, 1e-6, 2e-4, 3e-4, 1e-4]), np.array([0.2, 0.8, 1.5]), 1e-6, 2.0)
+PLAYS = Plays(np.array([1e-3, 1e-6, 2e-4, 3e-4, 1e-4]), np.array([0.2, 0.8, 1.5]), 1e-6, 2.0, rest_rad=5e-4)
 LOADS = np.concatenate(
     [np.linspace(a, b, 40) for a, b in ((0, 2), (2, -2), (-2, 1), (1, -0.5), (-0.5, 1), (1, 2))]
 )
@@ -41,7 +41,7 @@ def by_turning_points(loads: np.ndarray) -> np.ndarray:
     for load in loads:
         stop = np.maximum(np.minimum(stop + load - before, PLAYS.radii_Nm), -PLAYS.radii_Nm)
         before = load
-        found.append(PLAYS.weights @ [load, load**2, *(load - stop)])
+        found.append(PLAYS.rest_rad + PLAYS.weights @ [load, load**2, *(load - stop)])
     return np.array(found)
 
 
@@ -105,7 +105,7 @@ def test_the_mock_up_unit_does_the_same(tmp_path: Path, monkeypatch: pytest.Monk
         0.1,
     )  # initialised: below all radii, so no play moves
     begins = [slave.get_real([vr])[0] for vr, v in slave.vars.items() if v.causality.name == "output"]
-    bends = 1e-3 * 0.1 + 1e-6 * 0.1**2
+    bends = PLAYS.rest_rad + 1e-3 * 0.1 + 1e-6 * 0.1**2
     assert begins == pytest.approx([RATIO * 0.3 + bends, bends], abs=1e-15)
     found = []
     for load in LOADS:
