@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
 from cablecomp.mechanics.tables import (
     AGAIN,
@@ -23,7 +21,11 @@ from cablecomp.mechanics.tables import (
     KNEE_HALF,
     KNEE_RISE,
     LEAST_STIFFNESS,
+    LONG_W,
+    LONG_X,
     MODE,
+    MOST_PANELS,
+    PANEL,
     PLAIN,
     STEADY,
     STIFF,
@@ -33,6 +35,7 @@ from cablecomp.mechanics.tables import (
     V_PER,
     Floats,
     between,
+    gauss,
     groove,
     look_up,
     stiffening_strain,
@@ -57,15 +60,8 @@ B2, B4, B6, B8, B10, B12, B14 = (
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
 
 
-def _gauss(points: int) -> tuple[Floats, Floats]:
-    """Places and weights of Gauss-Legendre quadrature on [0, 1]."""
-    x, weights = np.polynomial.legendre.leggauss(points)
-    return (x + 1.0) / 2.0, weights / 2.0
-
-
-SHORT_X, SHORT_W = _gauss(3)
-MIDDLE_X, MIDDLE_W = _gauss(5)
-LONG_X, LONG_W = _gauss(8)
+SHORT_X, SHORT_W = gauss(3)
+MIDDLE_X, MIDDLE_W = gauss(5)
 
 
 @leaf_kernel
@@ -257,7 +253,7 @@ def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: flo
         area = look_up(laws, law, AREA_OF_V, low, per, v2) - look_up(laws, law, AREA_OF_V, low, per, v1)
         risen = look_up(laws, law, E_OF_V, low, per, v2) - look_up(laws, law, E_OF_V, low, per, v1)
         return area * dy / d, risen * dy / d
-    if dy < SHORT_GROOVE and abs(d) < 0.05:
+    if dy < min(SHORT_GROOVE, 0.25 * head[PANEL]) and abs(d) < 0.05:
         return _groove_sums(MIDDLE_X, MIDDLE_W, laws, law, y1, v1, dy, d)
     return _groove_sums(LONG_X, LONG_W, laws, law, y1, v1, dy, d)
 
@@ -266,13 +262,16 @@ def piece_table(laws: Floats, law: int, y1: float, v1: float, y2: float, v2: flo
 def _groove_sums(
     x: Floats, weights: Floats, laws: Floats, law: int, y1: float, v1: float, dy: float, d: float
 ) -> tuple[float, float]:
-    """The same where v rises with the groove coordinate g(y1 + dy x)."""
+    """The same where v rises with the groove coordinate g(y1 + dy x), panel by panel."""
     s1 = groove(laws, law, y1)
     span = groove(laws, law, y1 + dy) - s1
     rise = d / span if span > 0.0 else 0.0
+    panels = int(min(float(MOST_PANELS), dy / laws[law, HEAD, PANEL])) + 1
+    part = dy / panels
     total = slope = 0.0
-    for j in range(len(x)):
-        e, de = strain(laws, law, v1 + rise * (groove(laws, law, y1 + dy * x[j]) - s1))
-        total += weights[j] * e
-        slope += weights[j] * de
-    return total * dy, slope * dy
+    for k in range(panels):
+        for j in range(len(x)):
+            e, de = strain(laws, law, v1 + rise * (groove(laws, law, y1 + (k + x[j]) * part) - s1))
+            total += weights[j] * e
+            slope += weights[j] * de
+    return total * part, slope * part

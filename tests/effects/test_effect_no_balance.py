@@ -103,3 +103,20 @@ def test_no_row_of_friction_that_grows_with_pressure_beside_a_weight_is_refused(
         observer = Observer(with_effects(config, effects))
         for t, q in zip(time, motor, strict=True):
             observer.step(Sample(float(t), float(q), 0.0))  # raises where it refuses
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "phase", "order"), [(0.104, -0.689, 4.0), (0.387, -0.248, 4.0), (0.404, -2.178, 3.0)]
+)
+def test_no_row_of_a_groove_with_waves_is_refused_where_bumps_are_erased(
+    amplitude: float, phase: float, order: float
+) -> None:
+    """Ever smaller swings of the load, each back to nothing: the long slipped arc that is left jumped as it was cut."""
+    groove = {"amplitude": amplitude, "phase_rad": phase, "order": order}
+    open_rig = load_joint(CONFIGS / "snow-open-rig.toml")
+    observer = Observer(with_effects(open_rig, [("position_dependent_friction", groove)]))
+    shares = np.concatenate(
+        [most * (1.0 - np.abs(np.linspace(-1.0, 1.0, 121))) for most in (1.0, 0.75, 0.5, 0.25)]
+    )
+    for k, load in enumerate(1.85 * shares):
+        observer.step(Sample(0.05 * k, 0.0, float(load)))  # raises where it refuses
