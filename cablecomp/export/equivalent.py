@@ -47,7 +47,7 @@ class Equivalent(NamedTuple):
 def beyond_loops(config: JointConfig) -> tuple[str, ...]:
     """What a joint's own effects, empirical laws and sensors do that is in no loop of the load with the motor held, one
     line each."""
-    entries = (*config.effect, *config.empirical)
+    entries: tuple[EffectEntry | Empirical, ...] = (*config.effect, *config.empirical)
     of_time = [entry.id for entry in entries if is_of_time(entry)]
     of_more = [entry.id for entry in entries if _is_of_more(entry) and not is_of_time(entry)]
     right = Sensors()
