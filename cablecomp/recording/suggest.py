@@ -38,6 +38,9 @@ _STILL: Final = 0.3
 _NEEDED: Final = ("time_s", "motor_position_rad", "joint_position_rad", "joint_torque_Nm")
 _SURE: Final = 0.3
 """Least correlation from which on a sign is read off."""
+_GEARED: Final = 2.0
+"""Joints that move so many times what the drive's ratio allows, or less than its inverse, have another gear or unit:
+what they give way is what does not follow the motor then."""
 LOST: Final = 0.1
 """Share of the work at both ends that sensors of force that do not quite agree do not make."""
 
@@ -244,7 +247,9 @@ def _scale(motor: Suggestion, joint: Suggestion, off: float) -> None:
             _change(here, "57 times too large for the drive's ratio: degrees", unit="deg")
             return
     if abs(np.log(off)) > 0.2:
-        joint.why.append(f"moves {off:.3g} times what the drive's ratio allows: is there a gear?")
+        turned = [s.channel for s, f in ((joint, off), (motor, 1.0 / off)) if abs(np.log(f / _DEGREE)) < 0.2]
+        asked = f"is {turned[0]} in degrees?" if turned else "is there a gear?"
+        joint.why.append(f"moves {off:.3g} times what the drive's ratio allows: {asked}")
 
 
 def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], ratio: float | None) -> None:
@@ -255,7 +260,9 @@ def _torques(found: dict[str, Suggestion], values: Mapping[str, FloatArray], rat
     bent = angle = None
     if q is not None and joint is not None:
         angle = _in_si(joint, values[joint.source.column])
-        slope = _slope(q, angle)[0] if ratio is None else ratio
+        slope = _slope(q, angle)[0]
+        if ratio is not None and ratio < _GEARED * abs(slope) < _GEARED**2 * ratio:
+            slope = ratio
         bent = angle - slope * q
     if load is not None and bent is not None:
         _axis(found, values, bent)

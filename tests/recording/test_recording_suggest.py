@@ -73,6 +73,20 @@ def test_of_two_torques_that_disagree_the_one_is_turned_without_which_friction_w
     assert said == ({turned} if turned else set())
 
 
+@pytest.mark.parametrize(("turned", "sign"), [("joint_position_rad", -1.0), ("motor_position_rad", 1.0)])
+def test_an_angle_in_degrees_under_a_name_in_radians_turns_no_torque(turned: str, sign: float) -> None:
+    """What does not follow from the ratio is the wrong unit's then, and no give: a load that goes with the angle keeps
+    its sign, and the reason names the angle's unit."""
+    true = joint()
+    true["joint_torque_Nm"] = 0.3 * true["joint_torque_Nm"] + sign * true["motor_position_rad"]
+    true["joint_position_rad"] = RATIO * true["motor_position_rad"] + 4e-3 * true["joint_torque_Nm"]
+    true["motor_torque_Nm"] = -RATIO * true["joint_torque_Nm"]
+    true[turned] = np.degrees(true[turned])
+    found = {s.channel: s for s in suggest(true, RATIO)}
+    assert [c for c, s in found.items() if s.source.sign < 0] == []
+    assert f"is {turned} in degrees?" in " ".join(found["joint_position_rad"].why)
+
+
 def test_counts_per_turn_follow_from_the_other_encoder() -> None:
     true = joint()
     counts = np.round(true["motor_position_rad"] * 8192 / (2.0 * math.pi)) + 5000
