@@ -28,6 +28,9 @@ SURE: Final = 0.5
 """Least partial correlation from which on a slope means something."""
 RATIO_OFF: Final = 0.05
 """Relative departure from the rigid ratio that no compliance or slip makes."""
+MAGNITUDES_OFF: Final = 20.0
+"""Times the nominal ratio that no radius known by order of magnitude makes, and degrees (57) do; what is lost on the
+way makes a ratio as small as it likes."""
 SCALE_OFF: Final = 4.0
 """Factor between the compliance seen and the nominal one that friction, stiffening and tolerances do not make."""
 GAP: Final = 10.0
@@ -129,8 +132,10 @@ def _angles(view: View) -> list[Suspicion]:
         )
         found.append(Suspicion("sign", JOINT, words, {"slope_over_ratio": factor}))
     off = abs(factor)
-    if abs(log(off)) > RATIO_OFF and not _loose(view.config, "radius"):
-        unit = next((words for f, words in _ANGLES.items() if abs(log(off / f)) < 0.1), None)
+    loose = _loose(view.config, "radius")
+    if off > MAGNITUDES_OFF if loose else abs(log(off)) > RATIO_OFF:
+        nearest = min(_ANGLES, key=lambda f: abs(log(off / f)))
+        unit = _ANGLES[nearest] if loose or abs(log(off / nearest)) < 0.1 else None
         words = unit or "a gear between encoder and pulley, or a radius that is off"
         kind = "unit" if unit else "ratio"
         said = (
@@ -143,15 +148,19 @@ def _angles(view: View) -> list[Suspicion]:
 
 
 def _reach(view: View) -> Iterator[Suspicion]:
-    """Angles in degrees both: far beyond what is wound on the pulleys."""
-    last = view.config.drive.stage[-1]
-    reach, most = float(np.ptp(view.y)), 2.0 * last.wrap_output_rad
-    if reach > 4.0 * most:
+    """Angles in degrees: far beyond what is wound on their pulleys."""
+    first, last = view.config.drive.stage[0], view.config.drive.stage[-1]
+    ends = ((JOINT, view.y, last.wrap_output_rad), (INPUT, view.q, first.wrap_input_rad))
+    beyond = [(name, float(np.ptp(x)), 2.0 * wrap) for name, x, wrap in ends if np.ptp(x) > 8.0 * wrap]
+    if beyond:
+        name, reach, most = beyond[0]
+        alone = abs(view.slope) * MAGNITUDES_OFF < view.ratio
+        which = f"{name} seems" if alone else "both angles seem"
         words = (
-            f"both angles seem to be in degrees: the joint moves over {reach:.4g} rad, what is wound on its pulley "
+            f"{which} to be in degrees: {name} moves over {reach:.4g} rad, what is wound on its pulley "
             f"allows {most:.3g}"
         )
-        yield Suspicion("unit", JOINT, words, {"reach_rad": reach, "allowed_rad": most})
+        yield Suspicion("unit", name, words, {"reach_rad": reach, "allowed_rad": most})
 
 
 def _slack(view: View) -> Iterator[Suspicion]:

@@ -26,7 +26,7 @@ class Refusal(IntEnum):
 
 REASONS = {
     Refusal.UNWOUND: "a drum runs out of cable at this position; check wrap_output_rad, "
-    "wrap_input_rad and the angles' zero",
+    "wrap_input_rad and the angles' unit and zero",
     Refusal.SLACK: "the load would slacken the cable of an open circuit (T0 + M/R <= "
     "0); check pretension_N and the load's sign",
     Refusal.DIVERGED: "the tensions could not be solved; check the configuration's orders of magnitude",

@@ -100,6 +100,20 @@ def test_both_angles_in_degrees() -> None:
     assert kinds(**both) == [("unit", "joint_position_rad")]
 
 
+@pytest.mark.parametrize("kept", [1.0, 0.5])
+@pytest.mark.parametrize("name", ["joint_position_rad", "motor_position_rad"])
+def test_of_a_drive_known_by_order_of_magnitude_the_one_angle_in_degrees_is_named(
+    name: str, kept: float
+) -> None:
+    """Radii are known within a few times what they are; `kept`: what of the motion is not lost on the way."""
+    rough = JOINT.model_copy(update={"tolerance": {"input_radius_m": 1.0}})
+    right = {**COLUMNS, "joint_position_rad": kept * COLUMNS["joint_position_rad"]}
+    assert not [s for s in suspicions(rough, right) if s.kind in ("unit", "ratio")]
+    wide = {n: 3.0 * right[n] for n in ("joint_position_rad", "motor_position_rad")}
+    (said,) = suspicions(rough, {**right, **wide, name: np.degrees(wide[name])})
+    assert said.text.startswith(f"{name} seems to be in degrees")
+
+
 @pytest.mark.parametrize("late_s", [0.1, -0.1])
 @pytest.mark.parametrize("name", ["joint_torque_Nm", "joint_position_rad"])
 def test_delays(name: str, late_s: float) -> None:
