@@ -13,7 +13,7 @@ from joints import SMALL, closed
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.explain import rounds
 from cablecomp.diagnosis.explain.beginning import _far as far_off
-from cablecomp.diagnosis.explain.dependence import Dependence, tell_a_gain
+from cablecomp.diagnosis.explain.dependence import Dependence, gain_is_told, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
 from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -98,6 +98,31 @@ def test_a_gain_by_a_condition_wants_three_values_or_two_of_two_recordings_each(
     values: list[float], told: bool
 ) -> None:
     assert tell_a_gain(values) is told
+
+
+@pytest.mark.parametrize(
+    ("values", "sessions", "told"),
+    [
+        ([0.0, 1.0], ["all", "all"], True),
+        ([0.0, 0.0, 1.0], ["all", "all", "all"], True),
+        ([1.0, 1.0], ["all", "all"], False),
+        ([0.0, 1.0], ["a", "b"], False),
+        ([0.0, 0.0, 0.0, 1.0], ["all"] * 4, False),
+    ],
+)
+def test_two_values_of_a_condition_are_enough_in_one_session_of_which_blocks_are_left_out(
+    values: list[float], sessions: list[str], told: bool
+) -> None:
+    """The rest of either recording shows its own value still; of two sessions either is mounted anew as well, and of
+    four recordings whole ones are left out."""
+    names = tuple(dict.fromkeys(sessions))
+    problem: Any = SimpleNamespace(
+        evidence=[SimpleNamespace(condition={"bend_rad": v}) for v in values],
+        sessions=names,
+        parameters=(),
+        repeated=tuple(s for s in names if sessions.count(s) > 1),
+    )
+    assert gain_is_told(problem, "bend_rad") is told
 
 
 @pytest.mark.parametrize(

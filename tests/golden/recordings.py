@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from cablecomp.config import JointConfig, in_session, load_joint, session_of
+from cablecomp.diagnosis.body import Sessions
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import Diagnosis
 from cablecomp.observer import Observer
@@ -42,9 +43,9 @@ def joint(name: str) -> JointConfig:
     return load_joint(CONFIGS / f"{name}.toml")
 
 
-def diagnosed(config: JointConfig, paths: Sequence[Path]) -> Diagnosis:
+def diagnosed(config: JointConfig, paths: Sequence[Path], sessions: Sessions | None = None) -> Diagnosis:
     """What the command finds in these recordings."""
-    return diagnose(config, {str(p): read_all(p).columns for p in paths})
+    return diagnose(config, {str(p): read_all(p).columns for p in paths}, sessions=sessions)
 
 
 @cache

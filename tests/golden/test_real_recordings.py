@@ -93,3 +93,14 @@ def test_one_drive_for_all_bends(bends: Diagnosis) -> None:
     assert bends.heldout_by in ("recording", "condition", "session")
     assert degrees(e.rmse_rad) <= 1.35
     assert degrees(e.heldout_rmse_rad) <= 1.9
+
+
+def test_two_bends_of_one_session_are_one_drive_whose_friction_grows_with_the_bend() -> None:
+    """As recordings are taken that no `[[session]]` claims; asked no more of them than of all bends together."""
+    found = files.diagnosed(files.joint("tendon-sheath"), [sheath.path(60), sheath.path(240)], "one")
+    (routing,) = [n for n in found.named if n.effect == "routing_friction"]
+    assert routing.depends_on is not None
+    assert routing.depends_on["on"] == "sheath_bend_rad"
+    assert routing.depends_on["per_unit"] > 0.0
+    assert degrees(found.augmented.rmse_rad) <= 1.35
+    assert degrees(found.augmented.heldout_rmse_rad) <= 1.9

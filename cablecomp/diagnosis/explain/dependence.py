@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from cablecomp.diagnosis.explain.linear import anchor
-from cablecomp.diagnosis.folds import shown_apart
+from cablecomp.diagnosis.folds import kind_of_parts, shown_apart
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
 from cablecomp.estimation.least_squares import Fit
@@ -110,10 +110,18 @@ def ask_dependences(fit: Fit, terms: Sequence[Any], by: str) -> list[tuple[Depen
     return [f for f in found if 2.0 * f[1] < LIMITS.dependence * energy][: LIMITS.dependences]
 
 
-def tell_a_gain(values: Sequence[float]) -> bool:
-    """Whether a gain by a condition may be asked of recordings with these values of it."""
+def gain_is_told(problem: Problem, condition: str) -> bool:
+    """Whether a gain by a condition may be asked of these recordings."""
+    blocks = len(problem.sessions) == 1 and kind_of_parts(problem) == "block"
+    return tell_a_gain([e.condition[condition] for e in problem.evidence], blocks)
+
+
+def tell_a_gain(values: Sequence[float], blocks: bool = False) -> bool:
+    """Whether recordings with these values of a condition tell a gain by it while a part is left out: whole ones, or
+    `blocks` of those of one session, where the rest of each still shows its own value."""
     counts = np.unique(values, return_counts=True)[1]
-    return len(counts) >= LIMITS.conditions or (len(counts) > 1 and int(min(counts)) >= LIMITS.of_each)
+    each = 1 if blocks else LIMITS.of_each
+    return len(counts) >= LIMITS.conditions or (len(counts) > 1 and int(min(counts)) >= each)
 
 
 def _ways(
@@ -132,9 +140,9 @@ def _ways(
             cut.append(np.where(inside, column, 0.0))
         ways.append((Dependence(p.name, "session"), cut, problem.with_own(place)))
     for condition in problem.evidence[0].condition:
-        values = [e.condition[condition] for e in problem.evidence]
-        if not tell_a_gain(values) or not may_depend(p.base, condition):
+        if not gain_is_told(problem, condition) or not may_depend(p.base, condition):
             continue
+        values = [e.condition[condition] for e in problem.evidence]
         centred = np.array(values) - np.mean(values)
         weight = np.where(owners >= 0, centred[np.maximum(owners, 0).astype(np.int64)], 0.0)
         gain = by_condition(p, condition, float(np.ptp(values)))

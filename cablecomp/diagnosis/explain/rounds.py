@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from cablecomp.diagnosis.explain.beginning import Beginning, Begun, further
-from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, may_depend, tell_a_gain
+from cablecomp.diagnosis.explain.dependence import Dependence, ask_dependences, gain_is_told, may_depend
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import anchor, likeliest
 from cablecomp.diagnosis.explain.model import (
@@ -241,18 +241,18 @@ def _wants_rates(a: Answer, at: Beginning) -> bool:
 
 
 def _by_conditions(begun: Begun) -> list[Begun]:
-    """The same effect with an amount that grows with a condition, for each condition of three values and more."""
+    """The same effect with an amount that grows with a condition, for each condition that tells it."""
     problem, x, term = begun.problem, begun.x, begun.terms[0]
     assert isinstance(term, Hypothesis)
     found: list[Begun] = []
     for condition in problem.evidence[0].condition:
-        values = [e.condition[condition] for e in problem.evidence]
-        if not tell_a_gain(values):
+        if not gain_is_told(problem, condition):
             continue
         name = term.key(term.amount.name)
         amount = next((p for p in problem.parameters if p.name == name), None)
         if amount is None or not may_depend(name, condition):
             continue
+        values = [e.condition[condition] for e in problem.evidence]
         here = replace(
             amount, start=max(amount.value(float(x[problem.parameters.index(amount)])), amount.scale)
         )
