@@ -31,6 +31,8 @@ RATIO_OFF: Final = 0.05
 MAGNITUDES_OFF: Final = 20.0
 """Times the nominal ratio that no radius known by order of magnitude makes, and degrees (57) do; what is lost on the
 way makes a ratio as small as it likes."""
+BEYOND: Final = 4.0
+"""Times what is wound on a pulley that an angle in radians does not move by."""
 SCALE_OFF: Final = 4.0
 """Factor between the compliance seen and the nominal one that friction, stiffening and tolerances do not make."""
 GAP: Final = 10.0
@@ -70,7 +72,9 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     if len(rows["time_s"]) < FEWEST:
         return tuple(found)
     view = View(config, rows, load)
-    odd = tuple(odd_sensors(view, columns))
+    far = {name for name, (reach, most) in _moves(view).items() if reach > BEYOND * most}
+    # of an angle in degrees steps by 6.28 are no turns
+    odd = tuple(s for s in odd_sensors(view, columns) if not (s.kind == "wrapped" and s.channel in far))
     if any(s.kind in ("stuck", "wrapped") for s in odd):  # it would spoil all that follows
         return (*found, *odd)
     fits = _angles(view)
@@ -147,20 +151,28 @@ def _angles(view: View) -> list[Suspicion]:
     return found or list(_reach(view))
 
 
-def _reach(view: View) -> Iterator[Suspicion]:
-    """Angles in degrees: far beyond what is wound on their pulleys."""
+def _moves(view: View) -> dict[str, tuple[float, float]]:
+    """By how much each angle moves, and how much what is wound on its pulley allows [rad]."""
     first, last = view.config.drive.stage[0], view.config.drive.stage[-1]
-    ends = ((JOINT, view.y, last.wrap_output_rad), (INPUT, view.q, first.wrap_input_rad))
-    beyond = [(name, float(np.ptp(x)), 2.0 * wrap) for name, x, wrap in ends if np.ptp(x) > 8.0 * wrap]
-    if beyond:
-        name, reach, most = beyond[0]
-        alone = abs(view.slope) * MAGNITUDES_OFF < view.ratio
-        which = f"{name} seems" if alone else "both angles seem"
-        words = (
-            f"{which} to be in degrees: {name} moves over {reach:.4g} rad, what is wound on its pulley "
-            f"allows {most:.3g}"
-        )
-        yield Suspicion("unit", name, words, {"reach_rad": reach, "allowed_rad": most})
+    return {
+        JOINT: (float(np.ptp(view.y)), 2.0 * last.wrap_output_rad),
+        INPUT: (float(np.ptp(view.q)), 2.0 * first.wrap_input_rad),
+    }
+
+
+def _reach(view: View) -> Iterator[Suspicion]:
+    """Angles in degrees, by how far they move: one alone where the other stays within what is wound on its pulley."""
+    moves = _moves(view)
+    alone = any(reach < most for reach, most in moves.values())
+    for name, (reach, most) in moves.items():
+        if reach > BEYOND * most:
+            which = f"{name} seems" if alone else "both angles seem"
+            words = (
+                f"{which} to be in degrees: {name} moves over {reach:.4g} rad, what is wound on its pulley "
+                f"allows {most:.3g}"
+            )
+            yield Suspicion("unit", name, words, {"reach_rad": reach, "allowed_rad": most})
+            return
 
 
 def _slack(view: View) -> Iterator[Suspicion]:

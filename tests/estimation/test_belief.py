@@ -100,6 +100,32 @@ def test_both_angles_in_degrees() -> None:
     assert kinds(**both) == [("unit", "joint_position_rad")]
 
 
+@pytest.mark.parametrize(
+    ("in_degrees", "said"),
+    [
+        (("joint_position_rad",), "joint_position_rad seems"),
+        (("motor_position_rad", "joint_position_rad"), "both"),
+    ],
+)
+def test_of_degrees_read_slowly_steps_of_six_are_no_turns(in_degrees: tuple[str, ...], said: str) -> None:
+    """A joint that rests but for twice 0.6 s, and goes by 6.28 degrees from row to row then: a fifth of the motor's
+    way, 69 degrees."""
+    rough = JOINT.model_copy(update={"tolerance": {"input_radius_m": 1.0}})
+    time = 0.05 * np.arange(600.0)
+    angle = np.radians(
+        np.interp(np.arange(600.0), [0.0, 150.0, 161.0, 400.0, 411.0], [0.0, 0.0, 69.08, 69.08, 0.0])
+    )
+    right = {
+        "time_s": time,
+        "motor_position_rad": 5.0 * angle,
+        "joint_position_rad": angle,
+        "joint_torque_Nm": 0.0 * time,
+    }
+    found = suspicions(rough, {**right, **{n: np.degrees(right[n]) for n in in_degrees}})
+    assert [s.kind for s in found] == ["unit"]
+    assert found[0].text.startswith(said)
+
+
 @pytest.mark.parametrize("kept", [1.0, 0.5])
 @pytest.mark.parametrize("name", ["joint_position_rad", "motor_position_rad"])
 def test_of_a_drive_known_by_order_of_magnitude_the_one_angle_in_degrees_is_named(
