@@ -110,7 +110,9 @@ def extend(config: JointConfig) -> Change | None:
     plays = [effect.id for (effect, _), c in zip(known, changes, strict=True) if c.play_share > 0.0]
     if len(plays) > 1:
         raise InputError(f"{config.name}: effect `{plays[1]}` is given twice; one is accepted")
-    return together([*changes, Change(terms=tuple(_empirical(config)))])
+    if config.empirical:
+        changes.append(Change(terms=tuple(_empirical(config))))
+    return changes[0] if len(changes) == 1 else together(changes)
 
 
 def is_bounded(config: JointConfig) -> bool:
@@ -145,8 +147,9 @@ def _change(effect: Effect, values: Mapping[str, float], config: JointConfig) ->
 
 
 def _look_up(name: str) -> Effect:
-    known = catalogue()
-    if name not in known:
+    found = _built_in().get(name) or _registered.get(name)
+    if found is None:
+        known = catalogue()
         close = difflib.get_close_matches(name, known, 1)
         hint = (
             f"did you mean `{close[0]}`?"
@@ -154,7 +157,7 @@ def _look_up(name: str) -> Effect:
             else f"known are {', '.join(sorted(known))} (one of your own: --effects FILE)"
         )
         raise InputError(f"key `effect.id` is '{name}', which is no known effect; {hint}")
-    return known[name]
+    return found
 
 
 def _values(effect: Effect, entry: EffectEntry, config: JointConfig) -> dict[str, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,6 +22,10 @@ from cablecomp.mechanics.tables import ELSEWHERE, IN_H, IN_L, ON_H, ON_L
 Row: TypeAlias = tuple[Any, ...]
 """A record by the order of its fields."""
 
+_FIELDS = {
+    record: itemgetter(*(record.names or ()))
+    for record in (records.CIRCUIT, records.CABLE, records.SIZES, records.TERM, records.SENSOR)
+}
 BEFORE_NODES = 8  # numbers of a grid before its nodes
 SLACK = 1e-6  # tension, as a share of T0, below which a cable counts as slack
 
@@ -175,7 +180,8 @@ def _sensor(config: JointConfig) -> Row:
 
 def _row(record: np.dtype[Any], **values: Any) -> Row:
     """One record by the names of its fields; setting them one by one in numpy's records took most of the time."""
-    return tuple(values[name] for name in record.names or ())
+    row: Row = _FIELDS[record](values)
+    return row
 
 
 def _chain(group: Sequence[Stage], sign: float, config: JointConfig, extra: Change) -> list[Row]:

@@ -30,7 +30,7 @@ def joint(stated_Nm: float, tolerance: dict[str, float]) -> JointConfig:
 
 
 def test_a_known_friction_that_has_changed_is_recalibrated_and_nothing_is_named() -> None:
-    recordings = {"small/1": recorded([BEARING], 60.0)}
+    recordings = {"small/1": recorded([BEARING], 30.0)}
     found = diagnose(joint(0.8 * TRUE_NM, {TORQUE: 0.2}), recordings)
     assert [n.effect for n in found.named] == []
     assert found.verdict in {"recalibrate", "consistent"}
@@ -43,20 +43,20 @@ def test_a_known_friction_that_has_changed_is_recalibrated_and_nothing_is_named(
 
 
 def test_calibrate_moves_a_known_friction() -> None:
-    found = calibrate(joint(1.15 * TRUE_NM, {TORQUE: 0.2}), {"small/1": recorded([BEARING], 60.0)})
+    found = calibrate(joint(1.15 * TRUE_NM, {TORQUE: 0.2}), {"small/1": recorded([BEARING], 30.0)})
     (told,) = (v for v in found.values if v.name == TORQUE)
     assert abs(told.value - TRUE_NM) < max(3.0 * told.sd, 0.03 * TRUE_NM)
     assert found.config.effect[0].parameters["torque_Nm"] == pytest.approx(told.value)
 
 
 def test_without_a_tolerance_a_known_effect_stays_as_it_is() -> None:
-    found = diagnose(joint(TRUE_NM, {}), {"small/1": recorded([BEARING], 60.0)}, budget_s=0.0)
+    found = diagnose(joint(TRUE_NM, {}), {"small/1": recorded([BEARING], 30.0)}, budget_s=0.0)
     assert TORQUE not in {v.name for v in found.calibration}
     assert found.augmented_joint.effect[0].parameters["torque_Nm"] == TRUE_NM
 
 
 def test_how_much_of_a_named_effect_there_is_is_known_as_well_as_it_was_found() -> None:
-    found = diagnose(TOLERANT, {"small/1": recorded([BEARING], 60.0)})
+    found = diagnose(TOLERANT, {"small/1": recorded([BEARING], 30.0)})
     assert [n.effect for n in found.named] == ["bearing_friction"]
     tolerance = found.augmented_joint.tolerance
     assert 0.05 <= tolerance[TORQUE] < 0.3
@@ -64,7 +64,7 @@ def test_how_much_of_a_named_effect_there_is_is_known_as_well_as_it_was_found() 
         abs(float(found.augmented_joint.effect[0].parameters["torque_Nm"]) / TRUE_NM - 1.0)
         < 3.0 * tolerance[TORQUE]
     )
-    again = diagnose(found.augmented_joint, {"small/1": recorded([BEARING], 60.0)}, budget_s=0.0)
+    again = diagnose(found.augmented_joint, {"small/1": recorded([BEARING], 30.0)}, budget_s=0.0)
     assert TORQUE in {v.name for v in again.calibration}
 
 

@@ -59,7 +59,7 @@ def test_a_base_that_another_joint_turns_is_asked_for_all_the_same() -> None:
 
 
 def test_the_diagnosis_says_so_and_that_they_may_be_there() -> None:
-    found = diagnose(TOLERANT, {"small/1": recorded([SPRUNG], 40.0, locked=True)})
+    found = diagnose(TOLERANT, {"small/1": recorded([SPRUNG], 24.0, locked=True)})
     assert [n.effect for n in found.named] == ["series_compliance"]
     assert not BY_ANGLE & {t.name.partition(":")[0] for t in found.tested}
     assert {u["effect"] for u in found.could_be_unseen} >= BY_ANGLE

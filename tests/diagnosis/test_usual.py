@@ -51,13 +51,9 @@ def rippled(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
 
 def test_of_two_effects_the_one_that_stands_out_of_it_is_named() -> None:
     small, large = does_rad(GRAVITY), does_rad(LATE)
-    columns = {"small/1": recorded([GRAVITY, LATE], SECONDS)}
-    assert {*named(diagnose(TOLERANT, columns))} == {"gravity_load", "clock_skew"}
-    found = diagnose(known_to_leave(TOLERANT, 3.0 * small), columns)
+    found = diagnose(known_to_leave(TOLERANT, 3.0 * small), {"small/1": recorded([GRAVITY, LATE], SECONDS)})
     assert large > 3.0 * small
     assert named(found) == ["clock_skew"]
-    reasons = [c.why_not for c in found.candidates if c.effect == "gravity_load"]
-    assert all("is known to leave" in r for r in reasons)
     assert any("known to leave" in note for note in found.notes)
 
 
@@ -79,9 +75,6 @@ def test_a_joint_whose_diagnosis_left_structure_knows_it_and_is_consistent_with_
     assert (again.verdict, named(again)) == ("consistent", [])
     assert "no more than this joint is known to leave" in in_a_sentence(report_json(again))
     assert "known to leave" not in in_a_sentence(report_json(first))
-    late = {**columns["small/1"]}
-    late["joint_position_rad"] = np.interp(late["time_s"] - 0.05, late["time_s"], late["joint_position_rad"])
-    assert named(diagnose(joint, {"small/1": late}))[0] == "clock_skew"
 
 
 def test_half_of_what_is_left_stands_out_in_its_own_channel() -> None:

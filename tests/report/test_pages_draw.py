@@ -137,15 +137,15 @@ def test_the_name_of_an_axis_stays_out_of_the_column_before_it(chromium: Any, tm
 
 
 @pytest.mark.parametrize("width", [DESKTOP, PHONE])
-@pytest.mark.parametrize("physics", [1, 2, 8])
 def test_curves_of_what_was_concealed_leave_room_for_their_words(
-    chromium: Any, physics: int, width: int, tmp_path: Path
+    chromium: Any, width: int, tmp_path: Path
 ) -> None:
+    """Of one physics, of two, of eight."""
     rate = {"share": 0.5, "interval_95": [0.2, 0.8], "hits": 1, "of": 2}
     points = [{"size": size, "found": rate, "wrong_name": rate} for size in (0.1, 1.0)]
     curve = {"words": "joint channel late", "unit": "ms", "points": points}
-    figure = page.figure(found_by_size({"curves": [curve] * physics}))
-    with drawn(chromium, page.page("A page", "", [Section("Found", figure)]), tmp_path, width) as seen:
+    figures = [Section(f"Found {k}", page.figure(found_by_size({"curves": [curve] * k}))) for k in (1, 2, 8)]
+    with drawn(chromium, page.page("A page", "", figures), tmp_path, width) as seen:
         for what in (BLANK, CUT, OVERLAPPING):
             assert seen.evaluate(what) == [], what
 
