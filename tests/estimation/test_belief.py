@@ -209,6 +209,19 @@ def test_a_load_of_the_other_sign_does_not_bring_the_motor_torque_under_suspicio
     assert said == [("sign", "joint_torque_Nm")]
 
 
+@pytest.mark.parametrize("times", [3.0, 100.0, 1000.0])
+def test_a_motor_torque_far_beyond_load_and_pretension_is_in_another_unit(times: float) -> None:
+    """Three times what the load asks is a drive with much friction."""
+    wanted = -JOINT.drive.ratio * COLUMNS["joint_torque_Nm"]
+    said = suspicions(JOINT, {**COLUMNS, "motor_torque_Nm": times * wanted})
+    assert [(s.kind, s.channel) for s in said] == ([("scale", "motor_torque_Nm")] if times > 3.0 else [])
+    stage, rms = JOINT.drive.stage[0], float(np.sqrt(np.mean(wanted**2)))
+    for s in said:
+        usual = rms + stage.input_radius_m * stage.pretension_N
+        assert s.numbers["times_usual"] == pytest.approx(times * rms / usual)
+        assert "seems to be in another unit" in s.text
+
+
 def test_a_copy_under_another_name_is_said() -> None:
     other = {**COLUMNS, "joint_position_rad": 1.0001 * COLUMNS["joint_position_rad"]}
     copy = {name: values.copy() for name, values in reversed(COLUMNS.items())}
