@@ -26,7 +26,7 @@ from cablecomp.diagnosis.diagnose import diagnose as _diagnose
 from cablecomp.diagnosis.pace import Progress
 from cablecomp.diagnosis.result import Diagnosis, report_json
 from cablecomp.errors import InputError
-from cablecomp.estimation.belief import suspicions
+from cablecomp.estimation.belief import still_doubted, suspicions
 from cablecomp.estimation.standing import as_it_stood
 from cablecomp.estimation.view import Suspicion
 from cablecomp.observer import Observer
@@ -190,7 +190,8 @@ def diagnose(
     """
     _check(seed, sessions, budget_s)
     joint, data = _joint(config), columns_of(recordings, _mapping(mapping))
-    return DiagnosisResult(_diagnose(joint, data, progress, seed, sessions, budget_s), _doubts(joint, data))
+    found = _diagnose(joint, data, progress, seed, sessions, budget_s)
+    return DiagnosisResult(found, _doubts(joint, data, found.augmented_joint))
 
 
 class _Rows:
@@ -246,11 +247,14 @@ def _mapping(given: Mapped) -> ColumnMap | None:
     return load_mapping(Path(text)) if text.endswith(".toml") else mapping_from(text.split())
 
 
-def _doubts(joint: JointConfig, data: Mapping[str, Mapping[str, FloatArray]]) -> tuple[Suspicion, ...]:
+def _doubts(
+    joint: JointConfig, data: Mapping[str, Mapping[str, FloatArray]], found: JointConfig | None = None
+) -> tuple[Suspicion, ...]:
+    """What hardly fits the drive, and stands beside the joint as it was found."""
     return tuple(
         replace(s, text=f"{name}: {s.text}")
         for name, columns in data.items()
-        for s in suspicions(joint, columns)
+        for s in still_doubted(suspicions(joint, columns), found or joint, columns)
     )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 from cablecomp.cli.shared import warn
 from cablecomp.config import JointConfig
-from cablecomp.estimation.belief import same_readings, suspicions
+from cablecomp.estimation.belief import same_readings, still_doubted, suspicions
+from cablecomp.estimation.view import Suspicion
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.table import FloatArray
 
@@ -18,11 +20,31 @@ def believe(config: JointConfig, name: str, columns: Mapping[str, FloatArray]) -
     return lines
 
 
-def believe_all(config: JointConfig, data: Mapping[str, Mapping[str, FloatArray]]) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class Doubts:
+    """What was said of all recordings of one diagnosis: `of` each by name; `copies`: which of them are one."""
+
+    of: Mapping[str, tuple[Suspicion, ...]]
+    copies: tuple[str, ...]
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """One line each, for the result's own file."""
+        return (*(f"{name}: {s.text}" for name, said in self.of.items() for s in said), *self.copies)
+
+    def beside(self, found: JointConfig, data: Mapping[str, Mapping[str, FloatArray]]) -> Doubts:
+        """Those that stand beside the joint as it was found."""
+        return replace(
+            self, of={name: still_doubted(said, found, data[name]) for name, said in self.of.items()}
+        )
+
+
+def believe_all(config: JointConfig, data: Mapping[str, Mapping[str, FloatArray]]) -> Doubts:
     """The same for all recordings of one diagnosis, by name, and which of them are one."""
-    copies = tuple(same_readings(data))
-    warn(copies)
-    return (*(line for name, columns in data.items() for line in believe(config, name, columns)), *copies)
+    of = {name: suspicions(config, columns) for name, columns in data.items()}
+    doubts = Doubts(of, tuple(same_readings(data)))
+    warn(doubts.lines)
+    return doubts
 
 
 def believe_streamed(config: JointConfig, recording: Recording) -> tuple[str, ...]:

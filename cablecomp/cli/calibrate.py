@@ -52,7 +52,7 @@ def calibrate_joint(
     doubted = believe_all(joint, data)
     with share_bar() as progress:
         found = calibrate(joint, data, seed, progress=progress, budget_s=budget)
-    found = replace(found, warnings=(*doubted, *found.warnings))
+    found = replace(found, warnings=(*doubted.lines, *found.warnings))
     with atomic_directory(out) as folder:
         (folder / "joint.calibrated.toml").write_text(calibrated_text(found), encoding="utf-8")
         text = json.dumps(calibration_json(found), indent=1)

@@ -94,7 +94,8 @@ def diagnose_recordings(
     doubted = believe_all(joint, data)
     with share_bar() as progress, forks_allowed():
         found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
-    found = replace(found, warnings=(*doubted, *found.warnings))
+    doubted = doubted.beside(found.augmented_joint, data)
+    found = replace(found, warnings=(*doubted.lines, *found.warnings))
     with atomic_directory(out, (PROTOCOL,)) as folder:
         write_diagnosis(found, folder)
         page = diagnosis_page(found, joint_text(found.augmented_joint), concealed_beside(out))

@@ -93,6 +93,14 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     return (*odd, *found)
 
 
+def still_doubted(
+    said: Sequence[Suspicion], config: JointConfig, columns: Mapping[str, FloatArray]
+) -> tuple[Suspicion, ...]:
+    """What of that stands beside a joint with effects: what trails by them is not late."""
+    known = config.effect
+    return tuple(s for s in said if s.kind != "delay" or not known or not accounted_for(config, columns, s))
+
+
 def same_readings(recordings: Mapping[str, Mapping[str, FloatArray]]) -> Iterator[str]:
     """A line for each recording that holds, number by number, what one before it does."""
     first: dict[bytes, str] = {}
@@ -113,8 +121,7 @@ def _delays(view: View, fits: Sequence[Suspicion], columns: Mapping[str, FloatAr
         if not fits or (late and not _linear(view.shifted(late[0])))
         else rather_late(view, fits, _linear)
     )
-    known = view.config.effect
-    return [s for s in found if s.kind != "delay" or not known or not accounted_for(view.config, columns, s)]
+    return list(still_doubted(found, view.config, columns))
 
 
 def _linear(view: View) -> list[Suspicion]:

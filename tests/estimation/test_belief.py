@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from turning import JOINT, course, recorded
 
+from cablecomp import library
+from cablecomp.cli.beliefs import believe_all
 from cablecomp.config import JointConfig, load_joint
 from cablecomp.control.stiffness import stiffness_range
 from cablecomp.effects import with_effects
@@ -263,6 +266,23 @@ def test_lost_motion_that_the_joint_is_known_to_have_is_said_to_be_no_delay(lost
     assert delays_of(columns, joint=known) == []
     (said,) = delays_of(columns, "joint_position_rad", 0.1, known)
     assert said.numbers["late_s"] > 0.05
+
+
+def test_lost_motion_that_a_diagnosis_has_found_is_said_to_be_no_delay_beside_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the command (standard error has it, for then it was open) and by the library."""
+    columns = plant(1.8 * swung(ONE_SPEED), 1.2 * swung(ONE_SPEED, 1.0), FRICTION)
+    known = with_effects(JOINT, [(FRICTION.id, dict(FRICTION.parameters))])
+    doubts = believe_all(JOINT, {"bench": columns})
+    assert "lost motion" in capsys.readouterr().err
+    (line,) = doubts.lines
+    assert doubts.beside(JOINT, {"bench": columns}).lines == (line,)
+    assert doubts.beside(known, {"bench": columns}).lines == ()
+    for found, said in ((JOINT, 1), (known, 0)):
+        answer = SimpleNamespace(augmented_joint=found)
+        monkeypatch.setattr(library, "_diagnose", lambda *given, answer=answer: answer)
+        assert len(library.diagnose(columns, JOINT).doubts) == said
 
 
 @pytest.mark.parametrize("lost", [BACKLASH, FRICTION])
