@@ -201,9 +201,14 @@ def test_a_channel_that_is_not_followed_is_said(left: float, said: bool) -> None
     evidence = [SimpleNamespace(at_rows=at_rows, counted=c) for c in (counted, {})]
     fit: Any = leaving(1e-5, left)
     problem = SimpleNamespace(channels=fit.problem.channels, evidence=evidence)
-    lines = list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms))))
-    assert bool(lines) is said
+    lines, hurried = (
+        list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms)), cut_short))
+        for cut_short in (False, True)
+    )
+    assert bool(lines) is bool(hurried) is said
+    assert all("its unit, sign or zero" in line for line in lines)
+    assert all("unit" not in line and "give more time" in line for line in hurried)
     nowhere = [SimpleNamespace(at_rows=at_rows, counted={"motor_torque_Nm": np.zeros(2000, dtype=np.bool_)})]
     problem = SimpleNamespace(channels=fit.problem.channels, evidence=nowhere)
-    assert not list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms))))
+    assert not list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms)), False))
     assert all(line.startswith("motor_torque_Nm is not followed") for line in lines)

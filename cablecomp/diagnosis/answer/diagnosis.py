@@ -76,7 +76,7 @@ def diagnosis_of(
         warnings=(
             *((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()),
             *own_in_vain(case.config, drive.fit),
-            *warnings_of(kept),
+            *warnings_of(kept, found.cut_short),
             *not_carried(outcome.augmented, drive.floor_rad),
         ),
     )

@@ -76,8 +76,8 @@ def share_left(drive: Calibrated, final: Model) -> float:
     return float(np.clip(after / max(before, 1e-3 * noise), 0.0, 1.0))
 
 
-def warnings_of(model: Model) -> tuple[str, ...]:
-    """What speaks against trusting the model as it is, one line each."""
+def warnings_of(model: Model, cut_short: bool) -> tuple[str, ...]:
+    """What speaks against trusting the model as it is, one line each; `cut_short`: not all was tried."""
     lines = [f"{name} ended on its bound" for name in model.fit.at_bound()]
     if model.terms and not bears(model.fit):
         lines.append(
@@ -85,7 +85,12 @@ def warnings_of(model: Model) -> tuple[str, ...]:
         )
     if any(isinstance(t, Hypothesis) and t.effect.id == "clock_skew" for t in model.terms):
         lines += filter(None, [drag_alike(model.fit)])
-    return (*lines, *_not_followed(model.fit), *_set_anew(model.fit), *_hidden(model.fit.problem.evidence))
+    return (
+        *lines,
+        *_not_followed(model.fit, cut_short),
+        *_set_anew(model.fit),
+        *_hidden(model.fit.problem.evidence),
+    )
 
 
 def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
@@ -100,8 +105,13 @@ def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:
         )
 
 
-def _not_followed(fit: Fit) -> Iterator[str]:
+def _not_followed(fit: Fit, cut_short: bool) -> Iterator[str]:
     """Channels beside the joint's angle that the model follows hardly or not at all."""
+    why = (
+        "what it takes (friction) may not have been tried yet: give more time before you doubt the channel"
+        if cut_short
+        else "its unit, sign or zero is not as stated, or it is stuck, or of another joint; leave it out or mend it"
+    )
     for c in (c for c in fit.problem.channels if c != JOINT):
         read = [e.at_rows(c)[e.counted[c]] for e in fit.problem.evidence if c in e.counted]
         read = [x - np.mean(x) for x in read if len(x)]
@@ -111,8 +121,7 @@ def _not_followed(fit: Fit) -> Iterator[str]:
         left = rms_left(fit, c)
         if left > LIMITS.not_followed * own:
             yield (
-                f"{c} is not followed: the model leaves {left:.3g} of it RMS, and it changes by {own:.3g}; its unit, "
-                "sign or zero is another than stated, or it is stuck, or another joint's; leave it out or mend it"
+                f"{c} is not followed: the model leaves {left:.3g} of it RMS, and it changes by {own:.3g}; {why}"
             )
 
 
