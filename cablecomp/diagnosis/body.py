@@ -196,7 +196,8 @@ def _conditions(config: JointConfig, e: Evidence) -> dict[str, float]:
     for condition, channel in config.condition.items():
         if channel not in e.columns:
             raise InputError(
-                f"{e.name}: channel `{channel}` is missing, which [condition] `{condition}` names; record it"
+                f"{e.name}: channel `{channel}` is missing, which [condition] `{condition}` names; record it, or take "
+                "that line out of the joint"
             )
         values[condition] = float(np.median(e.columns[channel]))
     return values

@@ -155,7 +155,7 @@ def test_recordings_of_one_clock_are_taken_in_order_of_time_however_they_are_giv
 def test_a_condition_is_the_channels_median_and_has_to_be_there() -> None:
     bent = parse_joint({**PLAIN, "condition": {"bend_rad": "other_bend"}}, "x")
     columns = recorded()
-    with pytest.raises(InputError, match="other_bend"):
+    with pytest.raises(InputError, match=r"other_bend.*take that line out of the joint"):
         gather_body(bent, {"a/1": columns})
     columns["other_bend"] = np.full(len(columns["time_s"]), 0.7)
     (only,) = gather_body(bent, {"a/1": columns}).used
