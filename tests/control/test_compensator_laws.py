@@ -5,56 +5,19 @@ feedback that settles.
 from __future__ import annotations
 
 from math import inf, nan
-from pathlib import Path
 
 import numpy as np
 import pytest
+from spring_drive import CONFIGS, GAINS, JOINT, K, N, Spring, T, controller, sample
 
 from cablecomp.config import JointConfig, Limits, load_joint
 from cablecomp.control.command import FULL, Feed, Reference
-from cablecomp.control.compensator import Compensator, Gains, gains_of, given_gains
+from cablecomp.control.compensator import Compensator, gains_of, given_gains
 from cablecomp.control.options import CompensatorOptions, ControlMode, FeedForward, MotorModel
 from cablecomp.control.shaping import BumplessTransfer, LeadFilter, Slope
 from cablecomp.errors import InputError
 from cablecomp.observer import Observer
 from cablecomp.signals import NAN, Estimate, Sample
-
-JOINT = load_joint(Path(__file__).parents[2] / "configs/joints/wrist-capstan.toml")
-N = JOINT.drive.ratio
-T = 1e-3
-K = 200.0
-GAINS = Gains(20.0, 0.0, 20.0, 0.0, 0.0, 5.0, 0.0)
-
-
-class Spring:
-    """A drive that is a plain spring of K Nm/rad: deflection = load/K."""
-
-    def step(self, sample: Sample) -> Estimate:
-        return self._at(sample, sample.joint_torque_Nm)
-
-    def peek_deflection(self, time_s: float, motor_position_rad: float, joint_torque_Nm: float) -> float:
-        return joint_torque_Nm / K
-
-    def step_ahead(
-        self, sample: Sample, time_s: float, motor_position_rad: float, joint_torque_Nm: float
-    ) -> tuple[Estimate, float]:
-        return self.step(sample), joint_torque_Nm / K
-
-    def step_inverse(self, sample: Sample) -> Estimate:
-        return self._at(sample, K * (sample.joint_position_rad - N * sample.motor_position_rad))
-
-    def _at(self, sample: Sample, load: float) -> Estimate:
-        d = load / K
-        return Estimate(sample.time_s, d, NAN, NAN, N * sample.motor_position_rad + d, load, 60.0, 60.0)
-
-
-def controller(gains: Gains = GAINS, **options: object) -> Compensator:
-    chosen = CompensatorOptions.model_validate({"blend_s": 0.05, **options})
-    return Compensator(JOINT, chosen, T, Spring(), gains=gains, motor=MotorModel(coulomb_Nm=0.0))
-
-
-def sample(k: int, motor: float = 0.0, load: float = 0.0, joint: float = nan) -> Sample:
-    return Sample(k * T, motor, load, joint, -N * load)
 
 
 def test_a_steady_load_is_made_up_for_exactly() -> None:
@@ -264,8 +227,7 @@ def test_nonsense_is_refused() -> None:
 
 def test_an_open_circuit_is_held_against_its_pretension_and_a_closed_one_against_nothing() -> None:
     """r T0 of the input pulley: the plant's own balance at rest is the check in the system's tests."""
-    configs = Path(__file__).parents[2] / "configs/joints"
-    one_sided, balanced = (load_joint(configs / f"snow-{kind}-rig.toml") for kind in ("open", "closed"))
+    one_sided, balanced = (load_joint(CONFIGS / f"snow-{kind}-rig.toml") for kind in ("open", "closed"))
     stage = one_sided.drive.stage[0]
     assert one_sided.drive.preload_Nm == stage.input_radius_m * stage.pretension_N
     assert balanced.drive.preload_Nm == 0.0
