@@ -132,7 +132,7 @@ def test_sign_gear_ratio_and_offset_both_ways(rigs) -> None:
     assert joint.values[MOTOR_TORQUE] == pytest.approx(-72.0, abs=1e-12)
     assert joint.saturated == 0b111
     clipped = rig.link.send(0, MotorCommand(-3.375, -12.5, -72.0))
-    assert clipped == 0
+    assert clipped == rig.link.status().clipped == 0
     assert rig.heard() == [(1, bytes.fromhex("FF FF FF F6 66 66 6F FF"))]
     assert rig.link.send(0, MotorCommand(-3.375, -12.6, -72.1)) == CLIP_VELOCITY | CLIP_TORQUE
     assert rig.link.status().clipped == 1

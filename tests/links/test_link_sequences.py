@@ -33,6 +33,15 @@ def test_repeated_and_reordered_frames_are_not_used() -> None:
     assert (stats.lost, stats.repeated, stats.reordered, stats.restarts) == (1, 1, 1, 0)
 
 
+def test_half_of_the_counter_ahead_is_as_well_behind_and_is_not_used() -> None:
+    """127 of 256 on has lost 126; 128 on may as well come from before."""
+    ahead, either = MessageStats("m"), MessageStats("m")
+    assert [ahead.accept(s, 256) for s in (200, 71)] == [True, True]
+    assert [either.accept(s, 256) for s in (200, 72)] == [True, False]
+    assert (ahead.lost, ahead.reordered) == (126, 0)
+    assert (either.lost, either.reordered) == (0, 1)
+
+
 def test_a_restart_is_taken_at_its_third_frame() -> None:
     stats = MessageStats("m")
     assert all(stats.accept(s, 256) for s in range(90, 101))
@@ -62,3 +71,9 @@ def test_the_device_clock_does_not_run_backwards(steps: list[int]) -> None:
     for step in steps:
         t += step
         assert clock.seconds(t % 2**16) == pytest.approx(t * 1e-6, abs=1e-12)
+
+
+def test_the_device_clock_wraps_by_over_half_of_its_range_alone() -> None:
+    """A stamp from a little before is that, and no turn of the counter."""
+    clock = DeviceClock(1e-3, 8)
+    assert [clock.seconds(c) for c in (200, 100, 228, 99)] == pytest.approx([0.2, 0.1, 0.228, 0.256 + 0.099])
