@@ -18,6 +18,7 @@ from cablecomp.errors import DeviceError
 from cablecomp.links.load import load_link
 from cablecomp.links.port_can import GenericPort
 from cablecomp.links.ports import Port
+from cablecomp.links.schema import Timeouts
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import times_of
 
@@ -234,8 +235,11 @@ def test_no_answer_at_all_is_a_device_error_in_one_line(tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_times_follow_from_the_link() -> None:
-    link = load_link(CONFIGS / "links/wrist-virtual.toml")
-    times = times_of(link, 1e-3)
-    assert times.hold_s == link.timeouts.hold_s
-    assert times.stop_s == link.timeouts.stop_s
+@pytest.mark.parametrize(
+    ("period_s", "fresh_s", "motor_stop_s"), [(1e-3, 2.5e-3, 0.04), (3e-3, 7.5e-3, 0.04), (0.02, 0.01, 0.04)]
+)
+def test_times_follow_from_the_link(period_s: float, fresh_s: float, motor_stop_s: float) -> None:
+    """Fresh for two periods and a half, or as long as is held; a motor's reading is too old at half of the fade."""
+    timeouts = Timeouts(hold_s=0.01, fade_s=0.08, stop_s=0.2)
+    link = load_link(CONFIGS / "links/wrist-virtual.toml").model_copy(update={"timeouts": timeouts})
+    assert times_of(link, period_s) == pytest.approx((fresh_s, 0.01, 0.08, 0.2, 0.08, motor_stop_s))
