@@ -136,3 +136,27 @@ def test_what_the_load_is_found_from_may_not_grow_old(mode: str, load: str, sile
         checked = setup.health.check(readings, 1e-3 * k)
         assert checked.ready
         assert checked.load_age_s == pytest.approx(1e-3 * max(k - 19, 0))
+
+
+@pytest.mark.parametrize(("mode", "tells"), [("position", True), ("velocity", False), ("torque", False)])
+def test_the_gate_knows_what_holds_an_open_circuit_where_it_is(mode: str, tells: bool) -> None:
+    """-r T0 of the input pulley; what is told no position is held by where the motor is."""
+    link = load_link("wrist-virtual")
+    ends = link.joint[0]
+    ends = ends.model_copy(update={"motor": ends.motor.model_copy(update={"mode": mode})})
+    bus = BusLink(link.model_copy(update={"joint": (ends,)}))
+    joint = load_joint("snow-open-rig")
+    stage = joint.drive.stage[0]
+    contestant = Contestant(0, "rig", joint, CompensatorOptions())
+    setup = joint_setup(
+        contestant,
+        ControlMode.POSITION,
+        bus,
+        ControlConfig(),
+        lambda time_s: Reference(),
+        DEFAULT_GAINS,
+        1e-3,
+    )
+    assert setup.limits.balance_Nm == pytest.approx(-stage.input_radius_m * stage.pretension_N)
+    assert setup.limits.tells_position is tells
+    assert setup.limits.age_s == pytest.approx(0.5 * link.timeouts.fade_s)
