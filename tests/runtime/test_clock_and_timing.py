@@ -15,7 +15,8 @@ import pytest
 from cablecomp.errors import InputError
 from cablecomp.links.link import LinkStatus
 from cablecomp.links.records import BusState
-from cablecomp.runtime.clock import MonotonicClock, SteppedClock, Ticker
+from cablecomp.runtime.accounts import Accounts
+from cablecomp.runtime.clock import MonotonicClock, SteppedClock, Tick, Ticker
 from cablecomp.runtime.histogram import CycleTimes, Histogram
 from cablecomp.runtime.minutes import Minutes, shown
 from cablecomp.runtime.priority import Policy, armed
@@ -144,6 +145,23 @@ def test_what_came_since_is_what_was_added_since() -> None:
     assert since.total == pytest.approx(later.total)
     assert later.greatest <= since.greatest <= 1.03 * later.greatest
     assert whole.since(whole.copy()).count == 0
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "took_ms", "missed"),
+    [(0.0, 0.9, 0), (0.0, 1.1, 1), (0.6, 0.3, 0), (0.6, 0.5, 1), (0.9, 0.2, 1)],
+)
+def test_a_cycle_is_missed_that_ends_after_the_next_tick_is_due(
+    late_ms: float, took_ms: float, missed: int
+) -> None:
+    """However short it was, if it began late."""
+    accounts = Accounts(1e-3)
+    begin = 7.0  # by another clock than the ticks'
+    tick = Tick(5, 5e-3, 5e-3 + 1e-3 * late_ms, 0)
+    accounts.cycle(tick, begin, begin + 5e-5, begin + 1e-3 * took_ms)
+    assert accounts.times.misses == missed
+    found = [getattr(accounts.times, name).spread().max_s for name in ("jitter", "poll", "cycle")]
+    assert found == pytest.approx([1e-3 * late_ms, 5e-5, 1e-3 * took_ms])
 
 
 def status_with(lost: int) -> LinkStatus:
