@@ -138,6 +138,17 @@ def test_gaps_repeats_and_empty_optional_cells_are_remarked_with_their_line(tmp_
         assert "line 201 does not end with a line break" in notes
 
 
+@pytest.mark.parametrize(("step_s", "gaps"), [(0.099, []), (0.101, [52])])
+def test_a_gap_is_longer_than_ten_usual_steps(tmp_path: Path, step_s: float, gaps: list[int]) -> None:
+    time = 0.01 * np.arange(100)
+    time[50:] += step_s - 0.01
+    write_canonical(tmp_path / "a.csv", {"time_s": time, "other_x": time})
+    log = RemarkLog()
+    for block in open_recording(tmp_path / "a.csv").blocks():
+        log.add(block.remarks)
+    assert [gap.line for gap in log.gaps] == gaps
+
+
 def test_a_long_recording_streams_in_bounded_memory(tmp_path: Path) -> None:
     path = tmp_path / "long.csv.gz"
     rows = 3_000_000
