@@ -74,6 +74,20 @@ def test_where_the_fit_is_straight_it_is_two_standard_deviations(rubbing: Fit) -
     assert np.log(found) == pytest.approx([rubbing.x[k] - 1.96 * sd, rubbing.x[k] + 1.96 * sd], abs=0.25 * sd)
 
 
+def test_what_is_known_beforehand_counts_as_the_data_do(rubbing: Fit) -> None:
+    """A stiffness that is stated as well as the recording tells it: half of the interval's square is the prior's."""
+    here = rubbing.problem.parameters
+    k = next(k for k, p in enumerate(here) if p.name == "EA_N")
+    alone = float(np.sqrt(covariance(rubbing)[k, k]))
+    stated = (*here[:k], replace(here[k], sd=alone), *here[k + 1 :])
+    fit = solve(replace(rubbing.problem, parameters=stated), rubbing.x, 30, 1e-10)
+    for wider, told in ((1.0, 3.84), (1.5, 1.5**2 * 3.84)):
+        found = profile_interval(fit, "EA_N", wider)
+        assert found is not None
+        for end in found:
+            assert deviance(fit, "EA_N", end) == pytest.approx(told, rel=0.15)
+
+
 def test_an_amount_that_may_be_none_has_none_for_its_end() -> None:
     fit = fitted(0.0)
     found = profile_interval(fit, TORQUE)
