@@ -9,6 +9,8 @@ import uuid
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import can
 import cantools
@@ -17,17 +19,22 @@ from fault_runs import CONFIGS, GAINS, JOINT, REACH, simulated
 from mit_joint import POSITION_STEP, TORQUE_STEP, MitJoint, reply
 
 from cablecomp.config import load_joint
+from cablecomp.control.gate import GateLimits
 from cablecomp.control.options import load_control
 from cablecomp.control.protocol import Protocol, parse_protocol
 from cablecomp.errors import DeviceError
 from cablecomp.links.load import load_link
+from cablecomp.links.readings import JointReadings
+from cablecomp.links.records import DriveState, Mode
 from cablecomp.recording.reader import open_recording
 from cablecomp.runtime.clock import Tick
+from cablecomp.runtime.health import Checked
 from cablecomp.runtime.loop import Loop, RunStage
 from cablecomp.runtime.results import RunReport
 from cablecomp.runtime.run import RunOptions, run_joint
 from cablecomp.runtime.setup import matched
-from cablecomp.runtime.taking_up import EASE_S
+from cablecomp.runtime.taking_up import EASE_S, TakingUp
+from cablecomp.signals import Sample
 
 CONTROL = load_control(CONFIGS / "control/wrist-capstan.toml")
 
@@ -140,6 +147,50 @@ def test_stiffness_grows_little_by_little_and_the_target_stays(rig: Rig) -> None
     assert min(steps) >= 0.0
     assert {round(h.position, 6) for h in eased} == {round(commands[0].position, 6)}
     assert all(h.kd == pytest.approx(2.0, abs=1e-2) for h in commands)
+
+
+def test_an_open_circuits_pretension_is_held_before_the_drive_is_enabled_and_from_then_on() -> None:
+    """-r T0 at the input pulley, here -1.2 Nm, in steps of a twentieth within 20 ms."""
+    asked: list[str] = []
+    link: Any = SimpleNamespace(
+        config=load_link(CONFIGS / "links/mit-virtual.toml"),
+        ease=lambda place, share: True,
+        request=lambda place, request, mode: asked.append(request.name) or True,
+    )
+    taking_up = TakingUp(link, 0, GateLimits(), 2.5e-3, 1.2, 1e-3)
+    sent = taking_up.first(0.4)
+    torques = []
+    for k in range(100):
+        enabled = "ENABLE" in asked
+        torques.append(taking_up.step(sent, 0.4, enabled, Mode.IMPEDANCE, 1e-3 * k).motor_torque_Nm)
+        assert not asked or torques[-2] == pytest.approx(-1.2)
+    assert torques == pytest.approx([max(-0.06 * (k + 1), -1.2) for k in range(100)])
+    assert asked == ["CLEAR_FAULTS", "ENABLE"]
+    assert taking_up.held
+
+
+@pytest.mark.parametrize(
+    ("ages_s", "state", "known"),
+    [
+        ((0.0, 0.0), DriveState.DISABLED, True),
+        ((2.6e-3, 0.0), DriveState.DISABLED, False),  # the motor's reading alone is old
+        ((0.0, 2.6e-3), DriveState.DISABLED, False),
+        ((0.0, 0.0), DriveState.ENABLED, False),
+    ],
+)
+def test_a_drive_is_known_by_fresh_readings_once_it_has_let_go(
+    ages_s: tuple[float, float], state: DriveState, known: bool
+) -> None:
+    link: Any = SimpleNamespace(
+        config=load_link(CONFIGS / "links/mit-virtual.toml"), request=lambda place, request: True
+    )
+    taking_up = TakingUp(link, 0, GateLimits(), 2.5e-3, 0.0, 1e-3)
+    readings = JointReadings("joint-1")
+    readings.state = state
+    seen = Sample(0.0, 0.1, 0.0, 0.0)
+    taking_up.listen(readings, Checked(seen, 0.0, 0.0, 0, True, True, False), 0.0)
+    taking_up.listen(readings, Checked(seen, *ages_s, 0, True, True, False), 1e-3)
+    assert (taking_up.known_s(2e-3) >= 0.0) is known
 
 
 def test_nothing_is_commanded_before_the_drive_has_spoken_for_a_while(rig: Rig) -> None:
