@@ -96,9 +96,10 @@ def apart_by(problem: Problem, apart: float, history: float = 0.0) -> frozenset[
 def test_of_two_recordings_the_later_was_set_anew_where_nothing_within_moves_it_so(ten: Problem) -> None:
     one = ten.evidence[0]
     pair = ten.with_evidence((one, replace(one, name="1")))
-    assert apart_by(pair, 2.0 * FAR * WITHIN) == {"1"}
-    assert not apart_by(pair, 0.5 * FAR * WITHIN)
-    assert not apart_by(pair, 2.0 * FAR * WITHIN, FAR * WITHIN)
+    for way in (1.0, -1.0):
+        assert apart_by(pair, way * 2.0 * FAR * WITHIN) == {"1"}
+        assert not apart_by(pair, way * 0.5 * FAR * WITHIN)
+        assert not apart_by(pair, way * 2.0 * FAR * WITHIN, FAR * WITHIN)
 
 
 def test_of_two_recordings_at_two_steady_loads_the_drive_may_yield(ten: Problem) -> None:
