@@ -201,6 +201,14 @@ def test_the_joint_model_rests_where_statics_say() -> None:
     assert motor == pytest.approx(1.0 + pull / WANTED.motor.stiffness_Nm_per_rad, rel=1e-6)
 
 
+@pytest.mark.parametrize(("gain", "phase_deg"), [(2.0, 35.0), (4.0, 35.0), (2.0, 59.0)])
+def test_a_loop_that_keeps_its_distance_has_both_margins(gain: float, phase_deg: float) -> None:
+    """A loop with a smaller margin goes through a point that is nearer to -1: -1/gain, or at that angle on the unit
+    circle."""
+    points = -1.0 / gain, -np.exp(1j * np.radians(phase_deg))
+    assert modulus_for(gain, phase_deg) == pytest.approx(max(abs(1.0 + p) for p in points))
+
+
 def test_every_loop_is_stable_and_keeps_its_distance_over_the_whole_range(design: LoopDesign) -> None:
     least = modulus_for(WANTED.gain_margin, WANTED.phase_margin_deg)
     assert {loop.name for loop in design.loops} >= {
