@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.errors import InputError
+from cablecomp.config.toml_file import key_text, value_text
+from cablecomp.errors import InputError, printable
 
 
 def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
     """TOML text of a joint; keys that stand at their default of None are left out, floats keep every
     digit."""
     data = config.model_dump(by_alias=True, exclude_none=True)
-    lines = [f"# {line}" for line in comments]
-    lines += [f"{key} = {_value(data[key])}" for key in ("schema", "name")]
+    lines = [f"# {printable(line)}" for line in comments]
+    lines += [f"{key} = {value_text(data[key])}" for key in ("schema", "name")]
     drive = dict(data["drive"])
     stages = drive.pop("stage")
     lines += _table("drive", drive)
@@ -45,23 +45,4 @@ def write_joint(path: Path, config: JointConfig, comments: tuple[str, ...] = ())
 
 def _table(name: str, values: dict[str, Any], array: bool = False) -> list[str]:
     head = f"\n[[{name}]]" if array else f"\n[{name}]"
-    return [head, *(f"{_key(key)} = {_value(value)}" for key, value in values.items())]
-
-
-def _key(key: str) -> str:
-    bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
-    return key if bare else json.dumps(key)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return repr(value)
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(_value(v) for v in value)}]"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    return json.dumps(str(value), ensure_ascii=False)
+    return [head, *(f"{key_text(key)} = {value_text(value)}" for key, value in values.items())]

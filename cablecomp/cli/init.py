@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 import tomllib
@@ -17,6 +16,7 @@ from cablecomp.config import doubts, load_joint, read_toml, validated
 from cablecomp.config.draft import Draft, draft_text
 from cablecomp.config.reference import CONVENTIONS, reference
 from cablecomp.config.schema import JointConfig
+from cablecomp.config.toml_file import value_text
 from cablecomp.control.options import ControlConfig
 from cablecomp.errors import ConfigError, InputError
 from cablecomp.examples import example, with_companions
@@ -150,7 +150,7 @@ def _link(draft: Draft) -> dict[str, str]:
     text = source.read_text(encoding="utf-8")
     head, joint, tail = text.partition("[[joint]]")
     tail = re.sub(
-        r'^name = "[^"]*"', lambda _: f"name = {json.dumps(draft.name)}", tail, count=1, flags=re.MULTILINE
+        r'^name = "[^"]*"', lambda _: f"name = {value_text(draft.name)}", tail, count=1, flags=re.MULTILINE
     )
     text = f"# Written by `cablecomp init`: check channel, node and limits against your drive.\n{head}{joint}{tail}"
     tomllib.loads(text)

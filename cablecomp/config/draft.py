@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Iterator
 from math import pi, radians
@@ -13,6 +12,7 @@ from pydantic import Field, model_validator
 from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
 from cablecomp.config.cables import CABLES
 from cablecomp.config.load import parse_joint
+from cablecomp.config.toml_file import value_text
 
 PRETENSION: Final = {"measured": 0.05, "weight": 0.10, "tuned": 0.15, "by_feel": 0.5, "unknown": 1.0}
 """How a pretension was set: its relative 1-sigma."""
@@ -88,7 +88,7 @@ def draft_text(draft: Draft) -> str:
     wrong with it is said as for any joint file (ConfigError)."""
     lines = [f"# Written by `cablecomp init`; {CABLES[draft.cable].source}.", "schema = 1"]
     lines += [
-        f"name = {json.dumps(draft.name)}",
+        f"name = {value_text(draft.name)}",
         "",
         "[drive]",
         f'circuit = "{draft.circuit}"',

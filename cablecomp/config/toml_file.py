@@ -1,7 +1,9 @@
-"""Reading a TOML file that may hold anything: bounded size, depth and numbers; and where each key stands."""
+"""TOML: reading a file that may hold anything (bounded size, depth and numbers; where each key stands), and keys and
+values as they are written."""
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -60,6 +62,28 @@ def read_toml(path: Path) -> TomlTable:
         raise InputError(f"{path}: is nested too deeply; {_MOST_DEPTH} levels are accepted")
     found.text = text
     return found
+
+
+def key_text(key: str) -> str:
+    """A key as TOML has it: bare where it may be, else in quotes."""
+    bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
+    return key if bare else value_text(key)
+
+
+def value_text(value: Any) -> str:
+    """A value as TOML has it, which reads back as the same: floats keep every digit."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(value_text(v) for v in value)}]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key_text(k)} = {value_text(v)}" for k, v in value.items()) + "}"
+    # JSON may write a character as two halves, and leaves DEL as it is: TOML takes neither
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _deep(table: dict[str, Any]) -> bool:

@@ -7,7 +7,6 @@ or `cablecomp.map.toml`) or one by one: `--map motor_position_rad=enc1,unit=deg,
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,8 +16,8 @@ from pydantic import Field, model_validator
 
 from cablecomp.config import validated
 from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
-from cablecomp.config.toml_file import read_toml
-from cablecomp.errors import ConfigError, InputError
+from cablecomp.config.toml_file import key_text, read_toml, value_text
+from cablecomp.errors import ConfigError, InputError, printable
 from cablecomp.recording.atomic import atomic_file
 from cablecomp.recording.channels import CANONICAL, QUANTITIES, Column, order, parse_column
 from cablecomp.recording.join import JoinRule
@@ -241,18 +240,13 @@ def _unit(channel: str, source: Source, unit: str | None) -> Unit:
 def mapping_text(mapping: ColumnMap, comments: Iterable[str] = ()) -> str:
     """TOML of a mapping, which reads back as the same."""
 
-    lines = [f"# {line}" for line in comments] + ["schema = 1"]
+    lines = [f"# {printable(line)}" for line in comments] + ["schema = 1"]
     for channel, source in mapping.channel.items():
-        name = channel if channel.replace("_", "").isalnum() and channel.isascii() else json.dumps(channel)
-        lines += ["", f"[channel.{name}]"]
+        lines += ["", f"[channel.{key_text(channel)}]"]
         kept = {k: v for k, v in source.model_dump().items() if v != Source.model_fields[k].default}
-        lines += [f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in kept.items()]
+        lines += [f"{k} = {value_text(v)}" for k, v in kept.items()]
     kept = {k: v for k, v in mapping.join.model_dump().items() if v is not None and v != "auto"}
-    lines += (
-        ["", "[join]", *(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in kept.items())]
-        if kept
-        else []
-    )
+    lines += ["", "[join]", *(f"{k} = {value_text(v)}" for k, v in kept.items())] if kept else []
     return "\n".join(lines) + "\n"
 
 

@@ -52,6 +52,12 @@ def test_values_and_tolerances_follow_from_what_is_known(tmp_path: Path) -> None
     assert [j.name for j in load_link(tmp_path / "link.toml").joint] == ['my "wrist"'] == [joint.name]
 
 
+def test_a_joint_may_have_any_name(tmp_path: Path) -> None:
+    assert init(tmp_path, drive="moteus", name="🦾\x7f") == 0
+    assert load_joint(tmp_path / "joint.toml").name == "🦾\x7f"
+    assert [j.name for j in load_link(tmp_path / "link.toml").joint] == ["🦾\x7f"]
+
+
 @pytest.mark.parametrize("kind", CABLES)
 def test_every_cable_makes_a_joint_and_an_unknown_pretension_is_an_order_of_magnitude(
     tmp_path: Path, kind: str

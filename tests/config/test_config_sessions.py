@@ -44,11 +44,23 @@ def config(text: str):
     return parse_joint(tomllib.loads(JOINT.read_text() + text), "joint.toml")
 
 
+ODD = r"""
+condition = {"Öl 🛢\u007f" = "temperature_degC"}
+session = [{name = "🦾\u007f", own = [], recordings = ["\u0085\\"]}]
+"""
+
+
 @pytest.mark.parametrize("text", [SESSIONS, "[session]\nown = ['EA_N', 'effect.viscous_slip.x']\n", ""])
 def test_what_is_written_reads_back_as_the_same_configuration(text: str) -> None:
     joint = config(text + RIPPLE.format(law="fourier", of="motor_position_rad"))
     assert parse_joint(tomllib.loads(joint_text(joint)), "again") == joint
     assert parse_joint(joint.model_dump(by_alias=True), "dumped") == joint
+
+
+def test_any_text_is_written_so_that_toml_takes_it() -> None:
+    joint = parse_joint(tomllib.loads(ODD + JOINT.read_text()), "joint.toml")
+    text = joint_text(joint, ("two\nlines, and a bell\x07",))
+    assert parse_joint(tomllib.loads(text), "again") == joint
 
 
 def test_the_zeros_alone_differ_unless_the_configuration_says_more() -> None:

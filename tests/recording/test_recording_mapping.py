@@ -109,7 +109,8 @@ def test_a_mapping_is_read_back_as_written(channels: dict[str, Source]) -> None:
     import tomllib
 
     mapping = ColumnMap(schema=1, channel=channels)
-    assert ColumnMap.model_validate(tomllib.loads(mapping_text(mapping))) == mapping
+    text = mapping_text(mapping, ["what run\n1\x07.csv means"])
+    assert ColumnMap.model_validate(tomllib.loads(text)) == mapping
 
 
 def test_a_saved_mapping_is_found_and_said_and_leaves_canonical_files_alone(tmp_path: Path) -> None:
