@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -51,7 +52,7 @@ def spread(
 
     A job that raises, or whose process dies, is an outcome like others: it stops no other job. `work` is a function of
     a module, what it takes and returns can be pickled. Once closed, it begins nothing more. Raises InputError where the
-    scheduler does not answer.
+    scheduler does not answer or goes, and where its workers cannot read the jobs: what is not told then is not done.
     """
     if workers.scheduler is not None:
         yield from _on_cluster(work, jobs, workers.scheduler)
@@ -130,7 +131,7 @@ def _end_with_its_starter() -> None:
 
 def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address: str) -> Iterator[Done[R]]:
     try:
-        from distributed import Client
+        from distributed import CancelledError, Client, KilledWorker
         from distributed import as_completed as completed
         from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError:
@@ -145,11 +146,25 @@ def _on_cluster(work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], address
     except (OSError, ValueError) as error:
         words = str(error).partition("\n")[0]
         raise InputError(f"--scheduler {address}: no Dask scheduler answers there ({words})") from None
+    logging.getLogger("distributed.client").setLevel(
+        logging.CRITICAL
+    )  # a scheduler that goes is told of below
     with client, client.as_current():
         running = {client.submit(_told, work, job, pure=False): k for k, job in enumerate(jobs)}
         for finished in completed(running):
             try:
                 result, failed = finished.result()
-            except Exception as error:  # the worker died or was taken away: said by the scheduler
-                result, failed = None, f"{type(error).__name__}: {error}"
+            except KilledWorker as error:  # one worker after the other died of this job
+                result, failed = None, printable(f"KilledWorker: {error}")
+            except CancelledError:  # no job's fault: what is left is not done, and not failed
+                raise InputError(
+                    f"--scheduler {address}: the Dask scheduler has gone, or dropped the work; start it anew, "
+                    "the same command again goes on"
+                ) from None
+            except Exception as error:  # nor this: whatever a job raises is told by `_told`
+                why = printable(f"{type(error).__name__}: {error}")
+                raise InputError(
+                    f"--scheduler {address}: its workers cannot do this work ({why}); "
+                    "install this version of cablecomp for them, the same command again goes on"
+                ) from None
             yield Done(running[finished], result, failed)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -116,6 +118,62 @@ def test_no_scheduler_there_is_one_line(address: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+def local_cluster(place: str) -> None:
+    """Be a Dask cluster that works in threads of this process, and write its address."""
+    import distributed
+
+    with distributed.LocalCluster(
+        n_workers=1, processes=False, dashboard_address="127.0.0.1:0", host="127.0.0.1", protocol="tcp://"
+    ) as cluster:
+        Path(place).write_text(cluster.scheduler_address, encoding="utf-8")
+        time.sleep(600.0)
+
+
+@pytest.fixture
+def mortal(tmp_path: Path) -> Iterator[tuple[BaseProcess, str]]:
+    """A Dask cluster that is a process, and its address."""
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    cluster = get_context("spawn").Process(target=local_cluster, args=(str(tmp_path / "address"),))
+    cluster.start()
+    yield cluster, written(tmp_path / "address")
+    cluster.kill()
+    cluster.join()
+
+
+def test_a_scheduler_that_goes_makes_no_job_fail(
+    mortal: tuple[BaseProcess, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    cluster, address = mortal
+    outcomes = spread(
+        sleeping, [(str(tmp_path / "pid"),), (str(tmp_path / "next"),)], Workers(scheduler=address)
+    )
+    threading.Thread(target=lambda: (written(tmp_path / "pid"), cluster.kill()), daemon=True).start()
+    with pytest.raises(InputError, match=r"has gone, .* the same command again goes on"):
+        next(outcomes)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+class Elsewhere:
+    """What only this process can make."""
+
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[str]]:
+        return import_module, ("cablecomp.of_another_version",)
+
+
+def test_workers_that_cannot_read_a_job_make_none_fail(mortal: tuple[BaseProcess, str]) -> None:
+    with pytest.raises(InputError, match="its workers cannot do this work") as caught:
+        list(spread(square, [(Elsewhere(),), (2,)], Workers(scheduler=mortal[1])))
+    assert str(caught.value).isprintable()
+
+
+def written(place: Path) -> str:
+    """What somebody writes there, once it is."""
+    end = time.monotonic() + 60.0
+    while not (place.exists() and place.read_text(encoding="utf-8")) and time.monotonic() < end:
+        time.sleep(0.05)
+    return place.read_text(encoding="utf-8")
+
+
 def sleeping(place: str) -> None:
     """Say who this is, and sleep far longer than the test."""
     Path(place).write_text(str(os.getpid()), encoding="utf-8")
@@ -126,12 +184,10 @@ def test_processes_end_with_a_starter_that_is_killed(tmp_path: Path) -> None:
     said = tmp_path / "pid"
     starter = get_context("spawn").Process(target=start_sleeping, args=(str(said),))
     starter.start()
-    end = time.monotonic() + 60.0
-    while not (said.exists() and said.read_text(encoding="utf-8")) and time.monotonic() < end:
-        time.sleep(0.05)
-    worker = int(said.read_text(encoding="utf-8"))
+    worker = int(written(said))
     starter.kill()
     starter.join()
+    end = time.monotonic() + 60.0
     while lives(worker) and time.monotonic() < end:
         time.sleep(0.05)
     assert not lives(worker)
