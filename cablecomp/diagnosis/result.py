@@ -218,11 +218,11 @@ def _named(n: Named) -> dict[str, Any]:
 
 def write_diagnosis(d: Diagnosis, out: Path) -> None:
     """Write `diagnosis.json`, `joint.augmented.toml`, and `next_experiment.toml` where one is proposed."""
-    (out / "diagnosis.json").write_text(json.dumps(report_json(d), indent=1) + "\n")
+    (out / "diagnosis.json").write_text(json.dumps(report_json(d), indent=1) + "\n", encoding="utf-8")
     comment = ("calibrated values and effects found by the diagnosis",)
-    (out / "joint.augmented.toml").write_text(joint_text(d.augmented_joint, comment))
+    (out / "joint.augmented.toml").write_text(joint_text(d.augmented_joint, comment), encoding="utf-8")
     if d.next_experiment is not None:
-        (out / PROTOCOL).write_text(d.next_experiment[1])
+        (out / PROTOCOL).write_text(d.next_experiment[1], encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:

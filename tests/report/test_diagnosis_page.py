@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import sys
 from dataclasses import replace
@@ -16,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from diagnosis_example import NOISE, example, without_a_name
 
-from cablecomp.diagnosis.result import Diagnosis, Law, Traces, Value, report_json
+from cablecomp.config import load_joint
+from cablecomp.diagnosis.result import PROTOCOL, Diagnosis, Law, Traces, Value, report_json, write_diagnosis
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_answer import shown_first
 from cablecomp.report.diagnosis_page import diagnosis_page
@@ -35,6 +37,20 @@ def text_of(html: str) -> str:
     """The page without scripts and tags."""
     html = re.sub(r"<(script|style).*?</\1>", " ", html, flags=re.DOTALL).replace("<wbr>", "")
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html)).replace("&#x27;", "'")
+
+
+def test_its_files_are_utf_8_wherever_they_are_written(
+    found: Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    joint = found.augmented_joint.model_copy(update={"name": "Größe"})
+    with (
+        monkeypatch.context() as elsewhere
+    ):  # what text is written in where nothing is said, as in a C locale
+        elsewhere.setattr(io, "text_encoding", lambda encoding, level=2: encoding or "ascii")
+        write_diagnosis(replace(found, augmented_joint=joint), tmp_path)
+    assert load_joint(tmp_path / "joint.augmented.toml") == joint
+    assert found.next_experiment is not None
+    assert (tmp_path / PROTOCOL).read_text(encoding="utf-8") == found.next_experiment[1]
 
 
 def terminal(d: Diagnosis) -> str:
