@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
+import tempfile
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+
+from cablecomp.errors import InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -32,8 +37,41 @@ def _source_key() -> str:
 
 
 def _base() -> Path:
+    """The first folder that takes files: the one chosen, the user's cache, the user's own beside temporary files.
+
+    Raises InputError where there is none.
+    """
     chosen = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    return Path(chosen) if chosen else Path.home() / ".cache"
+    for place in (chosen, "~/.cache"):
+        with suppress(OSError, RuntimeError):  # a user without a home
+            if place and _takes_files(folder := Path(place).expanduser()):
+                return folder
+    with suppress(OSError):
+        if _takes_files(folder := _own_temporary()):
+            # for numba itself, which refuses what others cache (a simulated joint), here and in processes to come
+            os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(folder)
+            return folder
+    raise InputError(
+        "no folder takes the compiled code: neither ~/.cache nor that of temporary files can be written; "
+        "set NUMBA_CACHE_DIR to one that can"
+    )
+
+
+def _takes_files(folder: Path) -> bool:
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        return True
+
+
+def _own_temporary() -> Path:
+    """A folder that this user alone can write: who puts code there has it run. OSError where another has taken it."""
+    folder = Path(tempfile.gettempdir()) / f"cablecomp-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    ours = not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+    if not (ours and stat.S_ISDIR(found.st_mode)):
+        raise PermissionError(f"{folder}: is another's")
+    return folder
 
 
 CACHE = _base() / "cablecomp" / _source_key()

@@ -9,6 +9,8 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
+from cablecomp.mechanics.jit import njit
+
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba is not typed
 def _call(typing: Any, address: Any, data: Any, parameters: Any, state: Any) -> Any:
@@ -24,7 +26,7 @@ def _call(typing: Any, address: Any, data: Any, parameters: Any, state: Any) -> 
     return signature, generate
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]  # numba is not typed
+@njit
 def call_term(address: int, context: Any, parameters: Any, state: Any) -> None:
     """Run the compiled term at `address` on three float64 arrays (context, its parameters, its state)."""
     _call(address, context.ctypes.data, parameters.ctypes.data, state.ctypes.data)

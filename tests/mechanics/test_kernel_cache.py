@@ -29,6 +29,33 @@ def twice(x):
 """
 
 
+def base(chosen: str, home: Path, temporary: Path) -> subprocess.CompletedProcess[str]:
+    """Where a process keeps compiled code by such an environment."""
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": chosen,
+        "HOME": str(home),
+        "TMPDIR": str(temporary),
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
+    command = [sys.executable, "-c", "from cablecomp.mechanics.jit import CACHE; print(CACHE.parents[1])"]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
+
+
+def test_compiled_code_is_kept_where_it_can_be(tmp_path: Path) -> None:
+    """A chosen folder or a home that takes no files stops no command: here they lie below a file."""
+    (tmp_path / "file").touch()
+    none, home, temporary = tmp_path / "file" / "x", tmp_path / "home", tmp_path / "tmp"
+    temporary.mkdir()
+    own = temporary / f"cablecomp-{os.getuid()}"
+    assert base(str(tmp_path / "chosen"), home, temporary).stdout.strip() == str(tmp_path / "chosen")
+    assert base(str(none), home, temporary).stdout.strip() == str(home / ".cache")
+    assert base(str(none), none, temporary).stdout.strip() == str(own)
+    assert own.stat().st_mode & 0o777 == 0o700
+    own.chmod(0o777)  # anybody may have put code there, which would be run
+    assert "set NUMBA_CACHE_DIR to one that can" in base("", none, temporary).stderr
+
+
 @pytest.mark.parametrize(("kind", "size"), [("nbi", 0), ("nbc", 40)])
 def test_a_cache_that_was_cut_short_breaks_nothing(kind: str, size: int, tmp_path: Path) -> None:
     """A process that finds it compiles anew; `size` = bytes left."""
