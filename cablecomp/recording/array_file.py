@@ -26,12 +26,23 @@ _EXPECTED: Final = "expected one numeric array per channel, all of one length"
 
 
 def open_npz(path: Path) -> RawTable:
-    """Open .npz; an array of n x k is k columns `name[0]`... InputError if damaged or of unequal lengths."""
+    """Open .npz; an array of n x k is k columns `name[0]`..., one of no numbers (a remark) is left out and named.
+
+    InputError if damaged, or of unequal lengths.
+    """
+    heads: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
+    odd = []
     try:
         with zipfile.ZipFile(path) as archive:
             if "[Content_Types].xml" in archive.namelist():
                 raise InputError(f"{path}: is an Excel workbook; save its sheet as CSV")
-            heads = {info.filename: _npy_head(archive, info) for info in archive.infolist()}
+            for info in archive.infolist():
+                try:
+                    heads[info.filename] = _npy_head(archive, info)
+                except _NotRowsError as error:
+                    if is_channel(info.filename.removesuffix(".npy")):
+                        raise
+                    odd.append(str(error))
     except (
         OSError,
         ValueError,
@@ -52,7 +63,13 @@ def open_npz(path: Path) -> RawTable:
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path}: damaged .npz ({first_line(error)}); save it anew") from None
 
-    return RawTable(tuple(columns), read, notes=notes)
+    return RawTable(
+        tuple(columns), read, notes=(*notes, *([f"left out: {', '.join(odd[:12])}"] if odd else []))
+    )
+
+
+class _NotRowsError(ValueError):
+    """An array is none of rows of numbers."""
 
 
 class ArrayColumns(NamedTuple):
@@ -97,9 +114,9 @@ def _read_head(file: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[An
     reader = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, fortran, dtype = reader(file)
     if dtype.kind not in "fiub":
-        raise ValueError(f"array {name.removesuffix('.npy')!r} holds {dtype}, not numbers")
+        raise _NotRowsError(f"array {name.removesuffix('.npy')!r} holds {dtype}, not numbers")
     if fortran and len(shape) > 1 and math.prod(shape[1:]) > 1:
-        raise ValueError(f"array {name.removesuffix('.npy')!r} is stored by columns (Fortran order)")
+        raise _NotRowsError(f"array {name.removesuffix('.npy')!r} is stored by columns (Fortran order)")
     return tuple(int(n) for n in shape), dtype
 
 

@@ -202,6 +202,18 @@ def test_a_file_without_a_column_of_numbers_says_where_and_why(text: str, says: 
     assert f"{path}: no column holds numbers: {says}" in str(caught.value)
 
 
+def test_remarks_beside_the_arrays_of_npz_are_left_out_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    channels = {"time_s": TIME, "motor_position_rad": TIME, "other_k": np.ones((ROWS, 1), order="F")}
+    turned = np.asfortranarray(np.ones((ROWS, 2)))
+    np.savez(path, **channels, remark="rig 2", names=np.array(["a"]), setup={"kp": 1}, jacobian=turned)  # type: ignore[arg-type]  # stub: `**` may be a flag
+    assert list(read_all(path).columns) == list(channels)
+    (note,) = open_recording(path).notes
+    assert all(f"array {name!r}" in note for name in ("remark", "names", "setup", "jacobian"))
+    np.savez(path, **(channels | {"motor_position_rad": np.array(["x"] * ROWS)}))  # type: ignore[arg-type]
+    assert "array 'motor_position_rad' holds <U1, not numbers" in refusal(path)
+
+
 def test_a_bag_without_its_index_is_told_what_to_give_instead(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     assert "is a directory" in refusal(tmp_path / "bag")
