@@ -29,7 +29,9 @@ def open_hdf5(path: Path) -> RawTable:
     turned: set[str] = set()
 
     def look(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub" or name.startswith("#"):
+        if not isinstance(item, h5py.Dataset) or item.shape is None:  # a data set of nothing
+            return
+        if item.dtype.kind not in "fiub" or name.startswith("#"):
             return
         if item.chunks is not None and math.prod(item.chunks) * item.dtype.itemsize > _MOST_CHUNK:
             raise ValueError(f"{name!r} is stored in chunks of over {_MOST_CHUNK >> 20} MB")

@@ -214,6 +214,13 @@ def test_remarks_beside_the_arrays_of_npz_are_left_out_and_named(tmp_path: Path)
     assert "array 'motor_position_rad' holds <U1, not numbers" in refusal(path)
 
 
+def test_an_empty_data_set_beside_the_columns_of_hdf5_is_none(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["time_s"], file["motor_position_rad"], file["gains"] = TIME, TIME, h5py.Empty("f8")
+    assert set(read_all(tmp_path / "log.h5").columns) == {"time_s", "motor_position_rad"}
+
+
 def test_a_bag_without_its_index_is_told_what_to_give_instead(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     assert "is a directory" in refusal(tmp_path / "bag")
