@@ -32,6 +32,13 @@ class Doubts:
         """One line each, for the result's own file."""
         return (*(f"{name}: {s.text}" for name, said in self.of.items() for s in said), *self.copies)
 
+    @property
+    def mend_first(self) -> tuple[str, ...]:
+        """Those of signs and units: physics that is found in such readings is made up."""
+        return tuple(
+            f"{name}: {s.text}" for name, said in self.of.items() for s in said if s.kind in ("sign", "unit")
+        )
+
     def beside(self, found: JointConfig, data: Mapping[str, Mapping[str, FloatArray]]) -> Doubts:
         """Those that stand beside the joint as it was found."""
         return replace(

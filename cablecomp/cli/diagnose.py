@@ -95,7 +95,7 @@ def diagnose_recordings(
     with share_bar() as progress, forks_allowed():
         found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
     doubted = doubted.beside(found.augmented_joint, data)
-    found = replace(found, warnings=(*doubted.lines, *found.warnings))
+    found = replace(found, mend_first=doubted.mend_first, warnings=(*doubted.lines, *found.warnings))
     with atomic_directory(out, (PROTOCOL,)) as folder:
         write_diagnosis(found, folder)
         page = diagnosis_page(found, joint_text(found.augmented_joint), concealed_beside(out))

@@ -103,6 +103,7 @@ class Diagnosis:
     """Everything found.
 
     `clock_s`: where recordings begin their own clocks on the one that they share here (times of `location`, `traces`).
+    `mend_first`: the warnings about signs and units, which stand before any name.
     """
 
     config: JointConfig
@@ -136,6 +137,7 @@ class Diagnosis:
     traces: tuple[Traces, ...] = ()
     runtime_s: float = 0.0
     warnings: tuple[str, ...] = ()
+    mend_first: tuple[str, ...] = ()
 
     @property
     def acting(self) -> tuple[str, ...]:
@@ -189,6 +191,7 @@ def report_json(d: Diagnosis) -> dict[str, Any]:
         "hypotheses": [vars(t) for t in d.tested],
         "notes": list(d.notes),
         "warnings": list(d.warnings),
+        "mend_first": list(d.mend_first),
         "runtime_s": d.runtime_s,
     }
     finite: dict[str, Any] = _finite(report)

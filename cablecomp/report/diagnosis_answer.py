@@ -37,6 +37,9 @@ _MOST_OLD: Final = 8
 def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     """The answer: names or new values on the left, measured, before and after on the right, numbers below."""
     words = f'<p class="verdict {_TONES[d.verdict]}">{escape(sentence(d.verdict))}</p>'
+    if d.mend_first:
+        first = page.paragraph("Mend this first: what follows is about readings as they are.")
+        words += f'<div class="mend">{first}{page.bullets(d.mend_first)}</div>'
     words += page.paragraph(in_a_sentence(result))
     missing = result["missing_physics"]
     words += "".join(_missing(m, bool(result["channels"]), len(missing) > 1, unit) for m in missing)
@@ -50,8 +53,9 @@ def answer(d: Diagnosis, result: Mapping[str, Any], unit: Scale) -> Section:
     if trace is not None:
         seen = _unseen(result) if figures.end_is_shaded(trace) else ""
         picture = page.figure(figures.at_a_glance(trace, unit), f"The end of {short(trace.name)}.{seen}")
+    others = page.bullets(w for w in d.warnings if w not in d.mend_first)
     return Section("Answer", f'<div class="answer"><div>{words}</div><div>{picture}</div></div>'
-                   + page.facts(_facts(result, unit)) + page.bullets(d.warnings))  # fmt: skip
+                   + page.facts(_facts(result, unit)) + others)  # fmt: skip
 
 
 def shown_first(d: Diagnosis) -> Traces | None:

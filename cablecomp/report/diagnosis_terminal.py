@@ -34,7 +34,10 @@ def diagnosis_summary(result: Mapping[str, Any]) -> RenderableType:
     verdict = result["verdict"]
     names = " and ".join(plain(m["effect"]) for m in result["missing_physics"])
     head = f"{verdict}: {names}" if names else verdict
-    parts: list[RenderableType] = [Text(head.upper()[:1] + head[1:], style=f"bold {_COLOUR[verdict]}")]
+    parts: list[RenderableType] = [
+        Text(f"mend first: {line}", style="bold red", overflow="fold") for line in result["mend_first"]
+    ]
+    parts += [Text(head.upper()[:1] + head[1:], style=f"bold {_COLOUR[verdict]}")]
     parts += [Text(in_a_sentence(result)), ""]
     if result["missing_physics"]:
         parts += [_missing(result), ""]
@@ -102,7 +105,7 @@ def _rest(result: Mapping[str, Any]) -> Iterator[str]:
     if unseen:
         yield f"could be any size for all that these data say: {', '.join(unseen)}"
     yield from (f"note: {n}" for n in result["notes"])
-    yield from (f"warning: {w}" for w in result["warnings"])
+    yield from (f"warning: {w}" for w in result["warnings"] if w not in result["mend_first"])
     if result["next_experiment"]:
         yield f"next experiment: {result['next_experiment']['why']}"
 

@@ -285,6 +285,18 @@ def test_lost_motion_that_a_diagnosis_has_found_is_said_to_be_no_delay_beside_it
         assert len(library.diagnose(columns, JOINT).doubts) == said
 
 
+def test_what_is_said_of_signs_is_to_be_mended_first() -> None:
+    """A motor's angle that is turned; a late joint is a warning as others are."""
+    columns = plant(1.8 * swung(TWO_SPEEDS), 1.2 * swung(TWO_SPEEDS, 1.0))
+    turned = {**columns, "motor_position_rad": -columns["motor_position_rad"]}
+    (line,) = believe_all(JOINT, {"a": columns, "b": turned}).mend_first
+    assert line.startswith("b: motor_position_rad and joint_position_rad seem to turn against each other")
+    late = np.interp(TIME, TIME + 0.05, columns["joint_position_rad"])
+    doubts = believe_all(JOINT, {"late": {**columns, "joint_position_rad": late}})
+    assert doubts.lines
+    assert not doubts.mend_first
+
+
 @pytest.mark.parametrize("lost", [BACKLASH, FRICTION])
 def test_where_all_moves_at_one_speed_a_delay_is_not_said_without_lost_motion(lost: EffectSpec) -> None:
     found = delays_of(plant(1.8 * swung(ONE_SPEED), 1.2 * swung(ONE_SPEED, 1.0), lost))

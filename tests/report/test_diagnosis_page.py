@@ -191,6 +191,17 @@ def test_the_terminal_answers_first(found: Diagnosis) -> None:
         assert part in text, part
 
 
+def test_a_sign_that_is_doubted_stands_before_any_name(found: Diagnosis) -> None:
+    """And once, on the page as in the terminal; other warnings stay where they were."""
+    line = "b.csv: the angles seem to turn against each other"
+    doubted = replace(found, mend_first=(line,), warnings=(line, "EA_N ended on its bound"))
+    name = found.named[0].effect.replace("_", " ")
+    for text in (text_of(diagnosis_page(doubted, "")), terminal(doubted)):
+        assert text.count(line) == 1
+        assert text.index(line) < text.lower().index(name) < text.index("ended on its bound")
+    assert report_json(doubted)["mend_first"] == [line]
+
+
 def test_recalibrate_gives_old_and_new_values(found: Diagnosis) -> None:
     d = without_a_name(found, "recalibrate")
     text = " ".join(terminal(d).split())
