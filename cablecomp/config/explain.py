@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, NamedTuple, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from cablecomp.config.toml_file import Place
+from cablecomp.config.toml_file import Place, key_text
 from cablecomp.units import stated_unit, unit_named
 
 _MOST_LINES: Final = 20
@@ -80,7 +80,18 @@ def _sentence(found: _Found, data: Any) -> str:
     accepted = (
         found.error["msg"][0].lower() + found.error["msg"][1:] if words is None else words.format(**context)
     )
-    return f"key `{key or '(top level)'}` is {_shown(value)}; {accepted}"
+    return f"key `{key or '(top level)'}` is {_shown(value)}; {accepted}{_dotted(found)}"
+
+
+def _dotted(found: _Found) -> str:
+    """What to do where TOML took a name of parameters (`effect.ID.KEY`) for tables."""
+    name, value = str(found.place[-1] if found.place else ""), found.error["input"]
+    if found.model is not None or found.error["type"] != "float_type" or not isinstance(value, dict):
+        return ""
+    while isinstance(value, dict) and value:
+        key, value = next(iter(value.items()))
+        name += f".{key}"
+    return f"; a name with dots goes in quotes: {key_text(name)}"
 
 
 def _echo(error: ErrorDetails) -> bool:

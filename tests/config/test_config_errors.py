@@ -50,6 +50,14 @@ def changed(*pairs: tuple[str, str]) -> str:
     return text
 
 
+@pytest.mark.parametrize("name", ["effect.viscous_slip.exponent", "EA_N.2"])
+def test_a_name_with_dots_is_told_to_go_in_quotes(name: str, tmp_path: Path) -> None:
+    for table in ("[tolerance]", "[[session]]\nname = 'a'\n[session.values]"):
+        text = GOOD.partition("[tolerance]")[0] + f"{table}\n{name} = 0.1\n"
+        (line,) = said(text, tmp_path)
+        assert line.endswith(f'; a number is accepted; a name with dots goes in quotes: "{name}"')
+
+
 def test_every_error_is_said_each_with_its_line(tmp_path: Path) -> None:
     text = changed(
         ('circuit = "closed"', 'circuit = "clsed"'),
