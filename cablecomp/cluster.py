@@ -77,27 +77,33 @@ def _told(work: Callable[..., R], job: tuple[Any, ...]) -> tuple[R | None, str]:
 def _in_processes(
     work: Callable[..., R], jobs: Sequence[tuple[Any, ...]], processes: int
 ) -> Iterator[Done[R]]:
-    """A process that dies takes its pool along: what is left is then done one by one, to find whose fault it was. A
-    pool is handed no more than it works on: what it has it does, also after its user has gone."""
+    """A process that dies takes its pool along: what was worked on is then done one by one, to find whose fault it was,
+    and the rest side by side again. A pool is handed no more than it works on: what it has it does, also after its
+    user has gone."""
     left = dict(enumerate(jobs))
+    suspects: list[int] = []
     while left:
-        with _pool(min(processes, len(left))) as pool, suppress(BrokenProcessPool):
-            waiting = iter(list(left.items()))
+        count = 1 if suspects else min(processes, len(left))
+        waiting = iter(suspects or list(left))
+        begun = []
+        with _pool(count) as pool, suppress(BrokenProcessPool):
             running: dict[Future[tuple[R | None, str]], int] = {}
-            for k, job in islice(waiting, processes):
-                running[pool.submit(_told, work, job)] = k
+            for k in islice(waiting, count):
+                running[pool.submit(_told, work, left[k])] = k
+                begun.append(k)
             while running:
                 finished = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
                 number, (result, failed) = running.pop(finished), finished.result()
                 del left[number]
                 yield Done(number, result, failed)
-                for k, job in islice(waiting, 1):
-                    running[pool.submit(_told, work, job)] = k
-        if left and processes == 1:  # one process takes jobs in their order: the first that is left killed it
-            guilty = min(left)
-            del left[guilty]
-            yield Done(guilty, None, "its process died (out of memory?)")
-        processes = 1
+                for k in islice(waiting, 1):
+                    running[pool.submit(_told, work, left[k])] = k
+                    begun.append(k)
+        died = [k for k in begun if k in left]
+        if died and count == 1:
+            del left[died[0]]
+            yield Done(died[0], None, "its process died (out of memory?)")
+        suspects = [k for k in suspects or died if k in left]
 
 
 @contextmanager

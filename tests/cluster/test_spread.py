@@ -91,6 +91,30 @@ def test_a_process_that_dies_fails_alone() -> None:
     assert done[3].failed == "ZeroDivisionError: three"
 
 
+def meeting(folder: str, part: str) -> int:
+    """How many processes met in a folder; one part dies while the other waits, once."""
+    begun = Path(folder, "begun")
+    if part == "die":
+        written(begun)
+        os._exit(1)
+    if part == "wait" and not begun.exists():
+        begun.write_text("once", encoding="utf-8")
+        time.sleep(600.0)
+    if part == "meet":
+        Path(folder, f"met-{os.getpid()}").touch()
+        end = time.monotonic() + 60.0
+        while len(list(Path(folder).glob("met-*"))) < 2 and time.monotonic() < end:
+            time.sleep(0.05)
+    return len(list(Path(folder).glob("met-*")))
+
+
+def test_after_a_process_that_died_the_rest_is_done_side_by_side_again(tmp_path: Path) -> None:
+    parts = ("die", "wait", "meet", "meet")
+    done = {d.job: d for d in spread(meeting, [(str(tmp_path), part) for part in parts], Workers(2))}
+    assert "died" in done[0].failed
+    assert [done[k].result for k in (1, 2, 3)] == [0, 2, 2]
+
+
 def mark(folder: str, number: int) -> None:
     """Leaves a file behind."""
     Path(folder, str(number)).touch()
