@@ -17,6 +17,10 @@ class SlackError(InputError):
     """A load beyond what an open circuit bears: the cable would hang slack."""
 
 
+class NotWrittenError(InputError):
+    """A place that takes no file: a full disk, no right to write there."""
+
+
 class ConfigError(InputError):
     """Everything that is wrong with a configuration; `lines` holds one line for each error."""
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from cablecomp.durable import replace_durably
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, NotWrittenError
 
 
 @contextmanager
@@ -27,7 +27,9 @@ def atomic_directory(out: Path | str, renewed: Sequence[str] = ()) -> Iterator[P
     try:
         temporary = _sibling(out)
     except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); choose another directory") from None
+        raise NotWrittenError(
+            f"{out}: cannot be written ({error.strerror}); choose another directory"
+        ) from None
     try:
         yield temporary
         gone = [name for name in renewed if not (temporary / name).exists()]
@@ -38,7 +40,9 @@ def atomic_directory(out: Path | str, renewed: Sequence[str] = ()) -> Iterator[P
         shutil.rmtree(temporary, ignore_errors=True)
         _remove_empty(made)
         if isinstance(error, OSError):
-            raise InputError(f"{out}: cannot be written ({_why(error)}); nothing was left there") from None
+            raise NotWrittenError(
+                f"{out}: cannot be written ({_why(error)}); nothing was left there"
+            ) from None
         raise
 
 
@@ -77,7 +81,7 @@ def atomic_file(path: Path | str) -> Iterator[Path]:
     except OSError as error:
         with suppress(OSError):  # where there is no such folder, there is no file either
             temporary.unlink()
-        raise InputError(f"{path}: cannot be written ({_why(error)}); choose another place") from None
+        raise NotWrittenError(f"{path}: cannot be written ({_why(error)}); choose another place") from None
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise

@@ -16,7 +16,7 @@ from cablecomp.cluster import Workers, spread
 from cablecomp.config import load_joint
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.result import PROTOCOL, write_diagnosis
-from cablecomp.errors import InputError
+from cablecomp.errors import InputError, NotWrittenError
 from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.folder import find_recordings
 from cablecomp.recording.reader import read_all
@@ -129,7 +129,9 @@ def diagnose_all(
     tell(what, done, len(jobs))
     with closing(spread(_timed, left, workers)) as outcomes:
         for outcome in outcomes:
-            if outcome.failed:  # the process died, or its folder could not be written
+            if outcome.result:
+                raise InputError(f"{outcome.result}; make room, then the same command goes on")
+            if outcome.failed:  # the process died
                 place = left[outcome.job][3]
                 place.mkdir(parents=True, exist_ok=True)
                 write_json(place / "timing.json", {"seconds": None, "failed": outcome.failed})
@@ -139,15 +141,24 @@ def diagnose_all(
                 return
 
 
-def _timed(work: Diagnose, folder: Path, further: Sequence[Path], out: Path) -> None:
-    """One diagnosis and how long it took; what went wrong is written instead of a verdict."""
-    out.mkdir(parents=True, exist_ok=True)
+def _timed(work: Diagnose, folder: Path, further: Sequence[Path], out: Path) -> str:
+    """One diagnosis and how long it took; what went wrong is written instead of a verdict. Returns why nothing could be
+    written, which is no failure of the trial's."""
     started, failed = time.perf_counter(), ""
     try:
-        work(folder, further, out)
-    except Exception as error:  # whatever it is, it is this trial's failure: counted, and shown on the page
-        failed = f"{type(error).__name__}: {error}"
-    write_json(out / "timing.json", {"seconds": time.perf_counter() - started, "failed": failed})
+        out.mkdir(parents=True, exist_ok=True)
+        try:
+            work(folder, further, out)
+        except NotWrittenError as error:
+            return str(error)
+        except (
+            Exception
+        ) as error:  # whatever it is, it is this trial's failure: counted, and shown on the page
+            failed = f"{type(error).__name__}: {error}"
+        write_json(out / "timing.json", {"seconds": time.perf_counter() - started, "failed": failed})
+    except OSError as error:
+        return f"{out}: cannot be written ({error.strerror})"
+    return ""
 
 
 def diagnose_folder(folder: Path, further: Sequence[Path], out: Path) -> None:

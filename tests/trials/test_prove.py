@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -24,6 +25,8 @@ from cablecomp.cli import concealing
 from cablecomp.cluster import Workers
 from cablecomp.config_text import joint_text
 from cablecomp.errors import InputError
+from cablecomp.recording import atomic
+from cablecomp.recording.atomic import atomic_directory
 from cablecomp.recording.writer import write_canonical
 from cablecomp.trials.prove import Blind, Wish, prove
 from cablecomp.trials.sealed import SEALED, check_seal, digest, read_sealed, truth_from
@@ -134,6 +137,29 @@ def test_a_budget_that_is_spent_leaves_the_rest_for_the_next_time(tmp_path: Path
     whole = prove(blind, wish, lambda what, done, of: None, log.append)
     assert ([r.number for r in whole.rows], whole.counted) == ([0, 1], "2")
     assert log[4:] == ["diagnosed 00001 with 0", "experiment 00000", "diagnosed 00000 with 1"]
+
+
+def test_a_verdict_that_the_disk_does_not_take_is_no_failure_of_the_trial_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The command ends in one line, and once there is room goes on with that trial."""
+    log: list[str] = []
+
+    def full(*given: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def on_a_full_disk(folder: Path, further: Sequence[Path], out: Path) -> None:
+        with monkeypatch.context() as now, atomic_directory(out):
+            now.setattr(atomic, "_move_into", full)
+
+    wish = Wish(1, 5, "none", "catalogue", "none")
+    blind = Blind(tmp_path, _conceal(log), _fake_experiment(log), Workers(0), on_a_full_disk)
+    with pytest.raises(InputError, match=r"00000: cannot be written \(No space left.*make room") as told:
+        prove(blind, wish, lambda what, done, of: None, log.append)
+    assert len(str(told.value).splitlines()) == 1
+    again = replace(blind, diagnose=_fake_diagnosis(log))
+    board = prove(again, wish, lambda what, done, of: None, log.append)
+    assert [r.outcome for r in board.rows] == ["consistent"]
 
 
 def test_a_broken_seal_is_not_opened(tmp_path: Path) -> None:
