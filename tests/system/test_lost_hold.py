@@ -111,16 +111,18 @@ def test_a_first_command_that_the_bus_does_not_take_goes_out_before_anything_els
 
 
 def test_a_bus_that_takes_no_commands_ends_the_run(mit: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Though the drive goes on telling where it is."""
-    full = [False]
+    """Though the drive goes on telling where it is: after as long as its reading may be old, half of the fade."""
+    full, last = [False], [0.0]
     refusing(monkeypatch, lambda i, d: full[0] and is_command(i, d))
 
     def watch(loop: Loop, tick: Tick) -> None:
         full[0] = loop.since_s > 0.05
+        last[0] = max(last[0], loop.since_s)
         mit.joint.say(0, reply(1, mit.joint.angle, mit.joint.speed))
 
     report = mit.run(1.0, watch=watch)
     assert "the bus takes no commands" in report.stop_reason
+    assert last[0] == pytest.approx(0.05 + 0.5 * mit.link.timeouts.fade_s, abs=4e-3)
     assert mit.joint.heard[-1].word == "leave"
 
 
