@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import uuid
 from collections.abc import Callable, Iterator
 
@@ -238,3 +239,26 @@ def test_the_motor_stays_within_its_limit_whatever_the_drive_is_told(mit: Rig, m
     )
     mit.run(0.4, reach, watch, config.model_copy(update={"limits": limits}))
     assert 0.45 < farthest[0] < 0.52
+
+
+def test_a_joint_encoder_that_reads_too_much_as_stated_is_believed_and_its_zero_is_no_error(
+    mit: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0.1 rad too much, where 0.02 rad beside the prediction are too many."""
+    config, say = load_joint(JOINT), mit.joint.say
+
+    def say_more(identifier: int, data: bytes, **kind: bool) -> None:
+        if identifier == 0x680:
+            data = struct.pack("<i", struct.unpack("<i", data[:4])[0] + 100_000) + data[4:]
+        say(identifier, data, **kind)
+
+    monkeypatch.setattr(mit.joint, "say", say_more)
+    sensors = config.sensors.model_copy(update={"joint_position_offset_rad": 0.1})
+    reach = parse_protocol(
+        {"schema": 1, "name": "near", "segment": [{"kind": "ramp", "position_rad": 0.3, "duration_s": 0.4}]},
+        "test",
+    )
+    report = mit.run(0.5, reach, config=config.model_copy(update={"sensors": sensors}))
+    assert report.stop_reason == "time is over"
+    assert report.joints[0].position_rad < 0.02
+    assert not [what for _, _, what in report.events if "joint" in what]
