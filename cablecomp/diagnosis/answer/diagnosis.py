@@ -23,7 +23,7 @@ from cablecomp.diagnosis.answer.entries import (
 )
 from cablecomp.diagnosis.answer.notes import by_the_clock, notes
 from cablecomp.diagnosis.answer.values import as_trials_say, drive_values
-from cablecomp.diagnosis.answer.verdict import not_carried, warnings_of
+from cablecomp.diagnosis.answer.verdict import not_alike, not_carried, warnings_of
 from cablecomp.diagnosis.calibration.drive import own_in_vain
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.unseen import could_be_unseen
@@ -77,6 +77,7 @@ def diagnosis_of(
             *((OUT_OF_TIME.format(budget_s),) if found.cut_short else ()),
             *own_in_vain(case.config, drive.fit),
             *warnings_of(kept, found.cut_short),
+            *not_alike(kept, found.groups.by),
             *not_carried(outcome.augmented, drive.floor_rad),
         ),
     )

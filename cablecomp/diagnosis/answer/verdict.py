@@ -9,6 +9,7 @@ import numpy as np
 from cablecomp.diagnosis.answer.alike import drag_alike
 from cablecomp.diagnosis.body import short
 from cablecomp.diagnosis.calibration.drive import Calibrated
+from cablecomp.diagnosis.explain.dependence import unjudged
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, bears
 from cablecomp.diagnosis.locate.location import Location
@@ -91,6 +92,16 @@ def warnings_of(model: Model, cut_short: bool) -> tuple[str, ...]:
         *_set_anew(model.fit),
         *_hidden(model.fit.problem.evidence),
     )
+
+
+def not_alike(model: Model, by: str) -> Iterator[str]:
+    """What is not the same in all sessions, where each is one recording, of which nothing is left to judge that by."""
+    for depends, share in unjudged(model.fit, model.terms, by):
+        yield (
+            f"{depends.parameter} is not the same in all sessions: of each its own, it would take off about "
+            f"{1.0 - share:.0%} of the square of what is left, but one recording of each does not tell; name the "
+            "channel by which they differ in [condition], or give two of each"
+        )
 
 
 def not_carried(errors: Errors, floor_rad: float) -> Iterator[str]:

@@ -6,7 +6,7 @@ value of each session's own, or a gain per unit, would do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -21,6 +21,9 @@ from cablecomp.estimation.parameter import Parameter, by_condition
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
+OWN_LEAVES: Final = 0.5
+"""Share of the square of what is left, below which it is said what a value of each session's own would leave though
+nothing judges it (a sheath at five bends that nothing recorded: 0.2)."""
 POSTURES: Final = ("_rad", "_deg", "_m")
 """Ends of the names of conditions that say how the path lies."""
 
@@ -108,6 +111,18 @@ def ask_dependences(fit: Fit, terms: Sequence[Any], by: str) -> list[tuple[Depen
             found.append((dependence, cost, changed))
     found.sort(key=lambda f: f[1])
     return [f for f in found if 2.0 * f[1] < LIMITS.dependence * energy][: LIMITS.dependences]
+
+
+def unjudged(fit: Fit, terms: Sequence[Any], by: str) -> Iterator[tuple[Dependence, float]]:
+    """What leaves far less where each session has its own, with the share of the square left then, and what sessions of
+    one recording each leave nothing to judge by."""
+    asked = {d for d, _, _ in ask_dependences(fit, terms, by)}
+    told = {t.parameter for t in terms if isinstance(t, Dependence)}
+    left = anchor(fit).beyond(fit.residual)
+    for d, cost, _ in ask_dependences(fit, terms, "block"):
+        share = 2.0 * cost / float(left @ left)
+        if d.on == "session" and d not in asked and d.parameter not in told and share < OWN_LEAVES:
+            yield d, share
 
 
 def gain_is_told(problem: Problem, condition: str) -> bool:
