@@ -8,6 +8,15 @@ from __future__ import annotations
 import math
 
 from cablecomp.mechanics.jit import inner_kernel, leaf_kernel
+from cablecomp.mechanics.quadrature import (
+    LONG_W,
+    LONG_X,
+    MIDDLE_W,
+    MIDDLE_X,
+    MOST_PANELS,
+    SHORT_W,
+    SHORT_X,
+)
 from cablecomp.mechanics.tables import (
     AGAIN,
     AREA_OF_V,
@@ -21,10 +30,7 @@ from cablecomp.mechanics.tables import (
     KNEE_HALF,
     KNEE_RISE,
     LEAST_STIFFNESS,
-    LONG_W,
-    LONG_X,
     MODE,
-    MOST_PANELS,
     PANEL,
     PLAIN,
     STEADY,
@@ -35,7 +41,6 @@ from cablecomp.mechanics.tables import (
     V_PER,
     Floats,
     between,
-    gauss,
     groove,
     look_up,
     stiffening_strain,
@@ -58,10 +63,6 @@ B2, B4, B6, B8, B10, B12, B14 = (
     )
 )
 F2, F3, F4, F5, F6, F7, F8 = (1.0 / math.factorial(_n) for _n in range(2, 9))
-
-
-SHORT_X, SHORT_W = gauss(3)
-MIDDLE_X, MIDDLE_W = gauss(5)
 
 
 @leaf_kernel

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from cablecomp.mechanics.jit import constant, inner_kernel, kernel, leaf_kernel
+from cablecomp.mechanics.quadrature import panel
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -54,19 +55,6 @@ ROWS = 7
 ) = range(17)  # fmt: skip
 BENDS = constant(4)
 HEAD_SIZE = FIRST_BEND + 4
-SEEN = 1e-7
-"""Share of the friction on a panel that eight points may miss of it."""
-MOST_PANELS = 256
-"""Panels of an arc at most: what is rougher than they see is taken as they see it."""
-
-
-def gauss(points: int) -> tuple[Floats, Floats]:
-    """Places and weights of Gauss-Legendre quadrature on [0, 1]."""
-    x, weights = np.polynomial.legendre.leggauss(points)
-    return (x + 1.0) / 2.0, weights / 2.0
-
-
-LONG_X, LONG_W = gauss(8)
 
 
 def plain_law() -> Floats:
@@ -126,7 +114,7 @@ def law_table(
         table[G_OF_Y] = _integral(step, by_place)
         head[GROOVED] = 1.0
         head[Y_PER] = 1.0 / step
-        head[PANEL] = _panel(groove_factor, wrap_max_rad)
+        head[PANEL] = panel(groove_factor, wrap_max_rad)
     if head[BY_TENSION] or head[GROOVED]:
         head[MODE] = TABLED
     else:
@@ -136,25 +124,6 @@ def law_table(
         _fill_strains(table[None], 0)
         table[AREA_OF_V] = _integral(1.0 / head[V_PER], table[E_OF_V])
     return table
-
-
-def _panel(groove_factor: Callable[[Floats], Floats], wrap_max_rad: float) -> float:
-    """The longest even part of the wrap [rad] on each of which `LONG_X` finds what it does on both halves, but for the
-    share `SEEN`."""
-    panels = 1
-    while panels < MOST_PANELS:
-        one, two = (_on_panels(groove_factor, wrap_max_rad, n) for n in (panels, 2 * panels))
-        halves = 0.5 * (two[::2] + two[1::2])
-        if np.all(np.abs(one - halves) <= SEEN * halves):
-            break
-        panels += (panels + 1) // 2
-    return wrap_max_rad / panels
-
-
-def _on_panels(factor: Callable[[Floats], Floats], wrap_max_rad: float, panels: int) -> Floats:
-    """Mean of the factor on each of so many even parts of the wrap, by `LONG_X`."""
-    places = (np.arange(panels)[:, None] + LONG_X) * (wrap_max_rad / panels)
-    return np.asarray(factor(places.ravel()).reshape(places.shape) @ LONG_W)
 
 
 def _integral(h: float, f: Floats) -> Floats:

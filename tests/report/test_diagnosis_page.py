@@ -289,41 +289,6 @@ def test_names_are_escaped(found: Diagnosis) -> None:
     assert "<b>x</b>" not in diagnosis_page(d)
 
 
-def test_the_map_shows_rms_in_noise_floors(found: Diagnosis) -> None:
-    trace = found.traces[0]
-    size = len(trace.measured_rad)
-    flat = replace(
-        trace,
-        before_rad=trace.measured_rad - 3.0 * NOISE,
-        after_rad=trace.measured_rad - NOISE * np.where(np.arange(size) % 2, 1.0, -1.0),
-    )
-    before, after = (trace.z for trace in figures.energy_map([flat], "load", NOISE).data)
-    np.testing.assert_allclose(before[np.isfinite(before)], 3.0, atol=2e-3)
-    np.testing.assert_allclose(after[np.isfinite(after)], 1.0, atol=2e-3)
-
-
-def test_the_mean_error_is_that_of_what_was_fitted(found: Diagnosis) -> None:
-    """An unknown history at the beginning moves no point of the curve."""
-    trace = found.traces[0]
-    counted = np.arange(len(trace.measured_rad)) >= 200
-    moved = replace(trace, before_rad=trace.measured_rad - np.where(counted, 0.0, 1e-3), counted=counted)
-    lines = [s for s in figures.along([moved], "load", NOISE, Scale(1.0, "rad")).data if "before" in s.name]
-    assert lines
-    assert all(np.max(np.abs(line.y)) == 0.0 for line in lines)
-
-
-def test_a_hypothesis_fitted_twice_beside_one_model_has_one_bar(found: Diagnosis) -> None:
-    """Two bars in one place would lie on each other, and make all bars thin."""
-    first = found.tested[0]
-    again = (replace(first, heldout_gain=0.5 * first.heldout_gain), *found.tested)
-    rounds = {name: k + 1 for k, name in enumerate(dict.fromkeys(t.beside for t in again))}
-    bars = [
-        (y, x) for trace in figures.tried(again, rounds).data for x, y in zip(trace.x, trace.y, strict=True)
-    ]
-    assert len({y for y, _ in bars}) == len(bars) == len(found.tested)
-    assert pytest.approx(100.0 * first.heldout_gain) in [x for _, x in bars]
-
-
 def test_the_law_that_ties_sessions_is_drawn_at_their_values(found: Diagnosis) -> None:
     """A parameter that grows with a condition: base + rate times the condition, at each value of it."""
     by_bend = {"parameter": "mu_output", "on": "bend", "per_unit": 0.2}
