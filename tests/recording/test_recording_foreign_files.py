@@ -210,7 +210,7 @@ def test_remarks_beside_the_arrays_of_npz_are_left_out_and_named(tmp_path: Path)
     assert list(read_all(path).columns) == list(channels)
     (note,) = open_recording(path).notes
     assert all(f"array {name!r}" in note for name in ("remark", "names", "setup", "jacobian"))
-    np.savez(path, **(channels | {"motor_position_rad": np.array(["x"] * ROWS)}))  # type: ignore[arg-type]
+    np.savez(path, **(channels | {"motor_position_rad": np.array(["x"] * ROWS)}))  # type: ignore[arg-type]  # as above
     assert "array 'motor_position_rad' holds <U1, not numbers" in refusal(path)
 
 
