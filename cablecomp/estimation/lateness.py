@@ -121,8 +121,11 @@ def borne_out(view: View, said: Suspicion) -> bool:
 def _delay(view: View, name: str, late: float, before: float, after: float) -> Suspicion:
     """The words for a channel that is so late [s], and what is left at best [rad] as it is and shifted."""
     of_speed = _of_speed(view, name, late)
-    how = "late" if late > 0.0 else "early"
-    both = "" if of_speed > OF_SPEED else ", or to trail by lost motion (at one speed they look alike)"
+    how, trails = "late", ", or to trail by"
+    if late < 0.0:  # what leads trails nothing
+        how = f"early, or {INPUT if name == JOINT else 'the angles'} as late"
+        trails = " or trailing it by"
+    both = "" if of_speed > OF_SPEED else f"{trails} lost motion (at one speed they look alike)"
     rubs = ", or the motor's own friction stands in it" if name == MOTOR else ""
     words = (
         f"{name} seems to come {1e3 * abs(late):.3g} ms {how}{both}{rubs}: at best the drive leaves {mrad(before)} "

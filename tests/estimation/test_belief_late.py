@@ -131,6 +131,12 @@ def test_a_late_joint_at_one_speed_is_no_ratio_and_no_turned_load(
     assert "lost motion" in said.text
 
 
+def test_a_late_motor_angle_is_no_joint_that_trails(at_one_speed: dict[str, FloatArray]) -> None:
+    (said,) = suspicions(JOINT, late_by(at_one_speed, "motor_position_rad", 0.05))
+    assert said.numbers["late_s"] == pytest.approx(-0.05, abs=1e-3)
+    assert "early, or motor_position_rad as late or trailing it by lost motion" in said.text
+
+
 @pytest.mark.parametrize(
     ("changed", "factor", "told"),
     [
