@@ -18,7 +18,10 @@ _MOST_COLUMNS: Final = 4096
 _PREAMBLE: Final = 100
 """Lines among which the names are looked for."""
 _SEPARATORS: Final = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
+QUOTED_COMMA: Final = re.compile(rb'(?<![^,\r\n ])"([^",\r\n]*\d),(\d[^",\r\n]*)"(?![^,\r\n ])')
+"""A cell in quotes, between commas, that holds a comma between digits: no separator stands there."""
 _THOUSANDS: Final = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
+_GROUPED: Final = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}")
 _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d([.,]\d+)?(Z|[+-]\d\d:?\d\d)?")
 
 
@@ -27,7 +30,8 @@ class Head:
     """What stands before the first row: `first_line` is the line of the first row, counted from 1.
 
     `units`: those of a row of units below the names. `dates`: columns that hold dates and times (ISO 8601), read
-    as seconds since midnight of `day`. `trailing`: a separator stands behind the last cell of a row.
+    as seconds since midnight of `day`. `decimal_comma`: numbers hold one, where commas separate inside quotes alone.
+    `trailing`: a separator stands behind the last cell of a row.
     """
 
     columns: tuple[str, ...]
@@ -78,6 +82,8 @@ def read_head(path: Path, gzipped: bool) -> Head:
 
 def _parse_head(text: bytes) -> Head | None:
     shift = 3 if text.startswith(b"\xef\xbb\xbf") else 0
+    quoted = _decimal_in_quotes(text)
+    text = QUOTED_COMMA.sub(rb'"\1.\2"', text) if quoted else text  # as long as before
     lines = [_text(raw) for raw in plain_breaks(text[shift:].removesuffix(b"\r")).split(b"\n")]
     kept = [k for k, line in enumerate(lines) if line.strip() and not line.strip().startswith("#")]
     if not kept:
@@ -89,13 +95,17 @@ def _parse_head(text: bytes) -> Head | None:
     names = names[:-1] if trailing and names[-1] == "" else names
     columns = tuple(name or f"(column {k})" for k, name in enumerate(names, start=1))
     before = [line.strip().lstrip("#").strip() for line in lines[: max(header, first - 1)]]
-    comma = separator != "," and _decimal_comma(
-        [
-            cell.strip().strip('"')
-            for line in lines[first:]
-            if "," in line or "." in line
-            for cell in _cells(line, separator)
-        ]
+    comma = (
+        quoted
+        if separator == ","
+        else _decimal_comma(
+            [
+                cell.strip().strip('"')
+                for line in lines[first:]
+                if "," in line or "." in line
+                for cell in _cells(line, separator)
+            ]
+        )
     )
     raw = plain_breaks(text[shift:]).split(b"\n")
     size = shift + sum(len(line) + 1 for line in raw[:first])
@@ -137,6 +147,12 @@ def _decimal_comma(cells: list[str]) -> bool:
     commas = [c for c in cells if "," in c and (_is_number(c.replace(",", ".")) or _DATE.fullmatch(c))]
     points = any("." in c and _is_number(c) for c in cells)
     return bool(commas) and not (points and all(map(_THOUSANDS.fullmatch, commas)))
+
+
+def _decimal_in_quotes(text: bytes) -> bool:
+    """Whether commas inside quotes are decimal ones: a cell says so that divides no thousands, such as "0,5"."""
+    cells = (f"{_text(a)}.{_text(b)}".strip() for a, b in QUOTED_COMMA.findall(text))
+    return any((_is_number(c) or _DATE.fullmatch(c)) and not _GROUPED.fullmatch(c) for c in cells)
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -14,7 +14,15 @@ import polars as pl
 
 from cablecomp.counting import counted
 from cablecomp.errors import InputError
-from cablecomp.recording.csv_head import Head, number, odd_unit, plain_breaks, read_head, seconds_since
+from cablecomp.recording.csv_head import (
+    QUOTED_COMMA,
+    Head,
+    number,
+    odd_unit,
+    plain_breaks,
+    read_head,
+    seconds_since,
+)
 from cablecomp.recording.raw import RawTable
 from cablecomp.recording.source import Piece, Truncated, ahead, chunks
 from cablecomp.recording.table import FloatArray
@@ -104,18 +112,32 @@ class _Parser:
     names: tuple[str, ...]
 
     def parse(self, text: bytes, line: int, fraction: float, last: bool = False) -> Rows:
-        text = text.replace(b'"', b"") if b'"' in text else text
+        text = self._unquoted(text, line) if b'"' in text else text
         if self.head.separator == " ":
             text = _BLANKS.sub(b" ", _AT_ENDS.sub(b"", text))
         if self.head.trailing:
             separator = self.head.separator.encode()
             blanks = b" " if separator == b"\t" else rb" \t"  # else empty cells before it would go too
             text = re.sub(rb"%b[%b]*$" % (re.escape(separator), blanks), b"", text, flags=re.MULTILINE)
-        if self.head.decimal_comma:
+        if self.head.decimal_comma and self.head.separator != ",":
             text = text.replace(b",", b".")
         arrays = self._fast(text) or self._slow(text, line, last)
         named = dict(zip(self.names, arrays, strict=True))
         return Rows(line, named, fraction, text, self.head, not last)
+
+    def _unquoted(self, text: bytes, line: int) -> bytes:
+        """Without quotes; a comma inside them is the decimal one that the head found, or is refused."""
+        if self.head.separator == ",":
+            if self.head.decimal_comma:
+                text = QUOTED_COMMA.sub(rb"\1.\2", text)
+            elif (cell := QUOTED_COMMA.search(text)) is not None:
+                at, found = line + text[: cell.start()].count(_BREAK), cell[0].decode("utf-8", "replace")
+                raise InputError(
+                    f"{self.path}: line {at}: {_shown(found)} may "
+                    "hold a decimal comma or divide thousands, and no cell near the head tells which; write a point "
+                    "for the one and nothing for the other"
+                )
+        return text.replace(b'"', b"")
 
     def _fast(self, text: bytes) -> list[FloatArray] | None:
         """Return the columns (NaN where a cell is empty), or None if any row may be ragged or hold text.

@@ -126,6 +126,31 @@ def test_commas_between_thousands_are_no_decimal_commas(tmp_path: Path) -> None:
     assert "line 3: column 'time_ms' holds '1,000'; a number is expected there" in refusal(path)
 
 
+@pytest.mark.parametrize("line_break", ["\n", "\r\n"])
+def test_decimal_commas_inside_quotes_stand_between_commas(line_break: str, tmp_path: Path) -> None:
+    """As a spreadsheet of a country with decimal commas writes where commas are asked for between cells (RFC 4180)."""
+    path = tmp_path / "log.csv"
+    rows = [
+        '"time_s","motor_position_rad","joint_torque_Nm"',
+        '"0","1",""',
+        '"0,5","1,234","-1,25e-1"',
+        '1,"2",0',
+    ]
+    path.write_bytes(line_break.join(rows).encode())
+    columns = read_all(path, gaps=True).columns
+    assert columns["time_s"].tolist() == [0.0, 0.5, 1.0]
+    assert columns["motor_position_rad"].tolist() == [1.0, 1.234, 2.0]
+    assert np.array_equal(columns["joint_torque_Nm"], [np.nan, -0.125, 0.0], equal_nan=True)
+
+
+@pytest.mark.parametrize("row", ['"1,000",0.7', '"1,000","2,345"', '"1,000.5",0.7'])
+def test_a_comma_inside_quotes_that_may_divide_thousands_is_refused(row: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"time_ms,motor_position_deg\n0,1\n{row}\n")
+    assert "line 3: '\"1,000" in refusal(path)
+    assert "write a point for the one and nothing for the other" in refusal(path)
+
+
 @pytest.mark.parametrize("head", ["time_s,motor_position_rad", "time_s,motor_position_rad,"])
 @pytest.mark.parametrize("units", ["", "s,rad\n", "s,rad,\n"])
 def test_a_separator_behind_every_row_is_no_column(head: str, units: str, tmp_path: Path) -> None:
