@@ -11,6 +11,7 @@ from typing import Final
 from cablecomp import __version__
 from cablecomp.errors import InputError
 from cablecomp.recording.folder import SUFFIXES, find_recordings
+from cablecomp.recording.mapping import find_mapping
 
 JOINT_FILE: Final = "joint.toml"
 
@@ -26,13 +27,15 @@ class Night:
 
     def fingerprint(self, what: str) -> str:
         """Digest of what a row is made from: the work, version, configuration, and each recording's path, size
-        and date."""
+        and date, and the mapping that is saved beside it."""
         found = hashlib.sha256(f"{what} {__version__}\n".encode() + self.config.read_bytes())
         for path in self.recordings:
             stat = path.stat()
             found.update(
                 f"{path.resolve()} {stat.st_size} {stat.st_mtime_ns}\n".encode("utf-8", "surrogateescape")
             )
+            mapping = find_mapping(path)
+            found.update(b"" if mapping is None else mapping.read_bytes())
         return found.hexdigest()
 
 

@@ -89,6 +89,23 @@ def test_each_joint_is_told_by_what_it_does(tmp_path: Path, made_up: list[str]) 
     assert again.reused == 30
 
 
+@pytest.mark.parametrize("name", ["cablecomp.map.toml", "night-01.csv.map.toml"])
+def test_a_night_whose_mapping_was_mended_is_worked_on_again(
+    name: str, tmp_path: Path, made_up: list[str]
+) -> None:
+    place = folders(tmp_path / "in", ("a",), 2)
+    config = example("joints", "capstan-arm")
+    worked_on = []
+    for sign in (1, 1, -1):
+        made_up.clear()
+        text = f'[channel]\njoint_position_rad = {{ column = "angle", sign = {sign} }}\n'
+        (place / "a" / name).write_text(text, encoding="utf-8")
+        run_fleet("replay", nights([place], config), tmp_path / "out", Workers(0), told)
+        worked_on.append(list(made_up))
+    both = ["a/night-00.csv", "a/night-01.csv"]
+    assert worked_on == [both, [], both if name.startswith("cablecomp") else both[1:]]
+
+
 @pytest.mark.parametrize(
     "given", ["--map auto", "--map time_s=t", "--session a", "--effects own.py", "--no-bounds", "--view"]
 )
