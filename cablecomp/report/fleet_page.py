@@ -47,10 +47,13 @@ def fleet_page(fleet: Fleet, command: str) -> str:
 
 
 def failures(fleet: Fleet) -> list[str]:
-    """Which nights failed, and why, a line each."""
-    return [
-        printable(f"{row['joint']}/{row['night']}: {row['failed']}") for row in fleet.rows if row["failed"]
-    ]
+    """Which nights failed, and why, a line each, which names the place once."""
+    return [printable(_failure(row)) for row in fleet.rows if row["failed"]]
+
+
+def _failure(row: Row) -> str:
+    place, why = f"{row['joint']}/{row['night']}", str(row["failed"])
+    return why if place in why.partition(": ")[0] else f"{place}: {why}"
 
 
 def _counted(fleet: Fleet) -> str:

@@ -146,6 +146,14 @@ def test_a_configuration_for_all_is_needed_by_joints_without_their_own(
 def test_a_night_that_failed_is_told_of_on_one_line() -> None:
     row = {"joint": "a", "night": "odd\nname.csv", "failed": "is cut off"}
     assert failures(Fleet("replay", (row,), (), 0)) == ["a/odd name.csv: is cut off"]
+    for place in (
+        "rig/a/mon",
+        "rig/a/mon/1.csv",
+    ):  # who read it said where, a recording of the night or the night
+        row = {"joint": "a", "night": "mon", "failed": f"{place}: line 3: is empty"}
+        assert failures(Fleet("replay", (row,), (), 0)) == [f"{place}: line 3: is empty"]
+    row = {"joint": "a", "night": "mon", "failed": "rig/a/joint.toml: is not valid TOML"}
+    assert failures(Fleet("replay", (row,), (), 0)) == ["a/mon: rig/a/joint.toml: is not valid TOML"]
 
 
 def test_a_joint_has_its_own_configuration_or_that_of_all(tmp_path: Path) -> None:
