@@ -45,8 +45,8 @@ class Equivalent(NamedTuple):
 
 
 def beyond_loops(config: JointConfig) -> tuple[str, ...]:
-    """What a joint's own effects, empirical laws and sensors do that is in no loop of the load with the motor held, one
-    line each."""
+    """What a joint's own effects, empirical laws, sensors, sessions and conditions do that is in no loop of the load
+    with the motor held, one line each."""
     entries: tuple[EffectEntry | Empirical, ...] = (*config.effect, *config.empirical)
     of_time = [entry.id for entry in entries if is_of_time(entry)]
     of_more = [entry.id for entry in entries if _is_of_more(entry) and not is_of_time(entry)]
@@ -56,10 +56,15 @@ def beyond_loops(config: JointConfig) -> tuple[str, ...]:
         for name in ("joint_position_offset_rad", "joint_torque_gain", "joint_torque_offset_Nm")
         if getattr(config.sensors, name) != getattr(right, name)
     ]
+    own = dict.fromkeys(name for session in config.sessions for name in session.values)
     lines = {
         "what goes by the time": of_time,
         "what goes by more than the load enters by its loops alone, motor held at 0 rad": of_more,
         "what sensors read wrong; angles and loads are the true ones": wrong,
+        "what is a session's own; the values common to all are taken": list(own),
+        "what goes with a condition; each value at the condition that it is stated for is taken": [
+            f"{law.parameter} by {law.on}" for law in config.depends
+        ],
     }
     return tuple(f"{line}: {', '.join(names)}" for line, names in lines.items() if names)
 

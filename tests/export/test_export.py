@@ -246,6 +246,40 @@ def test_every_format_names_what_of_the_joint_s_own_it_leaves_out() -> None:
     assert not any("what goes" in line or "sensors" in line for line in left_out(JOINT))
 
 
+def test_what_differs_between_sessions_or_goes_with_a_condition_is_named(tmp_path: Path) -> None:
+    """A diagnosis leaves such joints: one drive, mounted twice, whose friction grows with the bend of its path."""
+    text = example("joints", "wrist-capstan").read_text(encoding="utf-8")
+    path = tmp_path / "joint.toml"
+    path.write_text(
+        f"""{text}
+[condition]
+bend = "other_bend_deg"
+
+[[session]]
+name = "rig-1"
+values = {{ pretension_N = 50.0, joint_position_offset_rad = 1e-3 }}
+
+[[session]]
+name = "rig-2"
+values = {{ pretension_N = 60.0 }}
+
+[[depends]]
+parameter = "mu_output"
+on = "bend"
+per_unit = 1e-3
+at = 90.0
+seen = [0.0, 180.0]
+""",
+        encoding="utf-8",
+    )
+    joint = load_joint(path)
+    for lines in (SPRING.lost(joint), left_out(joint)):
+        own = next(line for line in lines if "session's own" in line)
+        assert own.endswith(": pretension_N, joint_position_offset_rad")
+        assert any("with a condition" in line and line.endswith(": mu_output by bend") for line in lines)
+    assert not any("session" in line or "condition" in line for line in left_out(JOINT))
+
+
 def test_what_is_lost_is_said_with_the_formats_that_lose_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
