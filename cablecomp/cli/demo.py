@@ -24,6 +24,7 @@ from cablecomp.examples import example
 from cablecomp.links.load import load_link
 from cablecomp.links.schema import LinkConfig
 from cablecomp.report.compare_page import HEADERS, feedback_words, summary_rows, write_comparison
+from cablecomp.report.measured import with_sd
 from cablecomp.runtime.compare import Calibrated, Columns, CompareOptions, Comparison, compare
 from cablecomp.runtime.setup import matched
 from cablecomp.runtime.view import LiveView
@@ -88,7 +89,7 @@ def _beside(v: Value, true: float | None) -> str:
     """A value with its sd, what was nominal and what the simulation was given."""
     nominal = "" if v.nominal is None else f"nominal {v.nominal:.5g}"
     known = "" if true is None else f", truth {true:.5g}: {abs(v.value - true) / v.sd:.1f} sd off"
-    return f"{v.value:.5g} ± {v.sd:.2g} ({nominal}{known})"
+    return f"{with_sd(v.value, v.sd)} ({nominal}{known})"
 
 
 def _summary(found: Comparison) -> None:

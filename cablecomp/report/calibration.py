@@ -12,6 +12,7 @@ from rich.text import Text
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.calibrate import Calibration, Kept
 from cablecomp.diagnosis.result import Value
+from cablecomp.report.measured import rounded, with_sd
 
 
 def calibration_summary(found: Calibration) -> RenderableType:
@@ -35,7 +36,8 @@ def cells(v: Value) -> tuple[str, str, str, str]:
     """Nominal value, value, sd, change in per cent (in sd where the nominal one is 0)."""
     nominal = "–" if v.nominal is None else f"{v.nominal:.5g}"
     change = "" if not v.nominal else f"{100 * (v.value / v.nominal - 1):+.2g} %"
-    return nominal, f"{v.value:.5g}", f"{v.sd:.2g}", change
+    value, sd = rounded(v.value, v.sd)
+    return nominal, value, sd or "–", change
 
 
 def calibration_notes(found: Calibration) -> Iterator[str]:
@@ -76,7 +78,7 @@ def calibrated_text(found: Calibration) -> str:
     lines = [
         "calibrated; tolerances of fitted values are what the fit leaves (1 sigma, relative, at least 0.3 %)"
     ]
-    lines += [f"{v.name}: {v.value:.5g} ± {v.sd:.2g}, was {cells(v)[0]}" for v in found.values]
+    lines += [f"{v.name}: {with_sd(v.value, v.sd)}, was {cells(v)[0]}" for v in found.values]
     return joint_text(found.config, (*lines, *calibration_notes(found)))
 
 

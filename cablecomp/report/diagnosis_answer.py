@@ -17,13 +17,13 @@ from cablecomp.report.diagnosis_words import (
     dependences,
     depends,
     in_a_sentence,
-    number,
     percent,
     plain,
     repeats_limit,
     sentence,
     values_of,
 )
+from cablecomp.report.measured import rounded
 from cablecomp.report.page import Fact, Section, Tone
 from cablecomp.report.replay_figures import Scale
 
@@ -105,7 +105,11 @@ def _without_a_name(result: Mapping[str, Any]) -> str:
     if result["verdict"] == "recalibrate":
         moved = [(n, e) for n, e in result["calibration"].items() if e["nominal"] is not None]
         moved.sort(key=lambda p: -abs(p[1]["value"] - p[1]["nominal"]) / max(known(p[1]["sd"]), 1e-300))
-        rows = [(n, number(e["nominal"], 5), number(e["value"], 5), number(e["sd"], 2)) for n, e in moved]
+        rows = [
+            (n, *map(page.typeset, (f"{e['nominal']:.5g}", value, sd or "–")))
+            for n, e in moved
+            for value, sd in [rounded(e["value"], e["sd"])]
+        ]
         return page.table(("parameter", "configured", "now", "±"), rows[:_MOST_OLD])
     if result["candidates"]:
         c = result["candidates"][0]

@@ -26,8 +26,8 @@ from cablecomp.report.diagnosis_tables import (
     interval,
     known,
     rejected,
+    shown_with_sd,
     unit_for,
-    with_sd,
 )
 from cablecomp.report.diagnosis_words import (
     base_value,
@@ -120,12 +120,12 @@ def _parameter(effect: Effect, name: str, entry: Any) -> tuple[str, str, str, st
     base, _, condition = parts_of(name)
     known_as = next((p for p in effect.parameters if p.name == base and not condition), None)
     if known_as is not None and known_as.held:
-        return name, with_sd(value, sd), known_as.unit, "chosen, not fitted"
+        return name, shown_with_sd(value, sd), known_as.unit, "chosen, not fitted"
     if known_as is None:
-        return name, with_sd(value, sd), "", between(*ends) if ends else interval(value, sd)
+        return name, shown_with_sd(value, sd), "", between(*ends) if ends else interval(value, sd)
     least = 0.0 if known_as.low >= 0.0 else known_as.minimum
     words = between(*ends) if ends else interval(value, sd, least, known_as.maximum)
-    return name, with_sd(value, sd), known_as.unit, words
+    return name, shown_with_sd(value, sd), known_as.unit, words
 
 
 def _sessions(d: Diagnosis, result: Mapping[str, Any], laws: Sequence[Mapping[str, Any]]) -> Section:

@@ -13,6 +13,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.report import page
 from cablecomp.report.diagnosis_figures import not_fitted, residual
 from cablecomp.report.diagnosis_words import plain
+from cablecomp.report.measured import with_sd
 from cablecomp.report.replay_figures import Scale
 from cablecomp.units import suffix_of
 
@@ -37,16 +38,9 @@ def known(value: float | None) -> float:
     return float("nan") if value is None else float(value)
 
 
-def with_sd(value: float, sd: float) -> str:
-    """Value with as many decimals as its standard deviation has, and that one with two digits."""
-    if not (np.isfinite(sd) and sd > 0.0):
-        return page.number(value, digits=5)
-    decimals = 1 - int(np.floor(np.log10(sd)))
-    if -1 <= decimals <= 7:
-        places = max(decimals, 0)
-        return f"{value:.{places}f} ± {sd:.{places}f}".replace("-", "−")
-    digits = int(np.clip(np.floor(np.log10(max(abs(value), sd) / sd)) + 2, 2, 8))
-    return f"{page.number(value, digits=digits)} ± {page.number(sd, digits=2)}"
+def shown_with_sd(value: float, sd: float) -> str:
+    """`value ± sd` as a page prints it."""
+    return page.typeset(with_sd(value, sd))
 
 
 def interval(value: float, sd: float, least: float = -np.inf, most: float = np.inf) -> str:
@@ -114,7 +108,9 @@ def calibration(entries: Mapping[str, Mapping[str, Any]]) -> str:
         nominal, value, sd = (known(entry[key]) for key in ("nominal", "value", "sd"))
         share = np.isfinite(nominal) and nominal and "_offset_" not in name  # a zero has no share
         change = f"{100.0 * (value / nominal - 1.0):+.1f} %" if share else "–"
-        rows.append((name, page.number(nominal, digits=5), with_sd(value, sd), change.replace("-", "−")))
+        rows.append(
+            (name, page.number(nominal, digits=5), shown_with_sd(value, sd), change.replace("-", "−"))
+        )
     return page.table(("parameter", "configured", "calibrated", "change"), rows) if rows else ""
 
 
@@ -127,7 +123,7 @@ def by_session(entries: Mapping[str, Mapping[str, Any]]) -> str:
         (
             s,
             *(
-                with_sd(known(e["value"]), known(e["sd"])) if (e := own.get(f"{n}@{s}")) else "–"
+                shown_with_sd(known(e["value"]), known(e["sd"])) if (e := own.get(f"{n}@{s}")) else "–"
                 for n in names
             ),
         )

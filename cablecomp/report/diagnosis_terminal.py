@@ -19,6 +19,7 @@ from cablecomp.report.diagnosis_words import (
     repeats_limit,
     values_of,
 )
+from cablecomp.report.measured import rounded
 from cablecomp.report.replay_figures import Scale
 
 _COLOUR: Final[Mapping[str, str]] = {
@@ -80,7 +81,8 @@ def _errors(result: Mapping[str, Any]) -> Table:
 def _calibration(result: Mapping[str, Any]) -> Table:
     table = _table("calibration", "configured", "now", "±")
     for name, entry in result["calibration"].items():
-        table.add_row(name, _number(entry["nominal"]), _number(entry["value"]), _number(entry["sd"], 2))
+        value, sd = rounded(entry["value"], entry["sd"])
+        table.add_row(name, _number(entry["nominal"]), value, sd or "–")
     return table
 
 
@@ -117,8 +119,8 @@ def _table(*heads: str) -> Table:
     return table
 
 
-def _number(value: float | None, digits: int = 5) -> str:
-    return "–" if value is None else f"{value:.{digits}g}"
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.5g}"
 
 
 def _shown(value_rad: float | None, unit: Scale) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from cablecomp.estimation.parameter import parts_of
+from cablecomp.report.measured import with_sd
 
 ANSWERS: Final[Mapping[str, str]] = {
     "consistent": "The drive's known physics account for these data; nothing is left beyond noise.",
@@ -68,7 +69,7 @@ def values_of(entry: Mapping[str, Any]) -> Iterator[str]:
     """`name = value ± sd` of each parameter of an entry of `missing_physics`; a channel's name as it is."""
     for name, v in entry["parameters"].items():
         if isinstance(v, Mapping):
-            yield f"{name} = {number(v['value'])}" + (f" ± {number(v['sd'], 2)}" if v["sd"] else "")
+            yield f"{name} = {with_sd(v['value'], v['sd'])}"
         else:
             yield f"{name} = {v}"
 

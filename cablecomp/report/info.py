@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cablecomp.counting import counted
+from cablecomp.report.measured import with_sd
 from cablecomp.thesis.bench.types import BenchResult, Branch, Measured
 from cablecomp.thesis.design_types import DesignSheet, StageSheet, WrapUse
 
@@ -172,13 +173,7 @@ def _branches(result: BenchResult) -> list[Branch]:
 
 
 def _measured(value: Measured | None) -> str:
-    """Value and uncertainty to the uncertainty's second digit."""
-    if value is None:
-        return "–"
-    if not value.sd > 0.0:
-        return f"{value.value:.4g}"
-    places = min(max(0, 1 - math.floor(math.log10(value.sd))), 8)
-    return f"{value.value:.{places}f} ± {value.sd:.{places}f}"
+    return "–" if value is None else with_sd(value.value, value.sd)
 
 
 def _reading(GF: float) -> str:

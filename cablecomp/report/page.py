@@ -46,11 +46,12 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
     """Return `value` with `digits` significant digits and its unit; None and NaN are a dash."""
     if value is None or math.isnan(value):
         return "–"
-    text = f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, exponent = text.split("e")
-        text = f"{mantissa}·10{_superscript(int(exponent))}"
-    return f"{text.replace('-', '−')} {unit}".rstrip()
+    return f"{typeset(f'{value:.{digits}g}')} {unit}".rstrip()
+
+
+def typeset(text: str) -> str:
+    """Return numbers in a text with powers of ten and minus signs as they are printed."""
+    return re.sub(r"e([+-]\d+)", lambda m: f"·10{_superscript(int(m[1]))}", text).replace("-", "−")
 
 
 def paragraph(text: str) -> str:

@@ -205,8 +205,8 @@ def test_a_sign_that_is_doubted_stands_before_any_name(found: Diagnosis) -> None
 def test_recalibrate_gives_old_and_new_values(found: Diagnosis) -> None:
     d = without_a_name(found, "recalibrate")
     text = " ".join(terminal(d).split())
-    assert "pretension_N 33.54 33.1 0.22" in text
-    assert "pretension_N 33.54 33.1 0.22" in text_of(diagnosis_page(d).split("</section>")[0])
+    assert "pretension_N 33.54 33.10 0.22" in text
+    assert "pretension_N 33.54 33.10 0.22" in text_of(diagnosis_page(d).split("</section>")[0])
 
 
 def test_the_page_fetches_nothing(found: Diagnosis) -> None:
