@@ -71,6 +71,20 @@ def test_an_unsettled_peak_widens_what_follows() -> None:
         assert abs(branch.true.value - result.mu_eff_nominal) < 2.0 * branch.true.sd
 
 
+@pytest.mark.parametrize(("turn_rad", "said"), [(0.02, False), (2.0, True)])
+def test_a_motor_that_turns_meanwhile_is_said(turn_rad: float, said: bool) -> None:
+    """The plant with its motor going to and fro in the hold: what it does to the wraps, no bench knows."""
+    config = load_joint(JOINTS / "snow-closed-rig.toml")
+    t = np.arange(0.0, 240.0, 0.5)
+    load = np.interp(t, [20.0, 80.0, 120.0, 180.0], [0.0, 2.4, 2.4, 0.0])
+    motor = np.interp(t, [85.0, 95.0, 105.0], [0.0, turn_rad, 0.0])
+    run = simulate(PlantConfig.from_dict(config.model_dump(by_alias=True)), t, motor, load)
+    result = evaluate_bench(bench_recording(run.channels(), config), config)
+    notes = [note for note in result.notes if "the motor turns by" in note]
+    assert len(notes) == said
+    assert all(f"the motor turns by {turn_rad:.3g} rad" in note for note in notes)
+
+
 def test_a_missing_channel_is_named() -> None:
     config = load_joint(JOINTS / "snow-open-rig.toml")
     with pytest.raises(InputError, match="joint_torque_Nm"):

@@ -35,6 +35,9 @@ from cablecomp.thesis.geometry import sensor_deflection_rad
 
 __all__ = ["BenchRecording", "BenchResult", "Measured", "bench_recording", "evaluate_bench"]
 
+_TURNED_RAD = 0.1
+"""Turn of the motor that is said: a few per cent of the wrap that a usual load stretches (ln(1 + m)/mu)."""
+
 
 def bench_recording(columns: Mapping[str, Array], config: JointConfig) -> BenchRecording:
     """Return what the bench evaluation needs out of a recording's canonical channels.
@@ -49,12 +52,14 @@ def bench_recording(columns: Mapping[str, Array], config: JointConfig) -> BenchR
                 f"recording has no channel {name}, which a bench evaluation needs; there is {there}"
             )
     deflection = np.asarray(columns["joint_position_rad"], dtype=float)
-    if "motor_position_rad" in columns:
-        deflection = deflection - config.drive.ratio * np.asarray(columns["motor_position_rad"])
+    motor = columns.get("motor_position_rad")
+    if motor is not None:
+        deflection = deflection - config.drive.ratio * np.asarray(motor)
     return BenchRecording(
         np.asarray(columns["time_s"], dtype=float),
         np.asarray(columns["joint_torque_Nm"], dtype=float),
         deflection,
+        motor,
     )
 
 
@@ -126,6 +131,7 @@ def _prepare(recording: BenchRecording, config: JointConfig, sensor_stiffness: f
     deflection = deflection - (float(np.mean(deflection[rest])) - start)
     if rest.stop - rest.start < 8:
         notes = (*notes, "no hold at zero load before the ramp: its first samples are taken as the zero")
+    notes = (*notes, *_turned(recording.motor_position_rad, loading + unloading))
     _check_direction(deflection, smoothed.value, loading)
     resolution = sensors.joint_position_resolution_rad or 0.0
     quantised = reading_sigma(0.0, resolution)
@@ -145,6 +151,17 @@ def _prepare(recording: BenchRecording, config: JointConfig, sensor_stiffness: f
         segments,
         peak,
         notes,
+    )
+
+
+def _turned(motor_rad: Array | None, used: tuple[Segment, ...]) -> tuple[str, ...]:
+    """A note if the input was not held: cable that runs onto a pulley takes the place of what loads have stretched."""
+    turned = 0.0 if motor_rad is None else float(np.ptp(motor_rad[used[0].start : used[-1].stop]))
+    if turned < _TURNED_RAD:
+        return ()
+    return (
+        f"the motor turns by {turned:.3g} rad between the ramps' beginning and end, and a bench holds it still: the "
+        "coefficients are not to be trusted; hold it, or use `cablecomp calibrate`",
     )
 
 

@@ -21,13 +21,14 @@ class BenchRecording:
     """A drive loaded and unloaded with its input held, from uniform pretension.
 
     `time_s` rising; `load_Nm` the moment on the output pulley; `deflection_rad` = q_out - (r/R) q_in,
-    positive with M. Raises InputError for arrays of different length, fewer than 30 samples, values that are
-    not finite, time that does not rise.
+    positive with M; `motor_position_rad` q_in, None = held. Raises InputError for arrays of different length,
+    fewer than 30 samples, values that are not finite, time that does not rise.
     """
 
     time_s: Array
     load_Nm: Array
     deflection_rad: Array
+    motor_position_rad: Array | None = None
 
     def __post_init__(self) -> None:
         arrays = (self.time_s, self.load_Nm, self.deflection_rad)
