@@ -73,7 +73,7 @@ class _Contents:
             for record in self._outer(file):
                 try:
                     found += self._noted(record)
-                except (KeyError, ValueError, EOFError, self._error()) as error:
+                except (KeyError, ValueError, OverflowError, EOFError, self._error()) as error:
                     raise self._damaged(first_line(error)) from None
         return sorted(found)
 

@@ -246,3 +246,19 @@ def test_no_flipped_bit_changes_what_is_read(compression: str, tmp_path: Path) -
     )
     whole = path.read_bytes()
     same_or_refused(path, whole, 11)
+
+
+def test_a_chunk_that_states_more_bytes_than_can_be_counted_is_refused(tmp_path: Path) -> None:
+    """The topmost bit of the length of its records: a uint64 behind times, size, CRC, compression (mcap.dev/spec)."""
+    path = tmp_path / "a.mcap"
+    messages = (("/motor_position_rad", k * 10**6, {"value": 0.1 * k}) for k in range(9))
+    write_messages(path, {"/motor_position_rad": JSON}, messages)
+    whole, at = bytearray(path.read_bytes()), 8
+    while whole[at] != 0x06:
+        at += 9 + int.from_bytes(whole[at + 1 : at + 9], "little")
+    compression = at + 9 + 8 + 8 + 8 + 4
+    length = compression + 4 + int.from_bytes(whole[compression : compression + 4], "little")
+    whole[length + 7] |= 0x80
+    path.write_bytes(whole)
+    with pytest.raises(InputError, match=r"a\.mcap: damaged MCAP \(.*\); run `mcap recover` on it"):
+        read_all(path)
