@@ -169,7 +169,8 @@ def _absolute(lines: Iterator[str]) -> Iterator[str]:
 
 
 def _check_containers(path: Path) -> None:
-    """Refuse a BLF whose packed containers would not fit into memory."""
+    """Refuse a BLF whose packed containers would not fit into memory, or are packed as python-can, which leaves such
+    ones out, cannot unpack them."""
     with path.open("rb") as file:
         head = file.read(8)
         file.seek(int.from_bytes(head[4:8], "little"))
@@ -178,7 +179,15 @@ def _check_containers(path: Path) -> None:
             if size < 16:
                 raise InputError(f"{path}: damaged BLF log (an object of {size} bytes); record it anew")
             data = file.read(size - 16 + size % 4)
-            if kind == 10 and len(data) > 16 and int.from_bytes(data[:2], "little") == 2:
+            if kind != 10 or len(data) <= 16:
+                continue
+            method = int.from_bytes(data[:2], "little")
+            if method not in (0, 2):
+                raise InputError(
+                    f"{path}: damaged BLF log (a container packed by method {method}; 0 and 2 are accepted); "
+                    "record it anew"
+                )
+            if method == 2:
                 unpacker = zlib.decompressobj()
                 with suppress(zlib.error):
                     unpacker.decompress(data[16:], _MOST_CONTAINER)

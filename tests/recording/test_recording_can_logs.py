@@ -141,3 +141,20 @@ def test_a_container_that_unpacks_without_end_is_refused(tmp_path: Path) -> None
     path.write_bytes(head + container + packed)
     with pytest.raises(InputError, match="unpacks to over 64 MB"):
         list(frames(path, "blf"))
+
+
+def test_a_container_packed_in_a_way_that_is_not_known_is_refused(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its frames would be missing, with no word of which file that was. Method 2 is zlib, 0 is none."""
+    path = log(tmp_path, "blf")
+    whole = bytearray(path.read_bytes())
+    assert whole[144:148] == b"LOBJ"
+    assert whole[160:162] == b"\x02\x00"
+    whole[160] = 66
+    path.write_bytes(whole)
+    with pytest.raises(
+        InputError, match=r"log\.blf\S*: damaged BLF log \(a container packed by method 66; 0 and 2 are"
+    ):
+        list(frames(path, "blf"))
+    assert not caplog.records
