@@ -185,7 +185,7 @@ def left_out_in_turn(evidence: Sequence[Evidence], by: str) -> list[Part]:
             )
             for k in range(min(count, int(turn.sum())))
         ]
-    fold = [cut(len(e.rows), LIMITS.part_blocks) % count for e in evidence]
+    fold = [_out_of_step(cut(len(e.rows), LIMITS.part_blocks), count) for e in evidence]
     return [
         Part(
             [_counting(e, f != k) for e, f in zip(evidence, fold, strict=True)],
@@ -193,6 +193,12 @@ def left_out_in_turn(evidence: Sequence[Evidence], by: str) -> list[Part]:
         )
         for k in range(count)
     ]
+
+
+def _out_of_step(block: IntArray, count: int) -> IntArray:
+    """The part of each block: every round of `count` begins two further on, or a recording of as many cycles as there
+    are rounds would lose one phase of all of them, and its load or end of travel with it."""
+    return np.asarray((block + 2 * (block // count)) % count, dtype=np.int64)
 
 
 # --- blocks of a residual ---------------------------------------------------------------------------------------------

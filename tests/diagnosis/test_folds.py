@@ -59,6 +59,13 @@ def test_blocks_are_left_out_once() -> None:
             assert not np.any(part.out[k].counted[JOINT] & part.rest[k].counted[JOINT])
 
 
+@pytest.mark.parametrize("cycles", [2, 3, 4, 5, 6, 10])
+def test_no_phase_of_a_motion_is_left_out_in_all_its_cycles(cycles: int) -> None:
+    phase = np.arange(60) % (60 // cycles)
+    for part in left_out_in_turn([recording("0", "one")], "block"):
+        assert set(phase[part.rest[0].counted[JOINT]]) == set(phase)
+
+
 @pytest.mark.parametrize(
     ("sessions", "own", "what"),
     [
