@@ -35,7 +35,7 @@ def calibration_summary(found: Calibration) -> RenderableType:
 def cells(v: Value) -> tuple[str, str, str, str]:
     """Nominal value, value, sd, change in per cent (in sd where the nominal one is 0)."""
     nominal = "–" if v.nominal is None else f"{v.nominal:.5g}"
-    change = "" if not v.nominal else f"{100 * (v.value / v.nominal - 1):+.2g} %"
+    change = "" if not v.nominal else f"{float(f'{100 * (v.value / v.nominal - 1):.2g}'):+g} %"
     value, sd = rounded(v.value, v.sd)
     return nominal, value, sd or "–", change
 
@@ -93,4 +93,4 @@ def _kept(k: Kept) -> str:
 
 def _wide(sd: float, share: bool) -> str:
     """A share in per cent; else the amount, in the unit that the value's name ends with."""
-    return f"{100 * min(sd, 9.99):.2g} %" if share else f"{sd:.2g}"
+    return f"{float(f'{100 * min(sd, 9.99):.2g}'):g} %" if share else f"{sd:.2g}"

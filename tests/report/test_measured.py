@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
+from cablecomp.diagnosis.calibrate import Kept
 from cablecomp.diagnosis.result import Value
-from cablecomp.report.calibration import cells
+from cablecomp.report.calibration import calibration_notes, cells
 from cablecomp.report.diagnosis_words import values_of
 from cablecomp.report.measured import rounded, with_sd
 
@@ -35,3 +38,10 @@ def test_names_and_calibrations_are_written_by_the_same_rule() -> None:
     entry = {"parameters": {"mu_angle": {"value": 0.3483, "sd": 1.2}, "channel": "other_rad"}}
     assert list(values_of(entry)) == ["mu_angle = 0.3 ± 1.2", "channel = other_rad"]
     assert cells(Value("mu_angle", 0.3483, 1.2, 0.3)) == ("0.3", "0.3", "1.2", "+16 %")
+
+
+def test_a_share_above_a_hundred_per_cent_is_no_power_of_ten() -> None:
+    assert cells(Value("EA_N", 230.0, 4.0, 100.0))[-1] == "+130 %"
+    kept = Kept("EA_N", 100.0, 2.3, "these recordings tell nothing of it", None, True)
+    (line, *_) = calibration_notes(SimpleNamespace(kept=[kept], tied=(), warnings=()))
+    assert line.startswith("EA_N stays nominal, 100 ± 230 %: ")
