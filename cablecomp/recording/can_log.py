@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
@@ -92,9 +92,10 @@ def _ends_early(path: Path, kind: CanKind) -> Iterator[str]:
 
 def frames(path: Path, kind: CanKind) -> Iterator[Frame]:
     """Stream the data frames of a log, without error and remote frames; raises InputError where it is damaged."""
+    read: list[int] = []
     try:
         with ExitStack() as stack:
-            for count, m in enumerate(_reader(path, kind, stack)):
+            for count, m in enumerate(_reader(path, kind, stack, read)):
                 if m.is_error_frame or m.is_remote_frame:
                     continue
                 if not math.isfinite(m.timestamp):
@@ -103,12 +104,14 @@ def frames(path: Path, kind: CanKind) -> Iterator[Frame]:
     except InputError:
         raise
     except Exception as error:  # whatever python-can makes of a damaged log
+        where = f"line {read[0]}: " if read else ""
         raise InputError(
-            f"{path}: damaged {kind.upper()} log ({first_line(error)}); record it anew"
+            f"{path}: {where}damaged {kind.upper()} log ({first_line(error)}); record it anew"
         ) from None
 
 
-def _reader(path: Path, kind: CanKind, stack: ExitStack) -> Any:
+def _reader(path: Path, kind: CanKind, stack: ExitStack, read: list[int]) -> Any:
+    """python-can's reader; in `read` the number of the line of text that it was given last."""
     import can  # slow to import, and only such logs need it
 
     if kind == "mf4":
@@ -124,10 +127,17 @@ def _reader(path: Path, kind: CanKind, stack: ExitStack) -> Any:
         _check_containers(path)
         return can.BLFReader(stack.enter_context(path.open("rb")))
     text = stack.enter_context(path.open(encoding="latin-1"))
-    lines = (line for line in text if line.endswith("\n"))
+    lines = _whole(text, read)
     if kind == "asc":
         return can.ASCReader(_Lines(_absolute(lines)))
     return can.CanutilsLogReader(_Lines(lines)) if kind == "candump" else can.TRCReader(_Lines(lines))
+
+
+def _whole(text: Iterable[str], read: list[int]) -> Iterator[str]:
+    for number, line in enumerate(text, start=1):
+        read[:] = [number]
+        if line.endswith("\n"):
+            yield line
 
 
 class _Lines:

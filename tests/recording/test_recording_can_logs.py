@@ -131,6 +131,19 @@ def test_damaged_logs_end_in_a_line(kind: str, tmp_path: Path) -> None:
         assert "\n" not in said
 
 
+@pytest.mark.parametrize("kind", ["candump", "asc"])
+def test_a_damaged_line_of_a_log_is_named(kind: str, tmp_path: Path) -> None:
+    path = log(tmp_path, kind)
+    lines = path.read_text().split("\n")
+    at = 20
+    lines[at] = lines[at][:-2] + "0p"  # of the last byte in hexadecimal digits
+    path.write_text("\n".join(lines))
+    with pytest.raises(
+        InputError, match=rf"txt: line {at + 1}: damaged {kind.upper()} log \(.*\); record it anew"
+    ):
+        list(frames(path, kind))
+
+
 def test_a_container_that_unpacks_without_end_is_refused(tmp_path: Path) -> None:
     packed = zlib.compress(b"\0" * (1 << 28), 9)
     head = struct.pack("<4sL", b"LOGG", 144) + b"\0" * 136
