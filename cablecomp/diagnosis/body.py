@@ -16,7 +16,8 @@ from cablecomp.diagnosis.folds import kept_for_the_end
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.departures import FEWEST
-from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, gather, load_channel, rows_for
+from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
+from cablecomp.estimation.gather import gather, rows_for
 from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.standing import ONE_CLAIM, apart_of, stated_of
 from cablecomp.signal.smoothing import FloatArray

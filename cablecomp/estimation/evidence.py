@@ -1,7 +1,7 @@
 """Recordings as a fit takes them: cleaned inputs, rows thinned by travel, sessions and conditions.
 
 A law that knows no rates is done with a row per so much travel: between two rows motion and load go one way. Holds
-keep a row per so much time. What has no finite reading is bridged for the inputs and does not count for the outputs.
+keep a row per so much time. `gather` makes one of a recording's columns.
 """
 
 from __future__ import annotations
@@ -14,12 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cablecomp.config import JointConfig
-from cablecomp.errors import InputError
-from cablecomp.estimation.outliers import outliers, outliers_in_motion
-from cablecomp.estimation.thinning import APART, thinned
 from cablecomp.observer.rows import Readings
-from cablecomp.signal.noise import channel_noise
-from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 JOINT: Final = "joint_position_rad"
 INPUT: Final = "motor_position_rad"
@@ -28,19 +24,10 @@ OUTPUTS: Final = (JOINT, MOTOR, "tension_h_N", "tension_l_N")
 """Channels that a model has to account for, where they are recorded."""
 
 NEEDED: Final = ("time_s", INPUT, JOINT)
-FINE_ROWS: Final = 6_000
-"""Rows of all recordings together that are kept after cleaning."""
 RATED: Final = 2
 """Every so many of them a law with rates is run at, beside the judged ones."""
-LEAST_FINE: Final = 1_000
-"""Rows that a recording keeps of these, however many there are."""
 FEWEST: Final = 40
 """Readings of a channel, and rows, below which there is nothing to fit."""
-SPARSE: Final = 0.6
-"""Share of readings below which an input counts as a channel of a lower rate, which is bridged."""
-DIED: Final = 10.0
-"""Usual steps of such a channel beyond which it was not read for a while, or no more; those that a gap counts for in
-the time that rows stand for."""
 OVERFLOWN: Final = 1e15
 """From there on a reading is none, whatever its unit: something has overflowed, and its square would."""
 
@@ -178,174 +165,3 @@ def load_channel(config: JointConfig, columns: Mapping[str, FloatArray]) -> str 
     if config.observer.load == "motor_torque" and MOTOR in columns:
         return MOTOR
     return "joint_torque_Nm" if "joint_torque_Nm" in columns else None
-
-
-def gather(
-    config: JointConfig,
-    name: str,
-    columns: Mapping[str, FloatArray],
-    session: str,
-    *,
-    fine_rows: int,
-    judged_rows: int,
-) -> Evidence:
-    """Clean and thin one recording (canonical channels -> columns).
-
-    Raises InputError where a channel that is needed is missing or has hardly a finite reading.
-    """
-    for key in NEEDED:
-        if key not in columns:
-            raise InputError(f"{name}: channel `{key}` is missing; a diagnosis needs {', '.join(NEEDED)}")
-    raw = _in_order(name, {k: np.asarray(v, dtype=np.float64) for k, v in columns.items()})
-    load = load_channel(config, raw)
-    good, set_aside = _good(name, raw, load, config.drive.ratio)
-    unread = tuple(k for k in raw if k != "time_s" and k not in good)
-    raw = {k: v for k, v in raw.items() if k not in unread}
-    noise = {k: _noise(raw["time_s"][g], raw[k][g]) for k, g in good.items()}
-    noise |= _unresolved(config.drive.ratio, raw, good, noise)
-    drivable = _drivable(raw, good, load)
-    if drivable.sum() < FEWEST:
-        raise InputError(
-            f"{name}: motor angle and load were read together at {int(drivable.sum())} instants; {FEWEST} are needed"
-        )
-    raw, finite = _bridged(raw, good, drivable)
-    means, read = _fine(raw, finite, noise, fine_rows, load)
-    drivers = [means[k] for k in (INPUT, *([load] if load else []))]
-    rows = thinned(means["time_s"], drivers, means[JOINT], judged_rows)
-    weight = _weight(means["time_s"], rows)
-    return Evidence(
-        name, session, {}, means, rows, {k: v[rows] for k, v in read.items()}, weight, noise, set_aside,
-        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread, read=read,
-    )  # fmt: skip
-
-
-def _good(
-    name: str, raw: Mapping[str, FloatArray], load: str | None, ratio: float
-) -> tuple[dict[str, BoolArray], int]:
-    """Which readings of each channel are to be trusted, and how many were set aside as outliers; without the channels
-    that may be missing and were hardly read."""
-    good = {k: np.abs(v) < OVERFLOWN for k, v in raw.items() if k != "time_s"}
-    set_aside = 0
-    for key, kept in list(good.items()):
-        if kept.sum() < FEWEST:
-            if key in NEEDED or key == load:
-                raise InputError(
-                    f"{name}: channel `{key}` has {int(kept.sum())} finite readings; {FEWEST} are needed"
-                )
-            del good[key]
-            continue
-        spikes = outliers(raw[key], kept)
-        set_aside += int(spikes.sum())
-        kept &= ~spikes
-    both = good[JOINT] & good[INPUT]
-    in_motion = outliers_in_motion(raw["time_s"], raw[JOINT], ratio * raw[INPUT], both)
-    for key, spikes in zip((JOINT, INPUT), in_motion, strict=True):
-        set_aside += int(spikes.sum())
-        good[key] &= ~spikes
-    return good, set_aside
-
-
-def _drivable(raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], load: str | None) -> BoolArray:
-    """Rows at which the inputs were read: the drive goes from reading to reading, and where an input has none, a
-    bridged value would be an error of the prediction. Of a channel of a lower rate, rows between two readings of it."""
-    time = raw["time_s"]
-    kept = np.ones(len(time), dtype=np.bool_)
-    for key in (INPUT, *([load] if load else [])):
-        kept &= good[key] if good[key].mean() > SPARSE else _between(time, time[good[key]])
-    return kept
-
-
-def _between(time: FloatArray, read: FloatArray) -> BoolArray:
-    """Rows between two readings (at these times) that are no further apart than `DIED` times what is usual."""
-    steps = np.diff(read)
-    after = np.searchsorted(read, time, side="right")
-    inside = (after > 0) & ((after < len(read)) | (time == read[-1]))
-    step = steps[np.clip(after - 1, 0, len(steps) - 1)]
-    return np.asarray(inside & (step <= DIED * np.median(steps)), dtype=np.bool_)
-
-
-def _bridged(
-    raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], kept: BoolArray
-) -> tuple[dict[str, FloatArray], dict[str, BoolArray]]:
-    """The rows kept, other channels bridged where they have no reading; and where an output has one."""
-    time = raw["time_s"]
-    bridged = {
-        k: v[kept] if k == "time_s" else np.interp(time[kept], time[good[k]], v[good[k]])
-        for k, v in raw.items()
-    }
-    return bridged, {k: good[k][kept] for k in OUTPUTS if k in raw}
-
-
-def _fine(
-    raw: Mapping[str, FloatArray],
-    finite: Mapping[str, BoolArray],
-    noise: Mapping[str, float],
-    fine_rows: int,
-    load: str | None,
-) -> tuple[dict[str, FloatArray], dict[str, BoolArray]]:
-    """Means of as many readings as leave `fine_rows`, inputs cleaned; and which of these were read, by output channel.
-    Of readings on both sides of a gap nothing is made."""
-    group = max(1, -(-len(raw["time_s"]) // fine_rows))
-    whole = len(raw["time_s"]) // group * group
-    time = raw["time_s"][:whole].reshape(-1, group)
-    span = time[:, -1] - time[:, 0]
-    near = span <= APART * np.median(span)
-    means = {k: group_means(v[:whole], group)[near] for k, v in raw.items()}
-    read = {k: (group_means(v[:whole].astype(np.float64), group) > 0.99)[near] for k, v in finite.items()}
-    for key in raw:
-        is_input = key != "time_s" and (key not in OUTPUTS or key == load)
-        if is_input and np.ptp(means[key]) > 0.0:
-            means[key] = keep_corners(means["time_s"], means[key], noise[key] / np.sqrt(group))
-    if load == MOTOR:
-        read.pop(MOTOR)
-    return means, read
-
-
-def _weight(time: FloatArray, rows: IntArray) -> FloatArray:
-    """Root of the time that each judged row stands for, over its mean: a gap, in which nothing was read, counts as
-    `DIED` usual steps, or the two rows beside a long one would outweigh all others."""
-    if len(rows) < 2:
-        return np.ones(len(rows))
-    steps = np.diff(time)
-    recorded = np.append(0.0, np.cumsum(np.minimum(steps, DIED * np.median(steps))))[rows]
-    share = np.gradient(recorded)
-    return np.asarray(np.sqrt(share / share.mean()), dtype=np.float64)
-
-
-def rows_for(samples: Sequence[int], judged: int) -> tuple[list[int], list[int]]:
-    """(fine, judged) rows of each recording, out of its samples and of what all together may have."""
-    total = sum(samples)
-    fine = [max(LEAST_FINE, int(FINE_ROWS * n / total)) for n in samples]
-    return fine, [max(60, min(int(judged * n / total), f)) for n, f in zip(samples, fine, strict=True)]
-
-
-def _in_order(name: str, columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Rows with a finite time, one of each instant."""
-    time = columns["time_s"]
-    kept = np.isfinite(time)
-    kept[1:] &= np.diff(np.maximum.accumulate(np.where(kept, time, -np.inf))) > 0.0
-    if kept.sum() < FEWEST:
-        raise InputError(f"{name}: {int(kept.sum())} samples with a time of their own; {FEWEST} are needed")
-    return {k: v[kept] for k, v in columns.items()}
-
-
-def _unresolved(
-    ratio: float, raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], noise: Mapping[str, float]
-) -> dict[str, float]:
-    """Noise of the angles that were read so seldom that motion looks like noise (twice as much): that of the joint's
-    angle beyond the rigid drive, which holds both."""
-    both = good[JOINT] & good[INPUT]
-    if both.sum() < FEWEST:
-        return {}
-    beyond = _noise(raw["time_s"][both], raw[JOINT][both] - ratio * raw[INPUT][both])
-    found = {JOINT: beyond, INPUT: beyond / abs(ratio)}
-    return {k: v for k, v in found.items() if 0.0 < v < 0.5 * noise[k]}
-
-
-def _noise(time: FloatArray, values: FloatArray) -> float:
-    if np.ptp(values) == 0.0:
-        return 0.0
-    try:
-        return float(channel_noise(time, values).sigma)
-    except InputError:
-        return 0.0

@@ -15,7 +15,7 @@ from cablecomp.config import JointConfig, Session, load_joint, with_values
 from cablecomp.diagnosis.calibrate import Calibration, calibrate
 from cablecomp.diagnosis.calibration.drive import _drums_exchanged
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit, solve
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing

@@ -14,7 +14,7 @@ from cablecomp.diagnosis.calibration.counts import with_places
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.calibration.every_sample import by_wide_steps, in_common, on_every_sample
 from cablecomp.diagnosis.pace import Pace
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.examples import example
 from cablecomp.signal.smoothing import FloatArray

@@ -10,7 +10,7 @@ from turning import JOINT, recorded
 from cablecomp.diagnosis.locate.covariates import FURTHER, UNITS, covariates, join, reversals
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 
 
 def test_a_triangle_has_its_direction_rate_and_distance() -> None:

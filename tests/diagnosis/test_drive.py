@@ -15,7 +15,8 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibrate import calibrate
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.estimation.evidence import JOINT, gather
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit, rms_left, solve
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing

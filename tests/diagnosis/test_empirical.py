@@ -11,7 +11,8 @@ import pytest
 from cablecomp.config import Empirical
 from cablecomp.diagnosis.describe.empirical import _curve, _Rows, _wave, refitted, value_of
 from cablecomp.diagnosis.folds import Groups
-from cablecomp.estimation.evidence import JOINT, Evidence, gather
+from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.simulate import simulator
 from cablecomp.signal.smoothing import FloatArray
 from tests.diagnosis.test_diagnose import joint, recording

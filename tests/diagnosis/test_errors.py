@@ -15,7 +15,8 @@ from cablecomp.diagnosis.answer.errors import errors_of
 from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_history
 from cablecomp.diagnosis.diagnose import diagnose
-from cablecomp.estimation.evidence import JOINT, gather
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import solve
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing

@@ -18,7 +18,7 @@ from cablecomp.diagnosis.explain.model import no_answer
 from cablecomp.diagnosis.explain.plausible import falls_between, over_plausible
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive, of_effect, reach_of
 from cablecomp.estimation.problem import Problem, Weighing

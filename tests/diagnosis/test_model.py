@@ -16,7 +16,7 @@ from cablecomp.diagnosis.explain.scores import left_out
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.folds import make_groups
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive, vague_drive
 from cablecomp.estimation.problem import Problem, Weighing

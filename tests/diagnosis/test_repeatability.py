@@ -11,7 +11,7 @@ from joints import SMALL, SMALL_TOLERANCE, closed
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.locate.remainders import covariates_of
 from cablecomp.diagnosis.locate.repeatability import repeatability
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 
 CONFIG = parse_joint({**closed(SMALL, "small"), "tolerance": SMALL_TOLERANCE}, "small")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from turning import JOINT, recorded
 
 from cablecomp.config import JointConfig
-from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray

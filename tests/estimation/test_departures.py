@@ -10,7 +10,8 @@ from turning import JOINT, recorded
 
 from cablecomp.effects.catalogue import catalogue
 from cablecomp.estimation.departures import departures, set_anew
-from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.limits import FAR
 from cablecomp.estimation.parameter import of_drive, of_effect
 from cablecomp.estimation.problem import Problem, Weighing

@@ -10,7 +10,8 @@ from turning import JOINT, recorded
 
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence, gather, rows_for
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.gather import gather, rows_for
 from cablecomp.estimation.simulate import simulator
 from cablecomp.estimation.thinning import thinned
 from cablecomp.observer import Observer

@@ -11,7 +11,8 @@ import pytest
 from joints import LONG, closed
 
 from cablecomp.config import parse_joint
-from cablecomp.estimation.evidence import JOINT, Evidence, gather
+from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.history import Forgotten, forgotten
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing

@@ -11,7 +11,7 @@ from turning import JOINT, recorded
 
 from cablecomp.config import EffectEntry, JointConfig
 from cablecomp.effects import catalogue
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit, covariance, solve, weighed
 from cablecomp.estimation.parameter import of_drive, of_effect, own_of
 from cablecomp.estimation.problem import Problem, Weighing

@@ -16,7 +16,7 @@ from cablecomp.config.sessions import Session
 from cablecomp.config_text import joint_text
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.standing import apart_of, as_it_stood, at_pretension, standing, value_of
 from cablecomp.signal.smoothing import FloatArray
 

@@ -10,7 +10,8 @@ from joints import SMALL, SMALL_NOISE, closed
 from small_drive import TOLERANT, course
 
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
-from cablecomp.estimation.evidence import JOINT, gather
+from cablecomp.estimation.evidence import JOINT
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.limits import AVERAGED_MOST
 from cablecomp.estimation.steadying import on_every_row, steadied, with_steady_readings

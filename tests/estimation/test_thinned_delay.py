@@ -10,7 +10,8 @@ import pytest
 from turning import JOINT, recorded
 
 from cablecomp.effects import with_effects
-from cablecomp.estimation.evidence import Evidence, gather
+from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.simulate import simulator
 from cablecomp.signal.smoothing import FloatArray
 

@@ -87,7 +87,7 @@ def test_dates_and_durations_are_no_numbers_of_seconds(kept: str, of: str) -> No
     times = np.array([0, 1, 2], dtype="timedelta64[ms]").astype("timedelta64[ns]")
     times = times if of == "durations" else np.datetime64("2026-01-01", "ns") + times
     if kept != "numpy":
-        times = pytest.importorskip(kept).Series(times)
+        times = pytest.importorskip(kept, reason=f"{kept} is not installed").Series(times)
     columns = {"time_s": times, "motor_position_rad": np.zeros(3), "joint_torque_Nm": np.zeros(3)}
     with pytest.raises(InputError, match=r"'time_s' holds dates or durations.*timedelta64"):
         cablecomp.replay(columns, "capstan-arm")

@@ -22,7 +22,8 @@ from cablecomp.diagnosis.calibration.counts import count_rad, with_places
 from cablecomp.diagnosis.calibration.drive import Calibrated
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence, gather
+from cablecomp.estimation.evidence import JOINT, OUTPUTS, Evidence
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit, approach, refit, rms_left, solve, weighed
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.autocorrelation import integrated_time_of_parts
