@@ -18,7 +18,7 @@ from cablecomp.diagnosis.explain.linear import anchor, contribution
 from cablecomp.diagnosis.explain.unseen import _bound_of_phase, _likeliest, could_be_unseen
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT as ANGLE
-from cablecomp.estimation.evidence import gather
+from cablecomp.estimation.gather import gather
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.observer import Observer
