@@ -29,12 +29,6 @@ class ArcMeet(NamedTuple):
 
 
 @inner_kernel
-def line(laws: Floats, y1: float, v1: float, y2: float, v2: float) -> tuple[float, float]:
-    """Integral of e(v), and of its derivative, over a straight piece."""
-    return piece(laws, ELSEWHERE, y1, v1, math.exp(v1), y2, v2, math.exp(v2))
-
-
-@inner_kernel
 def _strain(laws: Floats, v: float) -> float:
     return strain_of_tau(laws, ELSEWHERE, tau_of_v(laws, ELSEWHERE, v))[0]
 
@@ -43,10 +37,12 @@ def _strain(laws: Floats, v: float) -> float:
 def integral_to(p: Points, laws: Floats, n: int, y: float) -> float:
     """Integral of e(v) from the near end to y, over the committed profile."""
     for k in range(n - 1):
-        if y <= p[k + 1].y:
+        if y < p[k + 1].y:
+            if y <= p[k].y:
+                return p[k].stretch
             share = (y - p[k].y) / (p[k + 1].y - p[k].y)
             v = p[k].v + share * (p[k + 1].v - p[k].v)
-            part, _ = line(laws, p[k].y, p[k].v, y, v)
+            part, _ = piece(laws, ELSEWHERE, p[k].y, p[k].v, p[k].tau, y, v, math.exp(v))
             return p[k].stretch + part
     return p[n - 1].stretch
 
@@ -87,8 +83,8 @@ def _far_meet(p: Points, n: int, v: float, steep: float, s: float) -> float:
 
 
 @inner_kernel
-def arc_meet(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float) -> ArcMeet:
-    """The arc at end values v1 (near) and v2 (far), |v1 - v2| <= mu width, without committing it."""
+def arc_meet(p: Points, laws: Floats, n: int, v1: float, tau1: float, v2: float, mu: float) -> ArcMeet:
+    """The arc at end values v1 (near; T/T0 = tau1) and v2 (far), |v1 - v2| <= mu width, without committing it."""
     width = p[n - 1].y
     s1, s2 = _side(v1, p[0].v), _side(v2, p[n - 1].v)
     near = 0.0 if s1 == 0.0 else _near_meet(p, n, v1, s1 * mu, s1)
@@ -107,17 +103,21 @@ def arc_meet(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float) -
         far = near
     slipped = by_near = 0.0
     if near > 0.0:
-        slipped, by_near = line(laws, 0.0, v1, near, v1 - s1 * mu * near)
+        v = v1 - s1 * mu * near
+        slipped, by_near = piece(laws, ELSEWHERE, 0.0, v1, tau1, near, v, math.exp(v))
     return ArcMeet(slipped - integral_to(p, laws, n, near), by_near, near, far, swap)
 
 
 @inner_kernel
-def arc_total(p: Points, laws: Floats, n: int, v2: float, mu: float, meet: ArcMeet) -> tuple[float, float]:
+def arc_total(
+    p: Points, laws: Floats, n: int, v2: float, tau2: float, mu: float, meet: ArcMeet
+) -> tuple[float, float]:
     """Integral of e(v) over the whole arc that has been met, and its derivative by the far end's value."""
     width, far = p[n - 1].y, meet.far
     total, by_far = meet.change + integral_to(p, laws, n, far), 0.0
     if far < width:
-        slipped, by_far = line(laws, far, v2 - _side(v2, p[n - 1].v) * mu * (width - far), width, v2)
+        v = v2 - _side(v2, p[n - 1].v) * mu * (width - far)
+        slipped, by_far = piece(laws, ELSEWHERE, far, v, math.exp(v), width, v2, tau2)
         total += slipped
     return total, by_far
 
@@ -132,7 +132,7 @@ def _side(new: float, old: float) -> float:
 def arc_commit(p: Points, laws: Floats, n: int, v1: float, v2: float, mu: float) -> int:
     """Clamp the arc's profile to its new end values; returns the new number of points."""
     width = p[n - 1].y
-    meet = arc_meet(p, laws, n, v1, v2, mu)
+    meet = arc_meet(p, laws, n, v1, math.exp(v1), v2, mu)
     near, far = meet.near, meet.far
     s1 = 1.0 if v1 > p[0].v else -1.0
     s2 = 1.0 if v2 > p[n - 1].v else -1.0

@@ -82,7 +82,7 @@ def cable_eval(d: Drive, laws: Floats, c: int, tension: float, x_in: float, x_ou
     if laws is not None:
         if cable.guide > 0.0:
             w_in = cable.wrap[IN] - cable.sign * x_in
-            split = guide_split(d, laws, c, v, x_in, w_in)
+            split = guide_split(d, laws, c, v, tau, x_in, w_in)
             total, slope, by_shaft_in = split.stretch, split.slope * dv, split.by_shaft
             state.tension_in = split.tau_in * t0
             d.guides[c].by_tension, d.guides[c].by_in = split.tau_by_end * dv, split.tau_by_shaft * t0

@@ -29,8 +29,10 @@ class Split(NamedTuple):
 
 
 @inner_kernel
-def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in: float) -> Split:
-    """Input side of cable c when the guide's output end stands at v_out (ln(T/T0) for the plain cable).
+def guide_split(
+    d: Drive, laws: Floats, c: int, v_out: float, tau_out: float, x_in: float, w_in: float
+) -> Split:
+    """Input side of cable c when the guide's output end stands at v_out (ln(T/T0) for the plain cable), T/T0 = tau_out.
 
     The input drum's pending step is kept.
     """
@@ -59,7 +61,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
         )
         set_pending(step, on_drum)
         step.end_v, step.end_tau = v_in, tau_in
-        on_guide = arc_meet(d.profiles[arc], laws, d.heights[arc], v_in, v_out, 1.0)
+        on_guide = arc_meet(d.profiles[arc], laws, d.heights[arc], v_in, tau_in, v_out, 1.0)
         strain, strain_slope = strain_of_tau(laws, ELSEWHERE, tau_in)
         side = radius * on_drum.total + span * strain
         by_v = radius * on_drum.slope + span * strain_slope / dv_dtau(laws, ELSEWHERE, tau_in, v_in)
@@ -90,7 +92,7 @@ def guide_split(d: Drive, laws: Floats, c: int, v_out: float, x_in: float, w_in:
         by_shaft = -cable.sign * radius * near_side / (near_side + per_turn * on_guide.swap)
         end_by_shaft = -cable.sign * radius / unit / (near_side + per_turn * on_guide.swap)
     state.guide_follow = follow
-    total, by_far = arc_total(d.profiles[arc], laws, d.heights[arc], v_out, 1.0, on_guide)
+    total, by_far = arc_total(d.profiles[arc], laws, d.heights[arc], v_out, tau_out, 1.0, on_guide)
     slope = per_turn * by_far + follow * near_side
     tau_in = tau_of_v(laws, ELSEWHERE, v_in)
     rise = 1.0 / dv_dtau(laws, ELSEWHERE, tau_in, v_in)

@@ -33,6 +33,7 @@ from cablecomp.mechanics.tables import (
     MODE,
     PANEL,
     PLAIN,
+    SIXTH,
     STEADY,
     STIFF,
     STIFFENING,
@@ -48,7 +49,8 @@ from cablecomp.mechanics.tables import (
 )
 
 LEAST_TABLED = 0.2
-"""Rise of a piece from which on the tabled integral of its strain is exact enough: its error is divided by the rise."""
+"""Rise of a piece from which on the tabled integral of its strain is exact enough, as its error is divided by the rise;
+below it a cable that stiffens is done by a series."""
 SHORT_GROOVE = 0.25
 """Arc [rad] on which five points lie no farther apart than eight do on longer pieces."""
 LEAST_CLOSED = 1e-6
@@ -102,13 +104,13 @@ def piece_plain(dy: float, d: float, tau1: float, tau2: float) -> tuple[float, f
 @inner_kernel
 def _piece_stiff(b: float, dy: float, v1: float, tau1: float, v2: float, tau2: float) -> tuple[float, float]:
     """`piece` for a cable all of which stiffens, under plain friction: in closed form, but for short pieces, where
-    differences would cancel, and where a cable softens beyond its law; these by Gauss-Legendre quadrature.
+    differences would cancel, by a series, and by Gauss-Legendre quadrature where the cable softens.
 
     e(v) = (ln(1 - b) + ln(1 + c exp v))/b with c = b/(1 - b); int ln(1 + c exp v) dv = -Li2(-c exp v).
     """
     d = v2 - v1
-    if abs(d) < 0.05 and b >= 0.0:
-        total, slope = _stiff_sums(SHORT_X, SHORT_W, b, v1, d)
+    if 0.0 <= b <= 1.0 - LEAST_STIFFNESS and abs(d) < LEAST_TABLED:
+        total, slope = _stiff_about(b, math.sqrt(tau1 * tau2), 0.25 * d * d)
     elif abs(d) < 0.05:
         total, slope = _stiff_sums(MIDDLE_X, MIDDLE_W, b, v1, d)
     elif abs(b) > LEAST_CLOSED and 1.0 + b * (max(tau1, tau2) - 1.0) > LEAST_STIFFNESS:
@@ -120,6 +122,27 @@ def _piece_stiff(b: float, dy: float, v1: float, tau1: float, v2: float, tau2: f
     else:
         total, slope = _stiff_sums(LONG_X, LONG_W, b, v1, d)
     return total * dy, slope * dy
+
+
+@leaf_kernel
+def _stiff_about(b: float, tau: float, h2: float) -> tuple[float, float]:
+    """Mean of e and of q = de/dv over a piece of half rise h = sqrt(h2) about T/T0 = tau, 0 <= b < 1: by the even
+    derivatives there, which for p = b q follow from p' = p (1 - p).
+
+    What is left out is of the size of (h/pi)^10: p has its poles off the real axis by pi."""
+    e = math.log1p(b * (tau - 1.0)) / b if b > 0.0 else tau - 1.0
+    q = tau / (1.0 + b * (tau - 1.0))
+    p = b * q
+    a = p * (1.0 - p)
+    # h^2/6, then h^4/120, h^6/5040 and h^8/9! as shares of it
+    bend, fourth = q * (1.0 - p) * h2 * SIXTH, 0.05 * h2
+    sixth = fourth * h2 / 42.0
+    eighth = sixth * h2 / 72.0
+    rest = fourth * (1.0 - 6.0 * a) + sixth * (1.0 - a * (30.0 - 120.0 * a))
+    e += bend * (1.0 + rest + eighth * (1.0 - a * (126.0 - a * (1680.0 - 5040.0 * a))))
+    rest = fourth * (1.0 - 12.0 * a) + sixth * (1.0 - a * (60.0 - 360.0 * a))
+    q += bend * (1.0 - 2.0 * p) * (1.0 + rest + eighth * (1.0 - a * (252.0 - a * (5040.0 - 20160.0 * a))))
+    return e, q
 
 
 @inner_kernel

@@ -3,6 +3,7 @@ profile."""
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -160,7 +161,7 @@ def test_a_pressed_play_holds_more_the_more_it_is_pressed() -> None:
 @numba.njit
 def near_change(p: Points, n: int, near: float, far: float) -> float:
     """How much cable an arc of mu = 1 takes up between its near end and the point that sticks."""
-    return float(arc.arc_meet(p, None, n, near, far, 1.0).change)
+    return float(arc.arc_meet(p, None, n, near, math.exp(near), far, 1.0).change)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
