@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -69,3 +70,15 @@ def test_the_reference_holds_every_public_name() -> None:
     headings = set(re.findall(r"^### (\w+)$", text, re.MULTILINE))
     assert set(cablecomp.__all__) <= headings
     assert "`Observer.step`" in text
+
+
+def test_the_guide_says_of_confidence_what_its_file_holds() -> None:
+    text = " ".join(topics.text_of("trials").split())
+    file = Path(cablecomp.__file__).parent / "diagnosis" / "explain" / "confidence.json"
+    told = json.loads(file.read_text(encoding="utf-8"))
+    learnt, left_out = told["learnt_on"], told["on_laws_left_out"]
+    assert f"On {learnt['effects']} effects of {learnt['laws']} laws" in text
+    assert f"in {sum(run['trials'] for run in learnt['runs'])} trials" in text
+    error, brier = left_out["calibration_error"], left_out["brier"]
+    assert f"calibration error {error:.2f}, Brier score {brier:.3f}" in text
+    assert f"conformal level is {told['conformal']['level']:.1f}" in text
