@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from turning import hypothesis
 
@@ -218,6 +219,24 @@ def test_what_stands_in_for_an_effect_is_told_with_how_far_data_tell_these_apart
     ((names, why),) = entries.tied_of([weighed], cast(Any, SimpleNamespace(rounds=[])))
     assert names == ("clamp_slip", "gravity_load", "strand_break")
     assert said in why
+
+
+@pytest.mark.parametrize(
+    ("without", "share"),
+    [
+        (8.0, 0.5),  # of 10, of which the model leaves 3
+        (9.9, 0.69),
+        (40.0, 0.7),  # the others alone are worse than none, and 3 are left for all that
+        (None, 0.7),  # the drive cannot be followed without it
+    ],
+)
+def test_an_effect_takes_off_no_more_than_the_whole_model(
+    monkeypatch: pytest.MonkeyPatch, without: float | None, share: float
+) -> None:
+    monkeypatch.setattr(weighing, "_mean_squares", lambda model, groups: np.array([model]))
+    selection: Any = SimpleNamespace(baseline=10.0, final=3.0, groups=None)
+    gone = weighing._gone(selection, cast(Any, without), selection.final)
+    assert weighing._of_all(selection, gone) == pytest.approx(share)
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,8 @@ class Weighed:
 
     `removes`: share of the calibrated drive's mean square on data left out that it takes off, alone or as the
     last to come, whichever is more: effects that trade places take off little as the last, what others hide
-    takes off little alone. `better`: the model with the rival in its place that predicts data left out better, by more
-    than a tie; None where there is none.
+    takes off little alone; no more than the whole model does. `better`: the model with the rival in its place that
+    predicts data left out better, by more than a tie; None where there is none.
     """
 
     term: Hypothesis

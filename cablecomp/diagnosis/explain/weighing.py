@@ -145,7 +145,8 @@ def _weighed(
     if (moves := moves_rad(final, term)) is not None:
         said["moves_rad"] = moves
     ties = {name: instead.differences[name].z for name in instead.effects}
-    return Weighed(term, depends, said, confidence, ties, nearest, why_not, removes, better)
+    said_to_go = _of_all(selection, most)
+    return Weighed(term, depends, said, confidence, ties, nearest, why_not, said_to_go, better)
 
 
 def _beyond_noise(fit: Fit) -> float:
@@ -201,6 +202,12 @@ def _gone(selection: Selection, before: Model | None, after: Model) -> FloatArra
     if before is None:
         return whole
     return _mean_squares(before, selection.groups) - _mean_squares(after, selection.groups)
+
+
+def _of_all(selection: Selection, gone: FloatArray) -> float:
+    """The share of the channel in which the effect shows most, at most what the whole model takes off: without the
+    effect others may fare worse than the calibrated drive."""
+    return _share(selection, np.minimum(gone, _gone(selection, selection.baseline, selection.final)))
 
 
 def _shares(selection: Selection, gone: FloatArray) -> FloatArray:
