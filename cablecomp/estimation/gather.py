@@ -25,7 +25,7 @@ from cablecomp.estimation.evidence import (
 )
 from cablecomp.estimation.outliers import outliers, outliers_in_motion
 from cablecomp.estimation.thinning import APART, thinned
-from cablecomp.signal.noise import channel_noise
+from cablecomp.signal.noise import channel_noise, grid_step, reading_sigma
 from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, group_means, keep_corners
 
 FINE_ROWS: Final = 6_000
@@ -192,13 +192,16 @@ def _unresolved(
     ratio: float, raw: Mapping[str, FloatArray], good: Mapping[str, BoolArray], noise: Mapping[str, float]
 ) -> dict[str, float]:
     """Noise of the angles that were read so seldom that motion looks like noise (twice as much): that of the joint's
-    angle beyond the rigid drive, which holds both."""
+    angle beyond the rigid drive, which holds both, but for the steps of a coarse encoder, which it lies on no more."""
     both = good[JOINT] & good[INPUT]
     if both.sum() < FEWEST:
         return {}
     beyond = _noise(raw["time_s"][both], raw[JOINT][both] - ratio * raw[INPUT][both])
-    found = {JOINT: beyond, INPUT: beyond / abs(ratio)}
-    return {k: v for k, v in found.items() if 0.0 < v < 0.5 * noise[k]}
+    if beyond == 0.0:
+        return {}
+    steps = {k: reading_sigma(None, grid_step(raw[k][good[k]])) for k in (JOINT, INPUT)}
+    found = {JOINT: max(beyond, steps[JOINT]), INPUT: max(beyond / abs(ratio), steps[INPUT])}
+    return {k: v for k, v in found.items() if v < 0.5 * noise[k]}
 
 
 def _noise(time: FloatArray, values: FloatArray) -> float:

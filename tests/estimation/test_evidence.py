@@ -210,6 +210,22 @@ def test_motion_that_few_readings_do_not_resolve_is_no_noise() -> None:
     assert e.noise["motor_position_rad"] == pytest.approx(1e-4 / JOINT.drive.ratio, rel=0.2)
 
 
+@pytest.mark.parametrize(
+    ("coarse", "other"),
+    [("joint_position_rad", "motor_position_rad"), ("motor_position_rad", "joint_position_rad")],
+)
+def test_a_coarse_encoders_steps_are_noise_however_often_it_is_read(coarse: str, other: str) -> None:
+    """Half a degree, crossed every 40 readings: the uniform error of a step (Widrow), however fine the other angle."""
+    time, step = np.arange(0.0, 20.0, 1e-3), np.deg2rad(0.5)
+    motor = 0.5 * np.sin(2.0 * np.pi * 0.1 * time)
+    columns = {"motor_position_rad": motor, "joint_position_rad": JOINT.drive.ratio * motor}
+    noise = 2e-4 * np.random.default_rng(6).standard_normal(len(time))
+    columns = columns | {coarse: step * np.round(columns[coarse] / step), other: columns[other] + noise}
+    e = gathered({"time_s": time, **columns})
+    assert e.noise[coarse] == pytest.approx(step / np.sqrt(12.0), rel=0.05)
+    assert e.noise[other] == pytest.approx(2e-4, rel=0.1)
+
+
 def test_the_rows_beside_a_gap_do_not_stand_for_the_time_in_which_nothing_was_read() -> None:
     columns = recorded(duration_s=40.0)
     time = columns["time_s"]
