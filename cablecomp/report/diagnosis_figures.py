@@ -316,12 +316,14 @@ def _bands(stretches: Sequence[Sequence[float]], colour: str, row: int) -> list[
 
 
 def _stretches(trace: Traces, shown: Any) -> list[tuple[float, float]]:
-    """Times of the stretches that nothing was fitted to."""
-    out = np.concatenate(([False], not_fitted(trace) & shown, [False]))
+    """Times of the stretches that nothing was fitted to; a reading that is missing there interrupts none."""
+    whole = trace.covariates["time"]
+    read = np.isfinite(trace.measured_rad) & shown
+    out = np.concatenate(([False], not_fitted(trace)[read], [False]))
     starts = np.flatnonzero(out[1:] & ~out[:-1])
     ends = np.flatnonzero(out[:-1] & ~out[1:]) - 1
-    time = trace.covariates["time"]
-    long = 0.01 * float(time[-1] - time[0])  # a reading set aside is no stretch
+    time = whole[read]
+    long = 0.01 * float(whole[-1] - whole[0])  # a reading set aside is no stretch
     found = [(float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True)]
     return [(a, b) for a, b in found if b - a > long]
 
