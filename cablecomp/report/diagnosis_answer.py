@@ -76,7 +76,14 @@ def _missing(m: Mapping[str, Any], several: bool, others: bool, unit: Scale) -> 
     law = page.paragraph(f"{depends(m['depends_on'])}.") if m["depends_on"] else ""
     moves, gain = m["evidence"].get("moves_rad"), m["evidence"].get("gain")
     by = f", and moves the joint by {angle(moves, unit)} RMS" if moves else ""
-    beside = f" ({percent(gain)} of what the others leave)" if others and gain is not None else ""
+    beside = ""
+    if others and gain is not None:
+        last = (
+            f"{percent(gain)} of what the others leave"
+            if gain > 0.0
+            else "the others predict as well without it"
+        )
+        beside = f" ({last})"
     return (
         f'<div class="missing"><h3>{escape(sentence(plain(m["effect"])))}</h3>'
         f'<div class="sure"><i style="width:{sure:.0f}%"></i></div>'

@@ -103,6 +103,13 @@ def test_a_name_beside_a_far_larger_one_says_what_it_takes_off_of_what_that_leav
     assert "of what the others leave" not in text_of(diagnosis_page(replace(found, named=(first,))))
 
 
+def test_of_a_name_that_the_others_do_without_no_negative_share_is_said(found: Diagnosis) -> None:
+    missed, spare = (replace(found.named[0], evidence={"gain": gain}) for gain in (0.97, -0.09))
+    text = text_of(diagnosis_page(replace(found, named=(missed, spare))).split("</section>")[0])
+    assert re.search(r"off the held-out square.* \(the others predict as well without it\)", text)
+    assert "-9 %" not in text
+
+
 def test_the_answer_stands_before_everything_else(found: Diagnosis) -> None:
     """Verdict, name, confidence, error before and after, what remains: all in the first section."""
     first = text_of(diagnosis_page(found).split("</section>")[0])
