@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from cablecomp.cli.shared import warn
 from cablecomp.config import JointConfig
-from cablecomp.estimation.belief import same_readings, still_doubted, suspicions
+from cablecomp.estimation.belief import still_doubted, suspicions
+from cablecomp.estimation.copies import same_readings
 from cablecomp.estimation.view import Suspicion
 from cablecomp.recording.reader import Recording
 from cablecomp.recording.table import FloatArray

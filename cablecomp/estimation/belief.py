@@ -7,7 +7,6 @@ suspicion with its numbers; nothing is changed.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from hashlib import blake2b
 from math import log, pi
 from typing import Final
 
@@ -99,18 +98,6 @@ def still_doubted(
     """What of that stands beside a joint with effects: what trails by them is not late."""
     known = config.effect
     return tuple(s for s in said if s.kind != "delay" or not known or not accounted_for(config, columns, s))
-
-
-def same_readings(recordings: Mapping[str, Mapping[str, FloatArray]]) -> Iterator[str]:
-    """A line for each recording that holds, number by number, what one before it does."""
-    first: dict[bytes, str] = {}
-    for name, columns in recordings.items():
-        digest = blake2b()
-        for channel in sorted(columns):
-            digest.update(channel.encode() + np.ascontiguousarray(columns[channel]).tobytes())
-        found = first.setdefault(digest.digest(), name)
-        if found != name:
-            yield f"{name}: holds the same readings as {found}, which count twice so: leave one of them out"
 
 
 def _delays(view: View, fits: Sequence[Suspicion], columns: Mapping[str, FloatArray]) -> list[Suspicion]:

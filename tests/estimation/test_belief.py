@@ -11,7 +11,7 @@ from turning import JOINT, course, recorded
 
 from cablecomp.config import load_joint
 from cablecomp.control.stiffness import stiffness_range
-from cablecomp.estimation.belief import same_readings, suspicions
+from cablecomp.estimation.belief import suspicions
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
 from firmware_sim.plant import PlantConfig, simulate
@@ -213,13 +213,6 @@ def test_a_motor_torque_far_beyond_load_and_pretension_is_in_another_unit(times:
         usual = rms + stage.input_radius_m * stage.pretension_N
         assert s.numbers["times_usual"] == pytest.approx(times * rms / usual)
         assert "seems to be in another unit" in s.text
-
-
-def test_a_copy_under_another_name_is_said() -> None:
-    other = {**COLUMNS, "joint_position_rad": 1.0001 * COLUMNS["joint_position_rad"]}
-    copy = {name: values.copy() for name, values in reversed(COLUMNS.items())}
-    (said,) = same_readings({"a": COLUMNS, "b": other, "c": copy})
-    assert said.startswith("c: holds the same readings as a")
 
 
 def test_a_motor_torque_that_was_never_read_says_nothing() -> None:
