@@ -233,10 +233,30 @@ def test_what_stands_in_for_an_effect_is_told_with_how_far_data_tell_these_apart
 def test_an_effect_takes_off_no_more_than_the_whole_model(
     monkeypatch: pytest.MonkeyPatch, without: float | None, share: float
 ) -> None:
-    monkeypatch.setattr(weighing, "_mean_squares", lambda model, groups: np.array([model]))
+    monkeypatch.setattr(weighing, "_mean_squares", lambda model, groups, tail=3.0: np.array([model]))
     selection: Any = SimpleNamespace(baseline=10.0, final=3.0, groups=None)
     gone = weighing._gone(selection, cast(Any, without), selection.final)
     assert weighing._of_all(selection, gone) == pytest.approx(share)
+
+
+def test_what_is_said_to_go_counts_in_full_what_the_model_misses_by_far() -> None:
+    """Of 100 rows all by 10 before; after by 1, but five by 20: of 100 squares 20.95 are left."""
+
+    def leaving(left: np.ndarray) -> Any:
+        spans = {"joint_position_rad": slice(0, 100)}
+        weighing_ = SimpleNamespace(sigma={"joint_position_rad": 1.0})
+        return SimpleNamespace(
+            left_out=left,
+            fit=SimpleNamespace(problem=SimpleNamespace(spans=lambda: spans, weighing=weighing_)),
+        )
+
+    final = leaving(np.where(np.arange(100) < 5, 20.0, 1.0))
+    groups = SimpleNamespace(block=np.arange(100) // 10, channel=np.zeros(100, dtype=np.int64))
+    selection: Any = SimpleNamespace(baseline=leaving(np.full(100, 10.0)), final=final, groups=groups)
+    gone = weighing._gone(selection, selection.baseline, final)
+    assert weighing._of_all(selection, gone) == pytest.approx(
+        1.0 - (5 * 20.0**2 + 95 * 1.0**2) / (100 * 10.0**2)
+    )
 
 
 @pytest.mark.parametrize(

@@ -205,9 +205,13 @@ def _gone(selection: Selection, before: Model | None, after: Model) -> FloatArra
 
 
 def _of_all(selection: Selection, gone: FloatArray) -> float:
-    """The share of the channel in which the effect shows most, at most what the whole model takes off: without the
-    effect others may fare worse than the calibrated drive."""
-    return _share(selection, np.minimum(gone, _gone(selection, selection.baseline, selection.final)))
+    """The share of the channel in which the effect shows most, at most what the whole model takes off, single rows far
+    off the rest counted in full: without the effect others may fare worse than the calibrated drive."""
+    before, after = (
+        _mean_squares(m, selection.groups, tail=np.inf) for m in (selection.baseline, selection.final)
+    )
+    taken = 1.0 - after / np.maximum(before, 1e-300)
+    return float(np.clip(np.max(np.minimum(_shares(selection, gone), taken)), 0.0, 1.0))
 
 
 def _shares(selection: Selection, gone: FloatArray) -> FloatArray:
@@ -227,10 +231,10 @@ def _beside_usual(selection: Selection, gone: FloatArray) -> str:
     return lost_in_usual(problem.config, list(problem.spans())[k], float(gone[k]))
 
 
-def _mean_squares(model: Model, groups: Groups) -> FloatArray:
+def _mean_squares(model: Model, groups: Groups, tail: float = LIMITS.tail) -> FloatArray:
     """Mean square left out of each channel, in its own unit squared; single rows far off the rest count as at most
-    `LIMITS.tail` deviations."""
-    bound = LIMITS.tail * scales(model.left_out, groups)
+    `tail` deviations."""
+    bound = tail * scales(model.left_out, groups)
     problem = model.fit.problem
     return np.array([
         float(np.mean(np.minimum(np.abs(model.left_out[span]), most) ** 2)) * problem.weighing.sigma[c] ** 2
