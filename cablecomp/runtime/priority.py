@@ -27,7 +27,7 @@ class Policy:
     collect_garbage: bool = False
 
 
-QUIET = Policy(fifo_priority=None, lock_memory=False)
+QUIET = Policy(fifo_priority=None, lock_memory=False, collect_garbage=True)
 """For stepped time, where nothing can be late."""
 
 
@@ -93,13 +93,11 @@ def _garbage(policy: Policy, granted: Granted) -> _Undo:
         granted.lines.append("garbage collection left on, as asked")
         return _Undo(lambda: sys.setswitchinterval(interval))
     was_on = gc.isenabled()
-    gc.collect()
-    gc.freeze()
+    gc.collect()  # whoever is there by now is young no more
     gc.disable()
     granted.lines.append("garbage collection off in the loop; young objects are collected in its idle time")
 
     def back() -> None:
-        gc.unfreeze()
         sys.setswitchinterval(interval)
         if was_on:
             gc.enable()

@@ -19,7 +19,7 @@ from cablecomp.runtime.accounts import Accounts
 from cablecomp.runtime.clock import MonotonicClock, SteppedClock, Tick, Ticker
 from cablecomp.runtime.histogram import CycleTimes, Histogram
 from cablecomp.runtime.minutes import Minutes, shown
-from cablecomp.runtime.priority import Policy, armed
+from cablecomp.runtime.priority import QUIET, Policy, armed
 
 
 class WorkingClock:
@@ -112,6 +112,17 @@ def test_the_policy_is_put_back_and_says_what_was_had() -> None:
         assert len(granted.lines) == 3
     assert gc.isenabled() == was_on
     assert sys.getswitchinterval() == interval
+
+
+def test_the_garbage_collector_is_the_callers_afterwards_and_in_stepped_time() -> None:
+    """What a caller froze is looked through no more, whatever ran meanwhile."""
+    gc.freeze()
+    with armed(Policy(fifo_priority=None, lock_memory=False)):
+        pass
+    assert gc.get_freeze_count() > 0
+    was_on = gc.isenabled()
+    with armed(QUIET):
+        assert gc.isenabled() == was_on
 
 
 def test_what_is_not_permitted_is_said_and_survived(monkeypatch: pytest.MonkeyPatch) -> None:
