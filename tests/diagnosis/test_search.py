@@ -25,6 +25,7 @@ from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, covariance, solve, weighed
 
 FREE = JOINT.model_copy(update={"tolerance": {"EA_N": 0.1}})
+WEIGHT = {"moment_Nm": 0.3, "phase_rad": 0.6}
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,26 @@ def drive() -> Calibrated:
     body = gather_body(FREE, many)
     assert len(body.used) > LIMITS.searched
     return calibrate_drive(FREE, body.used, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def heavy() -> tuple[Calibrated, Search]:
+    """A drive that lifts a weight nobody stated, and the search that is asked for one."""
+    weighed_down = with_effects(FREE, [("gravity_load", WEIGHT)])
+    many = {f"all/{k}": recorded(weighed_down, seed=k, duration_s=5.0) for k in range(LIMITS.searched + 3)}
+    drive = calibrate_drive(FREE, gather_body(FREE, many).used, np.random.default_rng(0))
+    return drive, searched(drive, "gravity_load")
+
+
+def of(drive: Calibrated, effect: str) -> list[Hypothesis]:
+    """What is asked about an effect, in its usual form."""
+    return [h for h in hypotheses(FREE, drive.fit.problem.evidence) if h.name == effect]
+
+
+def searched(drive: Calibrated, *effects: str) -> Search:
+    """The search among these effects alone."""
+    pool = [h for effect in effects for h in of(drive, effect)]
+    return search(drive, pool, np.random.default_rng(0), Pace(lambda what, share: None))
 
 
 def test_where_nothing_is_asked_the_calibrated_drive_is_the_model_of_all_recordings(
@@ -49,14 +70,11 @@ def test_where_nothing_is_asked_the_calibrated_drive_is_the_model_of_all_recordi
     assert found.groups.folds == len(drive.fit.problem.evidence)
 
 
-def test_the_final_fit_is_about_all_recordings_and_weighs_them_by_what_it_leaves() -> None:
-    true = {"moment_Nm": 0.3, "phase_rad": 0.6}
-    heavy = with_effects(FREE, [("gravity_load", true)])
-    many = {f"all/{k}": recorded(heavy, seed=k, duration_s=5.0) for k in range(LIMITS.searched + 3)}
-    drive = calibrate_drive(FREE, gather_body(FREE, many).used, np.random.default_rng(0))
+def test_the_final_fit_is_about_all_recordings_and_weighs_them_by_what_it_leaves(
+    heavy: tuple[Calibrated, Search],
+) -> None:
+    drive, found = heavy
     evidence = drive.fit.problem.evidence
-    pool = [h for h in hypotheses(FREE, evidence) if h.name == "gravity_load"]
-    found = search(drive, pool, np.random.default_rng(0), Pace(lambda what, share: None))
     assert [t.name for t in found.final.terms] == ["gravity_load"]
     fit = found.final.fit
     assert [e.name for e in fit.problem.evidence] == [e.name for e in evidence]
@@ -64,7 +82,7 @@ def test_the_final_fit_is_about_all_recordings_and_weighs_them_by_what_it_leaves
     own = weighed(fit, drive.floor)
     assert fit.problem.weighing.sigma == pytest.approx(own.sigma, rel=0.05)
     spread = np.sqrt(np.diag(covariance(fit)))
-    for key, value in true.items():
+    for key, value in WEIGHT.items():
         k = next(k for k, p in enumerate(fit.problem.parameters) if p.name == f"effect.gravity_load.{key}")
         assert abs(fit.x[k] - fit.problem.parameters[k].x(value)) < 4.0 * spread[k]
 
@@ -80,18 +98,11 @@ def test_a_last_fit_that_cannot_be_followed_leaves_the_model_as_it_was_found(
     assert found.fit is drive.fit
 
 
-def test_done_without_a_term_the_model_is_fitted_again() -> None:
+def test_done_without_a_term_the_model_is_fitted_again(heavy: tuple[Calibrated, Search]) -> None:
     """A weight of 0.3 N m and friction that is not there: without the one the other holds, and the weight is found as
     before; both fits, about the recordings searched and about all, are done again."""
-    true = {"moment_Nm": 0.3, "phase_rad": 0.6}
-    heavy = with_effects(FREE, [("gravity_load", true)])
-    body = gather_body(
-        FREE, {f"all/{k}": recorded(heavy, seed=k, duration_s=5.0) for k in range(LIMITS.searched + 2)}
-    )
-    drive = calibrate_drive(FREE, body.used, np.random.default_rng(0))
-    pool = [h for h in hypotheses(FREE, drive.fit.problem.evidence) if h.name == "gravity_load"]
-    found = search(drive, pool, np.random.default_rng(0), Pace(lambda what, share: None))
-    (rubbing,) = [h for h in hypotheses(FREE, drive.fit.problem.evidence) if h.name == "bearing_friction"]
+    drive, found = heavy
+    (rubbing,) = of(drive, "bearing_friction")
     both, about = (beside(m, rubbing) for m in (found.final, found.selection.final))
     fewer = done_without(
         replace(found, final=both, selection=replace(found.selection, final=about)), rubbing, drive
@@ -111,22 +122,15 @@ def beside(model: Model, h: Hypothesis) -> Model:
     return Model((*model.terms, h), fit, fit.residual)
 
 
-def test_what_predicts_better_is_put_in_the_place_of_another_and_not_the_other_way_round() -> None:
+def test_what_predicts_better_is_put_in_the_place_of_another_and_not_the_other_way_round(
+    heavy: tuple[Calibrated, Search],
+) -> None:
     """A weight of 0.3 N m that was taken for friction: both fits, about the recordings searched and about all, are the
     weight's then."""
-    heavy = with_effects(FREE, [("gravity_load", {"moment_Nm": 0.3, "phase_rad": 0.6})])
-    many = {f"all/{k}": recorded(heavy, seed=k, duration_s=5.0) for k in range(LIMITS.searched + 2)}
-    drive = calibrate_drive(FREE, gather_body(FREE, many).used, np.random.default_rng(0))
-    heavier, rubbing = (
-        [h for h in hypotheses(FREE, drive.fit.problem.evidence) if h.name == name]
-        for name in ("gravity_load", "bearing_friction")
-    )
-    right, nothing = (
-        search(drive, pool, np.random.default_rng(0), Pace(lambda what, share: None))
-        for pool in (heavier, [])
-    )
+    drive, right = heavy
+    nothing, (rubbing,) = searched(drive), of(drive, "bearing_friction")
     both = ((nothing.final, nothing.groups), (nothing.selection.final, nothing.selection.groups))
-    final, about = (reweighed(n := beside(m, rubbing[0]), n.fit.problem.weighing, g) for m, g in both)
+    final, about = (reweighed(n := beside(m, rubbing), n.fit.problem.weighing, g) for m, g in both)
     wrong = replace(nothing, final=final, selection=replace(nothing.selection, final=about))
 
     def as_weighed_by(mine: Search, other: Search) -> Model:
