@@ -261,7 +261,7 @@ def test_a_process_with_further_threads_is_not_forked() -> None:
 @needs_linux
 @pytest.mark.usefixtures("forking")
 def test_a_diagnosis_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = {"here": recorded([EffectSpec("termination_backlash", {"gap_rad": 2e-3})], 24.0)}
+    data = {"here": recorded([EffectSpec("termination_backlash", {"gap_rad": 2e-3})], 12.0)}
     with forks_allowed():
         apart = report_json(diagnose(TOLERANT, data))
     monkeypatch.setattr(parallel, "_threads", lambda: 1)
