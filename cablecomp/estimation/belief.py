@@ -16,6 +16,7 @@ from cablecomp.config import JointConfig
 from cablecomp.estimation.evidence import FEWEST, INPUT, JOINT, MOTOR, OVERFLOWN
 from cablecomp.estimation.evidence import load_channel as channel_of_load
 from cablecomp.estimation.lateness import accounted_for, borne_out, delays, rather_late
+from cablecomp.estimation.parallel import algebra_in_one_thread
 from cablecomp.estimation.sensors import odd_sensors
 from cablecomp.estimation.view import Suspicion, View, mrad, partial, rms
 from cablecomp.recording.suggest import LOST, lost_share
@@ -64,6 +65,7 @@ _TORQUES: Final = {
 """Units of torque by how many N m one is."""
 
 
+@algebra_in_one_thread
 def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[Suspicion, ...]:
     """What in a recording (canonical channels) hardly fits the drive; empty where all agrees or nothing can be said."""
     found = list(_gaps(columns))

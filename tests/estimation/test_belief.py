@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 from turning import JOINT, course, recorded
 
 from cablecomp.config import load_joint
 from cablecomp.control.stiffness import stiffness_range
+from cablecomp.estimation import belief
 from cablecomp.estimation.belief import suspicions
 from cablecomp.observer import Observer
 from cablecomp.signal.smoothing import FloatArray
@@ -30,6 +32,20 @@ def moved(name: str, late_s: float) -> FloatArray:
 
 def test_a_right_recording_raises_no_suspicion() -> None:
     assert kinds() == []
+
+
+def test_linear_algebra_keeps_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many small systems its threads only wait for each other."""
+    seen: set[int] = set()
+
+    def threads(*_: object) -> list[belief.Suspicion]:
+        seen.update(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        return []
+
+    monkeypatch.setattr(belief, "_delays", threads)
+    with threadpool_limits(limits=2, user_api="blas"):
+        assert kinds() == []
+    assert seen == {1}
 
 
 def test_what_is_no_more_than_rounding_is_not_said_to_be_late() -> None:
