@@ -153,7 +153,7 @@ def test_a_joint_with_nothing_but_its_motor_runs_on_the_motor_s_torque(tmp_path:
     text = (CONFIGS / "links/mit-virtual.toml").read_text()
     text = text.replace("cablecomp_joint.dbc", str(CONFIGS / "links/cablecomp_joint.dbc"))
     link.write_text(text.partition("[joint.sensor]")[0], encoding="utf-8")
-    asked = simulated(joint, out=tmp_path / "out", link=link, duration=1.5)
+    asked = simulated(joint, out=tmp_path / "out", link=link, duration=0.6)
     assert cli.main([*asked, "--no-bounds"]) == 0
     assert "joint_position_rad" not in (tmp_path / "out/recording.csv").read_text()
 
@@ -169,7 +169,7 @@ def test_an_open_circuit_is_held_by_its_brake_and_run_in_every_mode(mode: str, t
     """Its pretension pulls at the motor: without brake and counter-torque the joint runs away before control
     begins.
     """
-    asked = simulated(CONFIGS / "joints/snow-open-rig.toml", None, out=tmp_path, mode=mode, duration=1.5)
+    asked = simulated(CONFIGS / "joints/snow-open-rig.toml", None, out=tmp_path, mode=mode, duration=0.6)
     assert cli.main([*asked, "--no-bounds"]) == 0
     recording = pl.read_csv(tmp_path / "recording.csv", comment_prefix="#")
     assert abs(recording["joint_position_rad"][:20]).max() < 0.02
