@@ -199,7 +199,7 @@ def _place(c: Begun) -> str:
 def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
     """The model with what was begun, fitted to the end; None where it cannot be followed, or is none of it."""
     try:
-        fit = solve(c.problem, c.x, 15, LIMITS.tolerance, c.J)
+        fit = solve(c.problem, c.x, LIMITS.to_the_end, LIMITS.tolerance, c.J)
     except InputError:
         return None
     terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
