@@ -4,8 +4,7 @@ Imports the frames of `wire`. Start reading at `base.py`, what a port is.
 """
 
 from firmware_sim.ports.base import Port
-from firmware_sim.ports.can_port import CanPort
 from firmware_sim.ports.open import BUSES, open_port
 from firmware_sim.ports.pty_port import PtyPort, SerialPort, SlcanPort
 
-__all__ = ["BUSES", "CanPort", "Port", "PtyPort", "SerialPort", "SlcanPort", "open_port"]
+__all__ = ["BUSES", "Port", "PtyPort", "SerialPort", "SlcanPort", "open_port"]

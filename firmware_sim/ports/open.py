@@ -6,11 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import can
-
 from firmware_sim.errors import SimError
 from firmware_sim.ports.base import Port
-from firmware_sim.ports.can_port import CanPort
 from firmware_sim.ports.pty_port import DynamixelPort, SerialPort, SlcanPort
 
 BUSES = (
@@ -33,8 +30,12 @@ def open_port(bus: str, link: Path | None = None, bitrate: int | None = None, *,
     return open_can(interface, rest, bitrate, fd=fd)
 
 
-def open_can(interface: str, rest: str, bitrate: int | None = None, *, fd: bool = False) -> CanPort:
+def open_can(interface: str, rest: str, bitrate: int | None = None, *, fd: bool = False) -> Port:
     """A python-can bus as a port."""
+    import can  # slow to import, and pseudo-terminals do without
+
+    from firmware_sim.ports.can_port import CanPort
+
     options: dict[str, Any] = {"interface": interface, "channel": rest}
     if interface == "virtual":
         options["channel"] = rest or "cablecomp"

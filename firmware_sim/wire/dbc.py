@@ -30,8 +30,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import cantools.database
-
 from firmware_sim.errors import SimError
 from firmware_sim.firmware import Drive, DriveFlag, DriveReport, Mode, Request, Setpoint
 from firmware_sim.wire.base import Answer, Heard
@@ -125,6 +123,8 @@ def _message_map(path: Path, name: str, table: Any) -> MessageMap | None:
 
 
 def _database(path: Path | None) -> Any:
+    import cantools.database  # slow to import, with python-can, and for this protocol alone
+
     if path is None:  # written anew: an installed package need not bring the file
         return cantools.database.load_string(render(joint_table(), SHIPPED), "dbc")
     try:

@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CONFIG = str(ROOT / "configs" / "joints" / "snow-closed-rig.toml")
 LIGHT = (
     "import sys; from sim_two_mass import TwoMass; from firmware_sim.cli import main; "
-    "sys.exit(main(make_plant=lambda n: TwoMass()))"
+    "sys.exit(main(make_plant=lambda n: TwoMass()) or ('can' in sys.modules and 'python-can was loaded'))"
 )
 ENTER = b"\xff" * 7 + b"\xfc"
 ZERO = bytes.fromhex("7FFF7FF0000007FF")

@@ -23,7 +23,8 @@ from sim_two_mass import TwoMass
 from firmware_sim.bench import Bench
 from firmware_sim.build import BenchConfig, make_bench
 from firmware_sim.firmware import DriveState, Setpoint
-from firmware_sim.ports import CanPort, open_port
+from firmware_sim.ports import open_port
+from firmware_sim.ports.can_port import CanPort
 from firmware_sim.wire.mit import MODELS
 
 LINKS = Path(__file__).resolve().parents[2] / "configs" / "links"
