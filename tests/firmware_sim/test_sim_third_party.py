@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import io
 import os
+import runpy
 import select
 import signal
 import struct
@@ -101,14 +103,15 @@ def test_logger_records_and_player_replays(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.parametrize("protocol", ["mit", "odrive", "dbc"])
-def test_cantools_decodes_a_candump_log(tmp_path: Path, protocol: str) -> None:
+def test_cantools_decodes_a_candump_log(
+    tmp_path: Path, protocol: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "motion.log"
     heard = record(path, protocol, steps=12)
-    done = subprocess.run(
-        [sys.executable, "-m", "cantools", "decode", "--single-line", str(LINKS / TABLES[protocol])],
-        input=path.read_text(), capture_output=True, text=True, timeout=60, check=True,
-    )  # fmt: skip
-    lines = done.stdout.splitlines()
+    monkeypatch.setattr(sys, "argv", ["cantools", "decode", "--single-line", str(LINKS / TABLES[protocol])])
+    monkeypatch.setattr(sys, "stdin", io.StringIO(path.read_text()))
+    runpy.run_module("cantools", run_name="__main__")
+    lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(heard)
     assert not [line for line in lines if "Unknown frame id" in line or "Failed" in line]
     samples = [line for line in lines if "Joint1_State(" in line]
