@@ -6,9 +6,12 @@ import os
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from cablecomp.links.link import LinkStatus
 from cablecomp.runtime.histogram import CycleTimes, Histogram
+
+if TYPE_CHECKING:
+    from cablecomp.links.link import LinkStatus
 
 _STATM = Path("/proc/self/statm")
 _SHOWN = 10
