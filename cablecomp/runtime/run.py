@@ -12,7 +12,6 @@ from pathlib import Path
 from cablecomp.config import JointConfig
 from cablecomp.config_text import write_joint
 from cablecomp.control.compensator import Gains, given_gains
-from cablecomp.control.design import design_gains
 from cablecomp.control.options import ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol
 from cablecomp.durable import write_durably
@@ -162,6 +161,8 @@ def _gains(first: Contestant, mode: ControlMode, link: LinkConfig, control: Cont
     given = given_gains(options)
     if given is not None:
         return given
+    from cablecomp.control.design import design_gains  # a slow import, and only what is not stated needs it
+
     return design_gains(first.config, link.rate_Hz, control.model_copy(update={"compensator": options}))
 
 

@@ -20,4 +20,4 @@ def _designed_once(monkeypatch: pytest.MonkeyPatch) -> None:
             _designed[key] = design_gains(config, rate_Hz, wanted)
         return _designed[key]
 
-    monkeypatch.setattr("cablecomp.runtime.run.design_gains", gains)
+    monkeypatch.setattr("cablecomp.control.design.design_gains", gains)

@@ -33,7 +33,7 @@ class Host:
             stdout=subprocess.PIPE,
             text=True,
         )
-        assert self.answer(240.0) == "ready"
+        self.design_tools = self.answer(240.0)
 
     def start(self, **wanted: Any) -> int:
         """Fork a command; returns its process id."""

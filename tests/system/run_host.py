@@ -2,7 +2,8 @@
 
     {"arguments": [...], "cwd": "...", "said": "file for output", "terminal": "pseudo-terminal or null"}
 
-It answers with the child's process id, then, when it has ended, with its exit code (negative: the signal).
+Its first line says which of loop design's slow tools are loaded; then it answers with the child's process id and, when
+that has ended, with its exit code (negative: the signal).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def main() -> None:
     assert run
     assert run_page
     Observer(load_joint(Path(sys.argv[1])), bounds=True).compile()
-    tell("ready")
+    tell(sorted({"control", "scipy.signal"} & set(sys.modules)))
     for line in sys.stdin:
         wanted = json.loads(line)
         child = os.fork()

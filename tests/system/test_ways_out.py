@@ -89,6 +89,11 @@ def test_a_signal_stops_the_drive_and_leaves_everything_whole(run: LiveRun, sign
     assert "Traceback" not in run.said()
 
 
+def test_a_run_loads_no_tools_of_loop_design_before_a_gain_is_to_be_designed(host: Host) -> None:
+    """They take as long to import as all else."""
+    assert host.design_tools == []
+
+
 def test_a_terminal_that_is_closed_stops_the_drive_and_leaves_everything_whole(run: LiveRun) -> None:
     """Nor does one that nobody reads from, as when its output is paused, hold the loop up."""
     ours, theirs = pty.openpty()
