@@ -46,6 +46,20 @@ def test_the_mean_error_is_that_of_what_was_fitted(found: Diagnosis) -> None:
     assert all(np.max(np.abs(line.y)) == 0.0 for line in lines)
 
 
+def test_readings_set_aside_interrupt_no_stretch_that_was_kept_for_the_end(found: Diagnosis) -> None:
+    """Every third reading of it: all of it is shaded, as where all were read."""
+    trace = found.traces[0]
+    aside = (np.arange(len(trace.counted)) % 3 == 1) & ~trace.counted
+    assert aside.sum() > 3
+    unit = Scale(1e3, "mrad")
+    whole, holed = (
+        [(s.x0, s.x1) for s in figures.at_a_glance(t, unit).layout.shapes]
+        for t in (trace, replace(trace, measured_rad=np.where(aside, np.nan, trace.measured_rad)))
+    )
+    assert len(whole) == 2  # of deflection, of the error
+    assert np.abs(np.subtract(holed, whole)).max() <= 2.0 * np.diff(trace.covariates["time"]).max()
+
+
 def test_a_hypothesis_fitted_twice_beside_one_model_has_one_bar(found: Diagnosis) -> None:
     """Two bars in one place would lie on each other, and make all bars thin."""
     first = found.tested[0]

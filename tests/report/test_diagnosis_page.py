@@ -153,20 +153,6 @@ def test_the_answer_speaks_of_shading_where_the_end_that_it_shows_is_shaded(
     assert ("Shaded" in text_of(first)) is said
 
 
-def test_readings_set_aside_interrupt_no_stretch_that_was_kept_for_the_end(found: Diagnosis) -> None:
-    """Every third reading of it: all of it is shaded, as where all were read."""
-    trace = found.traces[0]
-    aside = (np.arange(len(trace.counted)) % 3 == 1) & ~trace.counted
-    assert aside.sum() > 3
-    unit = Scale(1e3, "mrad")
-    whole, holed = (
-        [(s.x0, s.x1) for s in figures.at_a_glance(t, unit).layout.shapes]
-        for t in (trace, replace(trace, measured_rad=np.where(aside, np.nan, trace.measured_rad)))
-    )
-    assert len(whole) == 2  # of deflection, of the error
-    assert np.abs(np.subtract(holed, whole)).max() <= 2.0 * np.diff(trace.covariates["time"]).max()
-
-
 def test_what_was_not_read_is_drawn_nowhere_and_is_in_no_number(found: Diagnosis) -> None:
     """The joint's encoder silent for a while that the drive went on in: a gap in the line, and no row of any table."""
     trace = found.traces[0]
