@@ -49,8 +49,9 @@ from cablecomp.mechanics.tables import (
 )
 
 LEAST_TABLED = 0.2
-"""Rise of a piece from which on the tabled integral of its strain is exact enough, as its error is divided by the rise;
-below it a cable that stiffens is done by a series."""
+"""Rise of a piece from which on the tabled integral of its strain is exact enough: its error is divided by the rise."""
+SHORT_STIFF = 0.2
+"""Rise up to which a piece of a cable that stiffens is done by a series: (0.1/pi)^10 is 1e-15."""
 SHORT_GROOVE = 0.25
 """Arc [rad] on which five points lie no farther apart than eight do on longer pieces."""
 LEAST_CLOSED = 1e-6
@@ -109,7 +110,7 @@ def _piece_stiff(b: float, dy: float, v1: float, tau1: float, v2: float, tau2: f
     e(v) = (ln(1 - b) + ln(1 + c exp v))/b with c = b/(1 - b); int ln(1 + c exp v) dv = -Li2(-c exp v).
     """
     d = v2 - v1
-    if 0.0 <= b <= 1.0 - LEAST_STIFFNESS and abs(d) < LEAST_TABLED:
+    if 0.0 <= b <= 1.0 - LEAST_STIFFNESS and abs(d) < SHORT_STIFF:
         total, slope = _stiff_about(b, math.sqrt(tau1 * tau2), 0.25 * d * d)
     elif abs(d) < 0.05:
         total, slope = _stiff_sums(MIDDLE_X, MIDDLE_W, b, v1, d)
