@@ -90,7 +90,11 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     turned = any((s.kind, s.channel) == ("sign", "joint_torque_Nm") for s in found)
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR and not turned:
         rows = _rows(columns, (INPUT, JOINT, MOTOR, "joint_torque_Nm"))
-        found += _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
+        said = _motor_torque(config, rows) if len(rows["time_s"]) >= FEWEST else []
+        # what trails then is friction turned round
+        if any(s.kind == "sign" and s.channel != MOTOR for s in said):
+            found = [s for s in found if s.kind != "delay"]
+        found += said
     return (*odd, *found)
 
 
@@ -244,7 +248,7 @@ def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[S
         return [Suspicion("scale", MOTOR, words, {"times_usual": off})]
     slope, sure = partial(torque, wanted, np.gradient(rows[INPUT]))
     if sure > -0.7:
-        return []
+        return list(_given_back(rows, sure))
     lost = lost_share(torque, rows[INPUT], rows["joint_torque_Nm"], rows[JOINT])
     turned = MOTOR if lost > -LOST else "joint_torque_Nm"
     either = " (or joint_torque_Nm: the work of both does not tell which)" if abs(lost) < LOST else ""
@@ -254,6 +258,31 @@ def _motor_torque(config: JointConfig, rows: Mapping[str, FloatArray]) -> list[S
         f"{rms(torque + wanted):.3g} Nm with one of them turned"
     )
     return [Suspicion("sign", turned, words, {"slope": slope, "correlation": sure})]
+
+
+def _given_back(rows: Mapping[str, FloatArray], sure: float) -> Iterator[Suspicion]:
+    """Friction takes work. Where both ends together are given more than a stroke can have stored, all is the other way
+    round; `sure`: how well the motor's torque holds against the load."""
+    ends = ((MOTOR, INPUT), ("joint_torque_Nm", JOINT))
+    work = [np.diff(rows[angle]) * 0.5 * (rows[torque][1:] + rows[torque][:-1]) for torque, angle in ends]
+    motor_J, load_J = (float(np.sum(w)) for w in work)
+    moved = sum(float(np.sum(np.abs(w))) for w in work)
+    strokes = min(_strokes(rows[angle]) for _, angle in ends)
+    if -(motor_J + load_J) > (LOST + 1.0 / strokes) * moved:
+        one = "" if sure > SURE else ", or one of the two torques"
+        words = (
+            f"time seems to run backwards, or both angles or both torques to have the opposite sign{one}: the motor "
+            f"does {motor_J:.3g} J and the load {load_J:.3g} J of work on the drive, whose friction would give what it "
+            "can only take"
+        )
+        yield Suspicion("sign", "time_s", words, {"motor_J": motor_J, "load_J": load_J})
+
+
+def _strokes(angle: FloatArray) -> int:
+    """How often it goes from one quarter of its range to the opposite one; 1 at least."""
+    low, high = float(np.min(angle)), float(np.max(angle))
+    end = np.sign(np.round(2.0 * (angle - 0.5 * (low + high)) / max(high - low, 1e-300)))
+    return max(1, int(np.count_nonzero(np.diff(end[end != 0.0]))))
 
 
 def _gaps(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:

@@ -212,6 +212,54 @@ def test_of_two_torques_that_disagree_the_one_is_named_without_which_friction_wo
     assert "does not tell" not in said.text
 
 
+def lifted(angle: FloatArray, lost: float) -> dict[str, FloatArray]:
+    """A weight of 1 N m at the joint, moved to and fro by a motor that has this share of it to overcome as well."""
+    ratio = JOINT.drive.ratio
+    return {
+        "time_s": TIME,
+        "motor_position_rad": angle / ratio,
+        "joint_position_rad": angle,
+        "joint_torque_Nm": np.full_like(TIME, -1.0) + 1e-3 * np.cos(TIME),
+        "motor_torque_Nm": ratio * (1.0 + lost * np.tanh(np.gradient(angle, TIME) / 0.05)),
+    }
+
+
+@pytest.mark.parametrize("lost", [0.6, 3.0])
+@pytest.mark.parametrize(
+    "turned",
+    [("motor_position_rad", "joint_position_rad"), ("motor_torque_Nm", "joint_torque_Nm"), ("time_s",)],
+)
+def test_where_friction_would_give_work_all_is_the_other_way_round(
+    lost: float, turned: tuple[str, ...]
+) -> None:
+    """The motor overcomes friction both ways: its work over whole cycles is 4 a lost N m each, and none is the load's.
+    What trails the motor leads it then, which is no delay."""
+    right = lifted(np.sin(2.0 * np.pi * 0.2 * TIME), lost)
+    assert [s for s in suspicions(JOINT, right) if s.kind == "sign"] == []
+    columns = {n: -v if n in turned else v for n, v in right.items()}
+    if turned == ("time_s",):
+        columns = {"time_s": TIME, **{n: v[::-1] for n, v in right.items() if n != "time_s"}}
+    (said,) = suspicions(JOINT, columns)
+    assert (said.kind, said.channel) == ("sign", "time_s")
+    assert said.numbers["motor_J"] == pytest.approx(-lost * 4.0 * 0.2 * TIME[-1], rel=0.1)
+
+
+def test_what_one_stroke_gives_back_was_stored() -> None:
+    """A motor that lets a wound-up drive go, its joint locked; a weight that is let down against little friction."""
+    ratio, way = JOINT.drive.ratio, 0.01 * (1.0 + np.cos(np.pi * TIME / TIME[-1]))
+    wound = {
+        "time_s": TIME,
+        "motor_position_rad": way,
+        "joint_position_rad": np.zeros_like(TIME),
+        "joint_torque_Nm": -50.0 * way,
+        "motor_torque_Nm": 50.0 * ratio * way,
+    }
+    assert np.trapezoid(wound["motor_torque_Nm"], way) == pytest.approx(-25.0 * ratio * 0.02**2, rel=1e-3)
+    down = lifted(np.cos(np.pi * TIME / TIME[-1]), 0.05)
+    for columns in (wound, down):
+        assert [s for s in suspicions(JOINT, columns) if s.kind == "sign"] == []
+
+
 def test_a_load_of_the_other_sign_does_not_bring_the_motor_torque_under_suspicion() -> None:
     torque = -JOINT.drive.ratio * COLUMNS["joint_torque_Nm"]
     said = kinds(joint_torque_Nm=-COLUMNS["joint_torque_Nm"], motor_torque_Nm=torque)
