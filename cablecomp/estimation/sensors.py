@@ -4,6 +4,7 @@ an angle that begins anew at each turn, a load that was never read."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -45,26 +46,29 @@ FORCES: Final = ("joint_torque_Nm", MOTOR, "tension_h_N", "tension_l_N")
 def odd_sensors(view: View, columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
     """What sensors show by themselves: nothing of rests, of a locked input, of a joint that is free."""
     yield from _stuck(view, JOINT, view.y, view.ratio * view.q, "motor")
-    yield from _stuck(view, INPUT, view.q, view.y, "joint")
+    yield from _stuck(view, INPUT, view.ratio * view.q, view.y, "joint")
     yield from _wrapped(columns)
     yield from _clipped(columns)
     yield from _unread(view, columns)
 
 
 def _stuck(view: View, name: str, values: FloatArray, other: FloatArray, end: str) -> Iterator[Suspicion]:
-    """The longest rest of an encoder in which the other end goes on (`other`: as angle of the joint) by more than
-    friction and load make, and after which it jumps, or comes not back."""
+    """The longest rest of an encoder in which the other end goes on (both as angles of the joint) by more than friction
+    and load make, and after which it jumps, or comes not back; whatever the load makes, where it jumps by as much of
+    the joint's range as the other end has to go on by."""
     steps = np.abs(np.diff(values))
     last = view.config.drive.stage[-1]
     load_Nm = float(np.ptp(view.M)) if view.channel else last.output_radius_m * last.pretension_N
-    least = max(BENT * view.compliance * load_Nm, OF_RANGE * float(np.ptp(view.y)))
+    least = OF_RANGE * float(np.ptp(view.y))
+    bent = max(BENT * view.compliance * load_Nm, least)
     quick = float(np.percentile(steps, 99.0))
     found = (0.0, 0.0)
     for begin, stop in runs(steps == 0.0):
         if stop - begin < FEWEST_ROWS:
             continue
         moved = float(np.ptp(other[begin : stop + 1]))
-        if moved > least and (stop == len(steps) or steps[stop] > JUMP * quick):
+        jump = float(steps[stop]) if stop < len(steps) else inf
+        if moved > (least if least < jump < inf else bent) and jump > JUMP * quick:
             found = max(found, (float(view.time[stop] - view.time[begin]), moved))
     if found[0] > 0.0:
         rests_s, moved = found

@@ -51,6 +51,21 @@ def test_an_encoder_that_stands_while_the_other_goes_on_is_said_to_be_stuck(
     assert "stuck?" in found.text
 
 
+@pytest.mark.parametrize("name", ["joint_position_rad", "motor_position_rad"])
+def test_an_encoder_that_jumps_back_was_stuck_however_soft_the_drive_is_said_to_be(name: str) -> None:
+    """Known by order of magnitude, the load would bend it by more than the joint turns at all."""
+    (stage,) = JOINT.drive.stage
+    drive = JOINT.drive.model_copy(update={"stage": (stage.model_copy(update={"EA_N": stage.EA_N / 100.0}),)})
+    soft = JOINT.model_copy(update={"drive": drive})
+    gone = TRUE[name][np.searchsorted(TIME, (8.0, 9.5))]
+    assert abs(np.diff(gone)[0]) > 0.25 * np.ptp(TRUE[name])
+    (found,) = suspicions(soft, {**TRUE, name: frozen(name, 8.0, 9.5)})
+    assert (found.kind, found.channel) == ("stuck", name)
+    held, after = frozen("joint_position_rad", 8.0, 9.5), int(np.searchsorted(TIME, 9.5))
+    held[after:] -= held[after] - held[after - 1]  # it goes on from where it was held
+    assert [s for s in suspicions(soft, {**TRUE, "joint_position_rad": held}) if s.kind == "stuck"] == []
+
+
 def test_a_motor_angle_that_never_changes_is_said_where_the_joint_goes_far() -> None:
     assert said(motor_position_rad=np.full(len(TIME), 0.3)) == [("stuck", "motor_position_rad")]
 
