@@ -191,7 +191,7 @@ def diagnose(
     _check(seed, sessions, budget_s)
     joint, data = _joint(config), columns_of(recordings, _mapping(mapping))
     found = _diagnose(joint, data, progress, seed, sessions, budget_s)
-    return DiagnosisResult(found, _doubts(joint, data, found.augmented_joint))
+    return DiagnosisResult(found, _doubts(joint, data, found.in_time))
 
 
 class _Rows:

@@ -94,7 +94,7 @@ def diagnose_recordings(
     doubted = believe_all(joint, data)
     with share_bar() as progress, forks_allowed():
         found = diagnose(joint, data, progress, seed, None if session is None else session.value, budget)
-    doubted = doubted.beside(found.augmented_joint, data)
+    doubted = doubted.beside(found.in_time, data)
     found = replace(found, mend_first=doubted.mend_first, warnings=(*doubted.lines, *found.warnings))
     with atomic_directory(out, (PROTOCOL,)) as folder:
         write_diagnosis(found, folder)

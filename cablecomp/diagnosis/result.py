@@ -144,6 +144,14 @@ class Diagnosis:
         """Covariates that the named effects act through, best first."""
         return tuple(dict.fromkeys(c for n in self.named for c in n.acts_through))
 
+    @property
+    def in_time(self) -> JointConfig:
+        """The joint with what was found, its channels late by what was stated or is named alone: what else trails is
+        not accounted for by a candidate that says the same."""
+        known = {e.id for e in self.config.effect} | {n.effect for n in self.named}
+        effects = tuple(e for e in self.augmented_joint.effect if e.id != "clock_skew" or e.id in known)
+        return self.augmented_joint.model_copy(update={"effect": effects})
+
 
 def report_json(d: Diagnosis) -> dict[str, Any]:
     """The contents of `diagnosis.json`, schema 2."""

@@ -73,7 +73,7 @@ def test_lost_motion_that_a_diagnosis_has_found_is_said_to_be_no_delay_beside_it
     assert doubts.beside(JOINT, {"bench": columns}).lines == (line,)
     assert doubts.beside(known, {"bench": columns}).lines == ()
     for found, said in ((JOINT, 1), (known, 0)):
-        answer = SimpleNamespace(augmented_joint=found)
+        answer = SimpleNamespace(in_time=found)
         monkeypatch.setattr(library, "_diagnose", lambda *given, answer=answer: answer)
         assert len(library.diagnose(columns, JOINT).doubts) == said
 

@@ -19,6 +19,8 @@ from diagnosis_example import NOISE, example, without_a_name
 
 from cablecomp.config import load_joint
 from cablecomp.diagnosis.result import PROTOCOL, Diagnosis, Law, Traces, Value, report_json, write_diagnosis
+from cablecomp.effects import with_effects
+from cablecomp.estimation.belief import still_doubted, suspicions
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_answer import shown_first
 from cablecomp.report.diagnosis_page import diagnosis_page
@@ -207,6 +209,25 @@ def test_a_sign_that_is_doubted_stands_before_any_name(found: Diagnosis) -> None
         assert text.count(line) == 1
         assert text.index(line) < text.lower().index(name) < text.index("ended on its bound")
     assert report_json(doubted)["mend_first"] == [line]
+
+
+def test_a_late_channel_is_said_beside_a_delay_that_has_no_name(found: Diagnosis) -> None:
+    """A candidate's delay, fitted beside the effects that have names, is the very lateness that the check saw."""
+    time = np.arange(0.0, 20.0, 0.02)
+    turns = np.where(time < 10.0, 0.2 * time, 2.0 + 0.6 * (time - 10.0))
+    motor = np.sin(2.0 * np.pi * turns) * (1.0 - np.exp(-time))
+    angle = found.config.drive.ratio * np.interp(time - 0.1, time, motor)
+    columns = {"time_s": time, "motor_position_rad": motor, "joint_position_rad": angle}
+    columns["joint_torque_Nm"] = np.zeros_like(time)
+    said = suspicions(found.config, columns)
+    assert [s.numbers["late_s"] for s in said] == [pytest.approx(0.1, abs=0.01)]
+    late = with_effects(found.config, [("clock_skew", {"delay_s": 0.1})])
+    (skew,) = found.candidates
+    assert skew.effect == "clock_skew"
+    nameless = replace(found, augmented_joint=late)
+    assert still_doubted(said, nameless.in_time, columns) == said
+    for known in (replace(nameless, config=late), replace(nameless, named=(skew,))):
+        assert still_doubted(said, known.in_time, columns) == ()
 
 
 def test_recalibrate_gives_old_and_new_values(found: Diagnosis) -> None:
