@@ -1,5 +1,5 @@
 """A check before belief, of sensors by themselves: one that stands still while the other goes on, one that is clipped,
-an angle that begins anew at each turn, a load that was never read."""
+an angle that begins anew at each turn, a load that was never read, rows that were made up between readings."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 FEWEST_ROWS: Final = 5
 """Rows without any change from which on a rest is looked at."""
+FEWEST_BENDS: Final = 50
+"""Bends from which on it is looked at how far apart they are."""
 BENT: Final = 20.0
 """Times what the load bends the nominal drive that the other end has to go on by while a sensor rests: friction, slack
 and compliances beside it make a few."""
@@ -37,6 +39,12 @@ NOISY: Final = 1e-5
 """Share of its range from which on a channel's noise is a sensor's, and none of arithmetic."""
 LONGER: Final = 3.0
 """Times as long as anywhere else that a clipped channel rests on its extreme value."""
+OFTEN: Final = 0.03
+"""Least share of the rows that a channel bends in where it bends at readings: corners of a course are few."""
+BENDS: Final = 0.1
+"""Share of what it bends by in so many rows, those that it bends most in, from which on it bends."""
+AT_READINGS: Final = 0.9
+"""Share of the stretches between bends that are as many rows long as one between readings, or several of these."""
 SWINGS: Final = 0.5
 """Share of the motor torque's variance that neither friction nor a weight explains, from which on there was a load."""
 FORCES: Final = ("joint_torque_Nm", MOTOR, "tension_h_N", "tension_l_N")
@@ -50,6 +58,7 @@ def odd_sensors(view: View, columns: Mapping[str, FloatArray]) -> Iterator[Suspi
     yield from _wrapped(columns)
     yield from _clipped(columns)
     yield from _unread(view, columns)
+    yield from _made_up(columns)
 
 
 def _stuck(view: View, name: str, values: FloatArray, other: FloatArray, end: str) -> Iterator[Suspicion]:
@@ -132,3 +141,21 @@ def _unread(view: View, columns: Mapping[str, FloatArray]) -> Iterator[Suspicion
             "and a weight make: was the load read? Without a sensor of it leave the channel out"
         )
         yield Suspicion("unread", view.channel, words, {"left": left})
+
+
+def _made_up(columns: Mapping[str, FloatArray]) -> Iterator[Suspicion]:
+    """A joint's angle that bends in every n-th row alone: a log that was brought to a higher rate by straight lines,
+    which hold no noise of their own."""
+    bent = np.abs(np.diff(columns[JOINT][np.isfinite(columns[JOINT])], 2))
+    usual = float(np.quantile(bent, 1.0 - OFTEN)) if OFTEN * len(bent) > FEWEST_BENDS else 0.0
+    if not usual > 0.0:
+        return
+    bends = np.flatnonzero(bent > BENDS * usual)
+    apart = np.diff(bends)
+    every = int(np.argmax(np.bincount(apart)))
+    if every > 2 and float(np.mean(apart % every == 0)) > AT_READINGS:
+        words = (
+            f"{JOINT} bends in one row of {every} alone and is straight between: made up from fewer readings, it seems "
+            "less noisy than these are, and what is left of it more than noise; give the log at the rate it was read at"
+        )
+        yield Suspicion("made up", JOINT, words, {"every": float(every)})

@@ -17,8 +17,8 @@ from cablecomp.signal.smoothing import FloatArray
 
 @dataclass(frozen=True)
 class Suspicion:
-    """`kind`: sign, ratio, unit, scale, delay, gap, stuck, clipped or unread; `channel`: which one is meant first;
-    `text`: one line with the numbers; `numbers`: those."""
+    """`kind`: sign, ratio, unit, scale, delay, gap, stuck, wrapped, clipped, unread or made up; `channel`: which one is
+    meant first; `text`: one line with the numbers; `numbers`: those."""
 
     kind: str
     channel: str

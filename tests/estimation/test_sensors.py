@@ -119,3 +119,33 @@ def test_a_load_of_0_in_every_row_is_said_where_the_motor_carries_one() -> None:
     free = 0.05 * np.sign(np.gradient(q)) + 0.02 * q + 0.005 * RNG.standard_normal(len(TIME))
     assert said(joint_torque_Nm=none, motor_torque_Nm=free) == []
     assert said(joint_torque_Nm=none) == []
+
+
+@pytest.mark.parametrize("decimals", [6, 15])
+@pytest.mark.parametrize("every", [3, 5])
+def test_a_log_brought_to_a_higher_rate_by_straight_lines_is_said(every: int, decimals: int) -> None:
+    time = np.linspace(TIME[0], TIME[-1], (len(TIME) - 1) * every + 1)
+    made_up = {n: np.interp(time, TIME, v).round(decimals) for n, v in TRUE.items() if n != "time_s"}
+    (found,) = suspicions(JOINT, {"time_s": time, **made_up})
+    assert (found.kind, found.numbers["every"]) == ("made up", every)
+
+
+@pytest.mark.parametrize("noise_rad", [0.0, 2e-5])
+@pytest.mark.parametrize("step_rad", [0.0, 1e-3])
+def test_rows_that_were_read_are_not_made_up(noise_rad: float, step_rad: float) -> None:
+    """Of a smooth course and of ramps, in steps of an encoder or not."""
+    time = np.arange(0.0, 60.0, 0.01)
+    noise = noise_rad * RNG.standard_normal(len(time))
+    for course_rad in (
+        np.sin(0.7 * time),
+        np.abs((time + 3.3) % 20.0 - 10.0),
+        np.interp(time, time[::400], time[::400] % 3),
+    ):
+        angle = course_rad + noise
+        angle = np.round(angle / step_rad) * step_rad if step_rad else angle
+        columns = {
+            "time_s": time,
+            "motor_position_rad": course_rad / JOINT.drive.ratio,
+            "joint_position_rad": angle,
+        }
+        assert [s for s in suspicions(JOINT, columns) if s.kind == "made up"] == []
